@@ -1,0 +1,93 @@
+"""Checks on what users pass in: every error names the field, the value and what is allowed."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+class InvalidInput(ValueError):
+    """A value that a user supplied is not allowed; the message says which, and what is."""
+
+    def __init__(self, field: str, value: Any, allowed: str) -> None:
+        super().__init__(f"{field} is {value!r}, allowed: {allowed}")
+        self.field = field
+        self.value = value
+        self.allowed = allowed
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.field, self.value, self.allowed)
+
+
+def whole_number(field: str, value: Any, at_least: int) -> int:
+    """Return ``value`` as an ``int`` that is no less than ``at_least``, or raise `InvalidInput`."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Integral):
+        raise InvalidInput(field, value, f"a whole number of at least {at_least}")
+    if value < at_least:
+        raise InvalidInput(field, int(value), f"a whole number of at least {at_least}")
+    return int(value)
+
+
+def real_number(
+    field: str,
+    value: Any,
+    *,
+    above: float = -math.inf,
+    at_least: float = -math.inf,
+    below: float = math.inf,
+    at_most: float = math.inf,
+) -> float:
+    """Return ``value`` as a finite ``float`` within the limits, or raise `InvalidInput`."""
+    limits = [
+        f"{word} {limit:g}"
+        for word, limit in (
+            ("above", above),
+            ("at least", at_least),
+            ("below", below),
+            ("at most", at_most),
+        )
+        if math.isfinite(limit)
+    ]
+    allowed = " ".join(["a finite number", " and ".join(limits)]).strip()
+    if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
+        raise InvalidInput(field, value, allowed)
+    number = float(value)
+    inside = above < number < below and at_least <= number <= at_most
+    if not math.isfinite(number) or not inside:
+        raise InvalidInput(field, number, allowed)
+    return number
+
+
+def one_of(field: str, value: Any, allowed: Collection[str]) -> str:
+    """Return ``value`` if it is one of the ``allowed`` words, or raise `InvalidInput`."""
+    if not isinstance(value, str) or value not in allowed:
+        raise InvalidInput(field, value, "one of " + ", ".join(repr(word) for word in allowed))
+    return value
+
+
+def finite_array(
+    field: str, value: ArrayLike, shape: tuple[int | None, ...]
+) -> NDArray[np.float64]:
+    """Return ``value`` as a new float array of the given shape, all finite, or raise `InvalidInput`.
+
+    ``None`` in ``shape`` stands for any length.
+    """
+    wanted = "(" + ", ".join("n" if size is None else str(size) for size in shape) + ")"
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInput(field, value, f"numbers of shape {wanted}") from None
+    fits = array.ndim == len(shape) and all(
+        size is None or size == actual for size, actual in zip(shape, array.shape, strict=True)
+    )
+    if not fits:
+        raise InvalidInput(f"shape of {field}", array.shape, wanted)
+    if not np.all(np.isfinite(array)):
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InvalidInput(f"{field}[{', '.join(map(str, where))}]", float(array[where]), "finite")
+    return array
