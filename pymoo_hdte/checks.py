@@ -73,7 +73,7 @@ def one_of(field: str, value: Any, allowed: Collection[str]) -> str:
 def finite_array(
     field: str, value: ArrayLike, shape: tuple[int | None, ...]
 ) -> NDArray[np.float64]:
-    """Return ``value`` as a new float array of the given shape, all finite, or raise `InvalidInput`.
+    """Return ``value`` as a new, finite float array of the given shape, or raise `InvalidInput`.
 
     ``None`` in ``shape`` stands for any length.
     """
