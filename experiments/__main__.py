@@ -1,0 +1,119 @@
+"""Command line of the experiments; see ``python -m experiments --help``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+
+from experiments.campaign import Campaign
+from experiments.registry import EXPERIMENTS, Context, Experiment
+from experiments.report import write_report
+from experiments.store import save
+from experiments.workers import make_executor
+from pymoo_hdte.checks import InvalidInput
+
+INTERRUPTED = 130
+"""Exit code that a shell expects of a program ended by Ctrl-C."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the experiments that the command line asks for; return the exit code."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    if options.list:
+        print(_list_of_experiments())
+        return 0
+    chosen = _chosen(options.name, parser)
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+        executor = make_executor(options.workers, options.dask)
+    except OSError as error:
+        parser.error(f"--out {options.out} cannot be made a folder: {error.strerror}")
+    except InvalidInput as error:
+        parser.error(str(error))
+    with executor or nullcontext():
+        context = Context(options.seeds, options.out, Campaign(options.out, executor))
+        return _run(chosen, context)
+
+
+def _run(chosen: Sequence[Experiment], context: Context) -> int:
+    for experiment in chosen:
+        print(f"{experiment.name}: {experiment.summary}", file=sys.stderr)
+        try:
+            save(context.out, experiment.name, experiment.run(context))
+            report = write_report(context.out)
+        except KeyboardInterrupt:
+            message = (
+                f"Interrupted during {experiment.name}. What is finished is kept in {context.out}; "
+                "the same command goes on from there."
+            )
+            print(f"\n{message}", file=sys.stderr)
+            write_report(context.out, notice=message)
+            return INTERRUPTED
+    print(report)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m experiments",
+        description="Reproduce the tables and figures of the paper and write a report.",
+        epilog=_list_of_experiments(),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("name", nargs="?", help="one experiment; without it, the quick set")
+    parser.add_argument("--list", action="store_true", help="list the experiments and stop")
+    parser.add_argument(
+        "--seeds", type=_positive, default=20, help="runs of every algorithm (default 20)"
+    )
+    parser.add_argument(
+        "--workers",
+        type=_positive,
+        default=os.cpu_count() or 1,
+        help="processes (default: as many as there are cores)",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("results"), help="folder of the results (default results)"
+    )
+    parser.add_argument(
+        "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"
+    )
+    return parser
+
+
+def _positive(text: str) -> int:
+    allowed = f"{text!r} is not a whole number of at least 1"
+    try:
+        number = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(allowed) from None
+    if number < 1:
+        raise argparse.ArgumentTypeError(allowed)
+    return number
+
+
+def _chosen(name: str | None, parser: argparse.ArgumentParser) -> list[Experiment]:
+    if name is None:
+        return [experiment for experiment in EXPERIMENTS if experiment.quick]
+    chosen = [experiment for experiment in EXPERIMENTS if experiment.name == name]
+    if not chosen:
+        known = ", ".join(experiment.name for experiment in EXPERIMENTS)
+        parser.error(f"unknown experiment {name!r}, known: {known}")
+    return chosen
+
+
+def _list_of_experiments() -> str:
+    width = max(len(experiment.name) for experiment in EXPERIMENTS)
+    return "\n".join(
+        f"  {experiment.name:{width}}  {experiment.summary}"
+        + ("" if experiment.quick else " (by name only)")
+        for experiment in EXPERIMENTS
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

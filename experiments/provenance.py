@@ -1,0 +1,41 @@
+"""Which source and which versions made a result."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import pymoo_hdte
+
+PACKAGES = ("numpy", "scipy", "pymoo", "moocore", "matplotlib")
+"""Installed packages whose version can change a result."""
+
+
+def environment() -> dict[str, str]:
+    """Versions of what computes the results."""
+    versions = {package: version(package) for package in PACKAGES}
+    return {"python": platform.python_version(), "machine": platform.machine()} | versions
+
+
+@cache
+def fingerprint(*sources: Path) -> str:
+    """Identify a state of the package, of further source files and of `environment`.
+
+    A change in any of them changes the fingerprint, so that what one state made is never taken for
+    the work of another.
+    """
+    package = Path(pymoo_hdte.__file__).parent
+    files = [p for p in package.rglob("*") if p.is_file() and "__pycache__" not in p.parts]
+    digest = hashlib.sha256(json.dumps(environment()).encode())
+    for path in [*sorted(files), *sources]:
+        digest.update(f"{path.name} {path.stat().st_size}\n".encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def report_fingerprint() -> str:
+    """Identify the state of everything that a finished result depends on."""
+    return fingerprint(*sorted(Path(__file__).parent.glob("*.py")))

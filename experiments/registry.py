@@ -1,0 +1,54 @@
+"""Which experiments there are, and what each gets to work with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from experiments.campaign import Campaign
+from experiments.result import Result
+
+
+@dataclass(frozen=True)
+class Context:
+    """What an experiment may use.
+
+    Attributes
+    ----------
+    seeds
+        Number of independent runs of every algorithm: seeds 1..seeds.
+    out
+        Folder of the results.
+    campaign
+        Runs jobs on the workers that the user allowed.
+    """
+
+    seeds: int
+    out: Path
+    campaign: Campaign
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A module ``experiments.<name>`` with ``run(context: Context) -> Result``.
+
+    ``quick`` ones belong to the set that runs when no name is given.
+    """
+
+    name: str
+    summary: str
+    quick: bool = True
+
+    def run(self, context: Context) -> Result:
+        """Import the module and run it; nothing is imported for ``--list``."""
+        return import_module(f"experiments.{self.name}").run(context)
+
+
+EXPERIMENTS = (
+    Experiment("table7", "Table 7 and Fig. 18: AMP-MOPSO against MOPSO and NSGA-II"),
+    Experiment("ablation", "Fig. 17: AMP-MOPSO without its pyramid, its entropy weight, or both"),
+    Experiment("table5", "Table 5 and Fig. 11: accuracy of the Chebyshev surrogate by order"),
+    Experiment("table8", "Tables 8 and 9, Fig. 19: the designs that three preferences choose"),
+)
+"""In the order in which they run and are reported."""

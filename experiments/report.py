@@ -1,0 +1,66 @@
+"""The report: one self-contained HTML page of every result found in a folder."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from experiments.provenance import report_fingerprint
+from experiments.registry import EXPERIMENTS
+from experiments.result import Finding, Table
+from experiments.store import StoredResult, load, write_atomically
+
+PAGE = "index.html"
+
+
+def write_report(out: Path, notice: str = "") -> Path:
+    """Write ``out/index.html`` from every stored result in the folder ``out``; return its path.
+
+    Results that another version of the source made are marked as such. ``notice`` is shown at the
+    top, e.g. what an interrupt left undone.
+    """
+    stored = [load(out, experiment.name) for experiment in EXPERIMENTS]
+    results = [result for result in stored if result is not None]
+    present = report_fingerprint()
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = environment.get_template(PAGE).render(
+        results=results,
+        headlines=_headlines(results),
+        agreeing=_findings(results, agrees=True),
+        differing=_findings(results, agrees=False),
+        outdated=[result.name for result in results if result.made_by != present],
+        notice=notice,
+        base64=lambda png: base64.b64encode(png).decode(),
+        zip=zip,
+    )
+    path = out / PAGE
+    write_atomically(path, page.encode())
+    return path
+
+
+def _headlines(results: Sequence[StoredResult]) -> list[tuple[StoredResult, Table]]:
+    return [
+        (result, table)
+        for result in results
+        for table in result.tables
+        if table.name == result.headline
+    ]
+
+
+def _findings(results: Sequence[StoredResult], agrees: bool) -> list[tuple[str, Finding]]:
+    return [
+        (result.name, finding)
+        for result in results
+        for table in result.tables
+        for finding in table.findings
+        if finding.agrees == agrees
+    ]

@@ -1,0 +1,117 @@
+"""What an experiment hands back: sentences, tables and figures, immutable and storable."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+NO_VALUE = "\N{EM DASH}"
+MINUS = "\N{MINUS SIGN}"
+
+Cell = float | int | str | None
+"""What a table holds; None where there is nothing to say."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One sentence that sets our numbers against a reference, and whether the two agree."""
+
+    agrees: bool
+    sentence: str
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table: what it holds, in which unit, shown with how many digits.
+
+    ``paper`` marks numbers that the paper printed, so that nobody takes them for ours.
+    """
+
+    name: str
+    unit: str = ""
+    digits: int = 4
+    paper: bool = False
+
+    @property
+    def heading(self) -> str:
+        """Name and unit, as a CSV heading shows them."""
+        source = f"{self.name} (paper)" if self.paper else self.name
+        return f"{source} [{self.unit}]" if self.unit else source
+
+    def show(self, value: Cell) -> str:
+        """Write ``value`` with the significant digits of this column; a dash for no value."""
+        if value is None:
+            return NO_VALUE
+        if isinstance(value, str | int):
+            return str(value)
+        return significant(value, self.digits)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of cells, the same number in each, under named columns.
+
+    ``findings`` hold the sentences that compare it with the paper. ``folded`` tables open on
+    request. ``wall_times`` marks a table that no two runs fill alike: it is stored apart from what
+    must come out the same.
+    """
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    findings: tuple[Finding, ...] = ()
+    folded: bool = False
+    wall_times: bool = False
+
+    def __post_init__(self) -> None:
+        rows = tuple(tuple(_plain(cell) for cell in row) for row in self.rows)
+        for row in rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"{self.name}: {len(row)} cells for {len(self.columns)} columns")
+        object.__setattr__(self, "rows", rows)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure with the caption that says what to see on it."""
+
+    name: str
+    caption: str
+    figure: Figure
+
+
+@dataclass(frozen=True)
+class Result:
+    """Everything that one experiment found, ready for the report.
+
+    ``headline`` names the table that the report's first screen repeats, if any.
+    """
+
+    title: str
+    command: str
+    paragraphs: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    notes: tuple[str, ...] = ()
+    headline: str = ""
+
+
+def significant(value: float, digits: int) -> str:
+    """Write ``value`` with that many significant digits, without exponent where it reads well."""
+    if not math.isfinite(value):
+        return NO_VALUE if math.isnan(value) else ("∞" if value > 0 else f"{MINUS}∞")
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if not -4 <= exponent <= 6:
+        return f"{value:.{digits - 1}e}".replace("-", MINUS)
+    return f"{value:.{max(0, digits - 1 - exponent)}f}".replace("-", MINUS)
+
+
+def _plain(cell: Any) -> Cell:
+    return cell.item() if isinstance(cell, np.generic) else cell

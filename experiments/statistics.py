@@ -1,0 +1,58 @@
+"""Statistics that compare algorithms over the same seeds."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import wilcoxon
+
+
+class Summary(NamedTuple):
+    """Mean, median and sample standard deviation of the runs of one algorithm."""
+
+    mean: float
+    median: float
+    std: float
+
+
+def summary(values: ArrayLike) -> Summary:
+    """Summarise the runs ``values`` (n,); the standard deviation of a single run is 0."""
+    runs = np.asarray(values, dtype=float)
+    std = float(runs.std(ddof=1)) if runs.size > 1 else 0.0
+    return Summary(float(runs.mean()), float(np.median(runs)), std)
+
+
+def wilcoxon_p(first: ArrayLike, second: ArrayLike) -> float:
+    """Two-sided p-value of the Wilcoxon signed-rank test on paired runs (n,) and (n,).
+
+    Pairs that are equal carry no sign and are dropped; if all are equal, p is 1. The result is NaN
+    where a run has no value.
+    """
+    difference = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)
+    if np.isnan(difference).any():
+        return float("nan")
+    if not difference.any():
+        return 1.0
+    return float(wilcoxon(difference).pvalue)
+
+
+def holm(p_values: ArrayLike) -> NDArray[np.float64]:
+    """Adjust p-values (m,) for m tests made at once (Holm, Scand. J. Statist. 6, 1979)."""
+    p = np.asarray(p_values, dtype=float)
+    order = np.argsort(p, kind="stable")
+    stepped = np.maximum.accumulate(p[order] * (p.size - np.arange(p.size)))
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(1.0, stepped)
+    return adjusted
+
+
+def effect_size(first: ArrayLike, second: ArrayLike) -> float:
+    """A12, the probability that a run of ``first`` exceeds one of ``second``, ties counted half.
+
+    0.5 means no difference (Vargha and Delaney, J. Educ. Behav. Stat. 25, 2000).
+    """
+    a = np.asarray(first, dtype=float)[:, None]
+    b = np.asarray(second, dtype=float)[None, :]
+    return float(np.mean((a > b) + 0.5 * (a == b)))

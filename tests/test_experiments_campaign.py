@@ -1,0 +1,145 @@
+"""Campaigns: same bytes for any number of workers, and after an interruption."""
+
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.campaign import Campaign, Run
+from experiments.workers import make_executor
+from pymoo_hdte.checks import InvalidInput
+
+
+@dataclass(frozen=True)
+class RandomWalk:
+    """A job whose later seeds finish first."""
+
+    seed: int
+
+    @property
+    def key(self) -> str:
+        return f"walk_seed{self.seed}"
+
+    def execute(self) -> Run:
+        begin = time.perf_counter()
+        time.sleep(0.02 * (5 - self.seed))
+        steps = np.random.default_rng(self.seed).normal(size=(4, 2))
+        return Run(("x", "y"), steps.cumsum(axis=0), time.perf_counter() - begin)
+
+
+@dataclass(frozen=True)
+class InterruptedWalk(RandomWalk):
+    """The same job, but the user presses Ctrl-C during seed 3."""
+
+    def execute(self) -> Run:
+        if self.seed == 3:
+            raise KeyboardInterrupt
+        return super().execute()
+
+
+@dataclass(frozen=True)
+class FailingWalk(RandomWalk):
+    """The same job with a defect that shows at seed 3."""
+
+    def execute(self) -> Run:
+        if self.seed == 3:
+            raise ArithmeticError("a step too far")
+        return super().execute()
+
+
+SEEDS = range(1, 6)
+WALKS = [RandomWalk(seed) for seed in SEEDS]
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Every file of the runs by its path."""
+    runs = folder / "runs"
+    return {str(p.relative_to(runs)): p.read_bytes() for p in runs.rglob("*") if p.is_file()}
+
+
+def test_values_come_back_to_the_last_bit_in_the_order_of_jobs(tmp_path):
+    runs = Campaign(tmp_path).run(WALKS[::-1], "walks")
+    for job, run in zip(WALKS[::-1], runs, strict=True):
+        np.testing.assert_array_equal(run.values, job.execute().values)
+        assert run.columns == ("x", "y")
+        assert run.seconds > 0.0
+
+
+def test_two_workers_write_the_same_bytes_as_one(tmp_path):
+    Campaign(tmp_path / "one").run(WALKS, "walks")
+    with make_executor(2) as executor:
+        Campaign(tmp_path / "two", executor).run(WALKS, "walks")
+    assert files(tmp_path / "one") == files(tmp_path / "two")
+    assert len(files(tmp_path / "one")) == len(WALKS) + 1
+
+
+def test_interruption_keeps_what_is_finished_and_a_rerun_goes_on(tmp_path):
+    campaign = Campaign(tmp_path / "interrupted")
+    with pytest.raises(KeyboardInterrupt):
+        campaign.run([InterruptedWalk(seed) for seed in SEEDS], "walks")
+    kept = files(tmp_path / "interrupted")
+    assert sorted(Path(p).name for p in kept) == [
+        "versions.json",
+        "walk_seed1.csv",
+        "walk_seed2.csv",
+    ]
+    finished = [p for p in (tmp_path / "interrupted" / "runs").rglob("*.csv")]
+    before = {p: p.stat().st_mtime_ns for p in finished}
+    campaign.run(WALKS, "walks")
+    Campaign(tmp_path / "through").run(WALKS, "walks")
+    assert files(tmp_path / "interrupted") == files(tmp_path / "through")
+    assert before == {p: p.stat().st_mtime_ns for p in finished}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_failing_job_is_reported_and_the_finished_ones_are_kept(tmp_path, workers):
+    executor = make_executor(workers)
+    with pytest.raises(ArithmeticError, match="a step too far"):
+        Campaign(tmp_path, executor).run([FailingWalk(seed) for seed in SEEDS], "walks")
+    if executor:
+        executor.shutdown()
+    names = {Path(p).name for p in files(tmp_path)}
+    assert {"walk_seed1.csv", "walk_seed2.csv"} <= names
+    assert "walk_seed3.csv" not in names
+
+
+def test_another_source_does_not_reuse_the_runs(tmp_path, monkeypatch):
+    Campaign(tmp_path).run(WALKS[:1], "walks")
+    monkeypatch.setattr("experiments.campaign.fingerprint", lambda *sources: "another")
+    Campaign(tmp_path).run(WALKS[:1], "walks")
+    assert len([name for name in files(tmp_path) if name.endswith(".csv")]) == 2
+
+
+def test_a_dask_address_without_a_scheduler_is_refused():
+    with pytest.raises(InvalidInput, match="--dask"):
+        make_executor(2, "not an address")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nothing"], "unknown experiment 'nothing'"),
+        (["--seeds", "0"], "'0' is not a whole number of at least 1"),
+        (["--workers", "two"], "'two' is not a whole number of at least 1"),
+        (["table5", "--out", __file__], "cannot be made a folder"),
+        (["table5", "--dask", "nowhere", "--out", "{tmp}"], "--dask"),
+    ],
+)
+def test_bad_command_lines_end_with_a_message_and_code_2(tmp_path, arguments, message):
+    command = [sys.executable, "-m", "experiments"]
+    arguments = [argument.format(tmp=tmp_path) for argument in arguments]
+    done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_list_names_every_experiment():
+    command = [sys.executable, "-m", "experiments", "--list"]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    for name in ("table5", "table7", "table8", "ablation"):
+        assert name in listed
