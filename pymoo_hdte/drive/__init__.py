@@ -1,0 +1,59 @@
+"""The machine: data sheet, static error, equations of motion, steady state, time integration."""
+
+from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100, load_datasheet
+from pymoo_hdte.drive.effects import (
+    DampingReference,
+    Effect,
+    LoadInertia,
+    MeshStiffnessVariation,
+)
+from pymoo_hdte.drive.measurement import low_pass, measured_dte
+from pymoo_hdte.drive.model import (
+    PARAMETER_UNITS,
+    PARAMETERS,
+    PRESETS,
+    DriveModel,
+    KinematicError,
+    load_model,
+    preset,
+)
+from pymoo_hdte.drive.order_spectrum import OrderSpectrum
+from pymoo_hdte.drive.stability import UnstableDrive, floquet_multipliers
+from pymoo_hdte.drive.static_error import (
+    StaticErrorSample,
+    class_amplitudes,
+    sample_static_error,
+)
+from pymoo_hdte.drive.steady_state import steady_state, transfer_function
+from pymoo_hdte.drive.time_domain import Run, simulate
+
+__all__ = [
+    "PARAMETERS",
+    "PARAMETER_UNITS",
+    "PRESETS",
+    "Coefficients",
+    "DampingReference",
+    "DataSheet",
+    "DriveModel",
+    "Effect",
+    "KinematicError",
+    "LoadInertia",
+    "MeshStiffnessVariation",
+    "OrderSpectrum",
+    "Run",
+    "StaticErrorSample",
+    "UnstableDrive",
+    "class_amplitudes",
+    "floquet_multipliers",
+    "hs_20_100",
+    "load_datasheet",
+    "load_model",
+    "low_pass",
+    "measured_dte",
+    "preset",
+    "sample_static_error",
+    "simulate",
+    "steady_state",
+    "transfer_function",
+]

@@ -1,0 +1,220 @@
+"""The data sheet of a drive: typed, checked, immutable. Tables 1, 2 and 4 of the paper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from importlib.resources import as_file, files
+from pathlib import Path
+
+from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.drive.toml_fields import Fields, read_toml
+
+ERROR_CLASSES = ("e_m", "e_g", "e_w", "e_p", "e_h")
+"""Classes of Eq. (1): stationary, with the flexspline, with the wave generator, pitch, tooth."""
+
+
+@dataclass(frozen=True)
+class ErrorSource:
+    """One manufacturing or assembly error of a component (Tables 1 and 2).
+
+    Attributes
+    ----------
+    component, symbol, description : str
+    error_class : str
+        One of `ERROR_CLASSES`.
+    mean, std : float
+        Of the normal distribution over prototypes, in metres.
+    """
+
+    component: str
+    symbol: str
+    description: str
+    error_class: str
+    mean: float
+    std: float
+
+    def __post_init__(self) -> None:
+        one_of(f"error class of {self.symbol}", self.error_class, ERROR_CLASSES)
+        real_number(f"mean of {self.symbol}", self.mean, at_least=0.0)
+        real_number(f"std of {self.symbol}", self.std, at_least=0.0)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """What Eq. (2) needs to turn the motion error at the mesh into an angle of the output.
+
+    Attributes
+    ----------
+    error_influence : float
+        K_b, influence of the errors under multi-tooth meshing.
+    teeth_in_mesh : int
+        z_t.
+    pitch_diameter : float
+        d of the circular spline, in metres.
+    pressure_angle : float
+        alpha_n of the flexspline's pitch circle, in radians.
+    """
+
+    error_influence: float
+    teeth_in_mesh: int
+    pitch_diameter: float
+    pressure_angle: float
+
+    def __post_init__(self) -> None:
+        real_number("error_influence", self.error_influence, above=0.0)
+        whole_number("teeth_in_mesh", self.teeth_in_mesh, 1)
+        real_number("pitch_diameter", self.pitch_diameter, above=0.0)
+        real_number("pressure_angle", self.pressure_angle, at_least=0.0, below=1.5)
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """Nominal parameters of the drive (Table 4), SI units.
+
+    Attributes
+    ----------
+    static_error : float
+        theta_s, rad.
+    stiffness : float
+        K, N.m/rad at the output.
+    input_inertia, output_inertia : float
+        J_in, J_out, kg.m2.
+    input_damping, mesh_damping, output_damping : float
+        B_in, B_fc, B_out, N.m.s/rad.
+    """
+
+    static_error: float
+    stiffness: float
+    input_inertia: float
+    input_damping: float
+    mesh_damping: float
+    output_inertia: float
+    output_damping: float
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            real_number(field.name, getattr(self, field.name), above=0.0)
+
+
+@dataclass(frozen=True)
+class DataSheet:
+    """A harmonic drive with fixed flexspline, as its maker and the test bench describe it.
+
+    Attributes
+    ----------
+    name, source : str
+    flexspline_teeth, circular_spline_teeth : int
+        Z_f < Z_c.
+    input_speed : float
+        Rated, rad/s.
+    load_torque : float
+        Rated, N.m at the output.
+    nominal : Nominal
+    mesh : Mesh
+    error_sources : tuple of ErrorSource
+    """
+
+    name: str
+    source: str
+    flexspline_teeth: int
+    circular_spline_teeth: int
+    input_speed: float
+    load_torque: float
+    nominal: Nominal
+    mesh: Mesh
+    error_sources: tuple[ErrorSource, ...]
+
+    def __post_init__(self) -> None:
+        whole_number("flexspline_teeth", self.flexspline_teeth, 2)
+        whole_number("circular_spline_teeth", self.circular_spline_teeth, self.flexspline_teeth + 1)
+        real_number("input_speed", self.input_speed, above=0.0)
+        real_number("load_torque", self.load_torque, at_least=0.0)
+        symbols = [source.symbol for source in self.error_sources]
+        if len(set(symbols)) != len(symbols):
+            raise InvalidInput("symbols of the error sources", symbols, "each symbol once")
+
+    @property
+    def ratio(self) -> float:
+        """Transmission ratio N with the flexspline fixed and the circular spline as output."""
+        return self.circular_spline_teeth / (self.circular_spline_teeth - self.flexspline_teeth)
+
+    @property
+    def error_orders(self) -> dict[str, float]:
+        """Order of each error class in multiples of the input angle (Eq. 1)."""
+        flexspline = 2.0 * self.circular_spline_teeth / self.flexspline_teeth
+        tooth = 2.0 * self.circular_spline_teeth
+        return {"e_m": 2.0, "e_g": flexspline, "e_w": 1.0, "e_p": 2.0, "e_h": tooth}
+
+
+def load_datasheet(path: str | Path) -> DataSheet:
+    """Read and check a data sheet in the format of ``drive/data/hs_20_100.toml``.
+
+    Raises
+    ------
+    InvalidInput
+        For a wrong, missing, superfluous, negative, non-finite or unit-less field.
+    OSError
+        If the file cannot be read.
+    """
+    sheet = read_toml(Path(path))
+    teeth = sheet.table("teeth")
+    rated = sheet.table("rated")
+    result = DataSheet(
+        name=sheet.text("name"),
+        source=sheet.text("source"),
+        flexspline_teeth=teeth.whole("flexspline", 2),
+        circular_spline_teeth=teeth.whole("circular_spline", 3),
+        input_speed=rated.quantity("input_speed", "speed", above=0.0),
+        load_torque=rated.quantity("load_torque", "torque", at_least=0.0),
+        nominal=_nominal(sheet.table("nominal")),
+        mesh=_mesh(sheet.table("mesh")),
+        error_sources=tuple(_error_source(row) for row in sheet.tables("error_source")),
+    )
+    for table in (teeth, rated, sheet):
+        table.finish()
+    return result
+
+
+def hs_20_100() -> DataSheet:
+    """Return the data sheet of the drive in the paper."""
+    with as_file(files("pymoo_hdte.drive") / "data" / "hs_20_100.toml") as path:
+        return load_datasheet(path)
+
+
+def _nominal(table: Fields) -> Nominal:
+    kinds = {
+        "static_error": "angle",
+        "stiffness": "stiffness",
+        "input_inertia": "inertia",
+        "input_damping": "damping",
+        "mesh_damping": "damping",
+        "output_inertia": "inertia",
+        "output_damping": "damping",
+    }
+    values = {name: table.quantity(name, kind, above=0.0) for name, kind in kinds.items()}
+    table.finish()
+    return Nominal(**values)
+
+
+def _mesh(table: Fields) -> Mesh:
+    mesh = Mesh(
+        error_influence=table.number("error_influence", above=0.0),
+        teeth_in_mesh=table.whole("teeth_in_mesh", 1),
+        pitch_diameter=table.quantity("pitch_diameter", "length", above=0.0),
+        pressure_angle=table.quantity("pressure_angle", "angle", at_least=0.0),
+    )
+    table.finish()
+    return mesh
+
+
+def _error_source(row: Fields) -> ErrorSource:
+    source = ErrorSource(
+        component=row.text("component"),
+        symbol=row.text("symbol"),
+        description=row.text("description"),
+        error_class=row.text("class"),
+        mean=row.quantity("mean", "length", at_least=0.0),
+        std=row.quantity("std", "length", at_least=0.0),
+    )
+    row.finish()
+    return source

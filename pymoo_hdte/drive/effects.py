@@ -1,0 +1,158 @@
+"""Named effects that a drive model may have beside the printed Eq. (9).
+
+An effect changes the coefficients of the equations of motion; every solver then follows. All three
+are candidates of the first calibration: the printed equations with the printed values respond to
+the static error as a rigid drive would.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Protocol
+
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.toml_fields import Fields
+
+
+class Effect(Protocol):
+    """Something Eq. (9) does not hold. ``name`` is the name used in model files and verdicts."""
+
+    name: ClassVar[str]
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with this effect added."""
+        ...
+
+    def sentence(self) -> str:
+        """Describe the effect and its size in one plain sentence."""
+        ...
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the effect as the TOML-like table that `effect_from_fields` reads."""
+        ...
+
+
+@dataclass(frozen=True)
+class LoadInertia:
+    """Inertia of the load rigidly on the output: loading motor, couplings, torque sensor, robot link.
+
+    Attributes
+    ----------
+    inertia : float
+        J_L, kg.m2, added to J_out.
+    """
+
+    name: ClassVar[str] = "load_inertia"
+    inertia: float
+
+    def __post_init__(self) -> None:
+        real_number("load_inertia.inertia", self.inertia, at_least=0.0)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the inertia added to the output."""
+        total = coefficients.output_inertia + self.inertia
+        return replace(coefficients, output_inertia=total)
+
+    def sentence(self) -> str:
+        """Describe the effect and its size in one plain sentence."""
+        return f"a load inertia of {self.inertia:g} kg.m2 turns with the output"
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the effect as a TOML-like table."""
+        return {"name": self.name, "inertia": {"value": self.inertia, "unit": "kg.m2"}}
+
+
+@dataclass(frozen=True)
+class DampingReference:
+    """Mesh damping acts on the torsion at the output: c = factor N^2 B_fc.
+
+    B_fc is identified as a torque per speed of the *input* shaft (Section 3); the same losses
+    referred to the output carry a factor of the order of N^2. Without this effect c = B_fc, as
+    Eq. (9) prints it.
+
+    Attributes
+    ----------
+    factor : float
+        Multiple of N^2, dimensionless.
+    """
+
+    name: ClassVar[str] = "damping_reference"
+    factor: float
+
+    def __post_init__(self) -> None:
+        real_number("damping_reference.factor", self.factor, above=0.0)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the damping referred to the output."""
+        scale = self.factor * coefficients.ratio**2
+        return replace(coefficients, damping=scale * coefficients.damping)
+
+    def sentence(self) -> str:
+        """Describe the effect and its size in one plain sentence."""
+        return f"the mesh damping acts on the torsion as {self.factor:g} N^2 B_fc"
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the effect as a TOML-like table."""
+        return {"name": self.name, "factor": self.factor}
+
+
+@dataclass(frozen=True)
+class MeshStiffnessVariation:
+    """Stiffness that varies twice per input turn, K (1 + depth cos(2 theta_in + phase)).
+
+    Under load it excites order 2 by itself and couples all orders that differ by 2. Gu, Tong,
+    Huang, Li (J. Vibroengineering 2021, article 21633) use and measure a time-varying stiffness.
+
+    Attributes
+    ----------
+    depth : float
+        kappa, dimensionless, at least 0 and below 1.
+    phase : float
+        psi, rad.
+    """
+
+    name: ClassVar[str] = "mesh_stiffness_variation"
+    depth: float
+    phase: float
+
+    def __post_init__(self) -> None:
+        real_number("mesh_stiffness_variation.depth", self.depth, at_least=0.0, below=1.0)
+        real_number("mesh_stiffness_variation.phase", self.phase)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the varying stiffness."""
+        return replace(coefficients, stiffness_depth=self.depth, stiffness_phase=self.phase)
+
+    def sentence(self) -> str:
+        """Describe the effect and its size in one plain sentence."""
+        return f"the mesh stiffness varies by {100 * self.depth:g} % twice per input turn"
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the effect as a TOML-like table."""
+        phase = {"value": self.phase, "unit": "rad"}
+        return {"name": self.name, "depth": self.depth, "phase": phase}
+
+
+def effect_from_fields(table: Fields) -> Effect:
+    """Build an effect from a table such as ``{ name = "damping_reference", factor = 8.7 }``.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown name, or a wrong, missing or superfluous field.
+    """
+    effect: Effect
+    match table.choice("name", EFFECT_NAMES):
+        case LoadInertia.name:
+            effect = LoadInertia(table.quantity("inertia", "inertia"))
+        case DampingReference.name:
+            effect = DampingReference(table.number("factor"))
+        case _:
+            effect = MeshStiffnessVariation(table.number("depth"), table.quantity("phase", "angle"))
+    table.finish()
+    return effect
+
+
+EFFECT_NAMES = (LoadInertia.name, DampingReference.name, MeshStiffnessVariation.name)
+"""Names of all effects."""

@@ -1,0 +1,255 @@
+"""A drive model: data sheet, kinematic error, effects. It maps uncertain parameters to the DTE."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
+from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100
+from pymoo_hdte.drive.effects import Effect, effect_from_fields
+from pymoo_hdte.drive.order_spectrum import OrderSpectrum
+from pymoo_hdte.drive.steady_state import steady_state
+from pymoo_hdte.drive.toml_fields import Fields, read_toml
+from pymoo_hdte.units import ARCSEC
+
+PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")
+"""The uncertain parameters xi of Section 2.3, in this order."""
+
+PARAMETER_UNITS = ("rad", "N.m/rad", "kg.m2", "N.m.s/rad", "N.m.s/rad")
+
+PRESETS = ("published", "calibrated", "resonant")
+
+_READINGS = {"peak_to_peak": 1.0, "semi_amplitude": 2.0}
+
+
+@dataclass(frozen=True)
+class KinematicError:
+    """Shape and scatter of theta_s = sum_j a_j sin(o_j theta_in + phi_j).
+
+    Attributes
+    ----------
+    orders, amplitudes, phases : tuple of float
+        o_j in cycles per input turn; a_j relative to each other; phi_j in rad.
+    reading : str
+        What the value theta_s measures: the ``"peak_to_peak"`` of the sum over one output turn, or
+        its ``"semi_amplitude"``, half of that.
+    std : float
+        Standard deviation of theta_s over prototypes (before truncation at 3 std), rad.
+    """
+
+    orders: tuple[float, ...]
+    amplitudes: tuple[float, ...]
+    phases: tuple[float, ...]
+    reading: str
+    std: float
+
+    def __post_init__(self) -> None:
+        one_of("kinematic_error.reading", self.reading, tuple(_READINGS))
+        real_number("kinematic_error.std", self.std, above=0.0)
+        orders = finite_array("kinematic_error.orders", self.orders, (None,))
+        if not orders.size or np.any(orders <= 0.0):
+            raise InvalidInput("kinematic_error.orders", self.orders, "one or more, above 0")
+        for name in ("amplitudes", "phases"):
+            finite_array(f"kinematic_error.{name}", getattr(self, name), (len(orders),))
+        if min(self.amplitudes) < 0.0 or max(self.amplitudes) == 0.0:
+            raise InvalidInput(
+                "kinematic_error.amplitudes", self.amplitudes, "at least 0, not all 0"
+            )
+
+    def unit_phasors(self, ratio: float) -> NDArray[np.complex128]:
+        """Return the phasors, shape (n_orders,), of the error whose value theta_s is 1 rad."""
+        phasors = -1j * np.array(self.amplitudes) * np.exp(1j * np.array(self.phases))
+        shape = OrderSpectrum(np.array(self.orders), phasors[None, :])
+        return phasors * _READINGS[self.reading] / shape.peak_to_peak(ratio)[0]
+
+
+@dataclass(frozen=True)
+class DriveModel:
+    """Eq. (9) for one drive under rated conditions, with the effects it has beside Eq. (9).
+
+    Attributes
+    ----------
+    name, description, provenance : str
+        ``description`` says in a sentence what the model is, ``provenance`` where its values come
+        from.
+    sheet : DataSheet
+    kinematic_error : KinematicError
+    effects : tuple of Effect
+    """
+
+    name: str
+    description: str
+    provenance: str
+    sheet: DataSheet
+    kinematic_error: KinematicError
+    effects: tuple[Effect, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [effect.name for effect in self.effects]
+        if len(set(names)) != len(names):
+            raise InvalidInput("effects", names, "each effect once")
+
+    @property
+    def nominal(self) -> NDArray[np.float64]:
+        """Nominal values of `PARAMETERS`, shape (5,), SI units."""
+        values = self.sheet.nominal
+        return np.array(
+            [
+                values.static_error,
+                values.stiffness,
+                values.input_inertia,
+                values.input_damping,
+                values.mesh_damping,
+            ]
+        )
+
+    @cached_property
+    def _unit_phasors(self) -> NDArray[np.complex128]:
+        return self.kinematic_error.unit_phasors(self.sheet.ratio)
+
+    def coefficients(self, parameters: ArrayLike) -> Coefficients:
+        """Return the equations of motion of n designs.
+
+        Parameters
+        ----------
+        parameters : array, shape (n, 5)
+            `PARAMETERS` in SI units, each above 0.
+
+        Raises
+        ------
+        InvalidInput
+            If the shape is wrong or a value is not finite or not above 0.
+        """
+        values = finite_array("parameters", parameters, (None, len(PARAMETERS)))
+        for name, column in zip(PARAMETERS, values.T, strict=True):
+            if np.any(column <= 0.0):
+                raise InvalidInput(name, float(column.min()), "above 0")
+        theta_s, stiffness, input_inertia, input_damping, mesh_damping = values.T
+        coefficients = Coefficients(
+            ratio=self.sheet.ratio,
+            input_speed=self.sheet.input_speed,
+            load_torque=self.sheet.load_torque,
+            stiffness=stiffness,
+            damping=mesh_damping,
+            stiffness_depth=0.0,
+            stiffness_phase=0.0,
+            input_inertia=input_inertia,
+            input_damping=input_damping,
+            output_inertia=self.sheet.nominal.output_inertia,
+            output_damping=self.sheet.nominal.output_damping,
+            error_orders=np.array(self.kinematic_error.orders),
+            error_phasors=theta_s[:, None] * self._unit_phasors,
+        )
+        for effect in self.effects:
+            coefficients = effect.apply(coefficients)
+        return coefficients
+
+    def steady_state(self, parameters: ArrayLike) -> OrderSpectrum:
+        """Return the steady-state theta_d of n designs as an order spectrum.
+
+        Raises
+        ------
+        InvalidInput
+            As `coefficients`.
+        UnstableDrive
+            If the varying stiffness makes a design's motion grow.
+        """
+        return steady_state(self.coefficients(parameters))
+
+    def dte_arcsec(self, parameters: ArrayLike) -> NDArray[np.float64]:
+        """Return the DTE of n designs, shape (n,), in arcsec (Section 4).
+
+        It is the peak-to-peak of the steady-state theta_d over one output turn. Parameters and
+        errors as in `steady_state`.
+        """
+        return self.steady_state(parameters).peak_to_peak(self.sheet.ratio) / ARCSEC
+
+    def at(self, input_speed: float, load_torque: float) -> DriveModel:
+        """Return the model at another operating condition (rad/s, N.m)."""
+        sheet = replace(self.sheet, input_speed=input_speed, load_torque=load_torque)
+        return replace(self, sheet=sheet)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what makes the model, JSON-able, as a record beside results."""
+        error = self.kinematic_error
+        return {
+            "name": self.name,
+            "description": self.description,
+            "provenance": self.provenance,
+            "data_sheet": self.sheet.name,
+            "input_speed_rad_s": self.sheet.input_speed,
+            "load_torque_Nm": self.sheet.load_torque,
+            "kinematic_error": {
+                "orders": list(error.orders),
+                "amplitudes": list(error.amplitudes),
+                "phases_rad": list(error.phases),
+                "reading": error.reading,
+                "std_arcsec": error.std / ARCSEC,
+            },
+            "effects": [effect.to_dict() for effect in self.effects],
+        }
+
+
+def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
+    """Read a model file in the format of ``drive/data/calibrated.toml``.
+
+    Raises
+    ------
+    InvalidInput
+        For a wrong, missing, superfluous or unit-less field.
+    OSError
+        If the file cannot be read.
+    """
+    fields = read_toml(Path(path))
+    error = fields.table("kinematic_error")
+    effects = fields.tables("effect") if fields.has("effect") else []
+    model = DriveModel(
+        name=fields.text("name"),
+        description=fields.text("description"),
+        provenance=fields.text("provenance"),
+        sheet=sheet,
+        kinematic_error=KinematicError(
+            orders=_numbers(error, "orders"),
+            amplitudes=_numbers(error, "amplitudes"),
+            phases=_numbers(error, "phases"),
+            reading=error.text("reading"),
+            std=error.quantity("std", "angle"),
+        ),
+        effects=tuple(effect_from_fields(table) for table in effects),
+    )
+    error.finish()
+    fields.finish()
+    return model
+
+
+def preset(name: str) -> DriveModel:
+    """Return one of the `PRESETS` of the HS-20-100.
+
+    ``"published"`` is Eq. (9) with the printed values; ``"calibrated"`` adds named effects whose
+    values were fitted to published statistics; ``"resonant"`` is a second fit, under another
+    reading of the bands, with a resonance between the excited orders.
+
+    Raises
+    ------
+    InvalidInput
+        For another name.
+    """
+    one_of("model", name, PRESETS)
+    with as_file(files("pymoo_hdte.drive") / "data" / f"{name}.toml") as path:
+        return load_model(path, hs_20_100())
+
+
+def _numbers(table: Fields, field: str) -> tuple[float, ...]:
+    raw = table.take(field, "a list of numbers")
+    if not isinstance(raw, Sequence) or isinstance(raw, str):
+        raise InvalidInput(field, raw, "a list of numbers")
+    return tuple(real_number(f"{field}[{index}]", value) for index, value in enumerate(raw))

@@ -1,0 +1,179 @@
+"""Signals that are sums of orders of the input angle, and their peak-to-peak over an output turn.
+
+Static error and steady-state transmission error are such signals. Order 2 Z_c / Z_f = 2.02 does not
+close over one output turn, so the extremes are searched over the whole turn and refined.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput, finite_array, real_number
+
+POINTS_PER_TURN = 60
+"""Least number of grid points an input turn before refinement."""
+
+_POINTS_PER_CYCLE = 6
+_PARABOLA_ERROR = 0.25
+"""Bound of a parabola's error at its vertex, as a share of the rise between grid points."""
+_NEWTON_STEPS = 3
+_ROWS_AT_ONCE = 32
+
+
+@dataclass(frozen=True)
+class OrderSpectrum:
+    """The signals Re sum_l c_l exp(i o_l theta_in), one for each row.
+
+    Attributes
+    ----------
+    orders : ndarray, shape (n_lines,)
+        Orders o_l in cycles per input turn; may be negative or fractional.
+    phasors : ndarray of complex, shape (n, n_lines)
+        c_l in rad.
+    """
+
+    orders: NDArray[np.float64]
+    phasors: NDArray[np.complex128]
+
+    def __post_init__(self) -> None:
+        finite_array("orders", self.orders, (None,))
+        if self.phasors.ndim != 2 or self.phasors.shape[1] != len(self.orders):
+            raise InvalidInput(
+                "shape of phasors",
+                self.phasors.shape,
+                f"(n, {len(self.orders)}), a column an order",
+            )
+
+    def at(self, input_angle: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the signals, shape (n, n_angles), at input angles of shape (n_angles,) in rad."""
+        return (self.phasors @ np.exp(1j * np.outer(self.orders, input_angle))).real
+
+    def amplitudes(self) -> dict[float, NDArray[np.float64]]:
+        """Return the amplitude, shape (n,), of each physical order |o| (rad), in rising order.
+
+        Lines at +o and -o are one sinusoid: c exp(i o x) and d exp(-i o x) add to c + conj(d).
+        """
+        folded: dict[float, NDArray[np.complex128]] = {}
+        for order, phasor in zip(self.orders, self.phasors.T, strict=True):
+            key = round(abs(float(order)), 9)
+            folded[key] = folded.get(key, 0.0) + (phasor.conj() if order < 0.0 else phasor)
+        return {
+            order: np.abs(folded[order].real if order == 0.0 else folded[order])
+            for order in sorted(folded)
+        }
+
+    def peak_to_peak(self, ratio: float) -> NDArray[np.float64]:
+        """Return the peak-to-peak of each signal over one output turn from theta_in = 0.
+
+        Parameters
+        ----------
+        ratio : float
+            Transmission ratio N; the window is 0 <= theta_in <= 2 pi N.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            In rad, exact to rounding.
+        """
+        real_number("ratio", ratio, above=0.0)
+        moving = self.orders != 0.0
+        orders, phasors = self.orders[moving], self.phasors[:, moving]
+        if not orders.size:
+            return np.zeros(len(phasors))
+        # Whole orders repeat every input turn; searching all N turns would find N equal peaks.
+        turns = min(ratio, 1.0) if np.all(orders == np.round(orders)) else ratio
+        result = np.empty(len(phasors))
+        for start in range(0, len(phasors), _ROWS_AT_ONCE):
+            rows = slice(start, start + _ROWS_AT_ONCE)
+            result[rows] = _peak_to_peak(orders, phasors[rows], turns)
+        return result
+
+
+def _peak_to_peak(
+    orders: NDArray[np.float64], phasors: NDArray[np.complex128], turns: float
+) -> NDArray[np.float64]:
+    points = max(POINTS_PER_TURN, int(np.ceil(_POINTS_PER_CYCLE * np.max(np.abs(orders)))))
+    step = 2.0 * np.pi / points
+    end = 2.0 * np.pi * turns
+    # One point beyond each end, so that every point of the window has two neighbours.
+    grid = _on_grid(orders, phasors, int(np.floor(turns * points)) + 3, step)
+    rise = np.abs(phasors) @ orders**2 * step**2 / 8.0
+    upper = _highest(orders, phasors, grid, step, end)
+    lower = _highest(orders, -phasors, -grid, step, end)
+    return upper + lower
+
+
+def _on_grid(
+    orders: NDArray[np.float64], phasors: NDArray[np.complex128], n_points: int, step: float
+) -> NDArray[np.float64]:
+    """Evaluate at the angles ``step * (-1, 0, 1, ...)``, where ``step`` divides a turn.
+
+    Lines whose orders differ by whole numbers repeat every turn up to one common phase, so each
+    such family is evaluated on one turn only.
+    """
+    points = round(2.0 * np.pi / step)
+    turns = -(-n_points // points)
+    within = step * (np.arange(points) - 1)
+    signal = np.zeros((len(phasors), turns, points))
+    fractions = np.round(np.mod(orders, 1.0), 9) % 1.0
+    for fraction in np.unique(fractions):
+        family = fractions == fraction
+        one_turn = phasors[:, family] @ np.exp(1j * np.outer(orders[family], within))
+        if fraction == 0.0:
+            signal += one_turn.real[:, None, :]
+        else:
+            phase = 2.0 * np.pi * float(orders[family][0]) * np.arange(turns)
+            signal += np.cos(phase)[:, None] * one_turn.real[:, None, :]
+            signal -= np.sin(phase)[:, None] * one_turn.imag[:, None, :]
+    return signal.reshape(len(phasors), -1)[:, :n_points]
+
+
+def _highest(
+    orders: NDArray[np.float64],
+    phasors: NDArray[np.complex128],
+    grid: NDArray[np.float64],
+    step: float,
+    end: float,
+) -> NDArray[np.float64]:
+    """Return the greatest value of each signal on [0, end], given its values on the grid.
+
+    A grid may straddle the highest peak and hit a lower one, so every peak that could be the
+    highest is climbed: first the grid values are compared, allowing for the rise between two
+    points, then parabolas through three points, allowing for their own, smaller error.
+    """
+    rise = np.abs(phasors) @ orders**2 * step**2 / 8.0
+    inner = grid[:, 1:-1]
+    rows, columns = np.nonzero(inner >= (inner.max(axis=1) - rise)[:, None])
+    before, here, after = (grid[rows, columns + shift] for shift in range(3))
+    slope = (after - before) / 2.0
+    curvature = 2.0 * here - before - after
+    vertex = np.divide(slope, curvature, out=np.zeros_like(here), where=curvature > 0.0)
+    shift = np.clip(vertex, np.maximum(-1.0, -columns), np.minimum(1.0, end / step - columns))
+    height = here + shift * (slope - shift * curvature / 2.0)
+    every_row = np.arange(len(grid))
+    highest = np.maximum.reduceat(height, np.searchsorted(rows, every_row))
+    close = height >= (highest - _PARABOLA_ERROR * rise)[rows]
+    rows, start = rows[close], step * (columns + shift)[close]
+    values = _climb(orders, phasors[rows], start, step, end)
+    return np.maximum.reduceat(values, np.searchsorted(rows, every_row))
+
+
+def _climb(
+    orders: NDArray[np.float64],
+    phasors: NDArray[np.complex128],
+    angle: NDArray[np.float64],
+    step: float,
+    end: float,
+) -> NDArray[np.float64]:
+    """Move from ``angle`` to the nearby maximum by Newton steps and return its value."""
+    low, high = np.maximum(angle - step, 0.0), np.minimum(angle + step, end)
+    for _ in range(_NEWTON_STEPS):
+        lines = phasors * np.exp(1j * angle[:, None] * orders)
+        slope = -(lines.imag @ orders)
+        curvature = lines.real @ orders**2
+        move = np.divide(slope, curvature, out=np.zeros_like(slope), where=curvature > 0.0)
+        angle = np.clip(angle + move, low, high)
+    return (phasors * np.exp(1j * angle[:, None] * orders)).real.sum(axis=1)

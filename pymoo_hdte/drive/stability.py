@@ -1,0 +1,67 @@
+"""Parametric stability of a drive with varying stiffness, by Floquet multipliers.
+
+Hill's method answers for an unstable drive too, so its callers ask here first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.drive.coefficients import Coefficients
+
+_STEPS = 64
+_ROUNDING = 1e-9
+
+
+class UnstableDrive(ArithmeticError):
+    """The motion grows from period to period: there is no steady state."""
+
+
+def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
+    """Return the multipliers over one period of the stiffness (half an input turn), shape (n, 3).
+
+    The state is (th_in', d', d). The transition matrix is a product of steps with the stiffness of
+    their midpoints, each the (2, 2) Pade approximant of the exponential: it is A-stable, so stiff
+    damping costs no small steps, and of second order in the step.
+    """
+    step = np.pi / coefficients.input_speed / _STEPS
+    identity = np.eye(3)
+    transition = np.broadcast_to(identity, (len(coefficients.stiffness), 3, 3))
+    for index in range(_STEPS):
+        angle = (index + 0.5) * np.pi / _STEPS
+        scaled = step * _state_matrix(coefficients, angle)
+        square = scaled @ scaled / 12.0
+        forward, backward = identity + scaled / 2.0 + square, identity - scaled / 2.0 + square
+        transition = np.linalg.solve(backward, forward @ transition)
+    return np.linalg.eigvals(transition)
+
+
+def require_stable(coefficients: Coefficients) -> None:
+    """Raise `UnstableDrive`, naming the design, if a multiplier lies outside the unit circle."""
+    largest = np.abs(floquet_multipliers(coefficients)).max(axis=1)
+    worst = int(np.argmax(largest))
+    if largest[worst] > 1.0 + _ROUNDING:
+        raise UnstableDrive(
+            f"design {worst} (K = {coefficients.stiffness[worst]:g} N.m/rad, "
+            f"c = {coefficients.damping[worst]:g} N.m.s/rad) has a Floquet multiplier of modulus "
+            f"{largest[worst]:.6f}, allowed: at most 1"
+        )
+
+
+def _state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.float64]:
+    variation = np.cos(2.0 * input_angle + coefficients.stiffness_phase)
+    stiffness = coefficients.stiffness * (1.0 + coefficients.stiffness_depth * variation)
+    ratio, damping = coefficients.ratio, coefficients.damping
+    bearing = coefficients.output_damping
+    matrix = np.zeros((len(stiffness), 3, 3))
+    matrix[:, 0, 0] = -coefficients.input_damping / coefficients.input_inertia
+    matrix[:, 0, 1] = -damping / ratio / coefficients.input_inertia
+    matrix[:, 0, 2] = -stiffness / ratio / coefficients.input_inertia
+    # d'' = th_in''/N - th_out'' with th_out' = th_in'/N - d'.
+    matrix[:, 1] = matrix[:, 0] / ratio
+    matrix[:, 1, 0] += bearing / ratio / coefficients.output_inertia
+    matrix[:, 1, 1] -= (damping + bearing) / coefficients.output_inertia
+    matrix[:, 1, 2] -= stiffness / coefficients.output_inertia
+    matrix[:, 2, 1] = 1.0
+    return matrix

@@ -1,0 +1,96 @@
+"""Static transmission error of prototypes, Eqs. (1) and (2): thirteen sources, five classes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import truncnorm
+
+from pymoo_hdte.checks import one_of, whole_number
+from pymoo_hdte.drive.datasheet import ERROR_CLASSES, DataSheet
+from pymoo_hdte.drive.order_spectrum import OrderSpectrum
+from pymoo_hdte.units import ARCSEC
+
+TRUNCATION = 3.0
+"""Errors are drawn within this many standard deviations (Section 2.1)."""
+
+_ARCSEC_MM_PER_UM = 412.8
+"""Eq. (2): arcsec at the output per micrometre at the mesh and per millimetre of diameter."""
+
+
+@dataclass(frozen=True)
+class StaticErrorSample:
+    """Static errors of n virtual prototypes.
+
+    Attributes
+    ----------
+    sheet : DataSheet
+    magnitudes : ndarray, shape (n, n_sources)
+        Size of each error source, m.
+    phases : ndarray, shape (n, n_sources)
+        Initial phase of each error source, rad.
+    """
+
+    sheet: DataSheet
+    magnitudes: NDArray[np.float64]
+    phases: NDArray[np.float64]
+
+    def class_phasor(self, error_class: str) -> NDArray[np.complex128]:
+        """Return the resultant of one class, shape (n,): rad at the output, sine reference.
+
+        The angle of the phasor is the phase phi of ``|phasor| sin(order theta_in + phi)``.
+        """
+        one_of("error_class", error_class, ERROR_CLASSES)
+        member = [source.error_class == error_class for source in self.sheet.error_sources]
+        vectors = self.magnitudes[:, member] * np.exp(1j * self.phases[:, member])
+        return _output_angle(self.sheet, error_class) * vectors.sum(axis=1)
+
+    def spectrum(self, classes: tuple[str, ...] = ERROR_CLASSES) -> OrderSpectrum:
+        """Return theta_s(theta_in) of the given classes (all by default) as an order spectrum."""
+        orders = np.array([self.sheet.error_orders[name] for name in classes])
+        sines = np.stack([self.class_phasor(name) for name in classes], axis=1)
+        return OrderSpectrum(orders, -1j * sines)
+
+    def peak_to_peak(self, classes: tuple[str, ...] = ERROR_CLASSES) -> NDArray[np.float64]:
+        """Return the peak-to-peak of theta_s over one output turn, shape (n,), rad."""
+        return self.spectrum(classes).peak_to_peak(self.sheet.ratio)
+
+
+def sample_static_error(
+    sheet: DataSheet, n_samples: int, rng: np.random.Generator
+) -> StaticErrorSample:
+    """Draw prototypes: truncated normal errors, independent uniform phases (Section 2.1).
+
+    Raises
+    ------
+    InvalidInput
+        If ``n_samples`` is below 1.
+    """
+    n_samples = whole_number("n_samples", n_samples, 1)
+    means = np.array([source.mean for source in sheet.error_sources])
+    stds = np.array([source.std for source in sheet.error_sources])
+    shape = (n_samples, len(means))
+    standard = truncnorm.rvs(-TRUNCATION, TRUNCATION, size=shape, random_state=rng)
+    return StaticErrorSample(sheet, means + stds * standard, rng.uniform(0.0, 2.0 * np.pi, shape))
+
+
+def class_amplitudes(sheet: DataSheet) -> dict[str, float]:
+    """Return each class's amplitude at the output (rad): root sum of squares of its mean errors.
+
+    The square is the expected squared resultant of sources with independent uniform phases, but for
+    the variances of the magnitudes.
+    """
+    squares = dict.fromkeys(ERROR_CLASSES, 0.0)
+    for source in sheet.error_sources:
+        squares[source.error_class] += source.mean**2
+    return {name: _output_angle(sheet, name) * square**0.5 for name, square in squares.items()}
+
+
+def _output_angle(sheet: DataSheet, error_class: str) -> float:
+    """Return rad at the output per metre of error in this class (Table 1 and Eq. 2)."""
+    mesh = sheet.mesh
+    projection = 0.5 if error_class in ("e_p", "e_h") else float(np.cos(mesh.pressure_angle))
+    averaging = mesh.error_influence / mesh.teeth_in_mesh**0.5
+    return projection * averaging * _ARCSEC_MM_PER_UM * 1e3 / mesh.pitch_diameter * ARCSEC

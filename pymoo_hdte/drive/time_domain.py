@@ -1,0 +1,226 @@
+"""Eq. (9) integrated from rest, torque-driven: the reference that the steady state is held against.
+
+The state is (th_in, th_in', th_d, th_d') with th_d = th_in / N - th_out, so that the transmission
+error, a part in 10^4 of the angles, is integrated to its own precision.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
+
+from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
+from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.model import PARAMETERS, DriveModel
+from pymoo_hdte.units import ARCSEC
+
+METHODS = ("LSODA", "DOP853", "Radau", "RK45", "BDF")
+ANGLES = ("free", "prescribed")
+
+_POINTS_PER_TURN = 120
+
+
+@dataclass(frozen=True)
+class Run:
+    """One simulated output turn in steady state, on the samples of the integrator's output.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n_times,)
+        s, from the start at rest.
+    input_angle : ndarray, shape (n_times,)
+        Angle on which theta_s and the stiffness depend, rad; passes 0 where the output turn begins.
+    input_speed : ndarray, shape (n_times,)
+        th_in', rad/s.
+    transmission_error : ndarray, shape (n_times,)
+        theta_d, rad.
+    ratio : float
+    """
+
+    time: NDArray[np.float64]
+    input_angle: NDArray[np.float64]
+    input_speed: NDArray[np.float64]
+    transmission_error: NDArray[np.float64]
+    ratio: float
+
+    def peak_to_peak(self) -> float:
+        """Return the peak-to-peak of theta_d over 0 <= input angle <= 2 pi N, in rad."""
+        curve = CubicSpline(self.input_angle, self.transmission_error)
+        end = 2.0 * np.pi * self.ratio
+        turning = curve.derivative().roots(extrapolate=False)
+        inside = turning[(turning > 0.0) & (turning < end)]
+        values = curve(np.concatenate([[0.0], inside, [end]]))
+        return float(values.max() - values.min())
+
+    def dte_arcsec(self) -> float:
+        """Return the DTE of Section 4 in arcsec."""
+        return self.peak_to_peak() / ARCSEC
+
+
+def smooth_step(x: float) -> tuple[float, float]:
+    """Return the envelope that rises from 0 at x = 0 to 1 at x = 1, and its derivative.
+
+    The seventh-degree polynomial whose first three derivatives vanish at both ends.
+    """
+    if x <= 0.0:
+        return 0.0, 0.0
+    if x >= 1.0:
+        return 1.0, 0.0
+    value = x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3)
+    return value, 140.0 * (x * (1.0 - x)) ** 3
+
+
+def simulate(
+    model: DriveModel,
+    parameters: ArrayLike,
+    *,
+    angle: str = "free",
+    method: str = "LSODA",
+    ramp: float = 0.5,
+    settle: float = 1.5,
+    rtol: float = 1e-8,
+) -> Run:
+    """Integrate one design from rest to steady state and through one output turn.
+
+    The input torque rises smoothly from zero to the level that holds the rated speed, with what it
+    takes to accelerate the inertias in between; load and static error follow the same envelope.
+    The drive starts at the negative input angle from which it reaches 0 after ``ramp + settle``,
+    so that the output turn is the one the steady state is evaluated on.
+
+    Parameters
+    ----------
+    model : DriveModel
+    parameters : array, shape (5,)
+        `PARAMETERS` in SI units.
+    angle : {"free", "prescribed"}
+        Whether theta_s and the stiffness follow the simulated input angle, as in a real drive, or
+        the angle of the nominal speed, as Hill's method has it.
+    method : str
+        One of `METHODS`, of ``scipy.integrate.solve_ivp``.
+    ramp, settle : float
+        Duration of the start-up and of the settling after it, s.
+    rtol : float
+        Relative tolerance.
+
+    Raises
+    ------
+    InvalidInput
+        For a wrong argument.
+    ArithmeticError
+        If the integrator gives up.
+    """
+    values = finite_array("parameters", parameters, (len(PARAMETERS),))
+    one_of("angle", angle, ANGLES)
+    one_of("method", method, METHODS)
+    real_number("ramp", ramp, above=0.0)
+    real_number("settle", settle, at_least=0.0)
+    real_number("rtol", rtol, at_least=1e-13, at_most=1e-2)
+    coefficients = model.coefficients(values[None, :])
+    start_up = StartUp(coefficients.input_speed, ramp, settle)
+    turn = 2.0 * np.pi * coefficients.ratio / coefficients.input_speed
+    margin = 0.01 * turn
+    steps = int(np.ceil(_POINTS_PER_TURN * coefficients.ratio * 1.02))
+    times = np.linspace(ramp + settle - margin, ramp + settle + turn + margin, steps)
+    if times[0] < ramp:
+        raise InvalidInput("settle", settle, f"at least {margin:.3g} s, the margin of the record")
+
+    start = np.array([start_up.angle(0.0), 0.0, 0.0, 0.0])
+    # theta_d is of the order of arcseconds and its rate of the order of arcseconds times 100 1/s.
+    atol = np.array([1e-8, 1e-6, 1e-4 * ARCSEC, 1e-2 * ARCSEC]) * rtol / 1e-8
+    solution = solve_ivp(
+        equations_of_motion(coefficients, start_up, prescribed=angle == "prescribed"),
+        (0.0, times[-1]),
+        start,
+        method=method,
+        t_eval=times,
+        rtol=rtol,
+        atol=atol,
+    )
+    if not solution.success:
+        raise ArithmeticError(f"{method} gave up at t = {solution.t[-1]:g} s: {solution.message}")
+    input_angle, input_speed, transmission_error, _ = solution.y
+    if angle == "prescribed":
+        input_angle = np.array([start_up.angle(time) for time in times])
+    return Run(times, input_angle, input_speed, transmission_error, coefficients.ratio)
+
+
+@dataclass(frozen=True)
+class StartUp:
+    """Prescribed course of the start: speed, load and static error rise together.
+
+    Attributes
+    ----------
+    speed : float
+        Speed reached, rad/s.
+    ramp, settle : float
+        s; the angle is 0 at ``ramp + settle``.
+    """
+
+    speed: float
+    ramp: float
+    settle: float
+
+    def envelope(self, time: float) -> tuple[float, float]:
+        """Return the envelope and its time derivative."""
+        value, slope = smooth_step(time / self.ramp)
+        return value, slope / self.ramp
+
+    def angle(self, time: float) -> float:
+        """Return the angle of the nominal course, the integral of speed times envelope."""
+        x = min(time / self.ramp, 1.0)
+        ramped = x**5 * (7.0 - 14.0 * x + 10.0 * x**2 - 2.5 * x**3)
+        after = max(time - self.ramp, 0.0)
+        return self.speed * (self.ramp * (ramped - 0.5) + after - self.settle)
+
+
+def equations_of_motion(
+    coefficients: Coefficients, start_up: StartUp, *, prescribed: bool
+) -> Callable[[float, NDArray[np.float64]], list[float]]:
+    """Return the right-hand side of Eq. (9) for the first design in ``coefficients``."""
+    ratio, load = coefficients.ratio, coefficients.load_torque
+    stiffness, damping = float(coefficients.stiffness[0]), float(coefficients.damping[0])
+    depth, phase = coefficients.stiffness_depth, coefficients.stiffness_phase
+    inertia_in, bearing_in = coefficients.input_inertia[0], coefficients.input_damping[0]
+    inertia_in, bearing_in = float(inertia_in), float(bearing_in)
+    inertia_out, bearing_out = coefficients.output_inertia, coefficients.output_damping
+    speed = coefficients.input_speed
+    accelerating = (inertia_in + inertia_out / ratio**2) * speed
+    holding = bearing_in * speed + coefficients.mean_mesh_torque / ratio
+    lines = [
+        (float(order), abs(phasor), math.atan2(phasor.imag, phasor.real))
+        for order, phasor in zip(
+            coefficients.error_orders, coefficients.error_phasors[0].tolist(), strict=True
+        )
+    ]
+
+    def right_hand_side(time: float, state: NDArray[np.float64]) -> list[float]:
+        input_angle, input_speed, error, error_rate = state.tolist()
+        envelope, envelope_rate = start_up.envelope(time)
+        if prescribed:
+            position, rate = start_up.angle(time), speed * envelope
+        else:
+            position, rate = input_angle, input_speed
+        static = slope = 0.0
+        for order, amplitude, line_phase in lines:
+            argument = order * position + line_phase
+            static += amplitude * math.cos(argument)
+            slope -= amplitude * order * math.sin(argument)
+        torsion = error - envelope * static
+        torsion_rate = error_rate - envelope_rate * static - envelope * slope * rate
+        varying = 1.0 + depth * math.cos(2.0 * position + phase)
+        mesh_torque = stiffness * varying * torsion + damping * torsion_rate
+        input_torque = accelerating * envelope_rate + holding * envelope
+        acceleration = (input_torque - bearing_in * input_speed - mesh_torque / ratio) / inertia_in
+        output_speed = input_speed / ratio - error_rate
+        output_acceleration = (
+            mesh_torque - load * envelope - bearing_out * output_speed
+        ) / inertia_out
+        return [input_speed, acceleration, error_rate, acceleration / ratio - output_acceleration]
+
+    return right_hand_side
