@@ -35,7 +35,7 @@ class Effect(Protocol):
 
 @dataclass(frozen=True)
 class LoadInertia:
-    """Inertia of the load rigidly on the output: loading motor, couplings, torque sensor, robot link.
+    """Inertia rigidly on the output: loading motor, couplings, torque sensor or robot link.
 
     Attributes
     ----------

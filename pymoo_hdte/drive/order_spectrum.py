@@ -100,7 +100,6 @@ def _peak_to_peak(
     end = 2.0 * np.pi * turns
     # One point beyond each end, so that every point of the window has two neighbours.
     grid = _on_grid(orders, phasors, int(np.floor(turns * points)) + 3, step)
-    rise = np.abs(phasors) @ orders**2 * step**2 / 8.0
     upper = _highest(orders, phasors, grid, step, end)
     lower = _highest(orders, -phasors, -grid, step, end)
     return upper + lower

@@ -27,14 +27,14 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
     """
     step = np.pi / coefficients.input_speed / _STEPS
     identity = np.eye(3)
-    transition = np.broadcast_to(identity, (len(coefficients.stiffness), 3, 3))
+    transition = np.tile(identity, (len(coefficients.stiffness), 1, 1))
     for index in range(_STEPS):
         angle = (index + 0.5) * np.pi / _STEPS
         scaled = step * _state_matrix(coefficients, angle)
         square = scaled @ scaled / 12.0
         forward, backward = identity + scaled / 2.0 + square, identity - scaled / 2.0 + square
-        transition = np.linalg.solve(backward, forward @ transition)
-    return np.linalg.eigvals(transition)
+        transition[:] = np.linalg.solve(backward, forward @ transition)
+    return np.linalg.eigvals(transition).astype(np.complex128)
 
 
 def require_stable(coefficients: Coefficients) -> None:

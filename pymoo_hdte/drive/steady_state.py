@@ -1,7 +1,7 @@
 """Steady state of the drive without time stepping: transfer function and Hill's method.
 
-Both take theta_in = Omega t as the argument of theta_s and of the varying stiffness. Written for one
-order o, w = o Omega, the torsion d of Eq. (9) obeys
+Both take theta_in = Omega t as the argument of theta_s and of the varying stiffness. Written for
+one order o, w = o Omega, the torsion d of Eq. (9) obeys
 
     (P_o + K + i w c) d_o + (K kappa / 2) (e^{i psi} d_{o-2} + e^{-i psi} d_{o+2})
         = -P_o s_o + T [o = 0]
@@ -67,7 +67,7 @@ def _family(
     excited = np.round((coefficients.error_orders - first) / 2.0, 9)
     member = excited == np.round(excited)
     highest = int(excited[member].max(initial=0.0))
-    orders = first + 2.0 * np.arange(-reach, highest + reach + 1)
+    orders = first + 2.0 * np.arange(-reach, highest + reach + 1, dtype=np.float64)
 
     static = np.zeros((len(coefficients.stiffness), len(orders)), dtype=complex)
     # Several error lines of one order add up, hence no plain assignment.

@@ -1,4 +1,4 @@
-"""Reading checked fields from TOML tables, with units; used by the data sheet and the model files."""
+"""Checked fields with units, read from TOML tables: for data sheets and model files."""
 
 from __future__ import annotations
 

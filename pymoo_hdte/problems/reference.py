@@ -1,0 +1,59 @@
+"""Stored true Pareto fronts: reading, writing, and telling to which problem a front belongs.
+
+`experiments/reference_front.py` computes them. A file is a CSV with one header comment that holds
+the settings of the problem as JSON; a front is only used for a problem of the same settings.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib.resources import files
+from io import StringIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_FOLDER = files("pymoo_hdte.problems") / "data"
+
+
+@dataclass(frozen=True)
+class ReferenceFront:
+    """A true Pareto front and its set, row for row, sorted by the first objective.
+
+    Attributes
+    ----------
+    front : ndarray, shape (n, n_obj)
+    designs : ndarray, shape (n, n_var)
+    """
+
+    front: NDArray[np.float64]
+    designs: NDArray[np.float64]
+
+
+def load_reference(name: str, settings: dict[str, Any]) -> ReferenceFront | None:
+    """Return the stored front of that name, or None if there is none for these settings."""
+    file = _FOLDER / f"front_{name}.csv"
+    if not file.is_file():
+        return None
+    header, _, rows = file.read_text(encoding="utf-8").partition("\n")
+    if json.loads(header.removeprefix("# ")) != _normalised(settings):
+        return None
+    table = np.loadtxt(StringIO(rows), delimiter=",", skiprows=1, ndmin=2)
+    return ReferenceFront(table[:, :2], table[:, 2:])
+
+
+def format_reference(
+    reference: ReferenceFront, settings: dict[str, Any], columns: tuple[str, ...]
+) -> str:
+    """Return the text of the file that `load_reference` reads; numbers round-trip exactly."""
+    lines = ["# " + json.dumps(_normalised(settings), sort_keys=True), ",".join(columns)]
+    table = np.column_stack([reference.front, reference.designs])
+    lines += [",".join(repr(float(value)) for value in row) for row in table]
+    return "\n".join(lines) + "\n"
+
+
+def _normalised(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings as JSON gives them back, so that both sides compare alike."""
+    return json.loads(json.dumps(settings))

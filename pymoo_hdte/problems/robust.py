@@ -1,0 +1,63 @@
+"""Robust design for pymoo: minimise mean and standard deviation of an uncertain response."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.problem import Problem
+
+from pymoo_hdte.surrogate import Box, ExactMoments, SampledMoments
+
+MOMENTS = ("exact", "sample")
+
+
+class RobustProblem(Problem):
+    """Minimise f1 = mean and f2 = standard deviation of a response (Eqs. 29 and 30).
+
+    The design box of the moments is the search space. All designs are evaluated at once, so pymoo's
+    runners have nothing to parallelise. Ask for ``dF`` (shape (n, 2, n_var)) in
+    ``return_values_of`` to get exact gradients.
+
+    Parameters
+    ----------
+    moments : ExactMoments or SampledMoments
+    obj_names : tuple of str
+        Names of the two objectives.
+    units : dict of str
+        Unit of every variable and objective, by name.
+
+    Attributes
+    ----------
+    var_names, obj_names : tuple of str
+    units : dict of str
+    """
+
+    def __init__(
+        self,
+        moments: ExactMoments | SampledMoments,
+        obj_names: tuple[str, str],
+        units: dict[str, str],
+    ) -> None:
+        box: Box = moments.design_box
+        super().__init__(n_var=len(box), n_obj=2, xl=box.lower.copy(), xu=box.upper.copy())
+        self.moments = moments
+        self.var_names = box.names
+        self.obj_names = obj_names
+        self.units = units
+
+    def _evaluate(
+        self, x: NDArray[np.float64], out: dict[str, Any], *args: Any, **kwargs: Any
+    ) -> None:
+        """Fill ``F``, and ``dF`` if asked for.
+
+        Raises
+        ------
+        ExtrapolationError
+            If a design is outside the box or NaN: the surrogate knows nothing there, and a NaN
+            objective would pass for a non-dominated one.
+        """
+        out["F"] = np.column_stack(self.moments(x))
+        if "dF" in out:
+            out["dF"] = np.stack(self.moments.gradient(x), axis=1)

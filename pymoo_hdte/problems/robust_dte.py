@@ -1,0 +1,154 @@
+"""The robust DTE problem of Section 5.1 as a pymoo `Problem`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import one_of, real_number, whole_number
+from pymoo_hdte.drive import PARAMETER_UNITS, PARAMETERS, DriveModel, preset
+from pymoo_hdte.problems.reference import ReferenceFront, load_reference
+from pymoo_hdte.problems.robust import MOMENTS, RobustProblem
+from pymoo_hdte.surrogate import (
+    Box,
+    ChebyshevSurrogate,
+    ExactMoments,
+    SampledMoments,
+    TruncatedNormal,
+    UniformBand,
+)
+
+SURROGATE_BOX = 0.35
+"""Half-width of the surrogate's box as a share of the nominal values (Section 3)."""
+
+DESIGN_VARIABLES = PARAMETERS[1:]
+"""U = (K, J_in, B_in, B_fc) of Section 5.1; theta_s is noise."""
+
+
+class RobustDTE(RobustProblem):
+    """Minimise mean and standard deviation of the dynamic transmission error (DTE).
+
+    Design variables are the nominal stiffness K and the nominal J_in, B_in and B_fc, each within
+    ``box`` of its value in the data sheet. Around a design the four vary uniformly by
+    ``tolerance``, while theta_s follows its truncated normal distribution; both objectives are
+    moments of the DTE over that scatter, on a Chebyshev surrogate of the drive model.
+
+    Parameters
+    ----------
+    model : str or DriveModel
+        A preset (``"calibrated"``, ``"resonant"``, ``"published"``) or a model of your own.
+        ``calibrated`` is the printed model plus named effects whose values were fitted to the
+        published statistics; the printed model alone has next to no trade-off.
+    order : int
+        Order k of the surrogate, at least 1; the paper takes 3. It costs (k + 1)^5 model runs.
+    moments : {"exact", "sample"}
+        Integrate the surrogate exactly, or over common random numbers as the paper does.
+    n_samples, sample_seed : int
+        Number and seed of those samples; only used with ``moments="sample"``.
+    tolerance : float
+        Relative half-width of the band around a design.
+    box : float
+        Relative half-width of the search space.
+
+    Attributes
+    ----------
+    model : DriveModel
+    surrogate : ChebyshevSurrogate
+        DTE in arcsec over ``PARAMETERS``. Its box is +-35 % (wider if box and tolerance reach
+        further) in the four design variables and mean +- 3 std in theta_s.
+    moments : ExactMoments or SampledMoments
+    nominal : ndarray, shape (4,)
+        The initial design.
+    var_names, obj_names, units
+        Names in the order of X and F, and the unit of each. X is in SI units, F in arcsec.
+
+    Raises
+    ------
+    InvalidInput
+        For an argument that is not allowed, naming it, its value and what is.
+
+    Notes
+    -----
+    In a real drive K and B_fc cannot be chosen independently: wall thickness and preload move both.
+    """
+
+    def __init__(
+        self,
+        model: str | DriveModel = "calibrated",
+        order: int = 3,
+        moments: str = "exact",
+        n_samples: int = 1000,
+        sample_seed: int = 1,
+        tolerance: float = 0.05,
+        box: float = 0.25,
+    ) -> None:
+        self.model = model if isinstance(model, DriveModel) else preset(model)
+        order = whole_number("order", order, 1)
+        one_of("moments", moments, MOMENTS)
+        tolerance = real_number("tolerance", tolerance, above=0.0, below=1.0)
+        box = real_number("box", box, above=0.0, below=1.0)
+        self.nominal = self.model.nominal[1:]
+        self._settings = self._describe(order, moments, tolerance, box)
+
+        theta_s = TruncatedNormal(self.model.nominal[0], self.model.kinematic_error.std)
+        inputs = (theta_s, *(UniformBand(tolerance) for _ in DESIGN_VARIABLES))
+        design_box = Box(DESIGN_VARIABLES, self.nominal * (1.0 - box), self.nominal * (1.0 + box))
+        self.surrogate = ChebyshevSurrogate.fit(
+            self.model.dte_arcsec,
+            surrogate_box(self.model, theta_s, reach=(1.0 + box) * (1.0 + tolerance) - 1.0),
+            order,
+            provenance={"model": self.model.to_dict(), "output": "DTE in arcsec"},
+        )
+        scatter: ExactMoments | SampledMoments
+        if moments == "exact":
+            scatter = ExactMoments(self.surrogate, inputs, design_box)
+        else:
+            scatter = SampledMoments(self.surrogate, inputs, design_box, n_samples, sample_seed)
+        obj_names = ("mean_dte_arcsec", "std_dte_arcsec")
+        units = dict(zip(PARAMETERS[1:], PARAMETER_UNITS[1:], strict=True))
+        super().__init__(scatter, obj_names, units | dict.fromkeys(obj_names, "arcsec"))
+
+    def _describe(self, order: int, moments: str, tolerance: float, box: float) -> dict[str, Any]:
+        model = self.model.to_dict()
+        texts = ("name", "description", "provenance")
+        return {
+            "model": {key: value for key, value in model.items() if key not in texts},
+            "nominal": self.model.nominal.tolist(),
+            "order": order,
+            "moments": moments,
+            "tolerance": tolerance,
+            "box": box,
+        }
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What decides the true front, JSON-able: model, surrogate order, moments, bands, box."""
+        return dict(self._settings)
+
+    def _reference(self) -> ReferenceFront | None:
+        return load_reference(self.model.name, self._settings)
+
+    def _calc_pareto_front(self) -> NDArray[np.float64] | None:
+        """Return the stored true front, shape (n, 2), or None for settings without one."""
+        reference = self._reference()
+        return None if reference is None else reference.front
+
+    def _calc_pareto_set(self) -> NDArray[np.float64] | None:
+        """Return the designs of `pareto_front`, row for row, shape (n, 4), or None."""
+        reference = self._reference()
+        return None if reference is None else reference.designs
+
+
+def surrogate_box(model: DriveModel, theta_s: TruncatedNormal, reach: float) -> Box:
+    """Return the box the surrogate is built on, over `PARAMETERS`.
+
+    +-35 % of the nominal in the dynamic parameters, or ``reach`` above it if that is more, and the
+    whole support of ``theta_s``.
+    """
+    half_width = max(SURROGATE_BOX, reach)
+    nominal = model.nominal
+    lower, upper = nominal * (1.0 - half_width), nominal * (1.0 + half_width)
+    lower[0], upper[0] = theta_s.support
+    return Box(PARAMETERS, lower, upper)

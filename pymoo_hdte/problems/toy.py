@@ -1,0 +1,99 @@
+"""A twin of the robust DTE problem whose moments and front are closed form, to test against.
+
+    y = x_1 + x_2 + a_1 (3 - x_1) + a_2 (x_3 - 3/2)
+
+with x_j uniform in u_j (1 +- t) around the design u in [1, 2]^3 and a_1, a_2 independent normals of
+mean zero, truncated at three standard deviations. As in the drive, a larger x_1 costs mean and buys
+robustness; x_2 has its optimum on the bound and x_3 inside.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import one_of, real_number
+from pymoo_hdte.problems.robust import MOMENTS, RobustProblem
+from pymoo_hdte.surrogate import (
+    Box,
+    ChebyshevSurrogate,
+    ExactMoments,
+    SampledMoments,
+    TruncatedNormal,
+    UniformBand,
+)
+
+_VARIABLES = ("x_1", "x_2", "x_3")
+_NOISE = (TruncatedNormal(0.0, 0.2), TruncatedNormal(0.0, 0.3))
+_FRONT_POINTS = 1000
+
+
+class RobustToy(RobustProblem):
+    """The closed-form twin, run through the same surrogate and moments as `RobustDTE`.
+
+    Parameters
+    ----------
+    moments, n_samples, sample_seed, tolerance
+        As in `RobustDTE`; the tolerance is at most 0.2, so that x_1 keeps its trade-off.
+
+    Raises
+    ------
+    InvalidInput
+        For an argument that is not allowed.
+    """
+
+    def __init__(
+        self,
+        moments: str = "exact",
+        n_samples: int = 1000,
+        sample_seed: int = 1,
+        tolerance: float = 0.05,
+    ) -> None:
+        one_of("moments", moments, MOMENTS)
+        self.tolerance = real_number("tolerance", tolerance, above=0.0, at_most=0.2)
+        inputs = (*_NOISE, *(UniformBand(self.tolerance) for _ in _VARIABLES))
+        noise = np.array([entry.support for entry in _NOISE])
+        reach = np.array([1.0 - self.tolerance, 2.0 * (1.0 + self.tolerance)])
+        lower, upper = np.vstack([noise, np.tile(reach, (3, 1))]).T
+        self.surrogate = ChebyshevSurrogate.fit(
+            response, Box(("a_1", "a_2", *_VARIABLES), lower, upper), order=1
+        )
+        design_box = Box(_VARIABLES, np.ones(3), np.full(3, 2.0))
+        scatter: ExactMoments | SampledMoments
+        if moments == "exact":
+            scatter = ExactMoments(self.surrogate, inputs, design_box)
+        else:
+            scatter = SampledMoments(self.surrogate, inputs, design_box, n_samples, sample_seed)
+        names = ("mean", "std")
+        super().__init__(scatter, names, dict.fromkeys((*_VARIABLES, *names), "1"))
+
+    def closed_form(
+        self, designs: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean and standard deviation, shape (n,) each, for designs of shape (n, 3)."""
+        first, second, third = designs.T
+        band = self.tolerance**2 / 3.0
+        variance = (
+            band * (first**2 + second**2)
+            + _NOISE[0].std ** 2 * ((3.0 - first) ** 2 + band * first**2)
+            + _NOISE[1].std ** 2 * ((third - 1.5) ** 2 + band * third**2)
+        )
+        return first + second, np.sqrt(variance)
+
+    def _calc_pareto_set(self) -> NDArray[np.float64]:
+        """Return the true set: u_2 = 1 and u_3 = (3/2) / (1 + t^2 / 3), for every u_1."""
+        designs = np.empty((_FRONT_POINTS, 3))
+        designs[:, 0] = np.linspace(1.0, 2.0, _FRONT_POINTS)
+        designs[:, 1] = 1.0
+        designs[:, 2] = 1.5 / (1.0 + self.tolerance**2 / 3.0)
+        return designs
+
+    def _calc_pareto_front(self) -> NDArray[np.float64]:
+        """Return the true front, from the closed form."""
+        return np.column_stack(self.closed_form(self._calc_pareto_set()))
+
+
+def response(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return y, shape (n,), for points (a_1, a_2, x_1, x_2, x_3) of shape (n, 5)."""
+    first_noise, second_noise, first, second, third = points.T
+    return first + second + first_noise * (3.0 - first) + second_noise * (third - 1.5)
