@@ -93,7 +93,8 @@ class RobustDTE(RobustProblem):
         self._settings = self._describe(order, moments, tolerance, box)
 
         theta_s = TruncatedNormal(self.model.nominal[0], self.model.kinematic_error.std)
-        inputs = (theta_s, *(UniformBand(tolerance) for _ in DESIGN_VARIABLES))
+        bands = [UniformBand(tolerance) for _ in DESIGN_VARIABLES]
+        inputs: list[TruncatedNormal | UniformBand] = [theta_s, *bands]
         design_box = Box(DESIGN_VARIABLES, self.nominal * (1.0 - box), self.nominal * (1.0 + box))
         self.surrogate = ChebyshevSurrogate.fit(
             self.model.dte_arcsec,

@@ -51,7 +51,8 @@ class RobustToy(RobustProblem):
     ) -> None:
         one_of("moments", moments, MOMENTS)
         self.tolerance = real_number("tolerance", tolerance, above=0.0, at_most=0.2)
-        inputs = (*_NOISE, *(UniformBand(self.tolerance) for _ in _VARIABLES))
+        bands = [UniformBand(self.tolerance) for _ in _VARIABLES]
+        inputs: list[TruncatedNormal | UniformBand] = [*_NOISE, *bands]
         noise = np.array([entry.support for entry in _NOISE])
         reach = np.array([1.0 - self.tolerance, 2.0 * (1.0 + self.tolerance)])
         lower, upper = np.vstack([noise, np.tile(reach, (3, 1))]).T
@@ -75,8 +76,8 @@ class RobustToy(RobustProblem):
         band = self.tolerance**2 / 3.0
         variance = (
             band * (first**2 + second**2)
-            + _NOISE[0].std ** 2 * ((3.0 - first) ** 2 + band * first**2)
-            + _NOISE[1].std ** 2 * ((third - 1.5) ** 2 + band * third**2)
+            + _NOISE[0].truncated_std ** 2 * ((3.0 - first) ** 2 + band * first**2)
+            + _NOISE[1].truncated_std ** 2 * ((third - 1.5) ** 2 + band * third**2)
         )
         return first + second, np.sqrt(variance)
 
