@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -23,24 +24,29 @@ class Finding:
     agrees: bool
     sentence: str
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "agrees", bool(self.agrees))
+
 
 @dataclass(frozen=True)
 class Column:
     """One column of a table: what it holds, in which unit, shown with how many digits.
 
-    ``paper`` marks numbers that the paper printed, so that nobody takes them for ours.
+    Neighbouring columns of the same ``group`` stand under one heading. ``paper`` marks numbers that
+    the paper printed, so that nobody takes them for ours.
     """
 
     name: str
     unit: str = ""
     digits: int = 4
+    group: str = ""
     paper: bool = False
 
     @property
     def heading(self) -> str:
-        """Name and unit, as a CSV heading shows them."""
-        source = f"{self.name} (paper)" if self.paper else self.name
-        return f"{source} [{self.unit}]" if self.unit else source
+        """Group, name and unit, as a CSV heading shows them."""
+        words = f"{self.group} {self.name}".strip()
+        return f"{words} [{self.unit}]" if self.unit else words
 
     def show(self, value: Cell) -> str:
         """Write ``value`` with the significant digits of this column; a dash for no value."""
@@ -75,6 +81,16 @@ class Table:
                 raise ValueError(f"{self.name}: {len(row)} cells for {len(self.columns)} columns")
         object.__setattr__(self, "rows", rows)
 
+    @property
+    def groups(self) -> list[tuple[str, int]]:
+        """Headings over neighbouring columns, each with the number of columns below it."""
+        runs = groupby(self.columns, key=lambda column: column.group)
+        return [(group, len(list(columns))) for group, columns in runs]
+
+    def holds_text(self, index: int) -> bool:
+        """Whether the column at ``index`` holds words, which read better aligned to the left."""
+        return any(isinstance(row[index], str) for row in self.rows)
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -108,7 +124,7 @@ def significant(value: float, digits: int) -> str:
     if value == 0.0:
         return "0"
     exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
-    if not -4 <= exponent <= 6:
+    if not -5 <= exponent <= 6:
         return f"{value:.{digits - 1}e}".replace("-", MINUS)
     return f"{value:.{max(0, digits - 1 - exponent)}f}".replace("-", MINUS)
 

@@ -1,0 +1,11 @@
+"""What a report says of the drive models behind its numbers."""
+
+from __future__ import annotations
+
+from experiments.runs import robust_problem
+
+
+def model_sentences(*names: str) -> tuple[str, ...]:
+    """Return one paragraph for each drive model: what it is and where its values come from."""
+    models = [robust_problem(name).model for name in names]
+    return tuple(f"{m.name}: {m.description} {m.provenance}" for m in models)
