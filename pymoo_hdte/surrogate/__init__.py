@@ -1,0 +1,24 @@
+"""Chebyshev surrogates on a box, and mean and standard deviation over uncertain inputs.
+
+Knows nothing of drives or of pymoo: any function of several real variables will do.
+"""
+
+from pymoo_hdte.surrogate.box import Box, ExtrapolationError
+from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
+from pymoo_hdte.surrogate.distributions import TruncatedNormal, UniformBand
+from pymoo_hdte.surrogate.moments import ExactMoments
+from pymoo_hdte.surrogate.sampled import SampledMoments
+from pymoo_hdte.surrogate.validation import Accuracy, accuracy, latin_hypercube
+
+__all__ = [
+    "Accuracy",
+    "Box",
+    "ChebyshevSurrogate",
+    "ExactMoments",
+    "ExtrapolationError",
+    "SampledMoments",
+    "TruncatedNormal",
+    "UniformBand",
+    "accuracy",
+    "latin_hypercube",
+]

@@ -1,0 +1,148 @@
+"""The box of physical variables on which a polynomial is known, and its map to the unit cube."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pymoo_hdte.checks import InvalidInput, finite_array
+
+# Points computed from the bounds themselves miss them by a few roundings; those are let in.
+_EDGE = 1e-12
+
+
+class ExtrapolationError(InvalidInput):
+    """A point lies outside the box on which a polynomial was built."""
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A product of intervals, one for each named variable.
+
+    Parameters
+    ----------
+    names : tuple of str, length d
+        Distinct names of the variables.
+    lower, upper : array_like, shape (d,)
+        Finite bounds in the variables' own units, ``lower < upper`` everywhere.
+
+    Raises
+    ------
+    InvalidInput
+        If names repeat or are no words, or bounds are not finite, in order and of length d.
+
+    Attributes
+    ----------
+    centre, half_width : ndarray, shape (d,)
+        Midpoint and half the length of every interval.
+    """
+
+    names: tuple[str, ...]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+    centre: NDArray[np.float64] = field(init=False, repr=False)
+    half_width: NDArray[np.float64] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        names = _distinct_names(self.names)
+        lower = finite_array("lower", self.lower, (len(names),))
+        upper = finite_array("upper", self.upper, (len(names),))
+        for name, low, high in zip(names, lower, upper, strict=True):
+            if not low < high:
+                raise InvalidInput(f"upper[{name!r}]", float(high), f"above lower = {low!s}")
+        object.__setattr__(self, "names", names)
+        arrays = {
+            "lower": lower,
+            "upper": upper,
+            "centre": 0.5 * (lower + upper),
+            "half_width": 0.5 * (upper - lower),
+        }
+        for attribute, array in arrays.items():
+            array.flags.writeable = False
+            object.__setattr__(self, attribute, array)
+
+    def __len__(self) -> int:
+        """Return the number of variables d."""
+        return len(self.names)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Box):
+            return NotImplemented
+        return (
+            self.names == other.names
+            and np.array_equal(self.lower, other.lower)
+            and np.array_equal(self.upper, other.upper)
+        )
+
+    def to_cube(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Map points of the box to the cube [-1, 1]^d (inverse of Eq. 25).
+
+        Parameters
+        ----------
+        points : array_like, shape (n, d)
+            Physical units. A point outside by less than 1e-12 of the half-width counts as on
+            the boundary.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+
+        Raises
+        ------
+        ExtrapolationError
+            If a point lies outside the box or is NaN; names the variable and its interval.
+        InvalidInput
+            If ``points`` is no array of numbers of shape (n, d).
+        """
+        physical = self._as_points(points)
+        # One variable per contiguous row: every later step works variable by variable.
+        cube = np.subtract(physical.T, self.centre[:, None], order="C")
+        cube /= self.half_width[:, None]
+        farthest = np.abs(cube).max(initial=0.0)
+        if not farthest <= 1.0:
+            if not farthest <= 1.0 + _EDGE:
+                self._refuse(physical, cube.T)
+            np.clip(cube, -1.0, 1.0, out=cube)
+        return cube.T
+
+    def from_cube(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Map points of the cube [-1, 1]^d, shape (n, d), to the box (Eq. 25)."""
+        return self.centre + self.half_width * cube
+
+    def check_inside(self, points: ArrayLike) -> None:
+        """Raise `ExtrapolationError` unless all points, shape (n, d), lie in the box."""
+        self.to_cube(points)
+
+    def _as_points(self, points: ArrayLike) -> NDArray[np.float64]:
+        wanted = f"numbers of shape (n, {len(self)})"
+        try:
+            array = np.asarray(points, dtype=float)
+        except (TypeError, ValueError):
+            raise InvalidInput("points", points, wanted) from None
+        if array.ndim != 2 or array.shape[1] != len(self):
+            raise InvalidInput("shape of points", array.shape, wanted)
+        return array
+
+    def _refuse(self, physical: NDArray[np.float64], cube: NDArray[np.float64]) -> None:
+        row, column = np.argwhere(~(np.abs(cube) <= 1.0 + _EDGE))[0]
+        raise ExtrapolationError(
+            self.names[column],
+            float(physical[row, column]),
+            f"{self.lower[column]!s} to {self.upper[column]!s} (row {row} of the points)",
+        )
+
+
+def _distinct_names(names: Any) -> tuple[str, ...]:
+    allowed = "one or more distinct, non-empty words"
+    if isinstance(names, str) or not isinstance(names, Sequence):
+        raise InvalidInput("names", names, allowed)
+    words = tuple(names)
+    if not words or not all(isinstance(word, str) and word for word in words):
+        raise InvalidInput("names", words, allowed)
+    if len(set(words)) < len(words):
+        raise InvalidInput("names", words, allowed)
+    return words

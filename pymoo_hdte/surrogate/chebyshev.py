@@ -1,0 +1,171 @@
+"""The Chebyshev surrogate: a tensor polynomial that stands in for a costly function on a box."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pymoo_hdte.checks import InvalidInput, finite_array, whole_number
+from pymoo_hdte.surrogate.box import Box
+from pymoo_hdte.surrogate.storage import read_archive, write_archive
+from pymoo_hdte.surrogate.tensor import (
+    TensorPolynomial,
+    chebyshev_nodes,
+    coefficients_from_nodes,
+)
+
+
+class ChebyshevSurrogate:
+    """Tensor Chebyshev polynomial on a box (Section 2.3 of the paper, Eqs. 14-25). Immutable.
+
+    Parameters
+    ----------
+    box : Box
+        The d variables and their intervals.
+    coefficients : array_like, shape (p_1, ..., p_d)
+        Entry ``i`` multiplies T_i1 ... T_id of the variables mapped to [-1, 1]. The factor
+        (1/2)^h of Eq. (23) is already in them.
+    provenance : mapping, optional
+        What made the surrogate, e.g. the model and its parameters; must be writable as JSON.
+
+    Raises
+    ------
+    InvalidInput
+        If the coefficients are not finite, have another number of axes than the box has
+        variables, or an axis is empty; or if the provenance is no JSON.
+    """
+
+    def __init__(
+        self, box: Box, coefficients: ArrayLike, provenance: Mapping[str, Any] | None = None
+    ) -> None:
+        array = finite_array("coefficients", coefficients, (None,) * len(box))
+        if array.size == 0:
+            raise InvalidInput("shape of coefficients", array.shape, "at least 1 on every axis")
+        self.box = box
+        self.polynomial = TensorPolynomial(array[None])
+        self._derivatives = self.polynomial.derivatives(range(len(box)))
+        self._provenance = _as_json(provenance)
+
+    @classmethod
+    def fit(
+        cls,
+        function: Callable[[NDArray[np.float64]], ArrayLike],
+        box: Box,
+        order: int,
+        provenance: Mapping[str, Any] | None = None,
+    ) -> ChebyshevSurrogate:
+        """Interpolate ``function`` at the tensor grid of Chebyshev nodes.
+
+        Parameters
+        ----------
+        function : callable
+            Maps points of shape (n, d) in the box's units to n finite values. Called once, with
+            all (order + 1)^d nodes; the last variable runs fastest.
+        box : Box
+            Where the surrogate shall hold.
+        order : int
+            Highest degree k in each variable, at least 1.
+        provenance : mapping, optional
+            As in the constructor.
+
+        Returns
+        -------
+        ChebyshevSurrogate
+
+        Raises
+        ------
+        InvalidInput
+            If the order is below 1, or the function returns another shape or a value that is
+            not finite.
+        """
+        size = whole_number("order", order, 1) + 1
+        grid = np.meshgrid(*[chebyshev_nodes(size)] * len(box), indexing="ij")
+        nodes = box.from_cube(np.stack(grid, axis=-1).reshape(-1, len(box)))
+        values = finite_array("values of the function", function(nodes), (size ** len(box),))
+        return cls(box, coefficients_from_nodes(values.reshape((size,) * len(box))), provenance)
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """Read-only coefficients, shape (p_1, ..., p_d)."""
+        return self.polynomial.coefficients[0]
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Highest degree in each variable."""
+        return tuple(size - 1 for size in self.coefficients.shape)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """What made the surrogate, as a copy that may be changed freely."""
+        return json.loads(self._provenance)
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Return the values, shape (n,), at points of shape (n, d).
+
+        Raises
+        ------
+        ExtrapolationError
+            If a point lies outside the box.
+        """
+        return self.polynomial(self.box.to_cube(points).T)[0]
+
+    def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Return the gradient, shape (n, d), in the output's unit per unit of each variable.
+
+        Raises
+        ------
+        ExtrapolationError
+            If a point lies outside the box.
+        """
+        return self._derivatives(self.box.to_cube(points).T).T / self.box.half_width
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the surrogate to ``path`` as an npz file, replacing it in one step."""
+        header = {
+            "names": self.box.names,
+            "lower": self.box.lower.tolist(),
+            "upper": self.box.upper.tolist(),
+            "orders": self.orders,
+            "provenance": self.provenance,
+        }
+        write_archive(path, header, self.coefficients)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> ChebyshevSurrogate:
+        """Read a surrogate that `save` wrote.
+
+        Raises
+        ------
+        InvalidInput
+            If the file is damaged, incomplete, of another format or of a later version.
+        OSError
+            If the file cannot be opened.
+        """
+        header, coefficients = read_archive(path)
+        missing = {"names", "lower", "upper", "orders", "provenance"} - header.keys()
+        if missing:
+            raise InvalidInput("header of the file", sorted(header), f"also {sorted(missing)}")
+        surrogate = cls(
+            Box(header["names"], header["lower"], header["upper"]),
+            coefficients,
+            header["provenance"],
+        )
+        if list(surrogate.orders) != header["orders"]:
+            raise InvalidInput(
+                "orders of the coefficients", surrogate.orders, f"as stated: {header['orders']}"
+            )
+        return surrogate
+
+
+def _as_json(provenance: Mapping[str, Any] | None) -> str:
+    if provenance is not None and not isinstance(provenance, Mapping):
+        raise InvalidInput("provenance", provenance, "a mapping")
+    try:
+        return json.dumps(dict(provenance or {}), allow_nan=False)
+    except (TypeError, ValueError):
+        raise InvalidInput("provenance", provenance, "words, numbers, lists and mappings") from None

@@ -1,0 +1,141 @@
+"""Exact mean and standard deviation of a Chebyshev surrogate over its uncertain inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pymoo_hdte.surrogate.box import Box
+from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
+from pymoo_hdte.surrogate.tensor import (
+    TensorPolynomial,
+    chebyshev_basis,
+    chebyshev_nodes,
+    coefficients_from_nodes,
+)
+from pymoo_hdte.surrogate.uncertainty import UncertainInput, Uncertainty
+
+
+class ExactMoments:
+    """Mean and standard deviation as functions of the design, free of sampling error.
+
+    The inputs are independent and the surrogate is a tensor polynomial of degree k_j in each
+    variable. Its mean over all scatter is therefore a tensor polynomial of degree k_j in each
+    design variable u_j, and its variance one of degree 2 k_j. Both are found once, from their
+    values on a Chebyshev grid of designs; evaluating a design sums two short series.
+
+    Parameters
+    ----------
+    surrogate : ChebyshevSurrogate
+        Polynomial in d variables.
+    inputs : sequence of TruncatedNormal or UniformBand, length d
+        The scatter of each variable of the surrogate, in its order.
+    design_box : Box
+        The m designed variables (those with a `UniformBand`) and the range of their designs.
+
+    Raises
+    ------
+    InvalidInput
+        If inputs and names do not match, or if the scatter of some design leaves the box of the
+        surrogate.
+    """
+
+    def __init__(
+        self, surrogate: ChebyshevSurrogate, inputs: Sequence[UncertainInput], design_box: Box
+    ) -> None:
+        self.uncertainty = Uncertainty(surrogate.box, inputs, design_box)
+        self.design_box = design_box
+        moments = _moments_on_grid(surrogate.coefficients, self.uncertainty)
+        self._polynomial = TensorPolynomial(np.array([coefficients_from_nodes(m) for m in moments]))
+        self._derivatives = self._polynomial.derivatives(range(len(design_box)))
+
+    def __call__(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return mean and standard deviation, shape (n,) each, in the surrogate's output unit.
+
+        Parameters
+        ----------
+        designs : array_like, shape (n, m)
+            Design variables in the units of ``design_box``.
+
+        Raises
+        ------
+        ExtrapolationError
+            If a design lies outside ``design_box``.
+        """
+        mean, variance = self._polynomial(self.design_box.to_cube(designs).T)
+        return mean, _square_root(variance)
+
+    def gradient(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the gradients of mean and standard deviation, shape (n, m) each.
+
+        Where the standard deviation is zero it has a kink or is constant; its gradient is then
+        given as zero. Arguments and errors as in a call.
+        """
+        cube = self.design_box.to_cube(designs).T
+        std = _square_root(self._polynomial(cube)[1])
+        slopes = self._derivatives(cube).reshape(len(self.design_box), 2, -1)
+        dmean, dvariance = slopes.transpose(1, 2, 0) / self.design_box.half_width
+        return dmean, divide_or_zero(dvariance, 2.0 * std[:, None])
+
+
+def divide_or_zero(
+    numerator: NDArray[np.float64], denominator: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the quotient, and zero where the denominator is zero."""
+    return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator != 0.0)
+
+
+def _square_root(variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    # Rounding can leave a variance of zero slightly negative.
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def _moments_on_grid(
+    coefficients: NDArray[np.float64], uncertainty: Uncertainty
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean and variance on the Chebyshev grid of designs.
+
+    Variables are integrated out one after the other. With some of them gone, what is left is a
+    polynomial whose coefficients are random; their mean vector and covariance matrix follow from
+    those of the step before by the laws of total mean and total covariance. Nothing large is
+    subtracted, so a small variance keeps its digits.
+    """
+    mean = coefficients.reshape(1, -1)
+    covariance = np.broadcast_to(0.0, (1, coefficients.size, coefficients.size))
+    for axis, size in enumerate(coefficients.shape):
+        first, spread = _basis_moments(uncertainty, axis, size)
+        second = spread + first[:, :, None] * first[:, None, :]
+        rows, rest = len(mean), mean.shape[1] // size
+        parts = mean.reshape(rows, size, rest)
+        covariances = covariance.reshape(rows, size, rest, size, rest)
+        total = np.einsum("iab,darbs->dirs", second, covariances)
+        total += np.einsum("iab,dar,dbs->dirs", spread, parts, parts, optimize=True)
+        mean = np.einsum("ia,dar->dir", first, parts).reshape(-1, rest)
+        covariance = total.reshape(-1, rest, rest)
+    grid = [2 * coefficients.shape[axis] - 1 for axis in uncertainty.design_axes]
+    return mean.reshape(grid), covariance.reshape(grid)
+
+
+def _basis_moments(
+    uncertainty: Uncertainty, axis: int, size: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean (g, size) and covariance (g, size, size) of T_0 .. T_(size-1) of one variable.
+
+    One row for each of its 2 size - 1 Chebyshev nodes if it is designed, a single row if not.
+    """
+    entry, box = uncertainty.inputs[axis], uncertainty.surrogate_box
+    values, weights = entry.quadrature(2 * (size - 1))
+    points = values[None]
+    if entry.scales_design:
+        design_axis = uncertainty.design_axes.index(axis)
+        nodes = chebyshev_nodes(2 * size - 1)
+        design = uncertainty.design_box
+        points = np.outer(
+            design.centre[design_axis] + design.half_width[design_axis] * nodes, values
+        )
+    basis = chebyshev_basis((points - box.centre[axis]) / box.half_width[axis], size)
+    first = basis @ weights
+    deviation = basis - first[:, :, None]
+    return first.T, np.einsum("aiq,biq,q->iab", deviation, deviation, weights)

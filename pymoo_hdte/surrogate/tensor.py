@@ -1,0 +1,124 @@
+"""Chebyshev series in several variables on the cube [-1, 1]^d: nodes, coefficients, values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebder
+from numpy.typing import NDArray
+
+# Keeps the arrays of one block in the processor's cache at the paper's order and dimension.
+POINTS_AT_ONCE = 8192
+
+
+def chebyshev_nodes(size: int) -> NDArray[np.float64]:
+    """Return the roots of the Chebyshev polynomial of degree ``size``, shape (size,) (Eq. 20)."""
+    return np.cos(_node_angles(size))
+
+
+def _node_angles(size: int) -> NDArray[np.float64]:
+    return (2 * np.arange(size) + 1) * np.pi / (2 * size)
+
+
+def chebyshev_basis(x: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """Return T_0 .. T_(size-1) at ``x``, shape (size, *x.shape), by the three-term recurrence."""
+    basis = np.empty((size, *x.shape))
+    basis[0] = 1.0
+    basis[1:2] = x
+    twice = 2.0 * x
+    rows = list(basis)
+    for before, last, new in zip(rows, rows[1:], rows[2:], strict=False):
+        np.multiply(twice, last, out=new)
+        np.subtract(new, before, out=new)
+    return basis
+
+
+def coefficients_from_nodes(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Turn values on a tensor grid of Chebyshev nodes into the coefficients of the interpolant.
+
+    This is the product Gauss-Chebyshev rule of Eq. (24). The factor (1/2)^h that Eq. (23) puts
+    before a term with h zero indices is folded into the coefficients here, so the expansion is
+    the plain sum of ``coefficients[i] * T_i1(x_1) * ... * T_id(x_d)``.
+
+    Parameters
+    ----------
+    values : ndarray, shape (p_1, ..., p_d)
+        Entry ``q`` is the function's value at ``chebyshev_nodes(p_j)[q_j]`` in each variable j.
+
+    Returns
+    -------
+    ndarray, same shape
+    """
+    coefficients = values
+    for axis, size in enumerate(values.shape):
+        rule = (2.0 / size) * np.cos(np.outer(np.arange(size), _node_angles(size)))
+        rule[0] *= 0.5
+        coefficients = np.moveaxis(np.tensordot(rule, coefficients, axes=(1, axis)), 0, axis)
+    return coefficients
+
+
+class TensorPolynomial:
+    """Several tensor Chebyshev series of one shape, evaluated together.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (outputs, p_1, ..., p_d)
+        Plain coefficients: no factor 1/2 is left to apply.
+    """
+
+    def __init__(self, coefficients: NDArray[np.float64]) -> None:
+        self.coefficients = np.array(coefficients)
+        self.coefficients.flags.writeable = False
+        shape = self.coefficients.shape[1:]
+        self._head, self._tail = shape[: len(shape) // 2], shape[len(shape) // 2 :]
+        self._longest = max(shape)
+        self._matrix = self.coefficients.reshape(-1, prod(self._tail))
+
+    def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values, shape (outputs, n), at points ``x`` of the cube, shape (d, n).
+
+        The trailing half of the variables is summed by one matrix product over all products of
+        their polynomials, the leading half point by point.
+        """
+        if x.shape[1] <= POINTS_AT_ONCE:
+            return self._block(x)
+        values = np.empty((len(self.coefficients), x.shape[1]))
+        for start in range(0, x.shape[1], POINTS_AT_ONCE):
+            block = slice(start, start + POINTS_AT_ONCE)
+            values[:, block] = self._block(x[:, block])
+        return values
+
+    def _block(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        basis = chebyshev_basis(x, self._longest)
+        split = len(self._head)
+        partial = self._matrix @ _products(basis[:, split:], self._tail)
+        operands: list[Any] = [partial.reshape(-1, *self._head, x.shape[1]), range(split + 2)]
+        for variable, size in enumerate(self._head):
+            operands += basis[:size, variable], (variable + 1, split + 1)
+        return np.einsum(*operands, (0, split + 1))
+
+    def derivatives(self, axes: Sequence[int]) -> TensorPolynomial:
+        """Return the partial derivatives in the variables ``axes``.
+
+        Output ``a * outputs + o`` of the result is the derivative of output o in ``axes[a]``.
+        """
+        parts = []
+        for axis in axes:
+            part = np.zeros_like(self.coefficients)
+            derivative = chebder(self.coefficients, axis=axis + 1)
+            # chebder shortens the axis by one, but keeps the length one of a constant.
+            part[tuple(slice(size) for size in derivative.shape)] = derivative
+            parts.append(part)
+        return TensorPolynomial(np.concatenate(parts))
+
+
+def _products(basis: NDArray[np.float64], sizes: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return all products of one polynomial per variable (Khatri-Rao), shape (prod(sizes), n)."""
+    points = basis.shape[-1]
+    product = basis[: sizes[0], 0]
+    for variable, size in enumerate(sizes[1:], start=1):
+        product = (product[:, None] * basis[:size, variable]).reshape(-1, points)
+    return product
