@@ -1,0 +1,20 @@
+"""The swarm family, as pymoo algorithms."""
+
+from pymoo_hdte.algorithms.archive import LeaderArchive
+from pymoo_hdte.algorithms.inertia import EntropyWeight, LinearDecrease
+from pymoo_hdte.algorithms.pyramid import Flat, Pyramid
+from pymoo_hdte.algorithms.swarm import ParticleSwarm
+from pymoo_hdte.algorithms.variants import AMOPSO, AMPMOPSO, MOPSO, MPMOPSO
+
+__all__ = [
+    "AMOPSO",
+    "AMPMOPSO",
+    "MOPSO",
+    "MPMOPSO",
+    "EntropyWeight",
+    "Flat",
+    "LeaderArchive",
+    "LinearDecrease",
+    "ParticleSwarm",
+    "Pyramid",
+]

@@ -1,0 +1,57 @@
+"""The external archive: the best points found so far, from which the swarm takes its leaders."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.population import Population
+
+from pymoo_hdte.algorithms.crowding import crowding_distance, least_crowded
+from pymoo_hdte.algorithms.dominance import best_front
+from pymoo_hdte.algorithms.points import Points
+
+
+class LeaderArchive:
+    """Mutually non-dominated, feasible solutions without duplicates, at most ``capacity`` of them.
+
+    Until a feasible solution is known it holds the least infeasible one; a solution with an
+    objective that is not finite or a constraint that is not a number never enters. Above
+    ``capacity`` the solution of smallest crowding distance leaves, one at a time (paper,
+    Section 5.1, step 5).
+
+    Parameters
+    ----------
+    capacity : int
+        Largest number of members.
+    n_var, n_obj : int
+        Numbers of variables and objectives.
+
+    Attributes
+    ----------
+    members : Population
+        The archived individuals, in order of arrival.
+    points : Points
+        The same as arrays.
+    """
+
+    def __init__(self, capacity: int, n_var: int, n_obj: int) -> None:
+        self.capacity = capacity
+        self.members = Population.empty()
+        self.points = Points.none(n_var, n_obj)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def update(self, population: Population, points: Points) -> None:
+        """Let an evaluated population in, row for row the given points, and keep the best."""
+        everyone = Population.merge(self.members, population)
+        points = self.points.followed_by(points)
+        front = best_front(points)
+        kept = front[least_crowded(points.F[front], self.capacity)]
+        self.members, self.points = everyone[kept], points[kept]
+
+    def draw(self, n: int, random_state: np.random.Generator) -> NDArray[np.float64]:
+        """Draw ``n`` positions (n, d), each the less crowded of two random members."""
+        pairs = random_state.integers(len(self), size=(n, 2))
+        distance = crowding_distance(self.points.F)[pairs]
+        return self.points.X[np.where(distance[:, 0] >= distance[:, 1], pairs[:, 0], pairs[:, 1])]

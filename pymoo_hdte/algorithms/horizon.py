@@ -1,0 +1,52 @@
+"""How many generations a run will have, for parts that follow a schedule."""
+
+from __future__ import annotations
+
+import math
+
+from pymoo.core.termination import TerminateIfAny, Termination
+from pymoo.termination.collection import TerminationCollection
+from pymoo.termination.default import DefaultTermination
+from pymoo.termination.max_eval import MaximumFunctionCallTermination
+from pymoo.termination.max_gen import MaximumGenerationTermination
+
+from pymoo_hdte.checks import InvalidInput
+
+
+def generation_limit(termination: Termination, pop_size: int, n_max_gen: int | None) -> int:
+    """Return G_max: of an ``n_gen`` termination, else ``n_max_gen``, else of other limits.
+
+    Other limits are a number of evaluations, ``pop_size`` of which make a generation, and the
+    smallest of the limits within a collection or a default termination of pymoo.
+
+    Raises
+    ------
+    InvalidInput
+        If nothing limits the number of generations.
+    """
+    limit = _limit(termination, pop_size)
+    if n_max_gen is not None and not (
+        isinstance(termination, MaximumGenerationTermination) and math.isfinite(limit)
+    ):
+        return n_max_gen
+    if math.isinf(limit):
+        raise InvalidInput(
+            "termination",
+            type(termination).__name__,
+            "('n_gen', n) or ('n_eval', n), or any with n_max_gen given to the algorithm",
+        )
+    return max(1, math.ceil(limit))
+
+
+def _limit(termination: Termination, pop_size: int) -> float:
+    """Return the largest number of generations that a termination allows, inf if unlimited."""
+    match termination:
+        case MaximumGenerationTermination(n_max_gen=limit) if limit is not None:
+            return limit
+        case MaximumFunctionCallTermination(n_max_evals=limit) if limit is not None:
+            return limit / pop_size
+        case DefaultTermination(criteria=parts) | TerminateIfAny(criteria=parts):
+            return min((_limit(part, pop_size) for part in parts), default=math.inf)
+        case TerminationCollection(terminations=parts):
+            return min((_limit(part, pop_size) for part in parts), default=math.inf)
+    return math.inf

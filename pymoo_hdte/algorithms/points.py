@@ -1,0 +1,70 @@
+"""Evaluated positions as arrays: what every part of the swarm works on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.population import Population
+
+
+@dataclass(frozen=True)
+class Points:
+    """Positions with their objectives and constraint violations, row for row.
+
+    Attributes
+    ----------
+    X : (n, d) array
+        Positions in the units of the problem.
+    F : (n, m) array
+        Objectives, to be minimised.
+    violation : (n,) array
+        Total constraint violation: 0 for a feasible point, inf for one that cannot be judged
+        because an objective is not finite or a constraint is not a number.
+    """
+
+    X: NDArray[np.float64]
+    F: NDArray[np.float64]
+    violation: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, population: Population, constrained: bool) -> Points:
+        """Read the points of an evaluated pymoo population, whose problem may have constraints."""
+        # Attribute access, because Population.get costs more than everything else in a generation.
+        X = np.array([individual.X for individual in population], dtype=float)
+        F = np.array([individual.F for individual in population], dtype=float)
+        violation = np.zeros(len(population))
+        if constrained:
+            violation = np.array([individual.CV[0] for individual in population])
+            violation[violation <= population[0].config.get("cv_eps", 0.0)] = 0.0
+        judged = np.isfinite(F).all(axis=1) & ~np.isnan(violation)
+        return cls(X, F, np.where(judged, violation, np.inf))
+
+    @classmethod
+    def none(cls, n_var: int, n_obj: int) -> Points:
+        """Return no points, of the given dimensions."""
+        return cls(np.empty((0, n_var)), np.empty((0, n_obj)), np.empty(0))
+
+    def __len__(self) -> int:
+        return len(self.violation)
+
+    def __getitem__(self, rows: NDArray) -> Points:
+        return Points(self.X[rows], self.F[rows], self.violation[rows])
+
+    def followed_by(self, other: Points) -> Points:
+        """Return these points and then the other ones."""
+        return Points(
+            np.concatenate([self.X, other.X]),
+            np.concatenate([self.F, other.F]),
+            np.concatenate([self.violation, other.violation]),
+        )
+
+    def replaced_by(self, other: Points, rows: NDArray[np.bool_]) -> Points:
+        """Return these points with the marked rows taken from ``other``."""
+        column = rows[:, np.newaxis]
+        return Points(
+            np.where(column, other.X, self.X),
+            np.where(column, other.F, self.F),
+            np.where(rows, other.violation, self.violation),
+        )
