@@ -16,6 +16,7 @@ from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 
 MODEL = "calibrated"
 INITIAL = "initial"
+TRUE_FRONT = "true front"
 BAND = 0.05
 """Tolerance of every optimised design."""
 
@@ -34,9 +35,14 @@ class Choice:
     moments: Moments
 
     @property
+    def name(self) -> str:
+        """The preference in words."""
+        return self.preference.replace("_", " ")
+
+    @property
     def label(self) -> str:
-        """Name for a legend or a sentence."""
-        return f"{self.preference.replace('_', ' ').capitalize()}, {self.source}"
+        """Name for a legend."""
+        return f"{self.name}, {self.source}"
 
 
 def initial_choices() -> tuple[Choice, Choice]:
@@ -45,7 +51,7 @@ def initial_choices() -> tuple[Choice, Choice]:
     wide, narrow = (
         Choice(
             INITIAL,
-            f"+-{100 * tolerance:g} %",
+            f"±{100 * tolerance:g} %",
             tuple(problem.nominal.tolist()),
             tolerance,
             exact_moments(problem, problem.nominal, tolerance),
@@ -61,7 +67,7 @@ def preferred_choices(campaign: Campaign) -> list[Choice]:
     (archive,) = campaign.run([OptimisationRun(MODEL, "AMP-MOPSO", seed=1)], "table8")
     sources = {
         "AMP-MOPSO": (designs(archive), objectives(archive)),
-        "true front": (problem.pareto_set(), problem.pareto_front()),
+        TRUE_FRONT: (problem.pareto_set(), problem.pareto_front()),
     }
     return [
         _choose(preference, source, X, F)

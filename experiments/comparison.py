@@ -85,11 +85,11 @@ class Comparison:
 def compare(context: Context, algorithms: Sequence[str], title: str) -> list[Comparison]:
     """Run every algorithm on every problem with seeds 1..seeds and measure the final sets."""
     seeds = range(1, context.seeds + 1)
+    truths = {model: TrueFront(true_front(model)) for model in MODELS}
     jobs = [OptimisationRun(*entry) for entry in product(MODELS, algorithms, seeds)]
     finished = dict(zip(jobs, context.campaign.run(jobs, title), strict=True))
     comparisons = []
-    for model in MODELS:
-        truth = TrueFront(true_front(model))
+    for model, truth in truths.items():
         runs = {
             algorithm: [finished[OptimisationRun(model, algorithm, seed)] for seed in seeds]
             for algorithm in algorithms

@@ -1,0 +1,155 @@
+"""Results on disk and the report made of them."""
+
+import csv
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from experiments.report import write_report
+from experiments.result import Column, Finding, Picture, Result, Table, significant
+from experiments.store import csv_bytes, load, png_bytes, save
+
+HOSTILE = "<script>alert('x')</script>"
+
+
+def line_plot() -> Figure:
+    figure = Figure(figsize=(2, 2))
+    figure.subplots().plot([0, 1], [0, np.pi])
+    return figure
+
+
+def example() -> Result:
+    columns = (
+        Column("algorithm"),
+        Column("mean", "arcsec", 3, "IGD"),
+        Column("paper", "arcsec", 4, "IGD", paper=True),
+        Column("runs"),
+    )
+    rows = (
+        (HOSTILE, np.float64(1 / 3), 0.018, np.int64(20)),
+        ("none", float("nan"), None, 0),
+    )
+    findings = (Finding(np.bool_(True), "They agree."), Finding(False, "They differ."))
+    times = Table("times", "Wall times", (Column("time", "s"),), ((1.5,),), wall_times=True)
+    return Result(
+        title="An example",
+        command="python -m experiments table7",
+        paragraphs=(HOSTILE,),
+        tables=(Table("quality", "Quality", columns, rows, findings), times),
+        pictures=(Picture("line", "A line.", line_plot()),),
+        notes=("A note.",),
+        headline="quality",
+    )
+
+
+@pytest.fixture
+def out(tmp_path):
+    save(tmp_path, "table7", example())
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (0.0180, 3, "0.0180"),
+        (88.767, 4, "88.77"),
+        (9.9996, 4, "10.00"),
+        (12345.6, 3, "12346"),
+        (-0.25, 2, "\N{MINUS SIGN}0.25"),
+        (1.9e-7, 2, "1.9e\N{MINUS SIGN}07"),
+        (0.0, 3, "0"),
+        (float("nan"), 3, "\N{EM DASH}"),
+        (float("inf"), 3, "∞"),
+    ],
+)
+def test_numbers_keep_their_significant_digits(value, digits, text):
+    assert significant(value, digits) == text
+
+
+def test_csv_keeps_every_digit(out):
+    with (out / "table7" / "quality.csv").open(newline="") as file:
+        heading, first, second = csv.reader(file)
+    assert heading == ["algorithm", "IGD mean [arcsec]", "IGD paper [arcsec]", "runs"]
+    assert float(first[1]) == 1 / 3
+    assert second == ["none", "nan", "", "0"]
+
+
+def test_floats_survive_csv_bit_for_bit():
+    values = np.random.default_rng(3).normal(size=(50, 2)) * 10.0 ** np.arange(-25, 25)[:, None]
+    text = csv_bytes(["a", "b"], values.tolist()).decode()
+    read = [[float(cell) for cell in line.split(",")] for line in text.splitlines()[1:]]
+    np.testing.assert_array_equal(read, values)
+
+
+def test_a_stored_result_reads_back_as_it_was(out):
+    written, read = example(), load(out, "table7")
+    for table, again in zip(written.tables, read.tables, strict=True):
+        assert repr(again) == repr(table)
+    assert (read.title, read.notes, read.headline) == ("An example", ("A note.",), "quality")
+    assert read.pictures[0].png == png_bytes(written.pictures[0])
+
+
+def test_wall_times_are_stored_apart_from_what_must_come_out_the_same(out):
+    assert (out / "times" / "table7" / "times.csv").is_file()
+    assert not (out / "table7" / "times.csv").exists()
+    assert "Wall times" not in (out / "table7" / "result.json").read_text()
+
+
+def test_a_table_with_a_short_row_is_refused():
+    with pytest.raises(ValueError, match="1 cells for 2 columns"):
+        Table("broken", "Broken", (Column("a"), Column("b")), ((1.0,),))
+
+
+def test_the_page_holds_everything_and_asks_for_nothing(out):
+    page = write_report(out).read_text()
+    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert sources
+    assert all(s.startswith(("data:image/png;base64,", "#")) for s in sources)
+    assert "<script" not in page
+    assert "@import" not in page
+
+
+def test_the_page_is_well_formed_and_escapes_what_it_shows(out):
+    class Balance(HTMLParser):
+        def __init__(self):
+            super().__init__()
+            self.open = []
+
+        def handle_starttag(self, tag, attributes):
+            if tag not in {"meta", "img"}:
+                self.open.append(tag)
+
+        def handle_endtag(self, tag):
+            assert self.open.pop() == tag
+
+    page = write_report(out).read_text()
+    parser = Balance()
+    parser.feed(page)
+    assert parser.open == []
+    assert "&lt;script&gt;" in page
+
+
+def test_the_first_screen_repeats_the_headline_and_sorts_the_findings(out):
+    page = write_report(out).read_text()
+    first_screen, rest = page.split('<section id="table7">')
+    assert "0.333" in first_screen
+    assert "0.333" in rest
+    agreeing, differing = first_screen.split("Does not agree")
+    assert "They agree." in agreeing
+    assert "They differ." in differing
+
+
+def test_results_of_another_source_are_marked(out):
+    assert "Made by another version" not in write_report(out).read_text()
+    stored = out / "table7" / "result.json"
+    stored.write_text(re.sub(r'"made_by": "\w+"', '"made_by": "older"', stored.read_text()))
+    assert "Made by another version" in write_report(out).read_text()
+
+
+def test_an_empty_folder_gives_an_empty_report(tmp_path):
+    page = write_report(tmp_path, notice="Interrupted.").read_text()
+    assert "Interrupted." in page
+    assert "<table>" not in page
