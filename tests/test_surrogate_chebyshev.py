@@ -185,7 +185,7 @@ def test_a_function_that_misbehaves_is_refused(function):
 def test_it_refuses_to_extrapolate():
     surrogate = ChebyshevSurrogate(Box(("a",), (0,), (1,)), [1.0, 2.0])
     for evaluate in (surrogate, surrogate.gradient):
-        with pytest.raises(ExtrapolationError, match="a is 1.001"):
+        with pytest.raises(ExtrapolationError, match=r"a is 1\.001"):
             evaluate([[0.5], [1.001]])
 
 
