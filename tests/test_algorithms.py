@@ -47,6 +47,13 @@ class Parabolas(Problem):
         out["F"] = np.column_stack([(X**2).sum(axis=1), ((X - 1.0) ** 2).sum(axis=1)])
 
 
+class Bowl(Parabolas):
+    """One objective, twice."""
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        out["F"] = np.repeat((X**2).sum(axis=1, keepdims=True), 2, axis=1)
+
+
 class Cliff(Parabolas):
     """Not a number on part of the box."""
 
@@ -120,28 +127,51 @@ def test_mutation_moves_the_position_and_not_the_velocity():
     np.testing.assert_allclose(after.get("X"), np.minimum(before.get("X") + 0.25, 2.0))
 
 
-def test_leaders_and_own_best_pull_by_their_factors():
-    class Pull(Still):
+def test_leaders_pull_by_twice_a_random_share_in_every_dimension():
+    class Social(Still):
         def acceleration(self, ranks):
             return np.zeros(len(ranks)), np.full(len(ranks), 2.0)
 
-    # One objective twice: the archive holds one leader, so the pull has one direction.
-    class Bowl(Parabolas):
-        def _evaluate(self, X, out, *args, **kwargs):
-            out["F"] = np.repeat((X**2).sum(axis=1, keepdims=True), 2, axis=1)
-
-    swarm = ParticleSwarm(LinearDecrease(0.0, 0.0), Pull(), pop_size=2000)
+    # The archive of a problem with one minimum holds one leader, so the pull has one direction.
+    swarm = ParticleSwarm(LinearDecrease(0.0, 0.0), Social(), pop_size=2000)
     swarm.setup(Bowl(), termination=("n_gen", 2), seed=0)
     swarm.next()
     start, leader = swarm.pop.get("X"), swarm.opt[0].X
-    share = swarm.ask().get("V") / np.where(start == leader, 1.0, leader - start)
-    share = share[(start != leader).all(axis=1)]
+    others = (start != leader).all(axis=1)
+    share = (swarm.ask().get("V")[others]) / (leader - start[others])
     assert share.min() >= 0.0
     assert share.max() <= 2.0
     # 2 r with r uniform has mean 1 and variance 1/3, independently in every dimension.
     np.testing.assert_allclose(share.mean(axis=0), 1.0, atol=4 / np.sqrt(3 * 2000))
     correlation = np.corrcoef(share.T)[np.triu_indices(3, 1)]
     np.testing.assert_allclose(correlation, 0.0, atol=4 / np.sqrt(2000))
+
+
+def test_own_best_pulls_back_those_who_left_it():
+    class Nostalgic(Still):
+        def acceleration(self, ranks):
+            return np.full(len(ranks), 2.0), np.zeros(len(ranks))
+
+    swarm = ParticleSwarm(LinearDecrease(0.0, 0.0), Nostalgic(shift=0.25), pop_size=200)
+    result = run(swarm, Bowl(), n_gen=3, save_history=True)
+    first, second, third = (step.pop for step in result.history)
+    improved = (second.get("F") < first.get("F")).all(axis=1)
+    assert 0 < improved.sum() < 200
+    back = first.get("X") - second.get("X")
+    share = third.get("V")[~improved] / back[~improved]
+    assert not third.get("V")[improved].any()
+    assert share.min() >= 0.0
+    assert share.max() <= 2.0
+    np.testing.assert_allclose(share.mean(), 1.0, atol=4 / np.sqrt(3 * share.size))
+
+
+def test_asking_again_does_not_move_twice():
+    swarm = ParticleSwarm(LinearDecrease(0.5, 0.5), Still(), **SMALL)
+    swarm.setup(Parabolas(), termination=("n_gen", 5), seed=1)
+    swarm.next()
+    once, twice = swarm.ask(), swarm.ask()
+    np.testing.assert_array_equal(once.get("V"), 0.5 * swarm.pop.get("V"))
+    np.testing.assert_array_equal(twice.get("V"), once.get("V"))
 
 
 def test_schedules_see_the_generation_that_moves():

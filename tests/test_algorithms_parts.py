@@ -30,6 +30,8 @@ fronts = arrays(
         (LINE, 1.0),  # a cell each
         (LINE[[0, 0, 7, 7]], 0.5),  # two cells of two: ln 2 / ln 4
         (LINE[[0, 0, 0, 7]], (4 * np.log(4) - 3 * np.log(3)) / (4 * np.log(4))),
+        # The upper edge belongs to the last cell, so the last two solutions share it.
+        (LINE[[0, 6, 7]] + [[0, 0], [0.9, -0.9], [0, 0]], 1 - 2 * np.log(2) / (3 * np.log(3))),
         (LINE[[3, 3, 3]], 0.0),  # one cell
         (LINE[:1], 0.0),  # one solution, 0 / 0 in the formula
         (LINE[:0], 0.0),
