@@ -10,7 +10,7 @@ import csv
 import inspect
 import json
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, Future, as_completed, wait
+from concurrent.futures import BrokenExecutor, Executor, Future, as_completed, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from experiments.provenance import environment, fingerprint
 from experiments.store import TIMES, csv_bytes, write_atomically
+from experiments.workers import interrupts_held_off
 
 
 @dataclass(frozen=True)
@@ -107,16 +108,19 @@ class Campaign:
 def _run_in_executor(
     executor: Executor, jobs: Sequence[Job], keep: Callable[[Job, Run], None]
 ) -> None:
-    waiting: dict[Future[Run], Job] = {executor.submit(execute, job): job for job in jobs}
+    with interrupts_held_off():
+        waiting: dict[Future[Run], Job] = {executor.submit(execute, job): job for job in jobs}
     try:
         for future in as_completed(list(waiting)):
             run = future.result()
             keep(waiting.pop(future), run)
+    except BrokenExecutor:
+        # The workers are gone: nothing has begun that could still be waited for.
+        raise
     except BaseException:
-        for future in waiting:
-            future.cancel()
-        for future in wait(waiting).done:
-            if not future.cancelled() and future.exception() is None:
+        begun = [future for future in waiting if not future.cancel()]
+        for future in wait(begun).done:
+            if future.exception() is None:
                 keep(waiting[future], future.result())
         raise
 

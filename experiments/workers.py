@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
+from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
 
 from pymoo_hdte.checks import InvalidInput
 
@@ -27,7 +29,7 @@ def make_executor(workers: int, dask: str | None = None) -> Executor | None:
         return None
     # Forked children would inherit the threads of numerical libraries in an undefined state.
     spawn = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, spawn, initializer=_ignore_interrupt)
+    return ProcessPoolExecutor(workers, spawn)
 
 
 def _dask_executor(address: str) -> Executor:
@@ -41,6 +43,15 @@ def _dask_executor(address: str) -> Executor:
         raise InvalidInput("--dask", address, "the address of a running Dask scheduler") from None
 
 
-def _ignore_interrupt() -> None:
-    # Ctrl-C reaches the whole process group; only the parent decides what becomes of the jobs.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def interrupts_held_off() -> Iterator[None]:
+    """Ignore Ctrl-C while processes are started, so that these ignore it for good.
+
+    Ctrl-C reaches the whole process group, and processes inherit what they ignore from the one that
+    starts them: only the parent is to decide what becomes of the jobs.
+    """
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)

@@ -1,8 +1,10 @@
 """Campaigns: same bytes for any number of workers, and after an interruption."""
 
+import os
 import subprocess
 import sys
 import time
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,6 +50,16 @@ class FailingWalk(RandomWalk):
     def execute(self) -> Run:
         if self.seed == 3:
             raise ArithmeticError("a step too far")
+        return super().execute()
+
+
+@dataclass(frozen=True)
+class KilledWalk(RandomWalk):
+    """The same job, but the operating system ends the worker at seed 3."""
+
+    def execute(self) -> Run:
+        if self.seed == 3:
+            os._exit(1)
         return super().execute()
 
 
@@ -105,6 +117,11 @@ def test_a_failing_job_is_reported_and_the_finished_ones_are_kept(tmp_path, work
     names = {Path(p).name for p in files(tmp_path)}
     assert {"walk_seed1.csv", "walk_seed2.csv"} <= names
     assert "walk_seed3.csv" not in names
+
+
+def test_a_killed_worker_is_an_error_and_not_a_wait_without_end(tmp_path):
+    with make_executor(2) as executor, pytest.raises(BrokenExecutor):
+        Campaign(tmp_path, executor).run([KilledWalk(seed) for seed in SEEDS], "walks")
 
 
 def test_another_source_does_not_reuse_the_runs(tmp_path, monkeypatch):

@@ -1,5 +1,6 @@
 """The experiments themselves, small: numbers against other ways to get them, and same bytes."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -85,11 +86,12 @@ def test_workers_and_repetition_do_not_change_a_byte(tmp_path):
 def test_ctrl_c_leaves_a_readable_report_and_code_130(tmp_path):
     arguments = ["table7", "--workers", "2", "--out", str(tmp_path)]
     command = [sys.executable, "-m", "experiments", *arguments]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     deadline = time.monotonic() + 60.0
     while not list(tmp_path.glob("runs/*/*.csv")) and time.monotonic() < deadline:
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
+    # A terminal sends Ctrl-C to the workers as well.
+    os.killpg(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60.0)
     assert process.returncode == 130
     assert "Interrupted during table7" in errors
