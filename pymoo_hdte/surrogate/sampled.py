@@ -11,16 +11,18 @@ from pymoo_hdte.checks import whole_number
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
 from pymoo_hdte.surrogate.moments import divide_or_zero
-from pymoo_hdte.surrogate.tensor import POINTS_AT_ONCE
 from pymoo_hdte.surrogate.uncertainty import UncertainInput, Uncertainty
+
+# Bounds the memory, whatever the number of designs.
+_POINTS_AT_ONCE = 8192
 
 
 class SampledMoments:
     """Monte Carlo mean and standard deviation as the paper has them (Section 5.1).
 
-    The samples of the inputs' standard variables are drawn once, at construction: all designs
-    and all calls share them (common random numbers), so differences between designs are not
-    blurred by sampling. Every sampled point of every design is evaluated on the surrogate.
+    The samples of the inputs' standard variables are drawn once, at construction, one input after
+    the other in the surrogate's order: all designs and all calls share them (common random
+    numbers), so differences between designs are not blurred by sampling. Every sampled point of every design is evaluated on the surrogate.
 
     Parameters
     ----------
@@ -53,8 +55,7 @@ class SampledMoments:
         self._samples = np.array(
             [entry.sample(random_state, self.n_samples) for entry in self.uncertainty.inputs]
         )
-        self._polynomial = surrogate.polynomial
-        self._derivatives = surrogate.polynomial.derivatives(self.uncertainty.design_axes)
+        self._surrogate = surrogate
 
     def __call__(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return mean and standard deviation of the samples, shape (n,) each.
@@ -73,8 +74,8 @@ class SampledMoments:
         """
         checked = self._checked(designs)
         mean, std = np.empty((2, len(checked)))
-        for block, cube in self._blocks(checked):
-            values = self._polynomial(cube).reshape(-1, self.n_samples)
+        for block, points in self._blocks(checked):
+            values = self._surrogate(points).reshape(-1, self.n_samples)
             mean[block] = values.mean(axis=1)
             std[block] = values.std(axis=1)
         return mean, std
@@ -87,11 +88,11 @@ class SampledMoments:
         checked = self._checked(designs)
         dmean, dstd = np.empty((2, *checked.shape))
         axes = list(self.uncertainty.design_axes)
-        inner = self._samples[axes] / self.uncertainty.surrogate_box.half_width[axes, None]
-        for block, cube in self._blocks(checked):
-            values = self._polynomial(cube).reshape(-1, self.n_samples)
-            slopes = self._derivatives(cube).reshape(len(axes), -1, self.n_samples)
-            slopes *= inner[:, None]
+        for block, points in self._blocks(checked):
+            values = self._surrogate(points).reshape(-1, self.n_samples)
+            slopes = self._surrogate.gradient(points)[:, axes].T
+            slopes = slopes.reshape(len(axes), -1, self.n_samples)
+            slopes *= self._samples[axes, None]
             deviation = values - values.mean(axis=1, keepdims=True)
             dmean[block] = slopes.mean(axis=2).T
             covariance = np.einsum("mns,ns->nm", slopes, deviation) / self.n_samples
@@ -102,18 +103,16 @@ class SampledMoments:
         return self.design_box.from_cube(self.design_box.to_cube(designs))
 
     def _blocks(self, designs: NDArray[np.float64]) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-        """Yield a few designs at a time: where they stand, and their points in the cube.
+        """Yield a few designs at a time: where they stand, and their sampled points.
 
-        The points have shape (d, designs * samples), the samples running fastest.
+        The points have shape (designs * samples, d), the samples running fastest.
         """
-        box = self.uncertainty.surrogate_box
-        step = max(1, POINTS_AT_ONCE // self.n_samples)
+        step = max(1, _POINTS_AT_ONCE // self.n_samples)
         for start in range(0, len(designs), step):
             block = slice(start, start + step)
-            points = np.empty((len(box), len(designs[block]), self.n_samples))
+            # One variable per contiguous row, as the surrogate works.
+            points = np.empty((len(self._samples), len(designs[block]), self.n_samples))
             points[:] = self._samples[:, None]
             for column, axis in enumerate(self.uncertainty.design_axes):
                 points[axis] *= designs[block, column, None]
-            points -= box.centre[:, None, None]
-            points /= box.half_width[:, None, None]
-            yield block, points.reshape(len(box), -1)
+            yield block, points.reshape(len(points), -1).T

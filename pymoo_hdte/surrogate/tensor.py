@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import prod
-from typing import Any
+from string import ascii_uppercase
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder
 from numpy.typing import NDArray
 
-# Keeps the arrays of one block in the processor's cache at the paper's order and dimension.
-POINTS_AT_ONCE = 8192
+# OpenBLAS keeps a matrix product of up to a million multiplications on one thread. A larger one
+# starts threads that gain nothing here, stall when several processes share the cores, and could
+# make the bytes of a result depend on their number.
+_MULTIPLICATIONS_AT_ONCE = 1_000_000
 
 
 def chebyshev_nodes(size: int) -> NDArray[np.float64]:
@@ -75,6 +77,8 @@ class TensorPolynomial:
         shape = self.coefficients.shape[1:]
         self._head, self._tail = shape[: len(shape) // 2], shape[len(shape) // 2 :]
         self._longest = max(shape)
+        letters = ascii_uppercase[: len(self._head)]
+        self._sum = ",".join([f"o{letters}n", *(f"{letter}n" for letter in letters)]) + "->on"
         self._matrix = self.coefficients.reshape(-1, prod(self._tail))
 
     def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -83,11 +87,12 @@ class TensorPolynomial:
         The trailing half of the variables is summed by one matrix product over all products of
         their polynomials, the leading half point by point.
         """
-        if x.shape[1] <= POINTS_AT_ONCE:
+        step = max(1, _MULTIPLICATIONS_AT_ONCE // self._matrix.size)
+        if x.shape[1] <= step:
             return self._block(x)
         values = np.empty((len(self.coefficients), x.shape[1]))
-        for start in range(0, x.shape[1], POINTS_AT_ONCE):
-            block = slice(start, start + POINTS_AT_ONCE)
+        for start in range(0, x.shape[1], step):
+            block = slice(start, start + step)
             values[:, block] = self._block(x[:, block])
         return values
 
@@ -95,10 +100,8 @@ class TensorPolynomial:
         basis = chebyshev_basis(x, self._longest)
         split = len(self._head)
         partial = self._matrix @ _products(basis[:, split:], self._tail)
-        operands: list[Any] = [partial.reshape(-1, *self._head, x.shape[1]), range(split + 2)]
-        for variable, size in enumerate(self._head):
-            operands += basis[:size, variable], (variable + 1, split + 1)
-        return np.einsum(*operands, (0, split + 1))
+        leading = [basis[:size, variable] for variable, size in enumerate(self._head)]
+        return np.einsum(self._sum, partial.reshape(-1, *self._head, x.shape[1]), *leading)
 
     def derivatives(self, axes: Sequence[int]) -> TensorPolynomial:
         """Return the partial derivatives in the variables ``axes``.
