@@ -22,7 +22,8 @@ class SampledMoments:
 
     The samples of the inputs' standard variables are drawn once, at construction, one input after
     the other in the surrogate's order: all designs and all calls share them (common random
-    numbers), so differences between designs are not blurred by sampling. Every sampled point of every design is evaluated on the surrogate.
+    numbers), so differences between designs are not blurred by sampling. Every sampled point of
+    every design is evaluated on the surrogate.
 
     Parameters
     ----------
