@@ -1,6 +1,7 @@
 """Saving and loading: the same bytes back, and a clear refusal of everything else."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -61,6 +62,21 @@ def test_a_write_that_fails_leaves_the_former_file(surrogate, path, monkeypatch)
     monkeypatch.setattr(np, "savez", fail)
     with pytest.raises(OSError, match="disk full"):
         surrogate.save(path)
+    assert path.read_bytes() == before
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_the_new_file_appears_in_one_step(surrogate, path, monkeypatch):
+    before = path.read_bytes()
+
+    def fail(source, target):
+        assert ChebyshevSurrogate.load(source).provenance == {}
+        assert path.read_bytes() == before
+        raise OSError("replaced by somebody else")
+
+    monkeypatch.setattr(os, "replace", fail)
+    with pytest.raises(OSError, match="somebody else"):
+        ChebyshevSurrogate(BOX, surrogate.coefficients).save(path)
     assert path.read_bytes() == before
     assert list(path.parent.iterdir()) == [path]
 

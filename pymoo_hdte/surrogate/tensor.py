@@ -11,8 +11,7 @@ from numpy.polynomial.chebyshev import chebder
 from numpy.typing import NDArray
 
 # OpenBLAS keeps a matrix product of up to a million multiplications on one thread. A larger one
-# starts threads that gain nothing here, stall when several processes share the cores, and could
-# make the bytes of a result depend on their number.
+# starts threads that gain nothing here, and stall when several processes share the cores.
 _MULTIPLICATIONS_AT_ONCE = 1_000_000
 
 
