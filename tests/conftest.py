@@ -1,0 +1,23 @@
+"""What several test files share."""
+
+import numpy as np
+import pytest
+
+from pymoo_hdte.drive import PRESETS, DriveModel, preset
+
+
+@pytest.fixture(params=PRESETS)
+def model(request: pytest.FixtureRequest) -> DriveModel:
+    """Every preset in turn."""
+    return preset(request.param)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """A fresh generator of fixed seed."""
+    return np.random.default_rng(20261121)
+
+
+def random_designs(model: DriveModel, n: int, rng: np.random.Generator) -> np.ndarray:
+    """Draw designs in the +-35 % box around the nominal, shape (n, 5)."""
+    return model.nominal * rng.uniform(0.65, 1.35, (n, 5))

@@ -1,0 +1,87 @@
+"""The data sheet: Table 4 and Table 2 as printed, and every way to get it wrong."""
+
+import math
+from dataclasses import FrozenInstanceError
+from importlib.resources import files
+
+import pytest
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive import hs_20_100, load_datasheet
+
+TEXT = (files("pymoo_hdte.drive") / "data" / "hs_20_100.toml").read_text(encoding="utf-8")
+
+
+def test_holds_table_4_in_si_units():
+    sheet = hs_20_100()
+    assert sheet.ratio == 101.0
+    assert sheet.input_speed == pytest.approx(2000 * math.pi / 30)
+    assert sheet.load_torque == 40.0
+    nominal = sheet.nominal
+    assert nominal.static_error * 648000 / math.pi == pytest.approx(36.251)
+    assert (nominal.stiffness, nominal.input_inertia, nominal.output_inertia) == (
+        2.583e4,
+        1.970e-4,
+        8.505e-4,
+    )
+    assert (nominal.input_damping, nominal.mesh_damping, nominal.output_damping) == (
+        1.700e-4,
+        4.465e-4,
+        5.022e-4,
+    )
+
+
+def test_holds_thirteen_sources_with_the_sums_of_table_2():
+    sources = hs_20_100().error_sources
+    assert len(sources) == 13
+    assert sum(source.mean for source in sources) == pytest.approx(88.51e-6)
+    assert sum(source.std for source in sources) == pytest.approx(13.43e-6)
+    assert sorted({source.component for source in sources}) == ["CS", "FB", "FS", "WG"]
+
+
+def test_orders_follow_from_the_teeth():
+    orders = hs_20_100().error_orders
+    assert orders == {"e_m": 2.0, "e_g": 2.02, "e_w": 1.0, "e_p": 2.0, "e_h": 404.0}
+
+
+def test_is_immutable():
+    with pytest.raises(FrozenInstanceError):
+        hs_20_100().nominal.stiffness = 1.0
+
+
+STIFFNESS = 'stiffness = { value = 2.583e4, unit = "N.m/rad" }'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "allowed"),
+    [
+        (STIFFNESS, "", "nominal.stiffness", "missing"),
+        (STIFFNESS, "stiffness = 2.583e4", "nominal.stiffness", "unit"),
+        (STIFFNESS, "stiffness = { value = 2.583e4 }", "nominal.stiffness", "unit"),
+        (STIFFNESS, 'stiffness = { value = 1, unit = "N/m" }', "stiffness.unit", "N.m/rad"),
+        (STIFFNESS, 'stiffness = { value = -1, unit = "N.m/rad" }', "stiffness.value", "above 0"),
+        (STIFFNESS, 'stiffness = { value = nan, unit = "N.m/rad" }', "stiffness.value", "finite"),
+        (STIFFNESS, 'stiffness = { value = inf, unit = "N.m/rad" }', "stiffness.value", "finite"),
+        (STIFFNESS, 'stiffness = { value = "2", unit = "N.m/rad" }', "stiffness.value", "number"),
+        (STIFFNESS, 'stiffness = { value = true, unit = "N.m/rad" }', "stiffness.value", "number"),
+        (STIFFNESS, STIFFNESS + "\nstifness = 1", "nominal.stifness", "no such field"),
+        ("flexspline = 200", "flexspline = 203", "circular_spline_teeth", "204"),
+        ("flexspline = 200", "flexspline = 200.5", "teeth.flexspline", "whole number"),
+        ('class = "e_h"', 'class = "e_x"', "error class of dfi1", "'e_m'"),
+        ('symbol = "dfi1"', 'symbol = "dFp1"', "symbols", "each symbol once"),
+        ('symbol = "dfi1"', 'symbol = ""', "error_source[1].symbol", "non-empty"),
+        ("teeth_in_mesh = 50", "teeth_in_mesh = 0", "mesh.teeth_in_mesh", "at least 1"),
+        ("[teeth]", "[tooth]", "teeth", "missing"),
+        ("value = 0.89", "value = -0.89", "error_source[0].std.value", "at least 0"),
+        ("value = 2000", "value = 0", "rated.input_speed.value", "above 0"),
+        ("[teeth]", "[teeth", "hs.toml", "valid TOML"),
+    ],
+)
+def test_bad_fields_are_named_with_what_is_allowed(tmp_path, old, new, field, allowed):
+    assert old in TEXT
+    path = tmp_path / "hs.toml"
+    path.write_text(TEXT.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InvalidInput) as caught:
+        load_datasheet(path)
+    assert field in str(caught.value)
+    assert allowed in str(caught.value)
