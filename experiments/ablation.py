@@ -15,7 +15,6 @@ from experiments.comparison_tables import (
     runs_table,
 )
 from experiments.figures import fronts, igd_of_runs
-from experiments.models import model_sentences
 from experiments.published_values import TABLE_7
 from experiments.registry import Context
 from experiments.result import Finding, Picture, Result, significant
@@ -36,7 +35,7 @@ def run(context: Context) -> Result:
     return Result(
         title=f"Fig. 17: ablation of AMP-MOPSO over {context.seeds} seeds",
         command=f"python -m experiments ablation --seeds {context.seeds}",
-        paragraphs=(SETTING, *model_sentences(*(c.model for c in comparisons))),
+        paragraphs=(SETTING,),
         tables=(
             quality_table(comparisons, TABLE_7, list(_evenness(comparisons))),
             coverage_table(comparisons, list(_gaps(comparisons))),

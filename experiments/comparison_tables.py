@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from experiments.comparison import Comparison
+from experiments.models import model_sentences
 from experiments.published_values import AlgorithmQuality
 from experiments.result import Cell, Column, Finding, Table, significant
 from experiments.statistics import summary
@@ -31,10 +32,14 @@ def quality_table(
         for name in ("IGD", "Spacing")
         for column in (*_summary_columns(name), _paper_column(name))
     ]
-    title = (
-        "IGD and Spacing of the final sets of 50, normalised by the true front; smaller is better"
+    return Table(
+        "quality",
+        "IGD and Spacing of the final sets, normalised by the true front; smaller is better",
+        (*WHO, *columns),
+        _rows(comparisons, cells),
+        note=" ".join(model_sentences(*(comparison.model for comparison in comparisons))),
+        findings=tuple(findings),
     )
-    return Table("quality", title, (*WHO, *columns), _rows(comparisons, cells), tuple(findings))
 
 
 def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding] = ()) -> Table:
@@ -54,12 +59,11 @@ def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding
         Column("runs that lose one", group="pieces"),
     )
     title = "Hypervolume (reference point 1.1, 1.1; larger is better) and lost pieces of the front"
-    return Table("coverage", title, (*WHO, *columns), _rows(comparisons, cells), tuple(findings))
+    rows = _rows(comparisons, cells)
+    return Table("coverage", title, (*WHO, *columns), rows, findings=tuple(findings))
 
 
-def paired_tests_table(
-    comparisons: Sequence[Comparison], algorithm: str, findings: Sequence[Finding] = ()
-) -> Table:
+def paired_tests_table(comparisons: Sequence[Comparison], algorithm: str) -> Table:
     """Paired tests of ``algorithm`` against every other one."""
     rows = [
         (comparison.model, INDICATOR_NAMES[indicator], test.rival, test.p, test.better)
@@ -75,7 +79,7 @@ def paired_tests_table(
         Column(f"A12: {algorithm} better", digits=3),
     )
     title = f"{algorithm} against each rival on the same seeds (A12 = 0.5: no difference)"
-    return Table("tests", title, columns, tuple(rows), tuple(findings))
+    return Table("tests", title, columns, tuple(rows))
 
 
 def runs_table(comparisons: Sequence[Comparison]) -> Table:
@@ -104,7 +108,8 @@ def times_table(
     columns = (*_summary_columns("time", "s"), _paper_column("time", "s", digits=4))
     title = "Wall time of one run of 10,000 evaluations, other runs going on beside it"
     rows = _rows(comparisons, cells)
-    return Table("times", title, (*WHO, *columns), rows, tuple(findings), wall_times=True)
+    found = tuple(findings)
+    return Table("times", title, (*WHO, *columns), rows, findings=found, wall_times=True)
 
 
 def change(before: float, after: float) -> str:

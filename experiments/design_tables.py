@@ -36,7 +36,7 @@ def optima_table(preferred: Sequence[Choice]) -> Table:
         columns += [Column(part, unit, 4, name) for part in ("optimum", "lower", "upper")]
     title = f"Table 9: optimal designs with their ±{100 * BAND:g} % bands"
     finding = _optima_finding([c for c in preferred if c.source != TRUE_FRONT])
-    return Table("optima", title, tuple(columns), tuple(rows), (finding,))
+    return Table("optima", title, tuple(columns), tuple(rows), findings=(finding,))
 
 
 def deviation_table(optimum: Choice) -> Table:
@@ -68,7 +68,8 @@ def deviation_table(optimum: Choice) -> Table:
             f"lowest DTE, and No. {theirs[1]}, with the highest.",
         ),
     )
-    return Table("deviation", "Deviation degree D_i of the prototypes", columns, rows, findings)
+    title = "Deviation degree D_i of the prototypes"
+    return Table("deviation", title, columns, rows, findings=findings)
 
 
 def influence_note(centre: Choice) -> str:

@@ -61,15 +61,16 @@ class Column:
 class Table:
     """Rows of cells, the same number in each, under named columns.
 
-    ``findings`` hold the sentences that compare it with the paper. ``folded`` tables open on
-    request. ``wall_times`` marks a table that no two runs fill alike: it is stored apart from what
-    must come out the same.
+    ``note`` says what a reader must know beside it; ``findings`` hold the sentences that compare it
+    with the paper. ``folded`` tables open on request. ``wall_times`` marks a table that no two runs
+    fill alike: it is stored apart from what must come out the same.
     """
 
     name: str
     title: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
     findings: tuple[Finding, ...] = ()
     folded: bool = False
     wall_times: bool = False

@@ -95,7 +95,8 @@ def _table(trials: list[Trial]) -> Table:
         columns.append(Column("ours", unit, digits, heading))
         columns.append(Column("paper", unit, 4, heading, paper=True))
     title = f"Errors at {N_TEST} test points"
-    return Table("accuracy", title, tuple(columns), tuple(rows), tuple(_findings(trials)))
+    findings = tuple(_findings(trials))
+    return Table("accuracy", title, tuple(columns), tuple(rows), findings=findings)
 
 
 def _cells(trial: Trial) -> Iterator[Cell]:

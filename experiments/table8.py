@@ -87,7 +87,7 @@ def _moments_table(initial: Sequence[Choice], preferred: Sequence[Choice]) -> Ta
     ours = [choice for choice in preferred if choice.source != TRUE_FRONT]
     findings = (_moment_finding((wide, *ours)), _band_finding(wide, narrow, ours))
     title = "Table 8: mean and standard deviation of the DTE"
-    return Table("preferences", title, tuple(columns), tuple(rows), findings)
+    return Table("preferences", title, tuple(columns), tuple(rows), findings=findings)
 
 
 def _moment_cells(choice: Choice, initial: Sequence[Choice]) -> Iterator[Cell]:
@@ -169,7 +169,7 @@ def _reevaluation_table(
         Column("95 % half width of the mean", "arcsec", 2),
     )
     title = f"Re-evaluation with {N_SAMPLES:,} samples of the surrogate"
-    return Table("reevaluation", title, columns, tuple(rows), (finding,))
+    return Table("reevaluation", title, columns, tuple(rows), findings=(finding,))
 
 
 def _densities(samples: dict[Choice, NDArray[np.float64]]) -> Figure:

@@ -38,7 +38,7 @@ def example() -> Result:
         title="An example",
         command="python -m experiments table7",
         paragraphs=(HOSTILE,),
-        tables=(Table("quality", "Quality", columns, rows, findings), times),
+        tables=(Table("quality", "Quality", columns, rows, "How.", findings), times),
         pictures=(Picture("line", "A line.", line_plot()),),
         notes=("A note.",),
         headline="quality",
