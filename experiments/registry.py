@@ -50,5 +50,8 @@ EXPERIMENTS = (
     Experiment("ablation", "Fig. 17: AMP-MOPSO without its pyramid, its entropy weight, or both"),
     Experiment("table5", "Table 5 and Fig. 11: accuracy of the Chebyshev surrogate by order"),
     Experiment("table8", "Tables 8 and 9, Fig. 19: the designs that three preferences choose"),
+    Experiment("published", "What Eq. (9) gives as printed, order by order, beside an integrator"),
+    Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
+    Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
 )
 """In the order in which they run and are reported."""

@@ -1,0 +1,295 @@
+"""The true Pareto front of a smooth two-objective problem in a box, every disconnected piece.
+
+For a level e of the first objective let g(e) be the least f2 with f1 <= e. The front is the graph
+of g where it falls. Each g(e) is a smooth constrained problem, solved by SLSQP with exact gradients
+from many starts; sweeps up and down hand solutions to neighbouring levels until nothing improves.
+Levels are then halved where neighbours are far apart, which locates the gaps between pieces, and
+the pieces are filled evenly in arc length.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.problem import Problem
+from scipy.optimize import Bounds, NonlinearConstraint, minimize
+from scipy.stats import qmc
+
+_SAMPLES = 2**16
+_STARTS = 8
+_LEVELS = 100
+_ROUGH = {"ftol": 1e-6, "maxiter": 40}
+_FINE = {"ftol": 1e-12, "maxiter": 100}
+_IMPROVEMENT = 1e-9
+_GAP = 0.02
+"""Neighbours farther apart than this, in normalised objectives, belong to different pieces."""
+_SPACING = 0.005
+"""Neighbours closer than this need no solution between them before the pieces are filled."""
+_GAP_END = 1e-7
+"""To this share of the front's width the ends of a gap are located."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A design in the unit cube and its objectives."""
+
+    cube: NDArray[np.float64]
+    objectives: NDArray[np.float64]
+
+
+class FrontSearch:
+    """Solves for g(e) and keeps what it needs to do so well.
+
+    Parameters
+    ----------
+    problem : Problem
+        Two smooth objectives with ``dF``, box bounds, no constraints.
+    rng : numpy.random.Generator
+        Scrambles the Sobol points that the starts come from.
+    """
+
+    def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
+        self._problem = problem
+        self._width = problem.xu - problem.xl
+        self._bounds = Bounds(np.zeros(problem.n_var), np.ones(problem.n_var))
+        self._cubes = qmc.Sobol(problem.n_var, rng=rng).random(_SAMPLES)
+        self._sample = problem.evaluate(self._designs(self._cubes))
+        self._scale = np.ptp(self._sample, axis=0)
+        self._last: tuple[bytes, tuple[NDArray[np.float64], ...]] = (b"", ())
+
+    def _designs(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._problem.xl + np.clip(cube, 0.0, 1.0) * self._width
+
+    def _evaluate(self, cube: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        # SLSQP asks for value and slope of objective and constraint at the same point in turn.
+        key = cube.tobytes()
+        if key != self._last[0]:
+            values, slopes = self._problem.evaluate(
+                self._designs(cube), return_values_of=["F", "dF"]
+            )
+            scaled = values / self._scale, slopes * self._width / self._scale[:, None]
+            self._last = key, scaled
+        return self._last[1]
+
+    def lowest(self, objective: int) -> Solution:
+        """Return the global minimum of one objective, ties broken by the other."""
+        weights = np.full(2, 1e-7)
+        weights[objective] = 1.0
+        order = np.argsort(self._sample[:, objective])[: 4 * _STARTS]
+
+        def weighted(cube: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+            values, slopes = self._evaluate(cube)
+            return float(weights @ values), weights @ slopes
+
+        ends = [self._minimise(weighted, self._cubes[index], _FINE) for index in order]
+        return self._solution(min(ends, key=lambda cube: weighted(cube)[0]))
+
+    def below(self, level: float, starts: list[NDArray[np.float64]]) -> Solution | None:
+        """Return the best solution with f1 <= level from these starts, or None if none got there.
+
+        All starts are followed roughly, the better half of what they reach to the end.
+        """
+        constraint = NonlinearConstraint(
+            lambda cube: self._evaluate(cube)[0][0],
+            -np.inf,
+            level / self._scale[0],
+            jac=lambda cube: self._evaluate(cube)[1][0][None, :],
+        )
+
+        def second(cube: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+            values, slopes = self._evaluate(cube)
+            return float(values[1]), slopes[1]
+
+        def merit(cube: NDArray[np.float64]) -> float:
+            first, last = self._evaluate(cube)[0]
+            return float(last + 1e3 * max(first - level / self._scale[0], 0.0))
+
+        rough = [self._minimise(second, start, _ROUGH, constraint) for start in starts]
+        rough.sort(key=merit)
+        kept = rough[: max(1, len(rough) // 2)]
+        fine = [self._solution(self._minimise(second, x, _FINE, constraint)) for x in kept]
+        slack = level + 1e-9 * self._scale[0]
+        feasible = [solution for solution in fine if solution.objectives[0] <= slack]
+        return min(feasible, key=lambda solution: solution.objectives[1], default=None)
+
+    def _minimise(
+        self,
+        function: Callable[[NDArray[np.float64]], tuple[float, NDArray[np.float64]]],
+        start: NDArray[np.float64],
+        options: dict[str, float],
+        *constraints: NonlinearConstraint,
+    ) -> NDArray[np.float64]:
+        result = minimize(
+            function,
+            start,
+            jac=True,
+            bounds=self._bounds,
+            constraints=constraints,
+            method="SLSQP",
+            options=options,
+        )
+        return np.clip(result.x, 0.0, 1.0)
+
+    def starts(self, level: float) -> list[NDArray[np.float64]]:
+        """Return sampled designs below the level with small f2, far apart from each other."""
+        order = np.argsort(np.where(self._sample[:, 0] <= level, self._sample[:, 1], np.inf))
+        chosen: list[NDArray[np.float64]] = []
+        for index in order[: 60 * _STARTS]:
+            cube = self._cubes[index]
+            if all(np.max(np.abs(cube - other)) > 0.15 for other in chosen):
+                chosen.append(cube)
+            if len(chosen) == _STARTS:
+                break
+        return chosen
+
+    def _solution(self, cube: NDArray[np.float64]) -> Solution:
+        return Solution(cube, self._problem.evaluate(self._designs(cube)))
+
+
+def true_front(
+    problem: Problem, n_points: int, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return front (n, 2) and designs (n, n_var), sorted by the first objective.
+
+    One row if a single design is best in both objectives, else at least ``n_points`` rows, even in
+    arc length of the normalised objectives along each piece.
+    """
+    search = FrontSearch(problem, rng)
+    first, last = search.lowest(0), search.lowest(1)
+    span = last.objectives - first.objectives
+    if np.all(np.abs(span) <= 1e-6 * np.abs(first.objectives)):
+        return first.objectives[None, :], search._designs(first.cube)[None, :]
+    coarse = _sweep(search, first, last)
+    knots = _refine(search, _front_of(coarse), span)
+    filled = _fill(search, knots, span, n_points)
+    front = np.array([solution.objectives for solution in filled])
+    return front, search._designs(np.array([solution.cube for solution in filled]))
+
+
+def second_objective_at(
+    problem: Problem,
+    levels: NDArray[np.float64],
+    designs: NDArray[np.float64],
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Return g at the given levels of f1, shape (n,), found from the ``designs`` of a front.
+
+    With the designs of one search and the levels of another, it tells how far two independent
+    searches agree.
+    """
+    search = FrontSearch(problem, rng)
+    firsts = problem.evaluate(designs)[:, 0]
+    cubes = (designs - problem.xl) / (problem.xu - problem.xl)
+    values = []
+    for level in levels:
+        nearest = int(np.searchsorted(firsts, level).clip(1, len(firsts) - 1))
+        found = search.below(level, [cubes[nearest - 1], cubes[nearest]])
+        values.append(np.inf if found is None else found.objectives[1])
+    return np.array(values)
+
+
+def _sweep(search: FrontSearch, first: Solution, last: Solution) -> list[Solution]:
+    levels = np.linspace(first.objectives[0], last.objectives[0], _LEVELS)
+    best = [first]
+    for level in levels[1:]:
+        found = search.below(level, [best[-1].cube, *search.starts(level)])
+        carried = best[-1]
+        better = found is not None and found.objectives[1] < carried.objectives[1]
+        best.append(found if found is not None and better else carried)
+    if last.objectives[1] < best[-1].objectives[1]:
+        best[-1] = last
+    improved = True
+    while improved:
+        improved = False
+        neighbours = [(i, i + 1) for i in range(len(best) - 2, -1, -1)]
+        neighbours += [(i + 1, i) for i in range(len(best) - 1)]
+        for target, source in neighbours:
+            found = search.below(levels[target], [best[source].cube])
+            gain = best[target].objectives[1] - (found.objectives[1] if found else np.inf)
+            if found is not None and gain > _IMPROVEMENT * abs(best[target].objectives[1]):
+                best[target], improved = found, True
+    return best
+
+
+def _front_of(solutions: list[Solution]) -> list[Solution]:
+    """Keep solutions that lower f2, in rising f1."""
+    kept: list[Solution] = []
+    for solution in sorted(solutions, key=lambda item: tuple(item.objectives)):
+        if not kept or solution.objectives[1] < kept[-1].objectives[1]:
+            kept.append(solution)
+    return kept
+
+
+def _distance(one: Solution, other: Solution, span: NDArray[np.float64]) -> float:
+    return float(np.hypot(*((other.objectives - one.objectives) / span)))
+
+
+def _refine(
+    search: FrontSearch, knots: list[Solution], span: NDArray[np.float64]
+) -> list[Solution]:
+    """Halve the levels between distant neighbours until they are close or a gap is located.
+
+    At a gap the solution stops changing below some level, where its branch ends, and another branch
+    undercuts it above: halving then closes in on that level, and both ends are knots.
+    """
+    found = list(knots)
+    open_pairs = [(low, low.objectives[0], high) for low, high in pairwise(knots)]
+    while open_pairs:
+        low, level, high = open_pairs.pop()
+        upper = high.objectives[0]
+        near = _distance(low, high, span) <= _SPACING
+        if near or upper - level <= _GAP_END * span[0]:
+            continue
+        middle = (level + upper) / 2.0
+        starts = [low.cube, high.cube]
+        if upper - level > _SPACING * span[0]:
+            starts += search.starts(middle)
+        between = search.below(middle, starts)
+        if between is None or between.objectives[1] >= low.objectives[1] * (1.0 - 1e-12):
+            open_pairs.append((low, middle, high))
+            continue
+        found.append(between)
+        open_pairs += [(low, level, between), (between, middle, high)]
+    return _front_of(found)
+
+
+def _fill(
+    search: FrontSearch, knots: list[Solution], span: NDArray[np.float64], n_points: int
+) -> list[Solution]:
+    """Solve again at levels that are even in arc length along each piece."""
+    steps = [_distance(one, other, span) for one, other in pairwise(knots)]
+    total = sum(step for step in steps if step <= _GAP)
+    filled: list[Solution] = []
+    start = 0
+    for stop in range(1, len(knots) + 1):
+        if stop < len(knots) and steps[stop - 1] <= _GAP:
+            continue
+        arc = np.concatenate([[0.0], np.cumsum(steps[start : stop - 1])])
+        wanted = np.linspace(0.0, arc[-1], int(np.ceil(n_points * arc[-1] / total)) + 1)
+        filled += _along(search, knots[start:stop], arc, wanted)
+        start = stop
+    return _front_of(filled)
+
+
+def _along(
+    search: FrontSearch,
+    piece: list[Solution],
+    arc: NDArray[np.float64],
+    wanted: NDArray[np.float64],
+) -> list[Solution]:
+    solutions = [piece[0], piece[-1]]
+    for position in wanted[1:-1]:
+        right = min(int(np.searchsorted(arc, position)), len(piece) - 1)
+        left = right - 1
+        share = (position - arc[left]) / (arc[right] - arc[left])
+        ends = piece[left], piece[right]
+        level = (1.0 - share) * ends[0].objectives[0] + share * ends[1].objectives[0]
+        between = (1.0 - share) * ends[0].cube + share * ends[1].cube
+        found = search.below(level, [between, ends[0].cube, ends[1].cube])
+        if found is not None:
+            solutions.append(found)
+    return solutions
