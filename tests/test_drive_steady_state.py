@@ -194,5 +194,5 @@ def test_bad_parameters_are_named(column, value):
     model = preset("calibrated")
     design = model.nominal
     design[column] = value
-    with pytest.raises(InvalidInput, match="parameters|theta_s|K|J_in|B_in|B_fc"):
+    with pytest.raises(InvalidInput, match=r"parameters|theta_s|K|J_in|B_in|B_fc"):
         model.dte_arcsec(design[None])
