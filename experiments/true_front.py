@@ -27,6 +27,8 @@ _FINE = {"ftol": 1e-12, "maxiter": 100}
 _IMPROVEMENT = 1e-9
 _GAP = 0.02
 """Neighbours farther apart than this, in normalised objectives, belong to different pieces."""
+_SLACK = 1e-7
+"""SLSQP may end this far above a level, in units of the sampled range of f1."""
 _SPACING = 0.005
 """Neighbours closer than this need no solution between them before the pieces are filled."""
 _GAP_END = 1e-7
@@ -112,7 +114,7 @@ class FrontSearch:
         rough.sort(key=merit)
         kept = rough[: max(1, len(rough) // 2)]
         fine = [self._solution(self._minimise(second, x, _FINE, constraint)) for x in kept]
-        slack = level + 1e-9 * self._scale[0]
+        slack = level + _SLACK * self._scale[0]
         feasible = [solution for solution in fine if solution.objectives[0] <= slack]
         return min(feasible, key=lambda solution: solution.objectives[1], default=None)
 
@@ -187,7 +189,8 @@ def second_objective_at(
     values = []
     for level in levels:
         nearest = int(np.searchsorted(firsts, level).clip(1, len(firsts) - 1))
-        found = search.below(level, [cubes[nearest - 1], cubes[nearest]])
+        between = (cubes[nearest - 1] + cubes[nearest]) / 2.0
+        found = search.below(level, [cubes[nearest - 1], between, cubes[nearest]])
         values.append(np.inf if found is None else found.objectives[1])
     return np.array(values)
 
