@@ -1,0 +1,32 @@
+"""The README's Python runs as printed, and prints what it says."""
+
+import contextlib
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+
+
+def output_of(snippet: str) -> str:
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text):
+        exec(compile(snippet, "README.md", "exec"), {})
+    return text.getvalue().strip()
+
+
+def test_study_prints_what_the_readme_says():
+    printed = output_of(SNIPPETS[0])
+    assert re.search(r"prints `(.*?)`", README).group(1) == printed
+
+
+def test_both_solvers_of_the_drive_snippet_agree():
+    steady, integrated = (float(line.strip("[]")) for line in output_of(SNIPPETS[1]).split("\n"))
+    assert integrated == pytest.approx(steady, rel=1e-4)
+
+
+def test_every_snippet_is_run_here():
+    assert len(SNIPPETS) == 2
