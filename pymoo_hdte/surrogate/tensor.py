@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import prod
-from string import ascii_uppercase
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder
@@ -64,6 +63,11 @@ def coefficients_from_nodes(values: NDArray[np.float64]) -> NDArray[np.float64]:
 class TensorPolynomial:
     """Several tensor Chebyshev series of one shape, evaluated together.
 
+    The variables are split into a leading and a trailing half. As a matrix over the products of
+    polynomials of either half, the coefficients of a smooth function often have a low rank r; then
+    one small product for each half, and a sum of r terms, give the values. Otherwise the trailing
+    half is summed by one product and the leading half point by point.
+
     Parameters
     ----------
     coefficients : ndarray, shape (outputs, p_1, ..., p_d)
@@ -76,17 +80,15 @@ class TensorPolynomial:
         shape = self.coefficients.shape[1:]
         self._head, self._tail = shape[: len(shape) // 2], shape[len(shape) // 2 :]
         self._longest = max(shape)
-        letters = ascii_uppercase[: len(self._head)]
-        self._sum = ",".join([f"o{letters}n", *(f"{letter}n" for letter in letters)]) + "->on"
-        self._matrix = self.coefficients.reshape(-1, prod(self._tail))
+        matrices = self.coefficients.reshape(-1, prod(self._head), prod(self._tail))
+        self._leading: NDArray[np.float64] | None
+        self._leading, self._trailing = _factors(matrices)
+        if self._leading.size + self._trailing.size >= matrices.size:
+            self._leading, self._trailing = None, matrices.reshape(-1, matrices.shape[2])
 
     def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values, shape (outputs, n), at points ``x`` of the cube, shape (d, n).
-
-        The trailing half of the variables is summed by one matrix product over all products of
-        their polynomials, the leading half point by point.
-        """
-        step = max(1, _MULTIPLICATIONS_AT_ONCE // self._matrix.size)
+        """Return the values, shape (outputs, n), at points ``x`` of the cube, shape (d, n)."""
+        step = max(1, _MULTIPLICATIONS_AT_ONCE // self._trailing.size)
         if x.shape[1] <= step:
             return self._block(x)
         values = np.empty((len(self.coefficients), x.shape[1]))
@@ -98,9 +100,13 @@ class TensorPolynomial:
     def _block(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         basis = chebyshev_basis(x, self._longest)
         split = len(self._head)
-        partial = self._matrix @ _products(basis[:, split:], self._tail)
-        leading = [basis[:size, variable] for variable, size in enumerate(self._head)]
-        return np.einsum(self._sum, partial.reshape(-1, *self._head, x.shape[1]), *leading)
+        leading = _products(basis[:, :split], self._head)
+        trailing = self._trailing @ _products(basis[:, split:], self._tail)
+        if self._leading is None:
+            parts = trailing.reshape(-1, *leading.shape)
+            return np.einsum("ohn,hn->on", parts, leading)
+        parts = (self._leading @ leading).reshape(-1, *trailing.shape)
+        return np.einsum("orn,rn->on", parts, trailing)
 
     def derivatives(self, axes: Sequence[int]) -> TensorPolynomial:
         """Return the partial derivatives in the variables ``axes``.
@@ -117,9 +123,28 @@ class TensorPolynomial:
         return TensorPolynomial(np.concatenate(parts))
 
 
+def _factors(
+    matrices: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Factor the matrices (outputs, h, t) into (outputs * r, h) and a common (r, t).
+
+    Singular values below the rounding of the largest are dropped. Outputs are brought to one scale
+    first, so that each keeps all its digits.
+    """
+    outputs, rows, columns = matrices.shape
+    scale = np.abs(matrices).max(axis=(1, 2), keepdims=True)
+    scaled = matrices / np.where(scale > 0.0, scale, 1.0)
+    left, values, right = np.linalg.svd(scaled.reshape(-1, columns), full_matrices=False)
+    rank = max(1, int(np.sum(values > np.finfo(float).eps * values[0])))
+    weighted = (left[:, :rank] * values[:rank]).reshape(outputs, rows, rank) * scale
+    return weighted.transpose(0, 2, 1).reshape(-1, rows), right[:rank]
+
+
 def _products(basis: NDArray[np.float64], sizes: tuple[int, ...]) -> NDArray[np.float64]:
     """Return all products of one polynomial per variable (Khatri-Rao), shape (prod(sizes), n)."""
     points = basis.shape[-1]
+    if not sizes:
+        return np.ones((1, points))
     product = basis[: sizes[0], 0]
     for variable, size in enumerate(sizes[1:], start=1):
         product = (product[:, None] * basis[:size, variable]).reshape(-1, points)
