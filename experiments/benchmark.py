@@ -210,7 +210,7 @@ def _ratio_table(ratios: list[Ratio]) -> Table:
         for r in ratios
     )
     findings = tuple(
-        Finding(r.reached, f"{r.what}: {r.slow} over {r.fast} is {r.value:.3g}; {r.target}.")
+        Finding(r.reached, f"{r.what}: {r.slow} over {r.fast} is {r.value:.3g}; {r.target}.", True)
         for r in ratios
         if r.target
     )
@@ -243,6 +243,7 @@ def _agreement_table(rows: tuple[tuple[str, str, float, float], ...]) -> Table:
                 difference <= allowed,
                 f"On {name} with the angle {angle}, the DTE differs by {difference:.1e} at most; "
                 f"{allowed:.0e} is allowed.",
+                check=True,
             )
             for name, angle, difference, allowed in rows
         ),

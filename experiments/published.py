@@ -58,8 +58,8 @@ def run(context: Context) -> Result:
         pictures=(
             Picture(
                 "gain",
-                "Gain from static error to transmission error over speed-independent frequency, "
-                "mean stiffness; vertical lines mark orders 1 and 2 at 2000 r/min.",
+                "Gain from static error to transmission error over frequency, at mean "
+                "stiffness; the vertical lines mark orders 1 and 2 at 2000 r/min.",
                 _gain(),
             ),
         ),
@@ -88,6 +88,7 @@ def _orders(model: DriveModel, integrated: Run) -> Table:
                 bool(np.all(np.abs(gain - 1.0) <= ONE_PERCENT)),
                 f"The gain of the three orders lies between {gain.min():.4f} and "
                 f"{gain.max():.4f}: the printed drive is rigid for its own excitation.",
+                check=True,
             ),
         ),
     )
@@ -120,7 +121,7 @@ def _designs(designs: list[Design]) -> Table:
     )
     return Table(
         "designs",
-        f"DTE of the nominal and {N_DESIGNS} random designs in the +-35 % box",
+        f"DTE of the nominal and {N_DESIGNS} random designs in the ±35 % box",
         (
             Column("design"),
             Column("theta_s, peak-to-peak", "arcsec", 5),
@@ -134,10 +135,12 @@ def _designs(designs: list[Design]) -> Table:
                 max(map(abs, excess)) <= ONE_PERCENT,
                 f"The DTE is the static error's peak-to-peak to {100 * max(map(abs, excess)):.2f} "
                 "% in every design: stiffness, inertia and damping hardly matter.",
+                check=True,
             ),
             Finding(
                 max(apart) <= 1e-4,
                 f"Steady state and integration from rest differ by {max(apart):.1e} at most.",
+                check=True,
             ),
             Finding(
                 abs(nominal.steady / paper - 1.0) <= ONE_PERCENT,

@@ -128,12 +128,14 @@ def _findings(
             max(disagreement, undercut) <= TOLERANCE,
             f"On {name}, two searches differ by {disagreement:.1e} of the front's width, and the "
             f"best rival undercuts it by {undercut:.1e}; {TOLERANCE:.0e} is allowed.",
+            check=True,
         ),
         Finding(
             stored is not None and stored <= TOLERANCE,
             f"On {name}, the stored front differs by {stored:.1e} of the width."
             if stored is not None
             else f"On {name}, no stored front fits these settings; copy the one written here.",
+            check=True,
         ),
     ]
 

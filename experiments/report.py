@@ -35,8 +35,12 @@ def write_report(out: Path, notice: str = "") -> Path:
     page = environment.get_template(PAGE).render(
         results=results,
         headlines=_headlines(results),
-        agreeing=_findings(results, agrees=True),
-        differing=_findings(results, agrees=False),
+        verdicts=[
+            ("Agrees with the paper", "yes", _findings(results, agrees=True, check=False)),
+            ("Does not agree with the paper", "no", _findings(results, agrees=False, check=False)),
+            ("Checks of our own that fail", "no", _findings(results, agrees=False, check=True)),
+            ("Checks of our own that hold", "yes", _findings(results, agrees=True, check=True)),
+        ],
         outdated=[result.name for result in results if result.made_by != present],
         notice=notice,
         base64=lambda png: base64.b64encode(png).decode(),
@@ -56,11 +60,13 @@ def _headlines(results: Sequence[StoredResult]) -> list[tuple[StoredResult, Tabl
     ]
 
 
-def _findings(results: Sequence[StoredResult], agrees: bool) -> list[tuple[str, Finding]]:
+def _findings(
+    results: Sequence[StoredResult], agrees: bool, check: bool
+) -> list[tuple[str, Finding]]:
     return [
         (result.name, finding)
         for result in results
         for table in result.tables
         for finding in table.findings
-        if finding.agrees == agrees
+        if finding.agrees == agrees and finding.check == check
     ]

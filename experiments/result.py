@@ -19,10 +19,14 @@ Cell = float | int | str | None
 
 @dataclass(frozen=True)
 class Finding:
-    """One sentence that sets our numbers against a reference, and whether the two agree."""
+    """One sentence that sets our numbers against the paper's, and whether the two agree.
+
+    A ``check`` sets them against a demand of our own instead, and says whether it holds.
+    """
 
     agrees: bool
     sentence: str
+    check: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "agrees", bool(self.agrees))
