@@ -92,72 +92,110 @@ class OrderSpectrum:
         return result
 
 
+class _Grid:
+    """The signals at the angles ``step * column``, where ``step`` divides an input turn.
+
+    Lines whose orders differ by whole numbers repeat every turn up to one common phase, so each
+    such family is evaluated on one turn only: P where the orders are whole, Q elsewhere.
+    """
+
+    def __init__(
+        self, orders: NDArray[np.float64], phasors: NDArray[np.complex128], points: int
+    ) -> None:
+        self.points = points
+        within = 2.0 * np.pi * np.arange(points) / points
+        fractions = np.round(np.mod(orders, 1.0), 9) % 1.0
+        self.whole = np.zeros((len(phasors), points))
+        self.fractional: list[tuple[float, NDArray[np.complex128]]] = []
+        for fraction in np.unique(fractions):
+            family = fractions == fraction
+            one_turn = phasors[:, family] @ np.exp(1j * np.outer(orders[family], within))
+            if fraction == 0.0:
+                self.whole = one_turn.real
+            else:
+                self.fractional.append((float(fraction), one_turn))
+
+    def envelope(self) -> NDArray[np.float64]:
+        """Return what no turn exceeds at each point within the turn, shape (n, points)."""
+        return self.whole + sum(np.abs(one_turn) for _, one_turn in self.fractional)
+
+    def values(self, rows: NDArray[np.int_], columns: NDArray[np.int_]) -> NDArray[np.float64]:
+        """Return the signals ``rows`` at ``columns``, arrays of shapes that broadcast."""
+        turn, point = np.divmod(columns, self.points)
+        result = self.whole[rows, point]
+        for fraction, one_turn in self.fractional:
+            phase = 2.0 * np.pi * fraction * turn
+            part = one_turn[rows, point]
+            result = result + np.cos(phase) * part.real - np.sin(phase) * part.imag
+        return result
+
+
 def _peak_to_peak(
     orders: NDArray[np.float64], phasors: NDArray[np.complex128], turns: float
 ) -> NDArray[np.float64]:
-    points = max(POINTS_PER_TURN, int(np.ceil(_POINTS_PER_CYCLE * np.max(np.abs(orders)))))
-    step = 2.0 * np.pi / points
-    end = 2.0 * np.pi * turns
-    # One point beyond each end, so that every point of the window has two neighbours.
-    grid = _on_grid(orders, phasors, int(np.floor(turns * points)) + 3, step)
-    upper = _highest(orders, phasors, grid, step, end)
-    lower = _highest(orders, -phasors, -grid, step, end)
+    upper = _highest(orders, phasors, turns)
+    lower = _highest(orders, -phasors, turns)
     return upper + lower
 
 
-def _on_grid(
-    orders: NDArray[np.float64], phasors: NDArray[np.complex128], n_points: int, step: float
-) -> NDArray[np.float64]:
-    """Evaluate at the angles ``step * (-1, 0, 1, ...)``, where ``step`` divides a turn.
-
-    Lines whose orders differ by whole numbers repeat every turn up to one common phase, so each
-    such family is evaluated on one turn only.
-    """
-    points = round(2.0 * np.pi / step)
-    turns = -(-n_points // points)
-    within = step * (np.arange(points) - 1)
-    signal = np.zeros((len(phasors), turns, points))
-    fractions = np.round(np.mod(orders, 1.0), 9) % 1.0
-    for fraction in np.unique(fractions):
-        family = fractions == fraction
-        one_turn = phasors[:, family] @ np.exp(1j * np.outer(orders[family], within))
-        if fraction == 0.0:
-            signal += one_turn.real[:, None, :]
-        else:
-            phase = 2.0 * np.pi * float(orders[family][0]) * np.arange(turns)
-            signal += np.cos(phase)[:, None] * one_turn.real[:, None, :]
-            signal -= np.sin(phase)[:, None] * one_turn.imag[:, None, :]
-    return signal.reshape(len(phasors), -1)[:, :n_points]
-
-
 def _highest(
-    orders: NDArray[np.float64],
-    phasors: NDArray[np.complex128],
-    grid: NDArray[np.float64],
-    step: float,
-    end: float,
+    orders: NDArray[np.float64], phasors: NDArray[np.complex128], turns: float
 ) -> NDArray[np.float64]:
-    """Return the greatest value of each signal on [0, end], given its values on the grid.
+    """Return the greatest value of each signal on 0 <= angle <= 2 pi turns.
 
     A grid may straddle the highest peak and hit a lower one, so every peak that could be the
     highest is climbed: first the grid values are compared, allowing for the rise between two
     points, then parabolas through three points, allowing for their own, smaller error.
     """
+    points = max(POINTS_PER_TURN, int(np.ceil(_POINTS_PER_CYCLE * np.max(np.abs(orders)))))
+    step = 2.0 * np.pi / points
+    end = 2.0 * np.pi * turns
+    last = int(np.floor(turns * points))
+    grid = _Grid(orders, phasors, points)
     rise = np.abs(phasors) @ orders**2 * step**2 / 8.0
-    inner = grid[:, 1:-1]
-    rows, columns = np.nonzero(inner >= (inner.max(axis=1) - rise)[:, None])
-    before, here, after = (grid[rows, columns + shift] for shift in range(3))
+
+    rows, columns = _high_points(grid, rise, last)
+    here = grid.values(rows, columns)
+    before, after = grid.values(rows, columns - 1), grid.values(rows, columns + 1)
     slope = (after - before) / 2.0
     curvature = 2.0 * here - before - after
     vertex = np.divide(slope, curvature, out=np.zeros_like(here), where=curvature > 0.0)
     shift = np.clip(vertex, np.maximum(-1.0, -columns), np.minimum(1.0, end / step - columns))
     height = here + shift * (slope - shift * curvature / 2.0)
-    every_row = np.arange(len(grid))
-    highest = np.maximum.reduceat(height, np.searchsorted(rows, every_row))
+    first = np.searchsorted(rows, np.arange(len(phasors)))
+    highest = np.maximum.reduceat(height, first)
     close = height >= (highest - _PARABOLA_ERROR * rise)[rows]
     rows, start = rows[close], step * (columns + shift)[close]
     values = _climb(orders, phasors[rows], start, step, end)
-    return np.maximum.reduceat(values, np.searchsorted(rows, every_row))
+    return np.maximum.reduceat(values, np.searchsorted(rows, np.arange(len(phasors))))
+
+
+def _high_points(
+    grid: _Grid, rise: NDArray[np.float64], last: int
+) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Return rows and columns, by row, of all grid points within ``rise`` of their row's highest.
+
+    Only points within the turn whose envelope could reach that high are followed over all turns.
+    """
+    envelope = grid.envelope()
+    turn_starts = np.arange(0, last + 1, grid.points)
+    every_row = np.arange(len(envelope))
+
+    def over_turns(
+        rows: NDArray[np.int_], points: NDArray[np.int_]
+    ) -> tuple[NDArray[np.int_], NDArray[np.float64]]:
+        columns = points[:, None] + turn_starts
+        values = grid.values(rows[:, None], columns)
+        return columns, np.where(columns <= last, values, -np.inf)
+
+    _, values = over_turns(every_row, np.argmax(envelope, axis=1))
+    reached = values.max(axis=1)
+    rows, points = np.nonzero(envelope >= (reached - rise)[:, None])
+    columns, values = over_turns(rows, points)
+    first = np.searchsorted(rows, every_row)
+    highest = np.maximum.reduceat(values.max(axis=1), first)
+    pair, turn = np.nonzero(values >= (highest - rise)[rows][:, None])
+    return rows[pair], columns[pair, turn]
 
 
 def _climb(
