@@ -1,4 +1,4 @@
-"""Chebyshev surrogates on a box, and mean and standard deviation over uncertain inputs.
+"""Chebyshev surrogates on a box; mean, deviation and Sobol indices over uncertain inputs.
 
 Knows nothing of drives or of pymoo: any function of several real variables will do.
 """
@@ -8,6 +8,11 @@ from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
 from pymoo_hdte.surrogate.distributions import TruncatedNormal, UniformBand
 from pymoo_hdte.surrogate.moments import ExactMoments
 from pymoo_hdte.surrogate.sampled import SampledMoments
+from pymoo_hdte.surrogate.sensitivity import (
+    SobolIndices,
+    sobol_indices,
+    sobol_indices_over_box,
+)
 from pymoo_hdte.surrogate.validation import Accuracy, accuracy, latin_hypercube
 
 __all__ = [
@@ -17,8 +22,11 @@ __all__ = [
     "ExactMoments",
     "ExtrapolationError",
     "SampledMoments",
+    "SobolIndices",
     "TruncatedNormal",
     "UniformBand",
     "accuracy",
     "latin_hypercube",
+    "sobol_indices",
+    "sobol_indices_over_box",
 ]
