@@ -51,8 +51,15 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
 def effect_size(first: ArrayLike, second: ArrayLike) -> float:
     """A12, the probability that a run of ``first`` exceeds one of ``second``, ties counted half.
 
-    0.5 means no difference (Vargha and Delaney, J. Educ. Behav. Stat. 25, 2000).
+    0.5 means no difference (Vargha and Delaney, J. Educ. Behav. Stat. 25, 2000). Runs without a
+    value (NaN) do not count; without any, the effect is NaN.
     """
-    a = np.asarray(first, dtype=float)[:, None]
-    b = np.asarray(second, dtype=float)[None, :]
-    return float(np.mean((a > b) + 0.5 * (a == b)))
+    a, b = (values[~np.isnan(values)] for values in map(_floats, (first, second)))
+    if not len(a) or not len(b):
+        return float("nan")
+    higher, equal = a[:, None] > b[None, :], a[:, None] == b[None, :]
+    return float(np.mean(higher + 0.5 * equal))
+
+
+def _floats(values: ArrayLike) -> NDArray[np.float64]:
+    return np.asarray(values, dtype=float)

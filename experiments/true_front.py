@@ -59,11 +59,12 @@ class FrontSearch:
         self._width = problem.xu - problem.xl
         self._bounds = Bounds(np.zeros(problem.n_var), np.ones(problem.n_var))
         self._cubes = qmc.Sobol(problem.n_var, rng=rng).random(_SAMPLES)
-        self._sample = problem.evaluate(self._designs(self._cubes))
+        self._sample = problem.evaluate(self.designs(self._cubes))
         self._scale = np.ptp(self._sample, axis=0)
         self._last: tuple[bytes, tuple[NDArray[np.float64], ...]] = (b"", ())
 
-    def _designs(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
+    def designs(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Map points of the unit cube to designs."""
         return self._problem.xl + np.clip(cube, 0.0, 1.0) * self._width
 
     def _evaluate(self, cube: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
@@ -71,7 +72,7 @@ class FrontSearch:
         key = cube.tobytes()
         if key != self._last[0]:
             values, slopes = self._problem.evaluate(
-                self._designs(cube), return_values_of=["F", "dF"]
+                self.designs(cube), return_values_of=["F", "dF"]
             )
             scaled = values / self._scale, slopes * self._width / self._scale[:, None]
             self._last = key, scaled
@@ -149,7 +150,7 @@ class FrontSearch:
         return chosen
 
     def _solution(self, cube: NDArray[np.float64]) -> Solution:
-        return Solution(cube, self._problem.evaluate(self._designs(cube)))
+        return Solution(cube, self._problem.evaluate(self.designs(cube)))
 
 
 def true_front(
@@ -164,12 +165,12 @@ def true_front(
     first, last = search.lowest(0), search.lowest(1)
     span = last.objectives - first.objectives
     if np.all(np.abs(span) <= 1e-6 * np.abs(first.objectives)):
-        return first.objectives[None, :], search._designs(first.cube)[None, :]
+        return first.objectives[None, :], search.designs(first.cube)[None, :]
     coarse = _sweep(search, first, last)
     knots = _refine(search, _front_of(coarse), span)
     filled = _fill(search, knots, span, n_points)
     front = np.array([solution.objectives for solution in filled])
-    return front, search._designs(np.array([solution.cube for solution in filled]))
+    return front, search.designs(np.array([solution.cube for solution in filled]))
 
 
 def second_objective_at(

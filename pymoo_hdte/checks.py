@@ -56,7 +56,10 @@ def real_number(
     allowed = " ".join(["a finite number", " and ".join(limits)]).strip()
     if isinstance(value, bool | np.bool_) or not isinstance(value, numbers.Real):
         raise InvalidInput(field, value, allowed)
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
     inside = above < number < below and at_least <= number <= at_most
     if not math.isfinite(number) or not inside:
         raise InvalidInput(field, number, allowed)
@@ -79,9 +82,11 @@ def finite_array(
     """
     wanted = "(" + ", ".join("n" if size is None else str(size) for size in shape) + ")"
     try:
+        if np.iscomplexobj(value):
+            raise TypeError
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InvalidInput(field, value, f"numbers of shape {wanted}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InvalidInput(field, value, f"real numbers of shape {wanted}") from None
     fits = array.ndim == len(shape) and all(
         size is None or size == actual for size, actual in zip(shape, array.shape, strict=True)
     )

@@ -88,3 +88,21 @@ def test_lines_of_opposite_sign_fold_into_one_amplitude():
 def test_wrong_shapes_are_refused():
     with pytest.raises(InvalidInput, match="shape of phasors"):
         OrderSpectrum(np.array([1.0, 2.0]), np.zeros((3, 1), dtype=complex))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(phasor, min_size=4, max_size=4), st.floats(0.3, 3.7))
+def test_turns_that_end_between_grid_points_lose_nothing(phasors, ratio):
+    spectrum = OrderSpectrum(np.array([0.5, -0.3, 1.7, 2.02]), np.array([phasors]))
+    exact = spectrum.peak_to_peak(ratio)[0]
+    fine = spectrum.at(np.linspace(0.0, 2 * np.pi * ratio, 20_001))[0]
+    grid = fine.max() - fine.min()
+    step = 2 * np.pi * ratio / 20_000
+    curvature = np.abs(phasors) @ spectrum.orders**2
+    rounding = 1e-9 * (1.0 + np.abs(phasors).sum())
+    assert -rounding <= exact - grid <= curvature * step**2 / 4 + rounding
+
+
+def test_lines_that_are_not_finite_are_refused():
+    with pytest.raises(InvalidInput, match="phasors"):
+        OrderSpectrum(np.array([1.0]), np.array([[np.nan + 0j]]))

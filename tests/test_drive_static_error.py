@@ -81,3 +81,7 @@ def test_bad_input_is_named(rng):
         sample_static_error(hs_20_100(), 0, rng)
     with pytest.raises(InvalidInput, match="error_class is 'x'"):
         sample_static_error(hs_20_100(), 1, rng).class_phasor("x")
+    with pytest.raises(InvalidInput, match="error class is 'x'"):
+        sample_static_error(hs_20_100(), 1, rng).spectrum(("e_m", "x"))
+    with pytest.raises(InvalidInput, match="classes"):
+        sample_static_error(hs_20_100(), 1, rng).spectrum(())

@@ -196,3 +196,60 @@ def test_bad_parameters_are_named(column, value):
     design[column] = value
     with pytest.raises(InvalidInput, match=r"parameters|theta_s|K|J_in|B_in|B_fc"):
         model.dte_arcsec(design[None])
+
+
+def test_no_designs_give_no_values(model):
+    assert model.dte_arcsec(np.empty((0, 5))).shape == (0,)
+
+
+def test_two_error_lines_of_one_order_add_up(rng):
+    for name in ("published", "calibrated"):
+        model = preset(name)
+        design = model.nominal[None]
+        coefficients = model.coefficients(design)
+        whole = replace(
+            coefficients,
+            error_orders=np.array([1.0, 2.0]),
+            error_phasors=np.array([[1e-4 + 0j, 2e-4j]]),
+        )
+        halves = replace(
+            coefficients,
+            error_orders=np.array([2.0, 1.0, 2.0 + 4e-10]),
+            error_phasors=np.array([[1e-4j, 1e-4 + 0j, 1e-4j]]),
+        )
+        assert steady_state(halves).peak_to_peak(101.0) == pytest.approx(
+            steady_state(whole).peak_to_peak(101.0), rel=1e-6
+        )
+
+
+def test_the_load_acts_even_if_the_error_has_odd_orders_only():
+    model = preset("calibrated")
+    coefficients = model.coefficients(model.nominal[None])
+    odd = replace(coefficients, error_orders=np.array([1.0]), error_phasors=np.array([[1e-9 + 0j]]))
+    amplitudes = steady_state(odd).amplitudes()
+    quasi_static = coefficients.stiffness_depth * coefficients.mean_mesh_torque / 2.583e4
+    assert amplitudes[2.0][0] == pytest.approx(quasi_static, rel=0.2)
+
+
+@pytest.mark.parametrize("depth", [0.3, 0.8])
+@pytest.mark.parametrize("speed", [50.0, 209.0])
+def test_deep_variations_agree_with_integration(depth, speed):
+    effects = (DampingReference(5.0), MeshStiffnessVariation(depth, 1.0))
+    model = replace(preset("published"), effects=effects).at(speed, 40.0)
+    run = simulate(model, model.nominal, angle="prescribed")
+    assert run.dte_arcsec() == pytest.approx(model.dte_arcsec(model.nominal[None])[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 1.25, 5.0, 20.0])
+def test_slow_drives_are_not_taken_for_unstable(speed):
+    for depth in (0.2, 0.5):
+        effects = (MeshStiffnessVariation(depth, 0.0),)
+        model = replace(preset("published"), effects=effects).at(speed, 0.0)
+        require_stable(model.coefficients(model.nominal[None]))
+
+
+def test_the_unstable_design_is_named():
+    model = parametric_resonance()
+    stiff = model.nominal * np.array([1.0, 4.0, 1.0, 1.0, 1.0])
+    with pytest.raises(UnstableDrive, match="design 1 "):
+        require_stable(model.coefficients(np.array([stiff, model.nominal, stiff])))

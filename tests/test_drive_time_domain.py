@@ -125,3 +125,47 @@ def test_a_record_shorter_than_a_turn_or_not_finite_is_refused():
         low_pass(np.zeros(5))
     with pytest.raises(InvalidInput, match="cutoff"):
         low_pass(np.zeros(100), cutoff=600.0)
+
+
+def test_the_middle_turn_of_a_record_is_evaluated():
+    ratio, speed = 101.0, 200.0
+    time = np.arange(0.0, 2 * np.pi * ratio / speed * 2.0, 1e-3)
+    driving = speed * time
+    turn = 2 * np.pi * ratio
+    outside = np.maximum(turn / 2 - 60.0 - driving, 0.0) + np.maximum(
+        driving - 1.5 * turn - 60.0, 0.0
+    )
+    error = 1e-4 * np.sin(driving * 0.2) + 1e-3 * outside
+    assert measured_dte(driving, driving / ratio - error, ratio) == pytest.approx(2e-4, rel=1e-3)
+
+
+def test_static_error_enters_with_the_rate_of_its_envelope():
+    """A transmission error that follows the enveloped static error leaves no mesh torque."""
+    model = preset("published")
+    design = model.nominal.copy()
+    coefficients = model.coefficients(design[None])
+    course = StartUp(coefficients.input_speed, 0.5, 0.5)
+    motion = equations_of_motion(coefficients, course, prescribed=True)
+    time, step = 0.2, 1e-6
+
+    def static(at):
+        angle = course.angle(at)
+        lines = coefficients.error_phasors[0] * np.exp(1j * coefficients.error_orders * angle)
+        return course.envelope(at)[0] * lines.real.sum()
+
+    rate = (static(time + step) - static(time - step)) / (2 * step)
+    state = np.array([0.0, 150.0, static(time), rate])
+    _, _, error_rate, error_acceleration = motion(time, state)
+    envelope, slope = course.envelope(time)
+    inertia = coefficients.input_inertia[0]
+    total = inertia + coefficients.output_inertia / 101.0**2
+    holding = (
+        coefficients.input_damping[0] * coefficients.input_speed
+        + coefficients.mean_mesh_torque / 101.0
+    )
+    torque = total * coefficients.input_speed * slope + holding * envelope
+    free_input = (torque - coefficients.input_damping[0] * 150.0) / inertia
+    output_speed = 150.0 / 101.0 - error_rate
+    bearing = coefficients.output_damping * output_speed
+    free_output = (-coefficients.load_torque * envelope - bearing) / coefficients.output_inertia
+    assert error_acceleration == pytest.approx(free_input / 101.0 - free_output, rel=1e-6)

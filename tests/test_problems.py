@@ -1,7 +1,9 @@
 """The robust problems inside pymoo: closed forms, gradients, stored fronts, bad input."""
 
 import copy
+import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +11,17 @@ from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.optimize import minimize
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import preset
+from pymoo_hdte.drive import (
+    DampingReference,
+    LoadInertia,
+    MeshStiffnessVariation,
+    UnstableDrive,
+    preset,
+)
 from pymoo_hdte.problems import RobustDTE, RobustToy
 from pymoo_hdte.problems.reference import ReferenceFront, format_reference, load_reference
-from pymoo_hdte.surrogate import ExtrapolationError
+from pymoo_hdte.surrogate import ChebyshevSurrogate, ExtrapolationError
+from pymoo_hdte.units import ARCSEC
 
 
 @pytest.fixture(scope="module", params=["calibrated", "resonant"])
@@ -115,6 +124,38 @@ def test_stored_front_satisfies_first_order_conditions(problem):
     residual = np.where(at_upper[some_free], np.maximum(mixed, 0.0), residual)
     assert np.median(np.abs(residual / scale)) < 1e-6
     assert np.abs(residual / scale).max() < 1e-2
+
+
+@pytest.mark.parametrize("field", ["output_inertia", "output_damping", "stiffness"])
+def test_a_front_is_not_lent_to_another_drive(field):
+    model = preset("calibrated")
+    nominal = replace(model.sheet.nominal, **{field: getattr(model.sheet.nominal, field) * 1.1})
+    other = replace(model, sheet=replace(model.sheet, nominal=nominal))
+    assert RobustDTE(other, order=1).settings["nominal"] != RobustDTE(order=1).settings["nominal"]
+    assert RobustDTE(other).pareto_front() is None
+    teeth = replace(model.sheet, circular_spline_teeth=204)
+    assert RobustDTE(replace(model, sheet=teeth)).pareto_front() is None
+
+
+def test_the_surrogate_carries_the_model_that_made_it(tmp_path):
+    problem = RobustDTE(order=1)
+    problem.surrogate.save(tmp_path / "surrogate.npz")
+    loaded = ChebyshevSurrogate.load(tmp_path / "surrogate.npz")
+    assert loaded.provenance["model"] == json.loads(json.dumps(problem.model.to_dict()))
+
+
+def test_no_designs_give_no_objectives(problem):
+    assert problem.evaluate(np.empty((0, 4))).shape == (0, 2)
+
+
+def test_models_without_a_positive_static_error_or_a_steady_state_are_refused():
+    model = preset("calibrated")
+    wide = replace(model.kinematic_error, std=13 * ARCSEC)
+    with pytest.raises(InvalidInput, match=r"kinematic_error\.std in arcsec is 1[23]\."):
+        RobustDTE(replace(model, kinematic_error=wide))
+    effects = (LoadInertia(0.395), DampingReference(0.01), MeshStiffnessVariation(0.3, 0.0))
+    with pytest.raises(UnstableDrive):
+        RobustDTE(replace(model, effects=effects).at(280.0, 40.0), order=1)
 
 
 def test_fronts_belong_to_their_settings_only():

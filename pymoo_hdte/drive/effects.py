@@ -24,10 +24,6 @@ class Effect(Protocol):
         """Return the coefficients with this effect added."""
         ...
 
-    def sentence(self) -> str:
-        """Describe the effect and its size in one plain sentence."""
-        ...
-
     def to_dict(self) -> dict[str, object]:
         """Return the effect as the TOML-like table that `effect_from_fields` reads."""
         ...
@@ -53,10 +49,6 @@ class LoadInertia:
         """Return the coefficients with the inertia added to the output."""
         total = coefficients.output_inertia + self.inertia
         return replace(coefficients, output_inertia=total)
-
-    def sentence(self) -> str:
-        """Describe the effect and its size in one plain sentence."""
-        return f"a load inertia of {self.inertia:g} kg.m2 turns with the output"
 
     def to_dict(self) -> dict[str, object]:
         """Return the effect as a TOML-like table."""
@@ -87,10 +79,6 @@ class DampingReference:
         """Return the coefficients with the damping referred to the output."""
         scale = self.factor * coefficients.ratio**2
         return replace(coefficients, damping=scale * coefficients.damping)
-
-    def sentence(self) -> str:
-        """Describe the effect and its size in one plain sentence."""
-        return f"the mesh damping acts on the torsion as {self.factor:g} N^2 B_fc"
 
     def to_dict(self) -> dict[str, object]:
         """Return the effect as a TOML-like table."""
@@ -123,10 +111,6 @@ class MeshStiffnessVariation:
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with the varying stiffness."""
         return replace(coefficients, stiffness_depth=self.depth, stiffness_phase=self.phase)
-
-    def sentence(self) -> str:
-        """Describe the effect and its size in one plain sentence."""
-        return f"the mesh stiffness varies by {100 * self.depth:g} % twice per input turn"
 
     def to_dict(self) -> dict[str, object]:
         """Return the effect as a TOML-like table."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -69,7 +69,10 @@ class KinematicError:
         """Return the phasors, shape (n_orders,), of the error whose value theta_s is 1 rad."""
         phasors = -1j * np.array(self.amplitudes) * np.exp(1j * np.array(self.phases))
         shape = OrderSpectrum(np.array(self.orders), phasors[None, :])
-        return phasors * _READINGS[self.reading] / shape.peak_to_peak(ratio)[0]
+        peak_to_peak = shape.peak_to_peak(ratio)[0]
+        if peak_to_peak <= 1e-9 * sum(self.amplitudes):
+            raise InvalidInput("kinematic_error", self, "lines that do not cancel each other")
+        return phasors * _READINGS[self.reading] / peak_to_peak
 
 
 @dataclass(frozen=True)
@@ -162,6 +165,8 @@ class DriveModel:
             As `coefficients`.
         UnstableDrive
             If the varying stiffness makes a design's motion grow.
+        ArithmeticError
+            If the harmonics of a deeply varying stiffness do not die out.
         """
         return steady_state(self.coefficients(parameters))
 
@@ -186,6 +191,9 @@ class DriveModel:
             "description": self.description,
             "provenance": self.provenance,
             "data_sheet": self.sheet.name,
+            "flexspline_teeth": self.sheet.flexspline_teeth,
+            "circular_spline_teeth": self.sheet.circular_spline_teeth,
+            "nominal": asdict(self.sheet.nominal),
             "input_speed_rad_s": self.sheet.input_speed,
             "load_torque_Nm": self.sheet.load_torque,
             "kinematic_error": {

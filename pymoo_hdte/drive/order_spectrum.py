@@ -17,8 +17,6 @@ POINTS_PER_TURN = 60
 """Least number of grid points an input turn before refinement."""
 
 _POINTS_PER_CYCLE = 6
-_PARABOLA_ERROR = 0.25
-"""Bound of a parabola's error at its vertex, as a share of the rise between grid points."""
 _NEWTON_STEPS = 3
 _ROWS_AT_ONCE = 32
 
@@ -46,6 +44,8 @@ class OrderSpectrum:
                 self.phasors.shape,
                 f"(n, {len(self.orders)}), a column an order",
             )
+        if not np.all(np.isfinite(self.phasors)):
+            raise InvalidInput("phasors", self.phasors, "all finite")
 
     def at(self, input_angle: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the signals, shape (n, n_angles), at input angles of shape (n_angles,) in rad."""
@@ -106,27 +106,34 @@ class _Grid:
         within = 2.0 * np.pi * np.arange(points) / points
         fractions = np.round(np.mod(orders, 1.0), 9) % 1.0
         self.whole = np.zeros((len(phasors), points))
-        self.fractional: list[tuple[float, NDArray[np.complex128]]] = []
+        self.fractional: list[tuple[float, NDArray[np.float64], NDArray[np.float64]]] = []
         for fraction in np.unique(fractions):
             family = fractions == fraction
-            one_turn = phasors[:, family] @ np.exp(1j * np.outer(orders[family], within))
+            argument = np.outer(orders[family], within)
+            cosine, sine = np.cos(argument), np.sin(argument)
+            # Real products, because complex ones this small already wake the threads of BLAS.
+            real, imaginary = phasors.real[:, family].copy(), phasors.imag[:, family].copy()
+            in_phase = real @ cosine - imaginary @ sine
             if fraction == 0.0:
-                self.whole = one_turn.real
+                self.whole = in_phase
             else:
-                self.fractional.append((float(fraction), one_turn))
+                quadrature = real @ sine + imaginary @ cosine
+                self.fractional.append((float(fraction), in_phase, quadrature))
 
     def envelope(self) -> NDArray[np.float64]:
         """Return what no turn exceeds at each point within the turn, shape (n, points)."""
-        return self.whole + sum(np.abs(one_turn) for _, one_turn in self.fractional)
+        return self.whole + sum(
+            np.hypot(in_phase, quadrature) for _, in_phase, quadrature in self.fractional
+        )
 
     def values(self, rows: NDArray[np.int_], columns: NDArray[np.int_]) -> NDArray[np.float64]:
         """Return the signals ``rows`` at ``columns``, arrays of shapes that broadcast."""
         turn, point = np.divmod(columns, self.points)
         result = self.whole[rows, point]
-        for fraction, one_turn in self.fractional:
+        for fraction, in_phase, quadrature in self.fractional:
             phase = 2.0 * np.pi * fraction * turn
-            part = one_turn[rows, point]
-            result = result + np.cos(phase) * part.real - np.sin(phase) * part.imag
+            result = result + np.cos(phase) * in_phase[rows, point]
+            result = result - np.sin(phase) * quadrature[rows, point]
         return result
 
 
@@ -153,6 +160,8 @@ def _highest(
     last = int(np.floor(turns * points))
     grid = _Grid(orders, phasors, points)
     rise = np.abs(phasors) @ orders**2 * step**2 / 8.0
+    # Interpolation error of a parabola, for the one that errs low and the one that errs high.
+    doubt = 2.0 * np.abs(phasors) @ np.abs(orders) ** 3 * step**3 / (9.0 * 3.0**0.5)
 
     rows, columns = _high_points(grid, rise, last)
     here = grid.values(rows, columns)
@@ -164,10 +173,12 @@ def _highest(
     height = here + shift * (slope - shift * curvature / 2.0)
     first = np.searchsorted(rows, np.arange(len(phasors)))
     highest = np.maximum.reduceat(height, first)
-    close = height >= (highest - _PARABOLA_ERROR * rise)[rows]
+    close = height >= (highest - doubt)[rows]
     rows, start = rows[close], step * (columns + shift)[close]
     values = _climb(orders, phasors[rows], start, step, end)
-    return np.maximum.reduceat(values, np.searchsorted(rows, np.arange(len(phasors))))
+    summits = np.maximum.reduceat(values, np.searchsorted(rows, np.arange(len(phasors))))
+    # A signal may still be rising where the turn ends, beyond the last grid point.
+    return np.maximum(summits, (phasors * np.exp(1j * end * orders)).real.sum(axis=1))
 
 
 def _high_points(

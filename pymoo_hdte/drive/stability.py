@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive.coefficients import Coefficients
 
-_STEPS = 64
+_LEAST_STEPS = 64
+_MOST_STEPS = 4096
+_PHASE_PER_STEP = 1.0
+"""Radians of the fastest torsional vibration that one step may span."""
 _ROUNDING = 1e-9
 
 
@@ -23,13 +26,15 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
 
     The state is (th_in', d', d). The transition matrix is a product of steps with the stiffness of
     their midpoints, each the (2, 2) Pade approximant of the exponential: it is A-stable, so stiff
-    damping costs no small steps, and of second order in the step.
+    damping costs no small steps, and of second order in the step. Steps resolve the torsional
+    vibration; see `require_stable` for drives so slow that they cannot.
     """
-    step = np.pi / coefficients.input_speed / _STEPS
+    steps = int(np.clip(np.ceil(_phase(coefficients)), _LEAST_STEPS, _MOST_STEPS))
+    step = np.pi / coefficients.input_speed / steps
     identity = np.eye(3)
     transition = np.tile(identity, (len(coefficients.stiffness), 1, 1))
-    for index in range(_STEPS):
-        angle = (index + 0.5) * np.pi / _STEPS
+    for index in range(steps):
+        angle = (index + 0.5) * np.pi / steps
         scaled = step * _state_matrix(coefficients, angle)
         square = scaled @ scaled / 12.0
         forward, backward = identity + scaled / 2.0 + square, identity - scaled / 2.0 + square
@@ -37,8 +42,24 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
     return np.linalg.eigvals(transition).astype(np.complex128)
 
 
+def _phase(coefficients: Coefficients) -> float:
+    """Return the phase of the fastest torsional vibration in one period, in `_PHASE_PER_STEP`."""
+    compliance = 1.0 / (coefficients.input_inertia * coefficients.ratio**2)
+    compliance += 1.0 / coefficients.output_inertia
+    stiffest = coefficients.stiffness * (1.0 + coefficients.stiffness_depth)
+    fastest = np.sqrt(np.max(stiffest * compliance, initial=0.0))
+    return float(fastest * np.pi / coefficients.input_speed / _PHASE_PER_STEP)
+
+
 def require_stable(coefficients: Coefficients) -> None:
-    """Raise `UnstableDrive`, naming the design, if a multiplier lies outside the unit circle."""
+    """Raise `UnstableDrive`, naming the design, if a multiplier lies outside the unit circle.
+
+    A stiffness that varies a thousand times more slowly than the drive vibrates pumps no energy
+    into it (tongues of parametric resonance shrink exponentially with their order), so such drives
+    pass as stable without integration.
+    """
+    if not len(coefficients.stiffness) or _phase(coefficients) > 2.0 * _MOST_STEPS:
+        return
     largest = np.abs(floquet_multipliers(coefficients)).max(axis=1)
     worst = int(np.argmax(largest))
     if largest[worst] > 1.0 + _ROUNDING:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import truncnorm
 
-from pymoo_hdte.checks import one_of, whole_number
+from pymoo_hdte.checks import InvalidInput, one_of, whole_number
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, DataSheet
 from pymoo_hdte.drive.order_spectrum import OrderSpectrum
 from pymoo_hdte.units import ARCSEC
@@ -49,6 +49,10 @@ class StaticErrorSample:
 
     def spectrum(self, classes: tuple[str, ...] = ERROR_CLASSES) -> OrderSpectrum:
         """Return theta_s(theta_in) of the given classes (all by default) as an order spectrum."""
+        if not classes:
+            raise InvalidInput("classes", classes, f"one or more of {', '.join(ERROR_CLASSES)}")
+        for name in classes:
+            one_of("error class", name, ERROR_CLASSES)
         orders = np.array([self.sheet.error_orders[name] for name in classes])
         sines = np.stack([self.class_phasor(name) for name in classes], axis=1)
         return OrderSpectrum(orders, -1j * sines)

@@ -19,9 +19,10 @@ from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.stability import require_stable
 
-_COUPLINGS = 6
-_TAIL = 1e-10
-"""Harmonics are kept until the next one is smaller by this factor."""
+_COUPLINGS = (6, 12, 24, 48, 96, 192)
+"""How many orders beyond the excited ones are kept: the first number that is enough."""
+_TAIL = 1e-9
+"""Enough is where the outermost harmonics are this much smaller than the largest."""
 
 
 def transfer_function(
@@ -50,8 +51,13 @@ def steady_state(coefficients: Coefficients) -> OrderSpectrum:
         response = transfer_function(coefficients, orders) * coefficients.error_phasors
         return OrderSpectrum(orders, response)
     require_stable(coefficients)
-    families = np.unique(np.round(np.mod(coefficients.error_orders, 2.0), 9) % 2.0)
-    parts = [_family(coefficients, first) for first in np.union1d(families, [0.0])]
+    # The mean torque belongs to the family of order 0, whether or not an error line does.
+    orders = np.concatenate([coefficients.error_orders, [0.0]])
+    firsts, family = np.unique(np.round(np.mod(orders, 2.0), 9) % 2.0, return_inverse=True)
+    parts = [
+        _family(coefficients, float(first), np.flatnonzero(family[:-1] == number))
+        for number, first in enumerate(firsts)
+    ]
     return OrderSpectrum(
         np.concatenate([orders for orders, _ in parts]),
         np.concatenate([phasors for _, phasors in parts], axis=1),
@@ -59,34 +65,52 @@ def steady_state(coefficients: Coefficients) -> OrderSpectrum:
 
 
 def _family(
-    coefficients: Coefficients, first: float
+    coefficients: Coefficients, first: float, lines: NDArray[np.int_]
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Solve for all orders ``first + 2 m`` that the couplings reach; return orders and theta_d."""
-    depth = coefficients.stiffness_depth
-    reach = max(_COUPLINGS, int(np.ceil(np.log(_TAIL) / np.log(depth / 2.0))))
-    excited = np.round((coefficients.error_orders - first) / 2.0, 9)
-    member = excited == np.round(excited)
-    highest = int(excited[member].max(initial=0.0))
-    orders = first + 2.0 * np.arange(-reach, highest + reach + 1, dtype=np.float64)
+    """Return all orders ``first + 2 m`` that matter, and their theta_d.
 
-    static = np.zeros((len(coefficients.stiffness), len(orders)), dtype=complex)
-    # Several error lines of one order add up, hence no plain assignment.
-    for column, phasor in zip(excited[member], coefficients.error_phasors.T[member], strict=True):
-        static[:, int(column) + reach] += phasor
+    ``lines`` are the error lines of this family.
 
+    Raises
+    ------
+    ArithmeticError
+        If the harmonics do not die out within the largest number kept.
+    """
+    places = np.rint((coefficients.error_orders[lines] - first) / 2.0).astype(int)
+    highest = int(places.max(initial=0))
+    for reach in _COUPLINGS:
+        orders = first + 2.0 * np.arange(-reach, highest + reach + 1, dtype=np.float64)
+        static = np.zeros((len(coefficients.stiffness), len(orders)), dtype=complex)
+        # Several error lines of one order add up, hence no plain assignment.
+        for place, phasor in zip(places, coefficients.error_phasors.T[lines], strict=True):
+            static[:, place + reach] += phasor
+        torsion = _torsion(coefficients, orders, static)
+        size = np.abs(torsion)
+        if np.all(size[:, [0, -1]] <= _TAIL * size.max(axis=1, keepdims=True)):
+            return orders, static + torsion
+    raise ArithmeticError(
+        f"harmonics of a stiffness variation of {coefficients.stiffness_depth:g} at "
+        f"{coefficients.input_speed:g} rad/s do not die out within {reach} couplings"
+    )
+
+
+def _torsion(
+    coefficients: Coefficients, orders: NDArray[np.float64], static: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Solve the coupled equations of one family; shape (n, n_orders)."""
     frequency = orders * coefficients.input_speed
     impedance = _free_impedance(coefficients, frequency)
     stiffness, damping = coefficients.stiffness[:, None], coefficients.damping[:, None]
     diagonal = np.arange(len(orders))
     system = np.zeros((*static.shape, len(orders)), dtype=complex)
     system[:, diagonal, diagonal] = impedance + stiffness + 1j * frequency * damping
-    coupling = stiffness * depth / 2.0 * np.exp(1j * coefficients.stiffness_phase)
+    rotation = np.exp(1j * coefficients.stiffness_phase)
+    coupling = stiffness * coefficients.stiffness_depth / 2.0 * rotation
     system[:, diagonal[1:], diagonal[:-1]] = coupling
     system[:, diagonal[:-1], diagonal[1:]] = coupling.conj()
     forcing = -impedance * static
     forcing[:, orders == 0.0] += coefficients.mean_mesh_torque
-    torsion = np.linalg.solve(system, forcing[:, :, None])[:, :, 0]
-    return orders, static + torsion
+    return np.asarray(np.linalg.solve(system, forcing[:, :, None])[:, :, 0], np.complex128)
 
 
 def _free_impedance(

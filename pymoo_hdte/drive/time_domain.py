@@ -147,6 +147,12 @@ def simulate(
     input_angle, input_speed, transmission_error, _ = solution.y
     if angle == "prescribed":
         input_angle = np.array([start_up.angle(time) for time in times])
+    end = 2.0 * np.pi * coefficients.ratio
+    if not (input_angle[0] <= 0.0 and input_angle[-1] >= end):
+        raise ArithmeticError(
+            f"the record covers input angles {input_angle[0]:g} to {input_angle[-1]:g} rad, not "
+            f"the whole output turn 0 to {end:g}: the speed has not settled"
+        )
     return Run(times, input_angle, input_speed, transmission_error, coefficients.ratio)
 
 

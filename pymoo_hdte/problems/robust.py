@@ -2,15 +2,44 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from pymoo_hdte.surrogate import Box, ExactMoments, SampledMoments
+from pymoo_hdte.checks import one_of
+from pymoo_hdte.surrogate import (
+    Box,
+    ChebyshevSurrogate,
+    ExactMoments,
+    SampledMoments,
+    TruncatedNormal,
+    UniformBand,
+)
 
 MOMENTS = ("exact", "sample")
+
+
+def make_moments(
+    kind: str,
+    surrogate: ChebyshevSurrogate,
+    inputs: Sequence[TruncatedNormal | UniformBand],
+    design_box: Box,
+    n_samples: int,
+    sample_seed: int,
+) -> ExactMoments | SampledMoments:
+    """Return the moments of one of the `MOMENTS`; number and seed of samples only serve the second.
+
+    Raises
+    ------
+    InvalidInput
+        For another kind, and as `ExactMoments` and `SampledMoments`.
+    """
+    if one_of("moments", kind, MOMENTS) == "exact":
+        return ExactMoments(surrogate, inputs, design_box)
+    return SampledMoments(surrogate, inputs, design_box, n_samples, sample_seed)
 
 
 class RobustProblem(Problem):

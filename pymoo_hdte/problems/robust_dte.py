@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import one_of, real_number, whole_number
+from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
 from pymoo_hdte.drive import PARAMETER_UNITS, PARAMETERS, DriveModel, preset
 from pymoo_hdte.problems.reference import ReferenceFront, load_reference
-from pymoo_hdte.problems.robust import MOMENTS, RobustProblem
+from pymoo_hdte.problems.robust import MOMENTS, RobustProblem, make_moments
 from pymoo_hdte.surrogate import (
     Box,
     ChebyshevSurrogate,
-    ExactMoments,
-    SampledMoments,
     TruncatedNormal,
     UniformBand,
 )
+from pymoo_hdte.units import ARCSEC
 
 SURROGATE_BOX = 0.35
 """Half-width of the surrogate's box as a share of the nominal values (Section 3)."""
@@ -67,7 +67,10 @@ class RobustDTE(RobustProblem):
     Raises
     ------
     InvalidInput
-        For an argument that is not allowed, naming it, its value and what is.
+        For an argument that is not allowed, naming it, its value and what is; also for a model
+        whose theta_s could become negative.
+    UnstableDrive
+        If the nominal design, or a corner or node of the surrogate's box, has no steady state.
 
     Notes
     -----
@@ -90,42 +93,37 @@ class RobustDTE(RobustProblem):
         tolerance = real_number("tolerance", tolerance, above=0.0, below=1.0)
         box = real_number("box", box, above=0.0, below=1.0)
         self.nominal = self.model.nominal[1:]
-        self._settings = self._describe(order, moments, tolerance, box)
+        self.nominal.flags.writeable = False
+        samples = {} if moments == "exact" else {"n_samples": n_samples, "seed": sample_seed}
+        self._settings = {
+            **_physics(self.model),
+            **{"order": order, "moments": moments, "tolerance": tolerance, "box": box},
+            **samples,
+        }
 
-        theta_s = TruncatedNormal(self.model.nominal[0], self.model.kinematic_error.std)
+        theta_s = _theta_s(self.model)
         bands = [UniformBand(tolerance) for _ in DESIGN_VARIABLES]
         inputs: list[TruncatedNormal | UniformBand] = [theta_s, *bands]
         design_box = Box(DESIGN_VARIABLES, self.nominal * (1.0 - box), self.nominal * (1.0 + box))
+        uncertain_box = surrogate_box(self.model, theta_s, box, tolerance)
+        # The nodes of the fit may miss an unstable nominal design, or corner of the box.
+        self.model.steady_state(np.vstack([self.model.nominal, *_corners(uncertain_box)]))
         self.surrogate = ChebyshevSurrogate.fit(
             self.model.dte_arcsec,
-            surrogate_box(self.model, theta_s, reach=(1.0 + box) * (1.0 + tolerance) - 1.0),
+            uncertain_box,
             order,
             provenance={"model": self.model.to_dict(), "output": "DTE in arcsec"},
         )
-        scatter: ExactMoments | SampledMoments
-        if moments == "exact":
-            scatter = ExactMoments(self.surrogate, inputs, design_box)
-        else:
-            scatter = SampledMoments(self.surrogate, inputs, design_box, n_samples, sample_seed)
+        scatter = make_moments(
+            moments, self.surrogate, inputs, design_box, n_samples, sample_seed
+        )
         obj_names = ("mean_dte_arcsec", "std_dte_arcsec")
         units = dict(zip(PARAMETERS[1:], PARAMETER_UNITS[1:], strict=True))
         super().__init__(scatter, obj_names, units | dict.fromkeys(obj_names, "arcsec"))
 
-    def _describe(self, order: int, moments: str, tolerance: float, box: float) -> dict[str, Any]:
-        model = self.model.to_dict()
-        texts = ("name", "description", "provenance")
-        return {
-            "model": {key: value for key, value in model.items() if key not in texts},
-            "nominal": self.model.nominal.tolist(),
-            "order": order,
-            "moments": moments,
-            "tolerance": tolerance,
-            "box": box,
-        }
-
     @property
     def settings(self) -> dict[str, Any]:
-        """What decides the true front, JSON-able: model, surrogate order, moments, bands, box."""
+        """What decides the true front, JSON-able: physics, surrogate order, moments, bands, box."""
         return dict(self._settings)
 
     def _reference(self) -> ReferenceFront | None:
@@ -142,14 +140,35 @@ class RobustDTE(RobustProblem):
         return None if reference is None else reference.designs
 
 
-def surrogate_box(model: DriveModel, theta_s: TruncatedNormal, reach: float) -> Box:
+def surrogate_box(
+    model: DriveModel, theta_s: TruncatedNormal, box: float, tolerance: float
+) -> Box:
     """Return the box the surrogate is built on, over `PARAMETERS`.
 
-    +-35 % of the nominal in the dynamic parameters, or ``reach`` above it if that is more, and the
-    whole support of ``theta_s``.
+    +-35 % of the nominal in the dynamic parameters, more where ``box`` and ``tolerance`` reach
+    further, and the whole support of ``theta_s``.
     """
-    half_width = max(SURROGATE_BOX, reach)
-    nominal = model.nominal
-    lower, upper = nominal * (1.0 - half_width), nominal * (1.0 + half_width)
+    lowest = min(1.0 - SURROGATE_BOX, (1.0 - box) * (1.0 - tolerance))
+    highest = max(1.0 + SURROGATE_BOX, (1.0 + box) * (1.0 + tolerance))
+    lower, upper = model.nominal * lowest, model.nominal * highest
     lower[0], upper[0] = theta_s.support
     return Box(PARAMETERS, lower, upper)
+
+
+def _theta_s(model: DriveModel) -> TruncatedNormal:
+    mean, std = model.nominal[0], model.kinematic_error.std
+    theta_s = TruncatedNormal(mean, std)
+    if theta_s.support[0] <= 0.0:
+        limit = f"below {mean / theta_s.cut / ARCSEC:g} arcsec, so that theta_s stays above 0"
+        raise InvalidInput("kinematic_error.std in arcsec", std / ARCSEC, limit)
+    return theta_s
+
+
+def _corners(box: Box) -> NDArray[np.float64]:
+    return np.array(list(product(*zip(box.lower, box.upper, strict=True))))
+
+
+def _physics(model: DriveModel) -> dict[str, Any]:
+    """Return what the model is, without the texts that only say so."""
+    texts = ("name", "description", "provenance", "data_sheet")
+    return {key: value for key, value in model.to_dict().items() if key not in texts}

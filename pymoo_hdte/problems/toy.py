@@ -12,13 +12,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import one_of, real_number
-from pymoo_hdte.problems.robust import MOMENTS, RobustProblem
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.problems.robust import RobustProblem, make_moments
 from pymoo_hdte.surrogate import (
     Box,
     ChebyshevSurrogate,
-    ExactMoments,
-    SampledMoments,
     TruncatedNormal,
     UniformBand,
 )
@@ -49,7 +47,6 @@ class RobustToy(RobustProblem):
         sample_seed: int = 1,
         tolerance: float = 0.05,
     ) -> None:
-        one_of("moments", moments, MOMENTS)
         self.tolerance = real_number("tolerance", tolerance, above=0.0, at_most=0.2)
         bands = [UniformBand(self.tolerance) for _ in _VARIABLES]
         inputs: list[TruncatedNormal | UniformBand] = [*_NOISE, *bands]
@@ -60,11 +57,9 @@ class RobustToy(RobustProblem):
             response, Box(("a_1", "a_2", *_VARIABLES), lower, upper), order=1
         )
         design_box = Box(_VARIABLES, np.ones(3), np.full(3, 2.0))
-        scatter: ExactMoments | SampledMoments
-        if moments == "exact":
-            scatter = ExactMoments(self.surrogate, inputs, design_box)
-        else:
-            scatter = SampledMoments(self.surrogate, inputs, design_box, n_samples, sample_seed)
+        scatter = make_moments(
+            moments, self.surrogate, inputs, design_box, n_samples, sample_seed
+        )
         names = ("mean", "std")
         super().__init__(scatter, names, dict.fromkeys((*_VARIABLES, *names), "1"))
 

@@ -88,7 +88,8 @@ class TensorPolynomial:
 
     def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values, shape (outputs, n), at points ``x`` of the cube, shape (d, n)."""
-        step = max(1, _MULTIPLICATIONS_AT_ONCE // self._trailing.size)
+        largest = max(self._trailing.size, 0 if self._leading is None else self._leading.size)
+        step = max(1, _MULTIPLICATIONS_AT_ONCE // largest)
         if x.shape[1] <= step:
             return self._block(x)
         values = np.empty((len(self.coefficients), x.shape[1]))
@@ -103,9 +104,9 @@ class TensorPolynomial:
         leading = _products(basis[:, :split], self._head)
         trailing = self._trailing @ _products(basis[:, split:], self._tail)
         if self._leading is None:
-            parts = trailing.reshape(-1, *leading.shape)
+            parts = trailing.reshape(len(self.coefficients), *leading.shape)
             return np.einsum("ohn,hn->on", parts, leading)
-        parts = (self._leading @ leading).reshape(-1, *trailing.shape)
+        parts = (self._leading @ leading).reshape(len(self.coefficients), *trailing.shape)
         return np.einsum("orn,rn->on", parts, trailing)
 
     def derivatives(self, axes: Sequence[int]) -> TensorPolynomial:
@@ -147,5 +148,6 @@ def _products(basis: NDArray[np.float64], sizes: tuple[int, ...]) -> NDArray[np.
         return np.ones((1, points))
     product = basis[: sizes[0], 0]
     for variable, size in enumerate(sizes[1:], start=1):
-        product = (product[:, None] * basis[:size, variable]).reshape(-1, points)
+        product = product[:, None] * basis[:size, variable]
+        product = product.reshape(product.shape[0] * size, points)
     return product
