@@ -95,3 +95,46 @@ TABLE_9 = {
 REEVALUATION_LIMITS = {"mean_percent": 0.5, "std_arcsec": 0.3, "half_width_arcsec": 0.1}
 """Section 5.3, 100,000 samples: bounds on the error of the mean and the deviation of the standard
 deviation, and the approximate half width of the 95 % confidence interval of the mean."""
+
+
+class ErrorStatistic(NamedTuple):
+    """One row of Table 2: Shapiro-Wilk test, mean and standard deviation of one error."""
+
+    shapiro_w: float
+    shapiro_p: float
+    mean_um: float
+    std_um: float
+
+
+TABLE_2 = {
+    "dFp1": ErrorStatistic(0.992, 0.322, 8.33, 0.89),
+    "dfi1": ErrorStatistic(0.994, 0.631, 7.44, 1.03),
+    "e13": ErrorStatistic(0.993, 0.440, 5.48, 1.10),
+    "e14": ErrorStatistic(0.994, 0.620, 5.97, 1.47),
+    "dFp2": ErrorStatistic(0.991, 0.235, 6.87, 0.70),
+    "dfi2": ErrorStatistic(0.990, 0.206, 10.24, 1.74),
+    "e23": ErrorStatistic(0.995, 0.722, 5.62, 0.95),
+    "e24": ErrorStatistic(0.987, 0.064, 7.86, 1.19),
+    "e31": ErrorStatistic(0.994, 0.612, 7.10, 1.40),
+    "e32": ErrorStatistic(0.989, 0.122, 5.40, 0.96),
+    "e33": ErrorStatistic(0.992, 0.376, 6.28, 0.68),
+    "e34": ErrorStatistic(0.992, 0.382, 3.47, 0.65),
+    "e41": ErrorStatistic(0.993, 0.435, 8.45, 0.67),
+}
+"""By symbol of the error, as in the data sheet."""
+
+
+class CoefficientStatistics(NamedTuple):
+    """One row of Table 3 (N.m.s/rad): a damping coefficient over 20 prototypes."""
+
+    mean: float
+    std: float
+    cv_percent: float
+
+
+TABLE_3 = {
+    "B_in": CoefficientStatistics(1.700e-4, 0.154e-4, 9.08),
+    "B_fc": CoefficientStatistics(4.465e-4, 0.209e-4, 4.68),
+    "B_out": CoefficientStatistics(5.022e-4, 0.280e-4, 5.57),
+}
+"""By coefficient."""
