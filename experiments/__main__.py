@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
@@ -36,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InvalidInput as error:
         parser.error(str(error))
     with executor or nullcontext():
-        context = Context(options.seeds, options.out, Campaign(options.out, executor))
+        context = Context(options.seeds, options.out, Campaign(options.out, executor), options.full)
         return _run(chosen, context)
 
 
@@ -47,6 +48,8 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
             save(context.out, experiment.name, experiment.run(context))
             report = write_report(context.out)
         except KeyboardInterrupt:
+            # Impatient further presses must not stop the workers' orderly end half-way.
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
             message = (
                 f"Interrupted during {experiment.name}. What is finished is kept in {context.out}; "
                 "the same command goes on from there."
@@ -73,16 +76,29 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--workers",
         type=_positive,
-        default=os.cpu_count() or 1,
-        help="processes (default: as many as there are cores)",
+        default=_usable_cores(),
+        help="processes (default: as many as there are cores to use)",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("results"), help="folder of the results (default results)"
     )
     parser.add_argument(
+        "--full",
+        action="store_true",
+        help="run the long campaign behind an experiment (calibration) instead of reading its "
+        "committed outcome",
+    )
+    parser.add_argument(
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"
     )
     return parser
+
+
+def _usable_cores() -> int:
+    # A scheduler or taskset may leave this process fewer cores than the machine has.
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _positive(text: str) -> int:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import inspect
 import json
+import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed, wait
 from dataclasses import dataclass
@@ -118,10 +119,12 @@ def _run_in_executor(
         # The workers are gone: nothing has begun that could still be waited for.
         raise
     except BaseException:
-        begun = [future for future in waiting if not future.cancel()]
-        for future in wait(begun).done:
-            if future.exception() is None:
-                keep(waiting[future], future.result())
+        with interrupts_held_off():
+            begun = [future for future in waiting if not future.cancel()]
+            tqdm.write(f"Stopping; waiting for {len(begun)} runs under way.", file=sys.stderr)
+            for future in wait(begun).done:
+                if future.exception() is None:
+                    keep(waiting[future], future.result())
         raise
 
 

@@ -42,6 +42,17 @@ class PairedTest:
         return self.p < SIGNIFICANT
 
 
+LEAST_SEEDS = 7
+"""With fewer, no paired Wilcoxon test of three rivals can fall below 5 % after Holm's correction."""
+
+
+def too_few_seeds(comparisons: Sequence[Comparison]) -> tuple[str, ...]:
+    """Return the note that explains missing verdicts, if there are too few seeds for them."""
+    if all(comparison.can_be_judged for comparison in comparisons):
+        return ()
+    return (f"Fewer than {LEAST_SEEDS} seeds: too few to judge differences, so no verdicts.",)
+
+
 @dataclass(frozen=True)
 class Comparison:
     """Runs of several algorithms on one problem, in the order of their seeds."""
@@ -55,6 +66,11 @@ class Comparison:
     def algorithms(self) -> tuple[str, ...]:
         """Names of the algorithms compared."""
         return tuple(self.runs)
+
+    @property
+    def can_be_judged(self) -> bool:
+        """Whether there are seeds enough for a difference to be significant at all."""
+        return min(map(len, self.runs.values())) >= LEAST_SEEDS
 
     def values(self, algorithm: str, indicator: str) -> NDArray[np.float64]:
         """Return a field of `Quality` for every run, shape (seeds,)."""

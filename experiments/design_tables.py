@@ -33,7 +33,8 @@ def optima_table(preferred: Sequence[Choice]) -> Table:
     ]
     columns = [Column("design"), Column("chosen from")]
     for name, unit, _ in VARIABLES:
-        columns += [Column(part, unit, 4, name) for part in ("optimum", "lower", "upper")]
+        group = f"{name} [{unit}]"
+        columns += [Column(part, "", 4, group) for part in ("optimum", "lower", "upper")]
     title = f"Table 9: optimal designs with their ±{100 * BAND:g} % bands"
     finding = _optima_finding([c for c in preferred if c.source != TRUE_FRONT])
     return Table("optima", title, tuple(columns), tuple(rows), findings=(finding,))

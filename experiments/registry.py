@@ -22,11 +22,14 @@ class Context:
         Folder of the results.
     campaign
         Runs jobs on the workers that the user allowed.
+    full
+        Whether to run long campaigns instead of reading their committed outcome.
     """
 
     seeds: int
     out: Path
     campaign: Campaign
+    full: bool = False
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,11 @@ EXPERIMENTS = (
     Experiment("published", "What Eq. (9) gives as printed, order by order, beside an integrator"),
     Experiment("table2", "Table 2, Figs. 4 and 5: error statistics and the static error"),
     Experiment("table3", "Tables 3 and 4, Figs. 9 and 10: stiffness and damping from records"),
+    Experiment("fig12", "Fig. 12: distribution of the DTE at the nominal design"),
+    Experiment("table6", "Table 6, Figs 14 and 15: five prototypes, predicted and measured"),
+    Experiment("sensitivity", "Sobol indices of the DTE: which tolerance deserves money"),
+    Experiment("crosscheck", "chaospy beside ours, and accuracy per model run: is 1024 needed?"),
+    Experiment("dte_map", "DTE over input speed and load, with the resonances of each preset"),
     Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
     Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
 )

@@ -18,9 +18,9 @@ class Summary(NamedTuple):
 
 
 def summary(values: ArrayLike) -> Summary:
-    """Summarise the runs ``values`` (n,); the standard deviation of a single run is 0."""
+    """Summarise the runs ``values`` (n,); a single run has no standard deviation (NaN)."""
     runs = np.asarray(values, dtype=float)
-    std = float(runs.std(ddof=1)) if runs.size > 1 else 0.0
+    std = float(runs.std(ddof=1)) if runs.size > 1 else float("nan")
     return Summary(float(runs.mean()), float(np.median(runs)), std)
 
 

@@ -36,7 +36,9 @@ def _dask_executor(address: str) -> Executor:
     try:
         from distributed import Client
     except ImportError:
-        raise InvalidInput("--dask", address, "only after pip install 'pymoo-hdte[dask]'") from None
+        raise InvalidInput(
+            "--dask", address, "only with the extra: pip install '.[dask]'"
+        ) from None
     try:
         return Client(address, timeout=CONNECT_SECONDS).get_executor()
     except (OSError, ValueError):

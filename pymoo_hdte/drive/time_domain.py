@@ -115,6 +115,8 @@ def simulate(
     ArithmeticError
         If the integrator gives up.
     """
+    if not isinstance(model, DriveModel):
+        raise InvalidInput("model", model, "a DriveModel, e.g. preset('calibrated')")
     values = finite_array("parameters", parameters, (len(PARAMETERS),))
     one_of("angle", angle, ANGLES)
     one_of("method", method, METHODS)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
-from pymoo_hdte.drive import PARAMETER_UNITS, PARAMETERS, DriveModel, preset
+from pymoo_hdte.drive import PARAMETER_UNITS, PARAMETERS, PRESETS, DriveModel, preset
 from pymoo_hdte.problems.reference import ReferenceFront, load_reference
 from pymoo_hdte.problems.robust import MOMENTS, RobustProblem, make_moments
 from pymoo_hdte.surrogate import (
@@ -22,6 +22,9 @@ from pymoo_hdte.units import ARCSEC
 
 SURROGATE_BOX = 0.35
 """Half-width of the surrogate's box as a share of the nominal values (Section 3)."""
+
+HIGHEST_ORDER = 6
+"""At order 6 the surrogate takes 16,807 model runs; time and memory grow with the tenth power."""
 
 DESIGN_VARIABLES = PARAMETERS[1:]
 """U = (K, J_in, B_in, B_fc) of Section 5.1; theta_s is noise."""
@@ -42,7 +45,7 @@ class RobustDTE(RobustProblem):
         ``calibrated`` is the printed model plus named effects whose values were fitted to the
         published statistics; the printed model alone has next to no trade-off.
     order : int
-        Order k of the surrogate, at least 1; the paper takes 3. It costs (k + 1)^5 model runs.
+        Order k of the surrogate, 1 to 6; the paper takes 3. It costs (k + 1)^5 model runs.
     moments : {"exact", "sample"}
         Integrate the surrogate exactly, or over common random numbers as the paper does.
     n_samples, sample_seed : int
@@ -74,6 +77,9 @@ class RobustDTE(RobustProblem):
 
     Notes
     -----
+    A true front is stored for every preset under the other defaults; with any other setting
+    ``pareto_front()`` and ``pareto_set()`` return None.
+
     In a real drive K and B_fc cannot be chosen independently: wall thickness and preload move both.
     """
 
@@ -87,9 +93,15 @@ class RobustDTE(RobustProblem):
         tolerance: float = 0.05,
         box: float = 0.25,
     ) -> None:
+        if not isinstance(model, DriveModel | str):
+            raise InvalidInput("model", model, f"a DriveModel or one of {', '.join(PRESETS)}")
         self.model = model if isinstance(model, DriveModel) else preset(model)
-        order = whole_number("order", order, 1)
+        if whole_number("order", order, 1) > HIGHEST_ORDER:
+            limit = f"1 to {HIGHEST_ORDER}, for (order + 1)^5 model runs"
+            raise InvalidInput("order", order, limit)
         one_of("moments", moments, MOMENTS)
+        n_samples = whole_number("n_samples", n_samples, 2)
+        sample_seed = whole_number("sample_seed", sample_seed, 0)
         tolerance = real_number("tolerance", tolerance, above=0.0, below=1.0)
         box = real_number("box", box, above=0.0, below=1.0)
         self.nominal = self.model.nominal[1:]
@@ -125,6 +137,10 @@ class RobustDTE(RobustProblem):
     def settings(self) -> dict[str, Any]:
         """What decides the true front, JSON-able: physics, surrogate order, moments, bands, box."""
         return dict(self._settings)
+
+    def name(self) -> str:
+        """Return the name that pymoo shows, with that of the drive model."""
+        return f"{type(self).__name__}({self.model.name})"
 
     def _reference(self) -> ReferenceFront | None:
         return load_reference(self.model.name, self._settings)
