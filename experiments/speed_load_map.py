@@ -1,0 +1,117 @@
+"""DTE of one design over input speed and load, with the resonances that explain it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+from tqdm import tqdm
+
+from pymoo_hdte.drive import DriveModel, UnstableDrive
+
+RPM = np.pi / 30.0
+_PROMINENCE = 0.02
+"""A peak over speed stands out by at least this share of its height."""
+
+
+@dataclass(frozen=True)
+class SpeedLoadMap:
+    """DTE in arcsec at the nominal design.
+
+    Attributes
+    ----------
+    model : DriveModel
+    speeds : ndarray, shape (n,)
+        Input speeds, r/min.
+    loads : ndarray, shape (m,)
+        Load torques, N.m.
+    dte : ndarray, shape (m, n)
+        arcsec; NaN where the drive has no steady state.
+    """
+
+    model: DriveModel
+    speeds: NDArray[np.float64]
+    loads: NDArray[np.float64]
+    dte: NDArray[np.float64]
+
+    @property
+    def unstable(self) -> int:
+        """Number of conditions without a steady state."""
+        return int(np.isnan(self.dte).sum())
+
+    def peaks(self, row: int) -> list[tuple[float, float]]:
+        """Return speed and DTE of every peak over speed at the load of that row."""
+        dte = self.dte[row]
+        places, found = find_peaks(np.nan_to_num(dte), prominence=0.0)
+        standing_out = found["prominences"] >= _PROMINENCE * dte[places]
+        return [(float(self.speeds[i]), float(dte[i])) for i in places[standing_out]]
+
+
+@dataclass(frozen=True)
+class TorsionalMode:
+    """Free vibration of both inertias against the mean mesh stiffness.
+
+    Attributes
+    ----------
+    frequency : float
+        Undamped, Hz.
+    damping_ratio : float
+        1 is critical; from 1 / sqrt(2) on nothing resonates.
+    """
+
+    frequency: float
+    damping_ratio: float
+
+    @property
+    def resonates(self) -> bool:
+        """Whether the response can exceed its static value at some frequency."""
+        return self.damping_ratio < np.sqrt(0.5)
+
+    def speed(self, order: float) -> float:
+        """Return the input speed in r/min at which an order of the input turn meets the mode."""
+        return 60.0 * self.frequency / order
+
+
+def torsional_mode(model: DriveModel) -> TorsionalMode:
+    """Return the torsional mode of the nominal design, its bearings left out."""
+    coefficients = model.coefficients(model.nominal[None])
+    input_inertia = coefficients.input_inertia[0] * coefficients.ratio**2
+    compliance = 1.0 / input_inertia + 1.0 / coefficients.output_inertia
+    stiffness, damping = coefficients.stiffness[0], coefficients.damping[0]
+    angular = np.sqrt(stiffness * compliance)
+    return TorsionalMode(
+        float(angular / (2.0 * np.pi)), float(damping * angular / (2.0 * stiffness))
+    )
+
+
+def critical_speeds(model: DriveModel) -> list[tuple[float, float]]:
+    """Return order and input speed (r/min) of every resonance of an excited order.
+
+    Excited are the orders of theta_s, and order 2 by a varying stiffness under load.
+    """
+    mode = torsional_mode(model)
+    if not mode.resonates:
+        return []
+    coefficients = model.coefficients(model.nominal[None])
+    orders = set(coefficients.error_orders.tolist())
+    if coefficients.stiffness_depth:
+        orders.add(2.0)
+    return [(order, mode.speed(order)) for order in sorted(orders)]
+
+
+def speed_load_map(
+    model: DriveModel, speeds: NDArray[np.float64], loads: NDArray[np.float64]
+) -> SpeedLoadMap:
+    """Evaluate the nominal design at all speeds (r/min) and loads (N.m)."""
+    dte = np.full((len(loads), len(speeds)), np.nan)
+    conditions = [(row, column) for row in range(len(loads)) for column in range(len(speeds))]
+    for row, column in tqdm(conditions, desc=f"map of {model.name}", leave=False, delay=2.0):
+        there = model.at(float(speeds[column]) * RPM, float(loads[row]))
+        try:
+            dte[row, column] = there.dte_arcsec(model.nominal[None])[0]
+        except UnstableDrive:
+            # Left NaN: motion that grows has no peak-to-peak.
+            continue
+    return SpeedLoadMap(model, speeds, loads, dte)
