@@ -8,6 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import wilcoxon
 
+from pymoo_hdte.identification.error_statistics import holm
+
+__all__ = ["Summary", "effect_size", "holm", "summary", "wilcoxon_p"]
+
 
 class Summary(NamedTuple):
     """Mean, median and sample standard deviation of the runs of one algorithm."""
@@ -36,16 +40,6 @@ def wilcoxon_p(first: ArrayLike, second: ArrayLike) -> float:
     if not difference.any():
         return 1.0
     return float(wilcoxon(difference).pvalue)
-
-
-def holm(p_values: ArrayLike) -> NDArray[np.float64]:
-    """Adjust p-values (m,) for m tests made at once (Holm, Scand. J. Statist. 6, 1979)."""
-    p = np.asarray(p_values, dtype=float)
-    order = np.argsort(p, kind="stable")
-    stepped = np.maximum.accumulate(p[order] * (p.size - np.arange(p.size)))
-    adjusted = np.empty_like(p)
-    adjusted[order] = np.minimum(1.0, stepped)
-    return adjusted
 
 
 def effect_size(first: ArrayLike, second: ArrayLike) -> float:

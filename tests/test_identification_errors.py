@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from experiments.statistics import holm as holm_of_experiments
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.identification import (
     NormalSample,
@@ -16,7 +15,6 @@ from pymoo_hdte.identification import (
     find_outliers,
     largest_deviation,
 )
-from pymoo_hdte.identification.error_statistics import holm
 from pymoo_hdte.identification.outliers import mean_of_valid
 from pymoo_hdte.identification.virtual_bench import (
     draw_prototypes,
@@ -122,11 +120,6 @@ def test_statistics_are_those_of_scipy(rng):
             assert result.correlation[index, other] == pytest.approx(pearson.statistic, rel=1e-12)
             assert result.correlation_p[index, other] == pytest.approx(pearson.pvalue, rel=1e-9)
     np.testing.assert_array_equal(np.diag(result.correlation_p), 1.0)
-
-
-@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20))
-def test_holm_is_that_of_the_experiments(p_values):
-    np.testing.assert_array_equal(holm(p_values), holm_of_experiments(p_values))
 
 
 def test_intervals_cover_the_truth_on_200_campaigns(rng):
