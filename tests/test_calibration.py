@@ -1,0 +1,124 @@
+"""The calibration ladder: rules against closed forms, predictions against samples, recovery."""
+
+import numpy as np
+import pytest
+
+from experiments.calibration_data import Outcome, format_outcomes, gap, read_outcomes
+from experiments.fitting import Budget, Fit, _refine, _residuals, outcome_row
+from experiments.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate, ladder
+from experiments.predictions import (
+    FITS,
+    PUBLISHED,
+    _theta_rule,
+    held_out,
+    predict,
+    prototype_dte,
+    uncertain_box,
+)
+from experiments.trade_off import TRAITS, front_traits
+from pymoo_hdte.drive import preset
+from pymoo_hdte.surrogate import TruncatedNormal
+
+FULL_LADDER = Candidate(EFFECTS, "semi_amplitude", NARROW)
+
+
+def test_ladder_has_every_combination_once():
+    rungs = ladder()
+    assert len(rungs) == 2**3 * 2 * 2
+    assert len({rung.name for rung in rungs}) == len(rungs)
+
+
+@pytest.mark.parametrize("rung", ladder(), ids=lambda rung: rung.name)
+def test_parameters_survive_the_way_to_the_search_space_and_back(rung):
+    parameters = {name: KNOWN[0][name] for name in rung.bounds}
+    assert rung.physical(rung.searched(parameters)) == pytest.approx(parameters)
+    low, high = np.array(list(rung.bounds.values())).T
+    assert np.all((rung.known() >= low) & (rung.known() <= high))
+    assert {effect.name for effect in rung.model(parameters).effects} == set(rung.effects)
+
+
+def test_theta_rule_integrates_polynomials_up_to_degree_nine():
+    nodes, weights = _theta_rule()
+    values, dense = TruncatedNormal(0.0, 1.0).quadrature(20)
+    for degree in range(10):
+        assert weights @ nodes**degree == pytest.approx(dense @ values**degree, abs=1e-12)
+
+
+@pytest.mark.parametrize(("name", "bands"), [("calibrated", WIDE), ("resonant", NARROW)])
+def test_predictions_are_those_of_samples_of_the_model(name, bands):
+    model = preset(name)
+    found = predict(model, bands, tuple(PUBLISHED))
+    rng, n = np.random.default_rng(1), 10_000
+    theta_s = TruncatedNormal(model.nominal[0], model.kinematic_error.std).sample(rng, n)
+    tolerance = {WIDE: 0.35, NARROW: 0.05}[bands]
+    rest = model.nominal[1:] * rng.uniform(1 - tolerance, 1 + tolerance, (n, 4))
+    values = model.dte_arcsec(np.column_stack([theta_s, rest]))
+    assert abs(found["mean_initial"] - values.mean()) < 4 * values.std() / np.sqrt(n)
+    assert found["std_initial"] == pytest.approx(values.std(), rel=0.03)
+    box = uncertain_box(model, bands)
+    sample = rng.uniform(box.lower, box.upper, (4000, 5))
+    assert found["box_std"] == pytest.approx(model.dte_arcsec(sample).std(), rel=0.05)
+    assert found["prototypes_mean"] == prototype_dte(model).mean()
+
+
+def test_only_what_is_asked_for_is_predicted():
+    model = preset("published")
+    assert set(predict(model, NARROW, ("std_balanced", "box_std"))) == {"std_balanced", "box_std"}
+
+
+def test_a_fit_never_sees_what_it_is_judged_on():
+    for direction, names in FITS.items():
+        assert set(names) & set(held_out(direction)) == set()
+        assert set(names) | set(held_out(direction)) == set(PUBLISHED)
+
+
+def test_a_local_fit_recovers_the_model_that_made_the_numbers():
+    rung = Candidate(("damping_reference",), "peak_to_peak", NARROW)
+    truth = {**{name: KNOWN[1][name] for name in rung.bounds}, "std_arcsec": 8.0}
+    targets = predict(rung.model(truth), NARROW, tuple(PUBLISHED))
+    residuals = _residuals(rung, "table8", targets)
+    start = rung.searched({**truth, "std_arcsec": 6.0})
+    chi_square, found = _refine(residuals, rung, start, Budget(0, 0, 1, 10))
+    assert chi_square < 1e-3
+    assert rung.physical(found)["std_arcsec"] == pytest.approx(8.0, rel=1e-3)
+
+
+def test_the_same_seed_gives_the_same_fit():
+    rung = Candidate((), "semi_amplitude", NARROW)
+    budget = Budget(population=6, generations=1, starts=1, local_evaluations=2)
+    first, second = (Fit(rung, "table8", 3, budget).execute() for _ in range(2))
+    assert first.columns == second.columns
+    assert np.array_equal(first.values, second.values)
+    other = Fit(rung, "table8", 4, budget).execute()
+    assert not np.array_equal(first.values, other.values)
+
+
+def test_traits_of_the_printed_model_show_no_trade_off():
+    traits = front_traits(preset("published"))
+    assert set(traits) == set(TRAITS)
+    assert traits["front_mean_width"] < 0.01
+    resonant = front_traits(preset("resonant"))
+    assert resonant["front_mean_width"] > 3.0
+    assert 0.9 < resonant["mean_share_K"] < 1.1
+
+
+def test_outcomes_survive_their_csv(tmp_path):
+    parameters = {name: KNOWN[1][name] for name in FULL_LADDER.bounds}
+    row = outcome_row(FULL_LADDER, 1.5, FULL_LADDER.searched(parameters))
+    outcome = Outcome(
+        kind="fit",
+        direction="table8",
+        candidate=FULL_LADDER,
+        seed=1,
+        budget="1x1",
+        chi_square=1.5,
+        parameters=parameters,
+        predictions={name: row[name] for name in PUBLISHED},
+        traits={name: row[name] for name in TRAITS},
+    )
+    path = tmp_path / "calibration.csv"
+    path.write_text(format_outcomes([outcome]), encoding="utf-8")
+    (read,) = read_outcomes(path)
+    assert read.candidate == outcome.candidate
+    assert read.parameters == pytest.approx(parameters, rel=1e-6)
+    assert read.gap(FITS["table8"]) == pytest.approx(gap(outcome.predictions, FITS["table8"]))
