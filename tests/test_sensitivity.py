@@ -57,7 +57,7 @@ def fitted_by_chaospy(surrogate, noise, design, tolerance, order):
     return joint, expansion, coefficients, polynomial
 
 
-@pytest.mark.parametrize(("sizes", "tolerance"), [((4, 4), 0.05), ((6, 3), 0.2), ((2, 3, 3), 0.3)])
+@pytest.mark.parametrize(("sizes", "tolerance"), [((4, 4), 0.05), ((5, 3), 0.2), ((2, 3, 2), 0.3)])
 def test_they_agree_with_chaospys_conditional_variances(sizes, tolerance):
     surrogate = random_surrogate(1, sizes)
     design = np.linspace(0.9, 1.3, len(sizes) - 1)
@@ -126,7 +126,7 @@ def test_a_polynomial_of_ishigamis_kind_has_its_closed_form(a, b):
     assert indices.total == pytest.approx(total, abs=1e-11)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     sizes=st.lists(st.integers(1, 4), min_size=2, max_size=4),
