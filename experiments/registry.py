@@ -61,6 +61,9 @@ EXPERIMENTS = (
     Experiment("sensitivity", "Sobol indices of the DTE: which tolerance deserves money"),
     Experiment("crosscheck", "chaospy beside ours, and accuracy per model run: is 1024 needed?"),
     Experiment("dte_map", "DTE over input speed and load, with the resonances of each preset"),
+    Experiment(
+        "calibration", "Which effects the printed equations lack: a ladder of fitted models"
+    ),
     Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
     Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
 )

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from experiments import calibration
+from experiments.calibration import COMMITTED, best_rungs
 from experiments.calibration_data import Outcome, format_outcomes, gap, read_outcomes
+from experiments.campaign import Campaign
 from experiments.fitting import Budget, Fit, _refine, _residuals, outcome_row
 from experiments.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate, ladder
 from experiments.predictions import (
@@ -15,6 +18,7 @@ from experiments.predictions import (
     prototype_dte,
     uncertain_box,
 )
+from experiments.registry import Context
 from experiments.trade_off import TRAITS, front_traits
 from pymoo_hdte.drive import preset
 from pymoo_hdte.surrogate import TruncatedNormal
@@ -100,6 +104,26 @@ def test_traits_of_the_printed_model_show_no_trade_off():
     resonant = front_traits(preset("resonant"))
     assert resonant["front_mean_width"] > 3.0
     assert 0.9 < resonant["mean_share_K"] < 1.1
+
+
+def test_the_committed_ladder_is_what_its_parameters_predict():
+    best = best_rungs(read_outcomes(COMMITTED), "table8")
+    assert len(best) == len(ladder())
+    for one in (best[0], best[3]):
+        model = one.candidate.model(one.parameters)
+        found = predict(model, one.candidate.bands, tuple(PUBLISHED))
+        assert found == pytest.approx(one.predictions, rel=1e-4)
+        residuals = _residuals(one.candidate, "table8", PUBLISHED)
+        searched = one.candidate.searched(one.parameters)
+        assert np.sum(residuals(searched) ** 2) == pytest.approx(one.chi_square, rel=1e-2)
+
+
+def test_the_report_is_made_from_the_committed_ladder(tmp_path):
+    result = calibration.run(Context(1, tmp_path, Campaign(tmp_path)))
+    numbers = result.tables[0]
+    assert [row[0] for row in numbers.rows] == [name.replace("_", " ") for name in PUBLISHED]
+    assert all(finding.agrees for finding in numbers.findings)
+    assert len(result.tables[1].rows) == len(ladder())
 
 
 def test_outcomes_survive_their_csv(tmp_path):
