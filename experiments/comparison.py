@@ -43,7 +43,7 @@ class PairedTest:
 
 
 LEAST_SEEDS = 7
-"""With fewer, no paired Wilcoxon test of three rivals can fall below 5 % after Holm's correction."""
+"""With fewer, no Wilcoxon test against three rivals can fall below 5 % after Holm's correction."""
 
 
 def too_few_seeds(comparisons: Sequence[Comparison]) -> tuple[str, ...]:
