@@ -62,8 +62,8 @@ def run(context: Context) -> Result:
                 "gain",
                 "Gain from static error to transmission error over frequency, at mean stiffness; "
                 "the vertical lines mark orders 1 and 2 at 2000 r/min. The sharp peak of "
-                "published, at 877 Hz, leaves the frame. A stiffness that varies with the angle, as "
-                "calibrated and resonant have it, acts beside this gain and is not shown.",
+                "published, at 877 Hz, leaves the frame. A stiffness that varies with the "
+                "angle, as calibrated and resonant have it, acts beside this gain.",
                 _gain(),
             ),
         ),
