@@ -92,6 +92,13 @@ def test_bad_model_files_are_explained(tmp_path, old, new, field, allowed):
     assert allowed in str(caught.value)
 
 
+def test_a_static_error_in_arcsec_is_not_taken_for_radians():
+    model = preset("calibrated")
+    design = model.nominal / np.array([ARCSEC, 1, 1, 1, 1])
+    with pytest.raises(InvalidInput, match=r"theta_s is 36\.251.*not given in arcsec"):
+        model.dte_arcsec(design[None])
+
+
 def test_unknown_presets_are_refused():
     with pytest.raises(InvalidInput, match="model is 'measured', allowed: one of 'published'"):
         preset("measured")

@@ -28,6 +28,9 @@ PARAMETER_UNITS = ("rad", "N.m/rad", "kg.m2", "N.m.s/rad", "N.m.s/rad")
 
 PRESETS = ("published", "calibrated", "resonant")
 
+LARGEST_STATIC_ERROR = 0.1
+"""rad; any larger theta_s must be an angle in other units."""
+
 _READINGS = {"peak_to_peak": 1.0, "semi_amplitude": 2.0}
 
 
@@ -130,13 +133,16 @@ class DriveModel:
         Raises
         ------
         InvalidInput
-            If the shape is wrong or a value is not finite or not above 0.
+            If the shape is wrong, a value is not finite or not above 0, or theta_s is 0.1 or more.
         """
         values = finite_array("parameters", parameters, (None, len(PARAMETERS)))
         for name, column in zip(PARAMETERS, values.T, strict=True):
             if np.any(column <= 0.0):
                 raise InvalidInput(name, float(column.min()), "above 0")
         theta_s, stiffness, input_inertia, input_damping, mesh_damping = values.T
+        if np.any(theta_s >= LARGEST_STATIC_ERROR):
+            limit = f"below {LARGEST_STATIC_ERROR} rad; it is not given in arcsec"
+            raise InvalidInput("theta_s", float(theta_s.max()), limit)
         coefficients = Coefficients(
             ratio=self.sheet.ratio,
             input_speed=self.sheet.input_speed,
