@@ -1,5 +1,7 @@
 """The calibration ladder: rules against closed forms, predictions against samples, recovery."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from experiments import calibration
 from experiments.calibration import COMMITTED, best_rungs
 from experiments.calibration_data import Outcome, format_outcomes, gap, read_outcomes
 from experiments.campaign import Campaign
-from experiments.fitting import Budget, Fit, _refine, _residuals, outcome_row
+from experiments.fitting import Bootstrap, Budget, Fit, _refine, _residuals, outcome_row
 from experiments.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate, ladder
 from experiments.predictions import (
     FITS,
@@ -124,6 +126,26 @@ def test_the_report_is_made_from_the_committed_ladder(tmp_path):
     assert [row[0] for row in numbers.rows] == [name.replace("_", " ") for name in PUBLISHED]
     assert all(finding.agrees for finding in numbers.findings)
     assert len(result.tables[1].rows) == len(ladder())
+
+
+def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
+    budget = Budget(population=6, generations=1, starts=1, local_evaluations=2)
+    rung = Candidate(("load_inertia",), "semi_amplitude", NARROW)
+    monkeypatch.setattr(calibration, "ladder", lambda: [rung])
+    monkeypatch.setattr(calibration, "REPLICATES", 2)
+    monkeypatch.setattr(calibration, "Fit", partial(Fit, budget=budget))
+    monkeypatch.setattr(calibration, "Bootstrap", partial(Bootstrap, budget=budget))
+    context = Context(1, tmp_path, Campaign(tmp_path), full=True)
+    first = calibration.run(context)
+    written = tmp_path / "calibration" / COMMITTED.name
+    outcomes = read_outcomes(written)
+    kinds = [(one.kind, one.direction) for one in outcomes]
+    assert kinds == [("fit", "table8"), ("fit", "table5"), *2 * [("bootstrap", "table8")]]
+    assert outcomes[2].parameters != outcomes[3].parameters
+    # A second run finds every fit on disk and reports the same.
+    runs = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.csv")}
+    assert calibration.run(context).tables == first.tables
+    assert {path: path.stat().st_mtime_ns for path in runs} == runs
 
 
 def test_outcomes_survive_their_csv(tmp_path):
