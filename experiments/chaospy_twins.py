@@ -12,7 +12,8 @@ import chaospy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.shares import scatter_indices, theta_s_of
+from experiments.scatter import theta_s_of
+from experiments.shares import scatter_indices
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import SobolIndices, TruncatedNormal, UniformBand
 

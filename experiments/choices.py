@@ -13,6 +13,7 @@ from experiments.published_values import TABLE_9, Moments
 from experiments.runs import OptimisationRun, robust_problem
 from experiments.scatter import dte_samples, exact_moments
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+from pymoo_hdte.problems.robust_dte import SURROGATE_BOX
 
 MODEL = "calibrated"
 INITIAL = "initial"
@@ -20,9 +21,6 @@ TRUE_FRONT = "true front"
 PAPER_DESIGN = "paper's design"
 BAND = 0.05
 """Tolerance of every optimised design."""
-
-WIDE_BAND = 0.35
-"""Tolerance of the surrogate's box, at which the paper may have sampled its initial design."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ def initial_choices() -> tuple[Choice, Choice]:
             tolerance,
             exact_moments(problem, problem.nominal, tolerance),
         )
-        for tolerance in (WIDE_BAND, BAND)
+        for tolerance in (SURROGATE_BOX, BAND)
     )
     return wide, narrow
 

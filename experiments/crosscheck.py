@@ -22,7 +22,8 @@ from experiments.published_values import REEVALUATION_LIMITS
 from experiments.registry import Context
 from experiments.result import Column, Finding, Picture, Result, Table, significant
 from experiments.runs import robust_problem
-from experiments.shares import study_designs, theta_s_of
+from experiments.scatter import theta_s_of
+from experiments.shares import study_designs
 from pymoo_hdte.drive import PRESETS
 from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
 from pymoo_hdte.units import ARCSEC

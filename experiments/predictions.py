@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from experiments.ladder import NARROW, WIDE
 from experiments.published_values import TABLE_5, TABLE_6, TABLE_8, TABLE_9
+from experiments.quadrature import Rule, tensor_rule, weighted_moments
 from pymoo_hdte.drive import PARAMETERS, DriveModel, OrderSpectrum
+from pymoo_hdte.problems.robust_dte import SURROGATE_BOX, theta_s_scatter
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, TruncatedNormal, latin_hypercube
 from pymoo_hdte.units import ARCSEC
 
 BAND = {"initial": {WIDE: 0.35, NARROW: 0.05}, "optimum": {WIDE: 0.05, NARROW: 0.05}}
-BOX = 0.35
 N_TEST = 500
 _THETA_NODES = 5
 
@@ -92,10 +93,9 @@ def prototype_dte(model: DriveModel) -> NDArray[np.float64]:
 
 def uncertain_box(model: DriveModel, bands: str) -> Box:
     """Return the box of Table 5 under this reading."""
-    lower, upper = model.nominal * (1.0 - BOX), model.nominal * (1.0 + BOX)
+    lower, upper = model.nominal * (1.0 - SURROGATE_BOX), model.nominal * (1.0 + SURROGATE_BOX)
     if bands == WIDE:
-        theta_s = TruncatedNormal(model.nominal[0], model.kinematic_error.std)
-        lower[0], upper[0] = theta_s.support
+        lower[0], upper[0] = theta_s_scatter(model).support
     return Box(PARAMETERS, lower, upper)
 
 
@@ -104,10 +104,6 @@ def _surrogate_rmse(model: DriveModel, bands: str, order: int) -> float:
     points = latin_hypercube(box, N_TEST, 1)
     surrogate = ChebyshevSurrogate.fit(model.dte_arcsec, box, order)
     return float(np.sqrt(np.mean((surrogate(points) - model.dte_arcsec(points)) ** 2)))
-
-
-Rule = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Nodes and weights of one variable."""
 
 
 def _design_rules(model: DriveModel, design: NDArray[np.float64], tolerance: float) -> list[Rule]:
@@ -122,7 +118,7 @@ def _box_rules(model: DriveModel, bands: str) -> list[Rule]:
     box = uncertain_box(model, bands)
     nodes, weights = leggauss(3)
     theta = box.centre[0] + box.half_width[0] * nodes
-    return [(theta, weights / 2.0), *_bands(model.nominal[1:], BOX, (4, 2, 1, 3))]
+    return [(theta, weights / 2.0), *_bands(model.nominal[1:], SURROGATE_BOX, (4, 2, 1, 3))]
 
 
 def _bands(design: NDArray[np.float64], tolerance: float, sizes: tuple[int, ...]) -> list[Rule]:
@@ -141,7 +137,7 @@ def _moments(model: DriveModel, rules: list[list[Rule]]) -> list[tuple[float, fl
     """
     if not rules:
         return []
-    grids = [_tensor(others) for _, *others in rules]
+    grids = [tensor_rule(others) for _, *others in rules]
     rest = np.vstack([points for points, _ in grids])
     ends = model.nominal[0] * np.array([0.5, 1.5])
     low, high = (
@@ -158,20 +154,7 @@ def _moments(model: DriveModel, rules: list[list[Rule]]) -> list[tuple[float, fl
         weights.append(np.outer(theta_weights, point_weights).ravel())
     values = OrderSpectrum(low.orders, np.vstack(blocks)).peak_to_peak(model.sheet.ratio) / ARCSEC
     parts = np.split(values, np.cumsum([len(weight) for weight in weights])[:-1])
-    return [_weighted(part, weight) for part, weight in zip(parts, weights, strict=True)]
-
-
-def _tensor(rules: list[Rule]) -> Rule:
-    points = np.meshgrid(*[values for values, _ in rules], indexing="ij")
-    weights = np.ones(1)
-    for _, factor in rules:
-        weights = np.outer(weights, factor).ravel()
-    return np.column_stack([axis.ravel() for axis in points]), weights
-
-
-def _weighted(values: NDArray[np.float64], weights: NDArray[np.float64]) -> tuple[float, float]:
-    mean = float(weights @ values)
-    return mean, float(np.sqrt(weights @ (values - mean) ** 2))
+    return [weighted_moments(part, weight) for part, weight in zip(parts, weights, strict=True)]
 
 
 @cache

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import cast
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from experiments.published_values import Moments
+from experiments.quadrature import tensor_rule, weighted_moments
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
+
+Inputs = Sequence[TruncatedNormal | UniformBand]
 
 
 def dte_samples(
@@ -18,7 +24,7 @@ def dte_samples(
     Returns arcsec, shape (n_samples,), from the problem's surrogate.
     """
     random_state = np.random.default_rng(seed)
-    inputs = _inputs(problem, tolerance)
+    inputs = scatter_of(problem, tolerance)
     columns = [entry.sample(random_state, n_samples) for entry in inputs]
     return problem.surrogate(np.column_stack(columns) * _scale(design))
 
@@ -30,19 +36,19 @@ def exact_moments(problem: RobustDTE, design: ArrayLike, tolerance: float) -> Mo
     box; here only this design's must, so that the wide band of the initial design can be asked for.
     """
     degree = 2 * max(problem.surrogate.orders)
-    rules = [entry.quadrature(degree) for entry in _inputs(problem, tolerance)]
-    points = np.meshgrid(*[values for values, _ in rules], indexing="ij")
-    weights = np.ones(1)
-    for _, weight in rules:
-        weights = np.outer(weights, weight).ravel()
-    values = problem.surrogate(np.column_stack([p.ravel() for p in points]) * _scale(design))
-    mean = weights @ values
-    return Moments(float(mean), float(np.sqrt(weights @ (values - mean) ** 2)))
+    rules = [entry.quadrature(degree) for entry in scatter_of(problem, tolerance)]
+    points, weights = tensor_rule(rules)
+    return Moments(*weighted_moments(problem.surrogate(points * _scale(design)), weights))
 
 
-def _inputs(problem: RobustDTE, tolerance: float) -> list[TruncatedNormal | UniformBand]:
-    theta_s = problem.moments.uncertainty.inputs[0]
-    return [theta_s, *[UniformBand(tolerance) for _ in problem.nominal]]
+def theta_s_of(problem: RobustDTE) -> TruncatedNormal:
+    """Return the distribution of theta_s, in rad."""
+    return cast(TruncatedNormal, problem.moments.uncertainty.inputs[0])
+
+
+def scatter_of(problem: RobustDTE, tolerance: float) -> Inputs:
+    """Return the scatter of `PARAMETERS` with bands of +-``tolerance`` around any design."""
+    return [theta_s_of(problem), *[UniformBand(tolerance) for _ in problem.nominal]]
 
 
 def _scale(design: ArrayLike) -> NDArray[np.float64]:

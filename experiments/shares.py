@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from experiments.choices import BAND, INITIAL
+from experiments.scatter import Inputs, scatter_of
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.problems.robust_dte import SURROGATE_BOX
@@ -21,8 +21,6 @@ from pymoo_hdte.surrogate import (
     sobol_indices,
     sobol_indices_over_box,
 )
-
-Inputs = Sequence[TruncatedNormal | UniformBand]
 
 
 def study_designs(problem: RobustDTE) -> Iterator[tuple[str, tuple[float, ...], float]]:
@@ -38,16 +36,6 @@ def study_designs(problem: RobustDTE) -> Iterator[tuple[str, tuple[float, ...], 
     for preference, weights in PREFERENCES.items():
         chosen = designs[WeightedUtopia(weights).do(front)]
         yield preference.replace("_", " "), tuple(chosen.tolist()), BAND
-
-
-def theta_s_of(problem: RobustDTE) -> TruncatedNormal:
-    """Return the distribution of theta_s, in rad."""
-    return cast(TruncatedNormal, problem.moments.uncertainty.inputs[0])
-
-
-def scatter_of(problem: RobustDTE, tolerance: float) -> Inputs:
-    """Return the scatter of `PARAMETERS` with bands of +-``tolerance`` around any design."""
-    return [theta_s_of(problem), *[UniformBand(tolerance) for _ in problem.nominal]]
 
 
 def halved(inputs: Inputs, axis: int) -> Inputs:

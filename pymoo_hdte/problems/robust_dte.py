@@ -113,7 +113,7 @@ class RobustDTE(RobustProblem):
             **samples,
         }
 
-        theta_s = _theta_s(self.model)
+        theta_s = theta_s_scatter(self.model)
         bands = [UniformBand(tolerance) for _ in DESIGN_VARIABLES]
         inputs: list[TruncatedNormal | UniformBand] = [theta_s, *bands]
         design_box = Box(DESIGN_VARIABLES, self.nominal * (1.0 - box), self.nominal * (1.0 + box))
@@ -171,7 +171,14 @@ def surrogate_box(
     return Box(PARAMETERS, lower, upper)
 
 
-def _theta_s(model: DriveModel) -> TruncatedNormal:
+def theta_s_scatter(model: DriveModel) -> TruncatedNormal:
+    """Return the distribution of theta_s over prototypes, in rad.
+
+    Raises
+    ------
+    InvalidInput
+        If theta_s could fall to 0 or below.
+    """
     mean, std = model.nominal[0], model.kinematic_error.std
     theta_s = TruncatedNormal(mean, std)
     if theta_s.support[0] <= 0.0:
