@@ -1,0 +1,126 @@
+"""What the engineer believes about drive and rig before the measurement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.units import ARCSEC
+
+
+@dataclass(frozen=True)
+class Believed:
+    """Believed parameters of the drive and its load, with their tolerances.
+
+    Attributes
+    ----------
+    ratio : float
+        Transmission ratio N.
+    stiffness, damping : float
+        K and c of the mesh at the output, N.m/rad and N.m.s/rad.
+    input_inertia, output_inertia, load_inertia : float
+        kg.m2; the load inertia may be zero.
+    input_damping, output_damping : float
+        N.m.s/rad.
+    error_orders : tuple of float, length n_lines
+        Orders of the static error in cycles per input turn.
+    error_amplitudes : tuple of float, length n_lines
+        Their amplitudes at the output, rad; the phases are unknown.
+    tolerance : float
+        Relative half-width of every parameter but the static error.
+    error_tolerance : float
+        Relative half-width of the amplitudes.
+
+    Raises
+    ------
+    InvalidInput
+        For a value that is not finite or out of range, or orders that do not match.
+    """
+
+    ratio: float
+    stiffness: float
+    damping: float
+    input_inertia: float
+    input_damping: float
+    output_damping: float
+    output_inertia: float
+    load_inertia: float
+    error_orders: tuple[float, ...]
+    error_amplitudes: tuple[float, ...]
+    tolerance: float = 0.1
+    error_tolerance: float = 0.3
+
+    def __post_init__(self) -> None:
+        real_number("ratio", self.ratio, above=1.0)
+        for name in ("stiffness", "input_inertia", "output_inertia"):
+            real_number(name, getattr(self, name), above=0.0)
+        for name in ("damping", "input_damping", "output_damping", "load_inertia"):
+            real_number(name, getattr(self, name), at_least=0.0)
+        for name in ("tolerance", "error_tolerance"):
+            real_number(name, getattr(self, name), at_least=0.0, below=1.0)
+        for name in ("error_orders", "error_amplitudes"):
+            if not isinstance(getattr(self, name), tuple):
+                raise InvalidInput(name, getattr(self, name), "a tuple of numbers")
+        for order in self.error_orders:
+            real_number("error_orders", order, above=0.0)
+        for amplitude in self.error_amplitudes:
+            real_number("error_amplitudes", amplitude, at_least=0.0)
+        if len(set(self.error_orders)) != len(self.error_orders):
+            raise InvalidInput("error_orders", self.error_orders, "each order once")
+        if len(self.error_amplitudes) != len(self.error_orders):
+            allowed = f"one for each of the {len(self.error_orders)} error_orders"
+            raise InvalidInput("error_amplitudes", self.error_amplitudes, allowed)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Speed loop and sensors of the rig.
+
+    The noise is that of one raw sample, before any averaging. Angles are referred to the output:
+    the input encoder has N times the noise and the quantisation written here. Gains are relative
+    half-widths, zeros half-widths, both constant over a campaign.
+
+    Attributes
+    ----------
+    proportional, integral : float
+        P and I of ``T_motor = P (w_set - w) + I integral(w_set - w) dt + constant``, N.m.s/rad and
+        N.m/rad; both zero for a constant motor torque.
+    angle_noise, torsion_angle_noise : float
+        Standard deviations of running and of torsion records, rad.
+    input_torque_noise, output_torque_noise : float
+        Standard deviations, N.m.
+    repeatability : float
+        Of the transmission error from one record to the next, rad.
+    angle_quantisation : float
+        Step, rad.
+    input_torque_gain, output_torque_gain : float
+    input_torque_zero, output_torque_zero : float
+        N.m.
+
+    Raises
+    ------
+    InvalidInput
+        For a value that is negative or not finite, or for noise of zero.
+    """
+
+    proportional: float
+    integral: float
+    angle_noise: float
+    input_torque_noise: float
+    output_torque_noise: float
+    repeatability: float
+    torsion_angle_noise: float
+    angle_quantisation: float = 0.3 * ARCSEC
+    input_torque_gain: float = 0.005
+    input_torque_zero: float = 0.003
+    output_torque_gain: float = 0.005
+    output_torque_zero: float = 0.1
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            # Without noise no misfit has a size, so that nothing can be weighted or tested.
+            if field.name.endswith("_noise"):
+                real_number(field.name, value, above=0.0)
+            else:
+                real_number(field.name, value, at_least=0.0)

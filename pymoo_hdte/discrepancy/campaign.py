@@ -1,0 +1,91 @@
+"""A campaign: records of one rig in one session, with what is believed about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.believed import Believed, Rig
+from pymoo_hdte.discrepancy.plausibility import check_running, check_torsion
+from pymoo_hdte.discrepancy.records import RunningRecord, TorsionRecord
+
+__all__ = ["Believed", "Campaign", "Rig", "RunningRecord", "TorsionRecord"]
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """Running and torsion records of one rig.
+
+    Attributes
+    ----------
+    title, drive : str
+        One line of printable text each.
+    believed : Believed
+    rig : Rig
+    running : tuple of RunningRecord
+        At least one.
+    torsion : tuple of TorsionRecord
+        May be empty.
+
+    Raises
+    ------
+    InvalidInput
+        For no running record, a name used twice, the same measurement under two names, or a record
+        that contradicts the believed drive (see `plausibility`).
+    """
+
+    title: str
+    drive: str
+    believed: Believed
+    rig: Rig
+    running: tuple[RunningRecord, ...]
+    torsion: tuple[TorsionRecord, ...]
+
+    def __post_init__(self) -> None:
+        for field in ("title", "drive"):
+            text = getattr(self, field)
+            if not isinstance(text, str) or not text.strip() or not text.isprintable():
+                raise InvalidInput(field, text, "one line of printable text")
+        if not self.running:
+            raise InvalidInput("running records", 0, "at least one")
+        self._check_each_once()
+        for record in self.running:
+            with _named(record.name):
+                check_running(record, self.believed, self.rig)
+        for sweep in self.torsion:
+            with _named(sweep.name):
+                check_torsion(sweep, self.believed)
+
+    @property
+    def train(self) -> tuple[RunningRecord, ...]:
+        """Running records to fit; may be empty."""
+        return tuple(record for record in self.running if record.role == "train")
+
+    @property
+    def held_out(self) -> tuple[RunningRecord, ...]:
+        """Running records to judge by; empty where nothing can be said about new conditions."""
+        return tuple(record for record in self.running if record.role == "held_out")
+
+    def _check_each_once(self) -> None:
+        names: set[str] = set()
+        measurements: dict[bytes, str] = {}
+        records: list[RunningRecord | TorsionRecord] = [*self.running, *self.torsion]
+        for record in records:
+            if record.name in names:
+                raise InvalidInput("name of a record", record.name, "each name once")
+            names.add(record.name)
+            # A copy among the held-out records would prove whatever was fitted to its twin.
+            twin = measurements.setdefault(record.output_angle.tobytes(), record.name)
+            if twin != record.name:
+                allowed = f"each measurement once; it repeats {twin}"
+                raise InvalidInput("record", record.name, allowed)
+
+
+@contextmanager
+def _named(name: str) -> Iterator[None]:
+    try:
+        yield
+    except InvalidInput as error:
+        raise InvalidInput(f"{name}: {error.field}", error.value, error.allowed) from None

@@ -1,0 +1,97 @@
+"""Names of the campaign format: ``campaign.toml`` and a ``.csv.gz`` file for each record.
+
+=========================  ===================================================================
+table                      fields; those with ``=`` may be left out
+=========================  ===================================================================
+top                        ``title``, ``drive``
+``[believed]``             ``ratio``, ``stiffness_Nm_per_rad``, ``damping_output_Nms_per_rad``,
+                           ``input_inertia_kgm2``, ``input_damping_Nms_per_rad``,
+                           ``output_damping_Nms_per_rad``, ``output_inertia_kgm2``,
+                           ``load_inertia_kgm2``, ``static_error_orders``,
+                           ``static_error_amplitudes_arcsec``, ``tolerance = 0.1``,
+                           ``static_error_tolerance = 0.3``
+``[rig]``                  ``proportional_Nms_per_rad`` and ``integral_Nm_per_rad``, or the
+                           sentence ``control`` with both numbers; ``angle_noise_arcsec``,
+                           ``angle_quantisation_arcsec = 0.3``, ``input_torque_noise_Nm``,
+                           ``input_torque_gain = 0.005``, ``input_torque_zero_Nm = 0.003``,
+                           ``output_torque_noise_Nm``, ``output_torque_gain = 0.005``,
+                           ``output_torque_zero_Nm = 0.1``, ``repeatability_arcsec``,
+                           ``torsion_angle_noise_arcsec``
+``[[record]]``, running    ``file``, ``test = "running"``, ``input_speed_rpm``,
+                           ``load_torque_Nm``, ``sample_rate_Hz``, ``samples_averaged``,
+                           ``elapsed_s``, ``role``
+``[[record]]``, torsion    ``file``, ``test = "torsion"``, ``sample_rate_Hz``, ``role``
+=========================  ===================================================================
+
+Columns of a running record: ``time_s, input_angle_rad, output_angle_rad, input_torque_Nm,
+output_torque_Nm``; of a torsion record: ``time_s, output_angle_rad, output_torque_Nm``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+
+CAMPAIGN_FILE = "campaign.toml"
+
+ENDING = ".csv.gz"
+"""Of the file of a record; what stands before it is the name of the record."""
+
+Names = Mapping[str, tuple[str, float]]
+"""For each attribute its name in the file and the factor to SI units."""
+
+BELIEVED: Names = {
+    "ratio": ("ratio", 1.0),
+    "stiffness": ("stiffness_Nm_per_rad", 1.0),
+    "damping": ("damping_output_Nms_per_rad", 1.0),
+    "input_inertia": ("input_inertia_kgm2", 1.0),
+    "input_damping": ("input_damping_Nms_per_rad", 1.0),
+    "output_damping": ("output_damping_Nms_per_rad", 1.0),
+    "output_inertia": ("output_inertia_kgm2", 1.0),
+    "load_inertia": ("load_inertia_kgm2", 1.0),
+    "error_orders": ("static_error_orders", 1.0),
+    "error_amplitudes": ("static_error_amplitudes_arcsec", ARCSEC),
+    "tolerance": ("tolerance", 1.0),
+    "error_tolerance": ("static_error_tolerance", 1.0),
+}
+
+RIG: Names = {
+    "proportional": ("proportional_Nms_per_rad", 1.0),
+    "integral": ("integral_Nm_per_rad", 1.0),
+    "angle_noise": ("angle_noise_arcsec", ARCSEC),
+    "angle_quantisation": ("angle_quantisation_arcsec", ARCSEC),
+    "input_torque_noise": ("input_torque_noise_Nm", 1.0),
+    "input_torque_gain": ("input_torque_gain", 1.0),
+    "input_torque_zero": ("input_torque_zero_Nm", 1.0),
+    "output_torque_noise": ("output_torque_noise_Nm", 1.0),
+    "output_torque_gain": ("output_torque_gain", 1.0),
+    "output_torque_zero": ("output_torque_zero_Nm", 1.0),
+    "repeatability": ("repeatability_arcsec", ARCSEC),
+    "torsion_angle_noise": ("torsion_angle_noise_arcsec", ARCSEC),
+}
+
+RUNNING: Names = {
+    "input_speed": ("input_speed_rpm", REVOLUTION_PER_MINUTE),
+    "load_torque": ("load_torque_Nm", 1.0),
+    "sample_rate": ("sample_rate_Hz", 1.0),
+    "samples_averaged": ("samples_averaged", 1.0),
+    "elapsed": ("elapsed_s", 1.0),
+}
+
+TORSION: Names = {"sample_rate": ("sample_rate_Hz", 1.0)}
+
+# Decimals far below the noise of any sensor.
+COLUMNS = {
+    "time": ("time_s", 6),
+    "input_angle": ("input_angle_rad", 9),
+    "output_angle": ("output_angle_rad", 11),
+    "input_torque": ("input_torque_Nm", 6),
+    "output_torque": ("output_torque_Nm", 5),
+}
+
+CONTROL = re.compile(
+    r"\bT\s*=\s*(\S+?)\s*\*\s*\(w_set - w\)\s*\+\s*(\S+?)\s*\*\s*integral\(w_set - w\)"
+)
+"""The sentence that may stand for the two numbers of the speed loop."""

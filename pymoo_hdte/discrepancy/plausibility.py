@@ -1,0 +1,90 @@
+"""Can these numbers come from this drive? Finds swapped channels and wrong units.
+
+The limits are wide: they must pass every effect that a campaign may hide and still tell degrees
+from radians, N.mm from N.m, and one channel from another.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.believed import Believed, Rig
+from pymoo_hdte.discrepancy.records import RunningRecord, TorsionRecord
+
+LARGEST_TRANSMISSION_ERROR = 0.02
+"""rad; ten times the wind-up of the drive of the paper at its rated torque."""
+
+
+def check_running(record: RunningRecord, believed: Believed, rig: Rig) -> None:
+    """Refuse a running record whose channels contradict its condition or the drive.
+
+    Raises
+    ------
+    InvalidInput
+        If the speed is off by more than 10 %, the record is shorter than one output turn, the
+        transmission error is not small, or a torque is far from what the load asks for.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        _check_travel(record, believed.ratio)
+        largest = float(np.max(np.abs(record.transmission_error(believed.ratio))))
+        if not largest <= LARGEST_TRANSMISSION_ERROR:
+            allowed = (
+                f"at most {LARGEST_TRANSMISSION_ERROR:g} rad at a ratio of {believed.ratio:g}, "
+                "both angles in rad with one common zero"
+            )
+            raise InvalidInput("largest transmission error", largest, allowed)
+        _check_torques(record, believed.ratio, rig)
+
+
+def check_torsion(record: TorsionRecord, believed: Believed) -> None:
+    """Refuse a torsion record whose slope is not that of the drive within a factor of five.
+
+    Raises
+    ------
+    InvalidInput
+        If the stiffness is of another sign or size.
+    """
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        torque = record.output_torque - np.mean(record.output_torque)
+        slope = -float(torque @ record.output_angle / (torque @ torque))
+        relative = slope * believed.stiffness
+    if not 0.2 < relative < 5.0:
+        allowed = (
+            f"{1.0 / believed.stiffness:.3g} rad/(N.m) within a factor of five; "
+            "a positive torque turns the output backwards"
+        )
+        raise InvalidInput("slope of -output_angle over output_torque", slope, allowed)
+
+
+def _check_travel(record: RunningRecord, ratio: float) -> None:
+    travel = float(record.input_angle[-1] - record.input_angle[0])
+    speed = travel / float(record.time[-1] - record.time[0])
+    if not abs(speed - record.input_speed) <= 0.1 * abs(record.input_speed):
+        allowed = f"{record.input_speed:g} rad/s within 10 %, the input speed of the record"
+        raise InvalidInput("mean speed of input_angle", speed, allowed)
+    turn = 2.0 * math.pi * ratio
+    # The last sample lies one step before the end of the turn, and the speed is not exact.
+    if not abs(travel) >= 0.99 * turn:
+        allowed = f"at least {turn:.6g} rad, one output turn"
+        raise InvalidInput("travel of input_angle", abs(travel), allowed)
+
+
+def _check_torques(record: RunningRecord, ratio: float, rig: Rig) -> None:
+    load = record.load_torque
+    measured = float(np.mean(record.output_torque))
+    slack = 10.0 * rig.output_torque_zero + 3.0 * float(np.std(record.output_torque))
+    if not abs(measured - load) <= 0.3 * abs(load) + slack:
+        raise InvalidInput("mean of output_torque", measured, f"near the load of {load:g} N.m")
+    if load == 0.0:
+        return
+    motor = float(np.mean(record.input_torque))
+    share = abs(load) / ratio
+    slack = 10.0 * rig.input_torque_zero
+    # Friction adds to the load when the motor drives it and may reverse the torque when not.
+    least = 0.3 * share - slack if load * record.input_speed > 0.0 else -math.inf
+    if not (least <= math.copysign(1.0, load) * motor and abs(motor) <= 10.0 * share + slack):
+        allowed = f"near load / ratio = {load / ratio:.3g} N.m"
+        raise InvalidInput("mean of input_torque", motor, allowed)

@@ -1,0 +1,148 @@
+"""Records of a campaign: one test each, with its condition and its raw channels."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number, whole_number
+
+ROLES = ("train", "held_out")
+"""``train`` records are fitted; ``held_out`` records only judge the result."""
+
+FEWEST_SAMPLES = 8
+"""Below this nothing can be said about a record."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunningRecord:
+    """The drive at constant speed and load, over one output turn or more.
+
+    Attributes
+    ----------
+    name : str
+        Letters, digits, ``.``, ``-`` and ``_``; also the stem of its file.
+    role : str
+        One of `ROLES`.
+    input_speed : float
+        Set speed, rad/s; negative in the reverse direction.
+    load_torque : float
+        N.m at the output; positive against positive rotation.
+    sample_rate : float
+        Of the rows, after averaging, Hz.
+    samples_averaged : int
+        Raw samples in the mean that is one row.
+    elapsed : float
+        Time from the start of the session to the start of this record, s.
+    time : ndarray, shape (n,)
+        Middle of the raw samples of each row, s, increasing.
+    input_angle, output_angle : ndarray, shape (n,)
+        rad, absolute and unwrapped, with one common zero over a campaign.
+    input_torque, output_torque : ndarray, shape (n,)
+        On the input shaft from the motor, and between drive and load inertia, N.m.
+
+    Raises
+    ------
+    InvalidInput
+        For a wrong condition, channels that are not finite, of unequal length or constant, time
+        that does not increase, or time that disagrees with the sample rate.
+    """
+
+    name: str
+    role: str
+    input_speed: float
+    load_torque: float
+    sample_rate: float
+    samples_averaged: int
+    elapsed: float
+    time: NDArray[np.float64]
+    input_angle: NDArray[np.float64]
+    output_angle: NDArray[np.float64]
+    input_torque: NDArray[np.float64]
+    output_torque: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        if real_number("input_speed", self.input_speed) == 0.0:
+            raise InvalidInput("input_speed", self.input_speed, "a speed other than zero")
+        real_number("load_torque", self.load_torque)
+        whole_number("samples_averaged", self.samples_averaged, 1)
+        real_number("elapsed", self.elapsed, at_least=0.0)
+        _check_record(self, ("input_angle", "output_angle", "input_torque", "output_torque"))
+
+    def transmission_error(self, ratio: float) -> NDArray[np.float64]:
+        """Return ``input_angle / ratio - output_angle``, rad, shape (n,)."""
+        return self.input_angle / ratio - self.output_angle
+
+
+@dataclass(frozen=True, eq=False)
+class TorsionRecord:
+    """Input locked, output torque swept slowly enough that only stiffness and friction answer.
+
+    Attributes
+    ----------
+    name, role : str
+        As in `RunningRecord`.
+    sample_rate : float
+        Hz.
+    time : ndarray, shape (n,)
+        s, increasing.
+    output_angle : ndarray, shape (n,)
+        rad; a positive torque turns the output backwards.
+    output_torque : ndarray, shape (n,)
+        N.m.
+
+    Raises
+    ------
+    InvalidInput
+        As in `RunningRecord`.
+    """
+
+    name: str
+    role: str
+    sample_rate: float
+    time: NDArray[np.float64]
+    output_angle: NDArray[np.float64]
+    output_torque: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        _check_record(self, ("output_angle", "output_torque"))
+
+
+def _check_record(record: Any, channels: tuple[str, ...]) -> None:
+    if not isinstance(record.name, str) or not re.fullmatch(r"\w[\w.-]*", record.name, re.ASCII):
+        raise InvalidInput("name", record.name, "letters, digits, '.', '-' and '_'")
+    one_of("role", record.role, ROLES)
+    real_number("sample_rate", record.sample_rate, above=0.0)
+    time = finite_array("time", record.time, (None,))
+    if len(time) < FEWEST_SAMPLES:
+        raise InvalidInput("number of samples", len(time), f"at least {FEWEST_SAMPLES}")
+    _freeze(record, "time", time)
+    for channel in channels:
+        values = finite_array(channel, getattr(record, channel), time.shape)
+        if np.all(values == values[0]):
+            raise InvalidInput(channel, float(values[0]), "a channel that is alive, not constant")
+        _freeze(record, channel, values)
+    _check_time(time, record.sample_rate)
+
+
+def _check_time(time: NDArray[np.float64], sample_rate: float) -> None:
+    with np.errstate(over="ignore"):
+        steps = np.diff(time)
+        falls = np.flatnonzero(~(steps > 0.0))
+        if falls.size:
+            row = int(falls[0]) + 1
+            raise InvalidInput(f"time[{row}]", float(time[row]), f"above {time[row - 1]:g}, rising")
+        # The median, because a few lost rows do no harm.
+        step = float(np.median(steps))
+        if not abs(step * sample_rate - 1.0) < 0.05:
+            allowed = f"{1.0 / sample_rate:g} s within 5 %, as the sample rate says"
+            raise InvalidInput("step of time", step, allowed)
+
+
+def _freeze(record: Any, channel: str, values: NDArray[np.float64]) -> None:
+    values.setflags(write=False)
+    object.__setattr__(record, channel, values)
