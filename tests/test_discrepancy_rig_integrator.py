@@ -130,8 +130,10 @@ def test_energy_is_conserved_only_with_the_kinematic_reaction(reaction, conserve
     assert (change < 0.03) == conserved
 
 
-def test_lines_of_a_clean_rig_are_those_of_the_closed_form():
-    mechanics = true_rig().mechanics(RIG)
+@pytest.mark.parametrize("compliant", [False, True])
+def test_lines_of_a_linear_rig_are_those_of_the_closed_form(compliant):
+    sensor = effect("output", sensor_stiffness=5e4, sensor_damping=1.5)
+    mechanics = true_rig(*([sensor] if compliant else [])).mechanics(RIG)
     angle, output, motor, _ = simulate_run(mechanics, FAST, 40.0, 100.0, 0.0)
     orders = np.array(BELIEVED.error_orders)
     waves = np.outer(angle, orders)
@@ -142,7 +144,10 @@ def test_lines_of_a_clean_rig_are_those_of_the_closed_form():
     phasors = -1j * np.array(BELIEVED.error_amplitudes) * np.exp(1j * np.array(PHASES))
     spring = 2.583e4 + 4.5j * w
     input_side = -(w**2) * 1.97e-4 + 1j * w * (1.7e-4 + 0.02) + 0.5
-    output_side = -(w**2) * 0.0808505 + 5.022e-4j * w
+    load_side = -(w**2) * 0.08
+    if compliant:
+        load_side = 1.0 / (1.0 / (5e4 + 1.5j * w) + 1.0 / load_side)
+    output_side = -(w**2) * 8.505e-4 + 5.022e-4j * w + load_side
     compliance = 1.0 / (101.0**2 * input_side) + 1.0 / output_side
     torque = -spring * phasors / (1.0 + spring * compliance)
     assert np.max(np.abs(lines[:, 0] + compliance * torque)) < 2e-3 * ARCSEC
