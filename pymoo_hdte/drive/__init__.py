@@ -1,5 +1,6 @@
 """The machine: data sheet, static error, equations of motion, steady state, time integration."""
 
+from pymoo_hdte.drive.balance import Balance, SpeedLoop
 from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100, load_datasheet
 from pymoo_hdte.drive.effects import (
@@ -8,6 +9,7 @@ from pymoo_hdte.drive.effects import (
     LoadInertia,
     MeshStiffnessVariation,
 )
+from pymoo_hdte.drive.harmonic_balance import harmonic_balance
 from pymoo_hdte.drive.measurement import low_pass, measured_dte
 from pymoo_hdte.drive.model import (
     PARAMETER_UNITS,
@@ -19,6 +21,7 @@ from pymoo_hdte.drive.model import (
     preset,
 )
 from pymoo_hdte.drive.order_spectrum import OrderSpectrum
+from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
 from pymoo_hdte.drive.stability import UnstableDrive, floquet_multipliers
 from pymoo_hdte.drive.static_error import (
     StaticErrorSample,
@@ -32,20 +35,26 @@ __all__ = [
     "PARAMETERS",
     "PARAMETER_UNITS",
     "PRESETS",
+    "Balance",
     "Coefficients",
     "DampingReference",
     "DataSheet",
     "DriveModel",
     "Effect",
     "KinematicError",
+    "KinematicErrorLine",
+    "KinematicReaction",
+    "LawAtPort",
     "LoadInertia",
     "MeshStiffnessVariation",
     "OrderSpectrum",
     "Run",
+    "SpeedLoop",
     "StaticErrorSample",
     "UnstableDrive",
     "class_amplitudes",
     "floquet_multipliers",
+    "harmonic_balance",
     "hs_20_100",
     "load_datasheet",
     "load_model",

@@ -9,10 +9,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from pymoo_hdte.drive.laws import Law
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,13 @@ class Coefficients:
         Orders of theta_s in cycles per input turn.
     error_phasors : ndarray of complex, shape (n, n_orders)
         theta_s = Re sum phasor exp(i order theta_in), rad.
+    load_inertia : float
+        The part of ``output_inertia`` beyond the output coupling, kg.m2.
+    laws : tuple of (str, Law)
+        Ports, each with a law whose torque is added there.
+    reaction : float
+        Share of the mesh torque's reaction on the input through the slope of theta_s: 0 in
+        Eq. (9), 1 by the principle of virtual work.
     """
 
     ratio: float
@@ -48,8 +57,26 @@ class Coefficients:
     output_damping: float
     error_orders: NDArray[np.float64]
     error_phasors: NDArray[np.complex128]
+    load_inertia: float = 0.0
+    laws: tuple[tuple[str, Law], ...] = ()
+    reaction: float = 0.0
+
+    def rows(self, rows: slice) -> Coefficients:
+        """Return the coefficients of some of the designs."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        parts = {k: v[rows] for k, v in values.items() if k in _BY_DESIGN}
+        return replace(self, **parts)
+
+    def torque_at(
+        self, input_speed: NDArray[np.float64], load_torque: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the mean mesh torque without laws at n operating conditions, N.m."""
+        return load_torque + self.output_damping * input_speed / self.ratio
 
     @property
     def mean_mesh_torque(self) -> float:
         """Mean of k d + c d' in steady state: load and bearing friction, N.m at the output."""
         return self.load_torque + self.output_damping * self.input_speed / self.ratio
+
+
+_BY_DESIGN = ("stiffness", "damping", "input_inertia", "input_damping", "error_phasors")

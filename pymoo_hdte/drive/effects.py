@@ -1,8 +1,8 @@
 """Named effects that a drive model may have beside the printed Eq. (9).
 
-An effect changes the coefficients of the equations of motion; every solver then follows. All three
-are candidates of the first calibration: the printed equations with the printed values respond to
-the static error as a rigid drive would.
+An effect changes the coefficients of the equations of motion; every solver then follows. The three
+that stand here are the candidates of the calibration: the printed equations with the printed values
+respond to the static error as a rigid drive would. Further ones are in `port_effects`.
 """
 
 from __future__ import annotations
@@ -12,13 +12,22 @@ from typing import ClassVar, Protocol
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.port_effects import (
+    LAWS,
+    KinematicErrorLine,
+    KinematicReaction,
+    law_from_fields,
+)
 from pymoo_hdte.drive.toml_fields import Fields
 
 
 class Effect(Protocol):
-    """Something Eq. (9) does not hold. ``name`` is the name used in model files and verdicts."""
+    """Something Eq. (9) does not hold."""
 
-    name: ClassVar[str]
+    @property
+    def name(self) -> str:
+        """Name used in model files and verdicts."""
+        ...
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with this effect added."""
@@ -47,8 +56,11 @@ class LoadInertia:
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with the inertia added to the output."""
-        total = coefficients.output_inertia + self.inertia
-        return replace(coefficients, output_inertia=total)
+        return replace(
+            coefficients,
+            output_inertia=coefficients.output_inertia + self.inertia,
+            load_inertia=coefficients.load_inertia + self.inertia,
+        )
 
     def to_dict(self) -> dict[str, object]:
         """Return the effect as a TOML-like table."""
@@ -127,16 +139,33 @@ def effect_from_fields(table: Fields) -> Effect:
         For an unknown name, or a wrong, missing or superfluous field.
     """
     effect: Effect
-    match table.choice("name", EFFECT_NAMES):
+    match name := table.choice("name", EFFECT_NAMES):
         case LoadInertia.name:
             effect = LoadInertia(table.quantity("inertia", "inertia"))
         case DampingReference.name:
             effect = DampingReference(table.number("factor"))
-        case _:
+        case MeshStiffnessVariation.name:
             effect = MeshStiffnessVariation(table.number("depth"), table.quantity("phase", "angle"))
+        case KinematicErrorLine.name:
+            amplitude, phase = (
+                table.quantity("amplitude", "angle"),
+                table.quantity("phase", "angle"),
+            )
+            effect = KinematicErrorLine(table.number("order"), amplitude, phase)
+        case KinematicReaction.name:
+            effect = KinematicReaction(table.number("share"))
+        case _:
+            effect = law_from_fields(name, table)
     table.finish()
     return effect
 
 
-EFFECT_NAMES = (LoadInertia.name, DampingReference.name, MeshStiffnessVariation.name)
+EFFECT_NAMES = (
+    LoadInertia.name,
+    DampingReference.name,
+    MeshStiffnessVariation.name,
+    KinematicErrorLine.name,
+    KinematicReaction.name,
+    *LAWS,
+)
 """Names of all effects."""

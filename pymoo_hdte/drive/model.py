@@ -100,9 +100,10 @@ class DriveModel:
     effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
-        names = [effect.name for effect in self.effects]
-        if len(set(names)) != len(names):
-            raise InvalidInput("effects", names, "each effect once")
+        places = [(effect.name, getattr(effect, "port", "")) for effect in self.effects]
+        if len(set(places)) != len(places):
+            names = [effect.name for effect in self.effects]
+            raise InvalidInput("effects", names, "each effect once, at each port")
 
     @property
     def nominal(self) -> NDArray[np.float64]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.harmonic_balance import harmonic_balance
 from pymoo_hdte.drive.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.stability import require_stable
 
@@ -45,7 +46,15 @@ def steady_state(coefficients: Coefficients) -> OrderSpectrum:
     UnstableDrive
         If the varying stiffness makes the motion of a design grow, so that there is no steady
         state for the equations to have.
+    ArithmeticError
+        If laws at ports are such that the harmonic balance finds no steady state.
     """
+    if coefficients.laws or coefficients.reaction:
+        balance = harmonic_balance(coefficients)
+        lost = int(np.sum(~balance.converged))
+        if lost:
+            raise ArithmeticError(f"no steady state found for {lost} of {len(balance.converged)}")
+        return balance.spectrum()
     if coefficients.stiffness_depth == 0.0:
         orders = coefficients.error_orders
         response = transfer_function(coefficients, orders) * coefficients.error_phasors

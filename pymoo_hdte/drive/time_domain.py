@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,9 @@ from scipy.interpolate import CubicSpline
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
 from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.harmonic_balance import harmonic_balance
+from pymoo_hdte.drive.hysteresis import SPRINGS, MaxwellSlip
+from pymoo_hdte.drive.laws import Law, PortState, periodic_phase
 from pymoo_hdte.drive.model import PARAMETERS, DriveModel
 from pymoo_hdte.units import ARCSEC
 
@@ -132,9 +135,11 @@ def simulate(
     if times[0] < ramp:
         raise InvalidInput("settle", settle, f"at least {margin:.3g} s, the margin of the record")
 
-    start = np.array([start_up.angle(0.0), 0.0, 0.0, 0.0])
+    memory = SPRINGS * len(_springs(coefficients))
+    start = np.array([start_up.angle(0.0), *np.zeros(3 + memory)])
     # theta_d is of the order of arcseconds and its rate of the order of arcseconds times 100 1/s.
-    atol = np.array([1e-8, 1e-6, 1e-4 * ARCSEC, 1e-2 * ARCSEC]) * rtol / 1e-8
+    atol = np.array([1e-8, 1e-6, 1e-4 * ARCSEC, 1e-2 * ARCSEC, *[1e-4 * ARCSEC] * memory])
+    atol *= rtol / 1e-8
     solution = solve_ivp(
         equations_of_motion(coefficients, start_up, prescribed=angle == "prescribed"),
         (0.0, times[-1]),
@@ -146,7 +151,7 @@ def simulate(
     )
     if not solution.success:
         raise ArithmeticError(f"{method} gave up at t = {solution.t[-1]:g} s: {solution.message}")
-    input_angle, input_speed, transmission_error, _ = solution.y
+    input_angle, input_speed, transmission_error = solution.y[:3]
     if angle == "prescribed":
         input_angle = np.array([start_up.angle(time) for time in times])
     end = 2.0 * np.pi * coefficients.ratio
@@ -207,8 +212,19 @@ def equations_of_motion(
         )
     ]
 
+    laws = _laws_at_ports(coefficients)
+    dry = _laws_at_ports(replace(coefficients, laws=_aperiodic(coefficients)))
+    reaction = coefficients.reaction
+
+    def losses(rate: float) -> float:
+        return dry("input", 0.0, rate, 0.0) + dry("output", 0.0, rate / ratio, 0.0) / ratio
+
+    # What is left of the holding torque is second order: speed and torsion fluctuate.
+    springs = _springs(coefficients)
+    left = _holding_torque(coefficients) - holding - losses(speed)
+
     def right_hand_side(time: float, state: NDArray[np.float64]) -> list[float]:
-        input_angle, input_speed, error, error_rate = state.tolist()
+        input_angle, input_speed, error, error_rate = state[:4].tolist()
         envelope, envelope_rate = start_up.envelope(time)
         if prescribed:
             position, rate = start_up.angle(time), speed * envelope
@@ -223,12 +239,61 @@ def equations_of_motion(
         torsion_rate = error_rate - envelope_rate * static - envelope * slope * rate
         varying = 1.0 + depth * math.cos(2.0 * position + phase)
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
-        input_torque = accelerating * envelope_rate + holding * envelope
-        acceleration = (input_torque - bearing_in * input_speed - mesh_torque / ratio) / inertia_in
+        mesh_torque += laws("mesh", torsion, torsion_rate, position)
+        stretches = np.split(state[4:], len(springs)) if springs else []
+        for spring, stretch in zip(springs, stretches, strict=True):
+            mesh_torque += spring.torque(stretch)
+        input_torque = accelerating * envelope_rate + (holding + left) * envelope
+        input_torque += losses(speed * envelope)
+        resisting = bearing_in * input_speed + laws("input", position, input_speed, position)
+        lever = 1.0 / ratio - reaction * envelope * slope
+        acceleration = (input_torque - resisting - mesh_torque * lever) / inertia_in
         output_speed = input_speed / ratio - error_rate
-        output_acceleration = (
-            mesh_torque - load * envelope - bearing_out * output_speed
-        ) / inertia_out
-        return [input_speed, acceleration, error_rate, acceleration / ratio - output_acceleration]
+        output_angle = position / ratio
+        resisting = load * envelope + bearing_out * output_speed
+        resisting += laws("output", output_angle, output_speed, output_angle)
+        output_acceleration = (mesh_torque - resisting) / inertia_out
+        rates = [input_speed, acceleration, error_rate, acceleration / ratio - output_acceleration]
+        for spring, stretch in zip(springs, stretches, strict=True):
+            rates += spring.rates(torsion_rate, stretch).tolist()
+        return rates
 
     return right_hand_side
+
+
+def _holding_torque(coefficients: Coefficients) -> float:
+    """Return the mean input torque that holds the speed of the first design."""
+    if not (coefficients.laws or coefficients.reaction):
+        mean = coefficients.mean_mesh_torque / coefficients.ratio
+        return float(coefficients.input_damping[0]) * coefficients.input_speed + mean
+    return float(harmonic_balance(coefficients).motor_torque[0, 0].real)
+
+
+def _aperiodic(coefficients: Coefficients) -> tuple[tuple[str, Law], ...]:
+    return tuple((port, law) for port, law in coefficients.laws if not law.orders)
+
+
+def _laws_at_ports(coefficients: Coefficients) -> Callable[[str, float, float, float], float]:
+    """Return a function from port, position, speed and angle to the torque of its laws.
+
+    Laws with memory are left out: their state is the integrator's (see `_springs`).
+    """
+    stiffness = coefficients.stiffness[:1]
+
+    def torque(port: str, position: float, speed: float, angle: float) -> float:
+        here = [
+            law
+            for place, law in coefficients.laws
+            if place == port and not isinstance(law, MaxwellSlip)
+        ]
+        if not here:
+            return 0.0
+        state = PortState(np.array([position]), np.array([speed]), periodic_phase(angle), stiffness)
+        return sum(np.asarray(law.respond(state).torque).item() for law in here)
+
+    return torque
+
+
+def _springs(coefficients: Coefficients) -> list[MaxwellSlip]:
+    """Return the laws with memory, all at the mesh."""
+    return [law for _, law in coefficients.laws if isinstance(law, MaxwellSlip)]

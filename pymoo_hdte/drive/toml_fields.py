@@ -19,6 +19,8 @@ UNITS: dict[str, dict[str, float]] = {
     "stiffness": {"N.m/rad": 1.0},
     "inertia": {"kg.m2": 1.0},
     "damping": {"N.m.s/rad": 1.0},
+    "cubic stiffness": {"N.m/rad3": 1.0},
+    "quadratic drag": {"N.m.s2/rad2": 1.0},
 }
 """For each quantity the units it may be given in, with the factor to SI."""
 

@@ -1,0 +1,58 @@
+"""A steady state as harmonics of the input angle, and the motor that holds its speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.drive.order_spectrum import OrderSpectrum
+from pymoo_hdte.drive.torus import Torus
+
+Phasors = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class SpeedLoop:
+    """The motor's torque P (w_set - w) + I integral(w_set - w) dt + constant.
+
+    ``proportional`` in N.m.s/rad and ``integral`` in N.m/rad, at the input; both 0 is a motor of
+    constant torque. The constant is whatever holds the mean speed.
+    """
+
+    proportional: float = 0.0
+    integral: float = 0.0
+
+
+CONSTANT_TORQUE = SpeedLoop()
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Steady state of n cases, as harmonics of the input angle.
+
+    Attributes
+    ----------
+    torus : Torus
+        Whose ``orders`` the phasors belong to.
+    transmission_error, torsion : ndarray of complex, shape (n, n_harmonics)
+        theta_d and d, rad.
+    motor_torque, coupling_torque : ndarray of complex, shape (n, n_harmonics)
+        Torque on the input, and between drive and load inertia, N.m.
+    lead : ndarray of complex, shape (n, n_harmonics)
+        Input angle ahead of the mean speed's, alpha - Omega t, rad; its mean is 0.
+    converged : ndarray of bool, shape (n,)
+    """
+
+    torus: Torus
+    transmission_error: Phasors
+    torsion: Phasors
+    motor_torque: Phasors
+    coupling_torque: Phasors
+    lead: Phasors
+    converged: NDArray[np.bool_]
+
+    def spectrum(self) -> OrderSpectrum:
+        """Return theta_d as an order spectrum."""
+        return OrderSpectrum(self.torus.orders, self.transmission_error)

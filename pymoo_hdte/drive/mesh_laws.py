@@ -1,0 +1,79 @@
+"""Laws of torque over torsion without memory: curved and missing stiffness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.drive.laws import Aperiodic, Periodic, PortState, Response, Values
+
+
+@dataclass(frozen=True)
+class CubicStiffness(Aperiodic):
+    """T = coefficient d^3; N.m/rad3."""
+
+    coefficient: float
+
+    def __post_init__(self) -> None:
+        real_number("hardening_stiffness.coefficient", self.coefficient)
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents."""
+        square = state.position**2
+        return Response(self.coefficient * square * state.position, 3.0 * self.coefficient * square)
+
+
+@dataclass(frozen=True)
+class SoftWindup(Aperiodic):
+    """T = -softening K torsion tanh(d / torsion): K is lower by this share near zero torsion.
+
+    The lower stiffness at small torque is in every catalogue of strain wave gears (K1 below K2
+    below K3). ``torsion``, rad, is where the drive has wound up.
+    """
+
+    softening: float
+    torsion: float
+
+    def __post_init__(self) -> None:
+        real_number("soft_windup.softening", self.softening, below=1.0)
+        real_number("soft_windup.torsion", self.torsion, above=0.0)
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents."""
+        wound = np.tanh(state.position / self.torsion)
+        lost = self.softening * state.stiffness
+        return Response(-lost * self.torsion * wound, -lost * (1.0 - wound**2))
+
+
+def _dead_zone(state: PortState, half_width: Values | float) -> Response:
+    """Return what a clearance takes from K d: everything within, a constant beyond."""
+    inside = np.abs(state.position) < half_width
+    lost = np.clip(state.position, -half_width, half_width)
+    return Response(-state.stiffness * lost, np.where(inside, -state.stiffness, 0.0))
+
+
+@dataclass(frozen=True)
+class DeadZone(Aperiodic):
+    """T = K (dz(d) - d): no spring torque within +-half_width (rad) of zero torsion."""
+
+    half_width: float
+
+    def __post_init__(self) -> None:
+        real_number("backlash.half_width", self.half_width, at_least=0.0)
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents."""
+        return _dead_zone(state, self.half_width)
+
+
+@dataclass(frozen=True)
+class PeriodicClearance(Periodic):
+    """A dead zone of varying half-width: half_width (1 + cos(order angle + phase)) / 2, rad."""
+
+    half_width: float
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents."""
+        return _dead_zone(state, 0.5 * self.half_width * (1.0 + self.cosine(state)))

@@ -1,0 +1,161 @@
+"""Signals that repeat with several angles at once: grids, harmonics and the way between them.
+
+Orders 1, 2 and 2.02 share no short period, but as a = 1, b = 0.02 they are (1, 0), (2, 0), (2, 1):
+a function on a torus of two angles. On a grid of that torus products and laws are evaluated point
+by point, and the discrete Fourier transform leads to the orders and back without leakage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+
+_TOLERANCE = 1e-9
+_LARGEST_MULTIPLE = 4
+"""An order whose fraction is up to this many times a known one needs no angle of its own."""
+
+
+def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
+    """Return 1 and the fractions from which all ``orders`` are whole multiples and sums."""
+    fractions = sorted({round(abs(order - np.rint(order)), 9) for order in orders} - {0.0})
+    found: list[float] = []
+    for fraction in fractions:
+        multiples = [fraction / known for known in found]
+        if not any(abs(m - round(m)) < 1e-6 and round(m) <= _LARGEST_MULTIPLE for m in multiples):
+            found.append(fraction)
+    return (1.0, *found)
+
+
+class Torus:
+    """A grid over the phases of ``fundamentals`` and the harmonics up to ``highest`` of each.
+
+    Parameters
+    ----------
+    fundamentals : sequence of float
+        Orders of the angles, in cycles per input turn; the first is 1.
+    highest : sequence of int
+        Largest multiple of each that is kept.
+
+    Attributes
+    ----------
+    orders : ndarray, shape (n_harmonics,)
+        Orders of the kept harmonics; the first is 0. Others may be negative: a real signal's line
+        at -o is the conjugate of that at o, so only one of the two stands here.
+    size : int
+        Number G of grid points.
+    """
+
+    def __init__(self, fundamentals: Sequence[float], highest: Sequence[int]) -> None:
+        self.fundamentals = tuple(fundamentals)
+        self.highest = tuple(highest)
+        if len(self.fundamentals) != len(self.highest) or self.fundamentals[0] != 1.0:
+            raise InvalidInput("fundamentals", fundamentals, "1 first, and one highest for each")
+        every = product(*(range(-most, most + 1) for most in self.highest))
+        half = [k for k in every if k > (0,) * len(k)]
+        self._multiples = np.array([(0,) * len(self.highest), *half])
+        self.orders = self._multiples @ np.array(self.fundamentals)
+        # Four points a cycle of the highest harmonic: cubic products do not fold back.
+        grids = [2.0 * np.pi * np.arange(4 * most) / (4 * most) for most in self.highest]
+        mesh = np.meshgrid(*grids, indexing="ij")
+        self._shape = mesh[0].shape
+        self._phases = np.array([axis.ravel() for axis in mesh])
+        self.size = self._phases.shape[1]
+        argument = self._multiples @ self._phases
+        self._cosine, self._sine = np.cos(argument), np.sin(argument)
+        weights = np.full((len(self.orders), 1), 2.0 / self.size)
+        weights[0] = 1.0 / self.size
+        self._analysis = weights * np.exp(-1j * argument)
+
+    def phase(self, order: float) -> NDArray[np.float64]:
+        """Return ``order`` times the input angle on the grid, shape (G,), up to whole turns."""
+        return self._find(order) @ self._phases
+
+    def place(self, order: float) -> tuple[int, bool]:
+        """Return the index of an order among the harmonics, and whether it stands there as -o."""
+        wanted = self._find(order)
+        for sign in (1, -1):
+            rows = np.flatnonzero(np.all(self._multiples == sign * wanted, axis=1))
+            if rows.size:
+                return int(rows[0]), sign < 0
+        raise InvalidInput("order", order, f"within {self.highest} times {self.fundamentals}")
+
+    def _find(self, order: float) -> NDArray[np.int_]:
+        """Return the smallest whole multiples that sum to ``order``."""
+        spans = [range(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1) for _ in self.fundamentals[1:]]
+        for parts in sorted(product(*spans), key=lambda parts: sum(map(abs, parts))):
+            rest = order - float(np.dot(parts, self.fundamentals[1:]))
+            if abs(rest - round(rest)) < _TOLERANCE:
+                return np.array([round(rest), *parts])
+        raise InvalidInput("order", order, f"a sum of multiples of {self.fundamentals}")
+
+    def path(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return grid values (n, G) in the order in which a slow beat passes them, twice over.
+
+        One input turn after the other, each at the next point of the other angles. What depends on
+        the sequence of extremes but not on time sees the same as in the real, slower beat; the
+        second passage is free of the start from rest.
+        """
+        turns = values.reshape(len(values), self._shape[0], -1).swapaxes(1, 2)
+        return np.tile(turns.reshape(len(values), -1), 2)
+
+    def back(self, along: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the second passage of values along `path` on the grid, shape (n, G)."""
+        second = along[:, self.size :].reshape(len(along), -1, self._shape[0])
+        return second.swapaxes(1, 2).reshape(len(along), -1)
+
+    def signal(self, phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Return values on the grid, shape (n, G), of Re sum phasor exp(i order alpha)."""
+        real, imaginary = np.ascontiguousarray(phasors.real), np.ascontiguousarray(phasors.imag)
+        return real @ self._cosine - imaginary @ self._sine
+
+    def phasors(self, values: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return the kept harmonics, shape (n, n_harmonics), of values on the grid."""
+        return values @ self._analysis.T
+
+    def derivative(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Return the harmonics of the derivative by the input angle."""
+        return 1j * self.orders * phasors
+
+    def integral(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Return the harmonics of the zero-mean integral over the input angle."""
+        moving = self.orders != 0.0
+        divisor = np.where(moving, 1j * self.orders, 1.0)
+        return np.where(moving, phasors / divisor, 0.0)
+
+    def product_matrix(self, factor: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the real matrices that multiply a signal by ``factor``, given on the grid (n, G).
+
+        They act on stacked real and imaginary parts of harmonics, shape (n, 2 H, 2 H).
+        """
+        synthesis = np.concatenate([self._cosine, -self._sine])
+        analysis = np.concatenate([self._analysis.real, self._analysis.imag])
+        return np.asarray(
+            np.matmul(factor[:, None, :] * analysis[None], synthesis.T), dtype=np.float64
+        )
+
+
+def stacked(phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return real and imaginary parts side by side, shape (n, 2 H)."""
+    return np.concatenate([phasors.real, phasors.imag], axis=-1)
+
+
+def unstacked(values: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Undo `stacked`."""
+    real, imaginary = np.split(values, 2, axis=-1)
+    return real + 1j * imaginary
+
+
+def multiplication(factor: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return the real matrices, (n, 2 H, 2 H), that multiply each harmonic by its ``factor``."""
+    n, size = factor.shape
+    matrix = np.zeros((n, 2 * size, 2 * size))
+    place = np.arange(size)
+    matrix[:, place, place] = matrix[:, place + size, place + size] = factor.real
+    matrix[:, place, place + size] = -factor.imag
+    matrix[:, place + size, place] = factor.imag
+    return matrix
