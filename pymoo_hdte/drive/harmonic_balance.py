@@ -35,8 +35,8 @@ HIGHEST = 8
 HIGHEST_FRACTION = 2
 """Harmonics kept of every other angle."""
 _STEPS = 40
-_TOLERANCE = 1e-11
-"""Largest change of the torsion, relative to its size, at which the iteration ends."""
+_NEARLY_CONSTANT = 0.02
+"""Variation of the mesh stiffness, relative, up to which its mean serves in Newton's step."""
 _ROWS_AT_ONCE = 64
 
 Values = NDArray[np.float64]
@@ -66,6 +66,7 @@ def harmonic_balance(
     load_torque: Values | None = None,
     motor: SpeedLoop = CONSTANT_TORQUE,
     torus: Torus | None = None,
+    tolerance: float = 1e-11,
 ) -> Balance:
     """Return the steady state of the n designs of ``coefficients``.
 
@@ -77,6 +78,8 @@ def harmonic_balance(
     motor : SpeedLoop
     torus : Torus, optional
         By default that of `torus_of`.
+    tolerance : float
+        Largest change of the torsion, relative to its size, at which the iteration ends.
     """
     n = len(coefficients.stiffness)
     speed = np.broadcast_to(coefficients.input_speed if input_speed is None else input_speed, n)
@@ -86,7 +89,7 @@ def harmonic_balance(
     for start in range(0, n, _ROWS_AT_ONCE):
         rows = slice(start, start + _ROWS_AT_ONCE)
         solver = _Solver(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
-        parts.append(solver.solve())
+        parts.append(solver.solve(tolerance))
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _BY_ROW}
     return Balance(torus=torus, **joined)
 
@@ -120,13 +123,13 @@ class _Solver:
         self.energy[:, 0] = speed**2 / 2.0
         self.constant = np.zeros((n, 1))
 
-    def solve(self) -> Balance:
+    def solve(self, tolerance: float) -> Balance:
         """Iterate until the torsion stands still; rows that never do are marked."""
         size = np.abs(self.torsion[:, :1]).max(axis=1) + np.abs(self.static).sum(axis=1) + 1e-12
         converged = np.zeros(len(size), dtype=bool)
         for _ in range(_STEPS):
             change = self._step()
-            converged = np.abs(change).max(axis=1) <= _TOLERANCE * size
+            converged = np.abs(change).max(axis=1) <= tolerance * size
             if np.all(converged):
                 break
         return self._result(converged)
@@ -176,48 +179,68 @@ class _Solver:
                 )
         return total
 
-    def _step(self) -> Values:
-        """Update speed, then torsion; return the change of the torsion, stacked."""
-        self._motion()
-        self._update_speed()
+    def _step(self) -> Phasors:
+        """Take one Newton step in speed and torsion together; return the change of the torsion.
+
+        E is eliminated: near the steady state it answers to the mesh torque harmonic by harmonic.
+        """
         self._motion()
         coefficients, torus = self.coefficients, self.torus
+        input_residual, self.constant = self._input_residual()
         friction = self._laws("output", np.zeros_like(self.output_speed), self.output_speed)
-        residual = torus.phasors(
+        output_residual = torus.phasors(
             coefficients.output_inertia * self.output_acceleration
             + coefficients.output_damping * self.output_speed
             + friction.torque
             - self.mesh_torque
             + self.load
         )
-        impedance, share = self._impedance(_mean(friction.damping))
-        frequency = torus.orders * self.speed
-        matrix = torus.product_matrix(np.broadcast_to(self.mesh_slope, self.mesh_torque.shape))
-        damping = _mean(self.mesh_damping)
-        matrix += multiplication(1j * frequency * damping - impedance)
+        operator = coefficients.ratio * self._input_operator()
+        impedance, coupling, share = self._impedance(_mean(friction.damping), operator)
+        energy_change = -coefficients.ratio * input_residual / operator
+        energy_change[:, 0] = 0.0
+        right = (output_residual + coupling * energy_change) / share
+        change = self._solve(impedance, right)
+        energy_change[:, 1:] -= ((right + impedance * change) / operator)[:, 1:]
+        self.torsion = self.torsion + change
+        self.energy = self.energy + energy_change
+        angular_speed = np.sqrt(2.0 * np.maximum(torus.signal(self.energy), 1e-12))
+        self.energy = self.energy * (self.speed * _mean(1.0 / angular_speed)) ** 2
+        return change
+
+    def _solve(self, impedance: Phasors, right: Phasors) -> Phasors:
+        """Return the change of the torsion that the linearised mesh answers ``right`` with."""
+        torus = self.torus
+        slope = np.broadcast_to(self.mesh_slope, self.mesh_torque.shape)
+        viscous = 1j * torus.orders * self.speed * _mean(self.mesh_damping) - impedance
+        mean = _mean(slope)
+        if np.all(np.abs(slope - mean) <= _NEARLY_CONSTANT * np.abs(mean)):
+            return right / (mean + viscous)
+        matrix = torus.product_matrix(slope) + multiplication(viscous)
         # The mean has no imaginary part: an equation for it must not be missing.
         empty = len(torus.orders)
         matrix[:, empty, empty] = np.abs(matrix[:, 0, 0])
-        right = stacked(residual / share)
-        right[:, empty] = 0.0
-        change = np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
-        self.torsion = self.torsion + unstacked(change)
-        return change
+        real = stacked(right)
+        real[:, empty] = 0.0
+        return unstacked(np.asarray(np.linalg.solve(matrix, real[:, :, None])[:, :, 0]))
 
-    def _impedance(self, friction: Values) -> tuple[Phasors, Phasors]:
-        """Return mesh torque per transmission error of the free inertias, and 1 + C / (N A)."""
+    def _impedance(self, friction: Values, operator: Phasors) -> tuple[Phasors, Phasors, Phasors]:
+        """Return mesh torque per transmission error P of the free inertias, C, and 1 + C / (N A).
+
+        C is the output's torque per unit of E, A the motor's (`_input_operator`).
+        """
         coefficients = self.coefficients
         frequency = self.torus.orders * self.speed
         damping = coefficients.output_damping + friction
         inertia = coefficients.output_inertia
         output = inertia * frequency**2 - 1j * frequency * damping
         coupling = (1j * self.torus.orders * inertia + damping / self.speed) / coefficients.ratio
-        share = 1.0 + coupling / (coefficients.ratio * self._input_operator())
+        share = 1.0 + coupling / operator
         share[:, 0] = 1.0
-        return output / share, share
+        return output / share, coupling, share
 
     def _input_operator(self) -> Phasors:
-        """Return motor torque per unit of E of the free input, linear in E; 1 for the mean."""
+        """Return A, motor torque per unit of E of the free input, linear in E; 1 for the mean."""
         coefficients, motor = self.coefficients, self.motor
         orders = np.where(self.torus.orders == 0.0, 1.0, self.torus.orders)
         damping = coefficients.input_damping[:, None] + motor.proportional
@@ -229,9 +252,9 @@ class _Solver:
         operator[:, 0] = 1.0
         return operator
 
-    def _update_speed(self) -> None:
-        """Bring the first equation to zero, and the mean of 1/w to that of the wanted speed."""
-        coefficients, torus = self.coefficients, self.torus
+    def _input_residual(self) -> tuple[Phasors, Values]:
+        """Return what is left of the first equation, and its mean: the motor's constant torque."""
+        coefficients = self.coefficients
         reaction = coefficients.reaction * self.static_slope
         friction = self._laws("input", np.zeros_like(self.angular_speed), self.angular_speed)
         resisting = (
@@ -240,13 +263,8 @@ class _Solver:
             + friction.torque
             + self.mesh_torque * (1.0 / coefficients.ratio - reaction)
         )
-        residual = torus.phasors(resisting - self._loop_torque())
-        self.constant = residual[:, :1].real
-        change = residual / self._input_operator()
-        change[:, 0] = 0.0
-        self.energy = self.energy - change
-        angular_speed = np.sqrt(2.0 * np.maximum(torus.signal(self.energy), 1e-12))
-        self.energy = self.energy * (self.speed * _mean(1.0 / angular_speed)) ** 2
+        residual = self.torus.phasors(resisting - self._loop_torque())
+        return residual, residual[:, :1].real
 
     def _lead(self) -> Phasors:
         """Return alpha - Omega t."""
