@@ -22,6 +22,8 @@ from pymoo_hdte.drive.model import (
 )
 from pymoo_hdte.drive.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
+from pymoo_hdte.drive.quasi_static import mean_torsion, quasi_static_torsion
+from pymoo_hdte.drive.sensor_effects import Eccentricity, ThermalDrift
 from pymoo_hdte.drive.stability import UnstableDrive, floquet_multipliers
 from pymoo_hdte.drive.static_error import (
     StaticErrorSample,
@@ -40,6 +42,7 @@ __all__ = [
     "DampingReference",
     "DataSheet",
     "DriveModel",
+    "Eccentricity",
     "Effect",
     "KinematicError",
     "KinematicErrorLine",
@@ -51,6 +54,7 @@ __all__ = [
     "Run",
     "SpeedLoop",
     "StaticErrorSample",
+    "ThermalDrift",
     "UnstableDrive",
     "class_amplitudes",
     "floquet_multipliers",
@@ -59,8 +63,10 @@ __all__ = [
     "load_datasheet",
     "load_model",
     "low_pass",
+    "mean_torsion",
     "measured_dte",
     "preset",
+    "quasi_static_torsion",
     "sample_static_error",
     "simulate",
     "steady_state",

@@ -2,7 +2,8 @@
 
 An effect changes the coefficients of the equations of motion; every solver then follows. The three
 that stand here are the candidates of the calibration: the printed equations with the printed values
-respond to the static error as a rigid drive would. Further ones are in `port_effects`.
+respond to the static error as a rigid drive would. Further ones are in `port_effects` and
+`sensor_effects`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pymoo_hdte.drive.port_effects import (
     KinematicReaction,
     law_from_fields,
 )
+from pymoo_hdte.drive.sensor_effects import Eccentricity, ThermalDrift
 from pymoo_hdte.drive.toml_fields import Fields
 
 
@@ -154,6 +156,12 @@ def effect_from_fields(table: Fields) -> Effect:
             effect = KinematicErrorLine(table.number("order"), amplitude, phase)
         case KinematicReaction.name:
             effect = KinematicReaction(table.number("share"))
+        case Eccentricity.name:
+            effect = Eccentricity(
+                table.quantity("amplitude", "angle"), table.quantity("phase", "angle")
+            )
+        case ThermalDrift.name:
+            effect = ThermalDrift(table.quantity("rate", "angle rate"))
         case _:
             effect = law_from_fields(name, table)
     table.finish()
@@ -166,6 +174,8 @@ EFFECT_NAMES = (
     MeshStiffnessVariation.name,
     KinematicErrorLine.name,
     KinematicReaction.name,
+    Eccentricity.name,
+    ThermalDrift.name,
     *LAWS,
 )
 """Names of all effects."""

@@ -1,0 +1,78 @@
+"""Named effects of the output encoder: they change what is read, not the motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.laws import Values
+from pymoo_hdte.drive.port_effects import with_unit
+
+
+@dataclass(frozen=True)
+class Eccentricity:
+    """The disc of the output encoder is off centre: amplitude cos(theta_out + phase) is added.
+
+    A once-per-turn error of the drive itself reads the same unless the encoder is clocked anew.
+
+    Attributes
+    ----------
+    amplitude, phase : float
+        rad.
+    """
+
+    name: ClassVar[str] = "eccentricity"
+    port: ClassVar[str] = "sensor"
+    amplitude: float
+    phase: float
+
+    def __post_init__(self) -> None:
+        real_number("eccentricity.amplitude", self.amplitude)
+        real_number("eccentricity.phase", self.phase)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients as they are."""
+        return coefficients
+
+    def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
+        """Return what is added to the reading of true output angles (n,), rad, shape (n,)."""
+        return np.asarray(self.amplitude * np.cos(output_angle + self.phase))
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the effect as a TOML-like table."""
+        amplitude, phase = with_unit(self.amplitude, "angle"), with_unit(self.phase, "angle")
+        return {"name": self.name, "amplitude": amplitude, "phase": phase}
+
+
+@dataclass(frozen=True)
+class ThermalDrift:
+    """The reading of the output angle drifts steadily while the rig warms up.
+
+    Attributes
+    ----------
+    rate : float
+        rad/s.
+    """
+
+    name: ClassVar[str] = "thermal_drift"
+    port: ClassVar[str] = "sensor"
+    rate: float
+
+    def __post_init__(self) -> None:
+        real_number("thermal_drift.rate", self.rate)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients as they are."""
+        return coefficients
+
+    def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
+        """Return what is added after ``elapsed`` seconds of the session, rad, shape (n,)."""
+        return np.broadcast_to(self.rate * np.asarray(elapsed, dtype=float), np.shape(output_angle))
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the effect as a TOML-like table."""
+        return {"name": self.name, "rate": with_unit(self.rate, "angle rate")}

@@ -1,0 +1,74 @@
+"""Sensor effects: what they add to a reading, and that they leave the motion alone."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive import Eccentricity, ThermalDrift, harmonic_balance, preset
+from pymoo_hdte.drive.effects import EFFECT_NAMES, effect_from_fields
+from pymoo_hdte.drive.toml_fields import Fields
+from pymoo_hdte.units import ARCSEC
+
+EFFECTS = [Eccentricity(5.0 * ARCSEC, 0.7), ThermalDrift(2e-9)]
+phases = st.floats(-np.pi, np.pi)
+
+
+@given(phases, st.floats(0.0, 1e-4))
+def test_an_eccentric_disc_adds_one_line_of_one_cycle_a_turn(phase, amplitude):
+    angle = 2.0 * np.pi * np.arange(64) / 64
+    lines = np.fft.rfft(Eccentricity(amplitude, phase).reading(angle, 0.0)) / 32
+    assert lines[1] == pytest.approx(amplitude * np.exp(1j * phase), abs=1e-18)
+    assert np.delete(lines, 1) == pytest.approx(0.0, abs=1e-18)
+
+
+@given(st.floats(0.0, 1e3), st.floats(-np.pi, np.pi))
+def test_clocking_the_encoder_turns_the_phase(time, turn):
+    """Only this tells it from a once-per-turn error of the drive."""
+    angle = np.linspace(0.0, 7.0, 50)
+    clocked = Eccentricity(1e-5, 0.3).reading(angle + turn, time)
+    assert clocked == pytest.approx(Eccentricity(1e-5, 0.3 + turn).reading(angle, time), abs=1e-18)
+
+
+def test_drift_grows_with_the_session_and_not_with_the_angle():
+    drift = ThermalDrift(3e-9)
+    angle = np.linspace(0.0, 6.0, 5)
+    elapsed = np.array([0.0, 1.0, 10.0, 100.0, 1000.0])
+    assert drift.reading(angle, elapsed) == pytest.approx(3e-9 * elapsed)
+    assert drift.reading(angle, 500.0) == pytest.approx(np.full(5, 1.5e-6))
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_the_motion_stays_as_it_is(effect):
+    model = preset("published")
+    coefficients = model.coefficients(model.nominal[None])
+    plain, with_effect = (harmonic_balance(c) for c in (coefficients, effect.apply(coefficients)))
+    np.testing.assert_array_equal(with_effect.transmission_error, plain.transmission_error)
+
+
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_tables_are_read_back(effect):
+    assert effect.name in EFFECT_NAMES
+    assert effect.port == "sensor"
+    assert effect_from_fields(Fields(effect.to_dict(), "effect")) == effect
+
+
+@pytest.mark.parametrize(
+    ("build", "field"),
+    [
+        (lambda: Eccentricity(np.inf, 0.0), "eccentricity.amplitude"),
+        (lambda: Eccentricity(1e-5, "north"), "eccentricity.phase"),
+        (lambda: ThermalDrift(np.nan), "thermal_drift.rate"),
+        (
+            lambda: effect_from_fields(
+                Fields({"name": "thermal_drift", "rate": {"value": 1.0, "unit": "K"}}, "effect")
+            ),
+            "effect.rate.unit",
+        ),
+    ],
+)
+def test_bad_fields_are_named(build, field):
+    with pytest.raises(InvalidInput) as caught:
+        build()
+    assert caught.value.field == field
