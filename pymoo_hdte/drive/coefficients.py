@@ -30,12 +30,12 @@ class Coefficients:
     stiffness_depth, stiffness_phase : float
         kappa and psi of the stiffness variation; kappa is 0 where the stiffness is constant.
     input_inertia, input_damping : ndarray, shape (n,)
-    output_inertia, output_damping : float
+    output_inertia, output_damping : float or ndarray, shape (n,)
     error_orders : ndarray, shape (n_orders,)
         Orders of theta_s in cycles per input turn.
     error_phasors : ndarray of complex, shape (n, n_orders)
         theta_s = Re sum phasor exp(i order theta_in), rad.
-    load_inertia : float
+    load_inertia : float or ndarray, shape (n,)
         The part of ``output_inertia`` beyond the output coupling, kg.m2.
     laws : tuple of (str, Law)
         Ports, each with a law whose torque is added there.
@@ -53,18 +53,18 @@ class Coefficients:
     stiffness_phase: float
     input_inertia: NDArray[np.float64]
     input_damping: NDArray[np.float64]
-    output_inertia: float
-    output_damping: float
+    output_inertia: float | NDArray[np.float64]
+    output_damping: float | NDArray[np.float64]
     error_orders: NDArray[np.float64]
     error_phasors: NDArray[np.complex128]
-    load_inertia: float = 0.0
+    load_inertia: float | NDArray[np.float64] = 0.0
     laws: tuple[tuple[str, Law], ...] = ()
     reaction: float = 0.0
 
-    def rows(self, rows: slice) -> Coefficients:
+    def rows(self, rows: slice | NDArray[np.int_]) -> Coefficients:
         """Return the coefficients of some of the designs."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        parts = {k: v[rows] for k, v in values.items() if k in _BY_DESIGN}
+        parts = {k: v[rows] for k, v in values.items() if k in _BY_DESIGN and np.ndim(v)}
         return replace(self, **parts)
 
     def torque_at(
@@ -74,9 +74,12 @@ class Coefficients:
         return load_torque + self.output_damping * input_speed / self.ratio
 
     @property
-    def mean_mesh_torque(self) -> float:
+    def mean_mesh_torque(self) -> float | NDArray[np.float64]:
         """Mean of k d + c d' in steady state: load and bearing friction, N.m at the output."""
         return self.load_torque + self.output_damping * self.input_speed / self.ratio
 
 
-_BY_DESIGN = ("stiffness", "damping", "input_inertia", "input_damping", "error_phasors")
+_BY_DESIGN = (
+    "stiffness", "damping", "input_inertia", "input_damping", "output_inertia", "output_damping",
+    "error_phasors", "load_inertia",
+)  # fmt: skip

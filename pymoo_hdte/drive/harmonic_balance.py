@@ -35,6 +35,7 @@ HIGHEST = 8
 HIGHEST_FRACTION = 2
 """Harmonics kept of every other angle."""
 _STEPS = 40
+_STATIC_STEPS = 8
 _NEARLY_CONSTANT = 0.02
 """Variation of the mesh stiffness, relative, up to which its mean serves in Newton's step."""
 _ROWS_AT_ONCE = 64
@@ -107,6 +108,8 @@ class _Solver:
     ) -> None:
         self.coefficients, self.motor, self.torus = coefficients, motor, torus
         self.speed, self.load = speed[:, None], load[:, None]
+        self.output_inertia = np.reshape(coefficients.output_inertia, (-1, 1))
+        self.output_damping = np.reshape(coefficients.output_damping, (-1, 1))
         n, size = len(speed), len(torus.orders)
         self.static = np.zeros((n, size), dtype=complex)
         for order, phasor in zip(
@@ -118,21 +121,34 @@ class _Solver:
         angle = 2.0 * torus.phase(1.0) + coefficients.stiffness_phase
         self.varying = 1.0 + coefficients.stiffness_depth * np.cos(angle)
         self.torsion = np.zeros((n, size), dtype=complex)
-        self.torsion[:, 0] = coefficients.torque_at(speed, load) / coefficients.stiffness
+        self.torsion[:, 0] = self._static_torsion(coefficients.torque_at(speed, load))
         self.energy = np.zeros((n, size), dtype=complex)
         self.energy[:, 0] = speed**2 / 2.0
         self.constant = np.zeros((n, 1))
 
     def solve(self, tolerance: float) -> Balance:
         """Iterate until the torsion stands still; rows that never do are marked."""
-        size = np.abs(self.torsion[:, :1]).max(axis=1) + np.abs(self.static).sum(axis=1) + 1e-12
-        converged = np.zeros(len(size), dtype=bool)
+        self.size = np.abs(self.torsion[:, :1]) + np.abs(self.static).sum(axis=1)[:, None] + 1e-9
+        converged = np.zeros(len(self.size), dtype=bool)
         for _ in range(_STEPS):
             change = self._step()
-            converged = np.abs(change).max(axis=1) <= tolerance * size
+            converged = np.abs(change).max(axis=1) <= tolerance * self.size[:, 0]
             if np.all(converged):
                 break
         return self._result(converged)
+
+    def _static_torsion(self, torque: Values) -> Values:
+        """Return a mean torsion to begin with, shape (n,): that which holds ``torque`` at rest."""
+        stiffness = self.coefficients.stiffness
+        found = torque / stiffness
+        if not any(port == "mesh" for port, _ in self.coefficients.laws):
+            return found
+        still = np.zeros((len(found), self.torus.size))
+        for _ in range(_STATIC_STEPS):
+            position = np.broadcast_to(found[:, None], still.shape)
+            added = _mean(self._laws("mesh", position, still).torque)[:, 0]
+            found = found + (torque - stiffness * found - added) / stiffness
+        return found
 
     def _motion(self) -> None:
         """Put the present torsion and speed on the grid, with the torques that follow."""
@@ -189,8 +205,8 @@ class _Solver:
         input_residual, self.constant = self._input_residual()
         friction = self._laws("output", np.zeros_like(self.output_speed), self.output_speed)
         output_residual = torus.phasors(
-            coefficients.output_inertia * self.output_acceleration
-            + coefficients.output_damping * self.output_speed
+            self.output_inertia * self.output_acceleration
+            + self.output_damping * self.output_speed
             + friction.torque
             - self.mesh_torque
             + self.load
@@ -201,7 +217,14 @@ class _Solver:
         energy_change[:, 0] = 0.0
         right = (output_residual + coupling * energy_change) / share
         change = self._solve(impedance, right)
+        # Where a law takes the stiffness away, a full step may lead far off.
+        longest = np.abs(change).max(axis=1, keepdims=True)
+        change *= np.minimum(1.0, self.size / np.maximum(longest, 1e-300))
         energy_change[:, 1:] -= ((right + impedance * change) / operator)[:, 1:]
+        # Nor may the speed come near zero on the way.
+        largest = np.abs(energy_change).sum(axis=1, keepdims=True)
+        slowest = 0.5 * self.energy[:, :1].real
+        energy_change *= np.minimum(1.0, slowest / np.maximum(largest, 1e-300))
         self.torsion = self.torsion + change
         self.energy = self.energy + energy_change
         angular_speed = np.sqrt(2.0 * np.maximum(torus.signal(self.energy), 1e-12))
@@ -231,8 +254,8 @@ class _Solver:
         """
         coefficients = self.coefficients
         frequency = self.torus.orders * self.speed
-        damping = coefficients.output_damping + friction
-        inertia = coefficients.output_inertia
+        damping = self.output_damping + friction
+        inertia = self.output_inertia
         output = inertia * frequency**2 - 1j * frequency * damping
         coupling = (1j * self.torus.orders * inertia + damping / self.speed) / coefficients.ratio
         share = 1.0 + coupling / operator
@@ -281,7 +304,8 @@ class _Solver:
 
     def _result(self, converged: NDArray[np.bool_]) -> Balance:
         self._motion()
-        torus, inertia = self.torus, self.coefficients.load_inertia
+        torus = self.torus
+        inertia = np.reshape(self.coefficients.load_inertia, (-1, 1))
         return Balance(
             torus=torus,
             transmission_error=self.static + self.torsion,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.laws import Aperiodic, PortState, Response, Values
@@ -59,13 +60,21 @@ def slip_along(path: Values, slips: Values) -> tuple[Values, Values]:
 
     ``path`` has shape (n, steps) and starts from rest; results have shape (springs, n, steps).
     """
-    bounds = slips[:, None]
-    stretch = np.zeros((len(slips), *path.shape))
-    sticking = np.zeros_like(stretch)
-    now, before = np.zeros((len(slips), len(path))), np.zeros(len(path))
-    for step, position in enumerate(path.T):
-        moved = now + (position - before)
-        now = np.clip(moved, -bounds, bounds)
-        stretch[..., step], sticking[..., step] = now, now == moved
-        before = position
+    stretch = np.empty((len(slips), *path.shape))
+    sticking = np.empty_like(stretch)
+    _slip(np.ascontiguousarray(path), slips, stretch, sticking)
     return stretch, sticking
+
+
+@njit(cache=True)
+def _slip(path: Values, slips: Values, stretch: Values, sticking: Values) -> None:
+    springs, rows, steps = stretch.shape
+    for row in range(rows):
+        for spring in range(springs):
+            now, before, bound = 0.0, 0.0, slips[spring]
+            for step in range(steps):
+                moved = now + path[row, step] - before
+                now = min(max(moved, -bound), bound)
+                stretch[spring, row, step] = now
+                sticking[spring, row, step] = 1.0 if now == moved else 0.0
+                before = path[row, step]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.laws import Aperiodic, Periodic, PortState, Response, Values
@@ -47,11 +48,22 @@ class SoftWindup(Aperiodic):
         return Response(-lost * self.torsion * wound, -lost * (1.0 - wound**2))
 
 
+ROUNDING = 0.05
+"""Share of a clearance over which contact sets in: no tooth flank is met at once. A sharp corner
+differs by less than this share of the half-width, times ln 2, and only at the corner itself."""
+
+
 def _dead_zone(state: PortState, half_width: Values | float) -> Response:
     """Return what a clearance takes from K d: everything within, a constant beyond."""
-    inside = np.abs(state.position) < half_width
-    lost = np.clip(state.position, -half_width, half_width)
-    return Response(-state.stiffness * lost, np.where(inside, -state.stiffness, 0.0))
+    rounding = ROUNDING * np.maximum(half_width, 1e-12)
+    left, right = state.position + half_width, state.position - half_width
+    lost = rounding * (_soft_plus(left / rounding) - _soft_plus(right / rounding)) - half_width
+    slope = expit(left / rounding) - expit(right / rounding)
+    return Response(-state.stiffness * lost, -state.stiffness * slope)
+
+
+def _soft_plus(x: Values) -> Values:
+    return np.logaddexp(0.0, x)
 
 
 @dataclass(frozen=True)

@@ -264,7 +264,7 @@ def equations_of_motion(
 def _holding_torque(coefficients: Coefficients) -> float:
     """Return the mean input torque that holds the speed of the first design."""
     if not (coefficients.laws or coefficients.reaction):
-        mean = coefficients.mean_mesh_torque / coefficients.ratio
+        mean = float(coefficients.mean_mesh_torque) / coefficients.ratio
         return float(coefficients.input_damping[0]) * coefficients.input_speed + mean
     return float(harmonic_balance(coefficients).motor_torque[0, 0].real)
 

@@ -65,11 +65,19 @@ class Torus:
         self._shape = mesh[0].shape
         self._phases = np.array([axis.ravel() for axis in mesh])
         self.size = self._phases.shape[1]
+        lines = self._multiples
+        self._differences = self._flat(lines[:, None] - lines)
+        self._sums = self._flat(lines[:, None] + lines)
         argument = self._multiples @ self._phases
         self._cosine, self._sine = np.cos(argument), np.sin(argument)
         weights = np.full((len(self.orders), 1), 2.0 / self.size)
         weights[0] = 1.0 / self.size
         self._analysis = weights * np.exp(-1j * argument)
+
+    def _flat(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
+        """Return where multiples (..., n_angles) stand in a flattened transform of the grid."""
+        wrapped = np.moveaxis(multiples % np.array(self._shape), -1, 0)
+        return np.asarray(np.ravel_multi_index(tuple(wrapped), self._shape))
 
     def phase(self, order: float) -> NDArray[np.float64]:
         """Return ``order`` times the input angle on the grid, shape (G,), up to whole turns."""
@@ -77,12 +85,18 @@ class Torus:
 
     def place(self, order: float) -> tuple[int, bool]:
         """Return the index of an order among the harmonics, and whether it stands there as -o."""
-        wanted = self._find(order)
-        for sign in (1, -1):
-            rows = np.flatnonzero(np.all(self._multiples == sign * wanted, axis=1))
-            if rows.size:
-                return int(rows[0]), sign < 0
-        raise InvalidInput("order", order, f"within {self.highest} times {self.fundamentals}")
+        found = self.find(order)
+        if found is None:
+            raise InvalidInput("order", order, f"within {self.highest} times {self.fundamentals}")
+        return found
+
+    def find(self, order: float) -> tuple[int, bool] | None:
+        """Return what `place` does, or None for an order that is not kept."""
+        for sign in (1.0, -1.0):
+            places = np.flatnonzero(np.abs(self.orders - sign * order) < _TOLERANCE)
+            if places.size:
+                return int(places[0]), sign < 0.0
+        return None
 
     def _find(self, order: float) -> NDArray[np.int_]:
         """Return the smallest whole multiples that sum to ``order``."""
@@ -130,13 +144,23 @@ class Torus:
     def product_matrix(self, factor: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the real matrices that multiply a signal by ``factor``, given on the grid (n, G).
 
-        They act on stacked real and imaginary parts of harmonics, shape (n, 2 H, 2 H).
+        They act on stacked real and imaginary parts of harmonics, shape (n, 2 H, 2 H). With the
+        Fourier coefficients F of the factor, line j of the product is the sum over lines k of
+        F(j - k) x_k + F(j + k) conj(x_k).
         """
-        synthesis = np.concatenate([self._cosine, -self._sine])
-        analysis = np.concatenate([self._analysis.real, self._analysis.imag])
-        return np.asarray(
-            np.matmul(factor[:, None, :] * analysis[None], synthesis.T), dtype=np.float64
-        )
+        axes = tuple(range(1, 1 + len(self._shape)))
+        spectrum = np.fft.fftn(factor.reshape(-1, *self._shape), axes=axes) / self.size
+        flat = spectrum.reshape(len(factor), -1)
+        below, above = flat[:, self._differences], flat[:, self._sums]
+        size = len(self.orders)
+        matrix = np.empty((len(factor), 2 * size, 2 * size))
+        matrix[:, :size, :size] = below.real + above.real
+        matrix[:, :size, size:] = above.imag - below.imag
+        matrix[:, size:, :size] = below.imag + above.imag
+        matrix[:, size:, size:] = below.real - above.real
+        # The mean counts once, a line with its conjugate twice.
+        matrix[:, 0] *= 0.5
+        return matrix
 
 
 def stacked(phasors: NDArray[np.complex128]) -> NDArray[np.float64]:

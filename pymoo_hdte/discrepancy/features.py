@@ -1,0 +1,110 @@
+"""What a campaign's running records say, as numbers with a full covariance.
+
+A record's features are the means of transmission error and input torque, then real and imaginary
+parts of the order lines of every channel. Their covariance is that of the sensors (both encoders
+share the input's noise) plus that of the repeatability: the static error changes a little from one
+record to the next, and the drive's own response carries that to all channels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.believed import Rig
+from pymoo_hdte.discrepancy.campaign import Campaign
+from pymoo_hdte.discrepancy.forward import Conditions, Prediction
+from pymoo_hdte.discrepancy.order_lines import CHANNELS, OrderLines, order_lines
+from pymoo_hdte.discrepancy.records import RunningRecord
+
+MEANS = (0, 1)
+"""Channels whose mean is a feature; the others' means are conditions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """Features of r records.
+
+    Attributes
+    ----------
+    records : tuple of RunningRecord
+    conditions : Conditions
+    orders : ndarray, shape (m,)
+        Cycles per input turn.
+    values : ndarray, shape (r, n_features)
+    covariance : ndarray, shape (r, n_features, n_features)
+        Of the sensors' noise only.
+    """
+
+    records: tuple[RunningRecord, ...]
+    conditions: Conditions
+    orders: NDArray[np.float64]
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+    def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
+        """Return predicted features, shape (v, r, n_features)."""
+        return stack(prediction.mean, prediction.phasors)
+
+    def places(self, channel: int) -> NDArray[np.int_]:
+        """Return the places (m, 2) of a channel's real and imaginary parts among the features."""
+        m = len(self.orders)
+        first = len(MEANS) + 2 * m * channel
+        return first + np.array([np.arange(m), m + np.arange(m)]).T
+
+
+def stack(mean: NDArray[np.float64], phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return means (..., 4) and phasors (..., 4, m) as features (..., n_features)."""
+    lines = np.concatenate([phasors.real, phasors.imag], axis=-1)
+    flat = lines.reshape(*lines.shape[:-2], -1)
+    return np.concatenate([mean[..., list(MEANS)], flat], axis=-1)
+
+
+def measure(
+    campaign: Campaign, records: Sequence[RunningRecord], orders: Sequence[float]
+) -> Features:
+    """Return the features of records at these orders.
+
+    Raises
+    ------
+    InvalidInput
+        For orders that a record cannot tell apart or that lie beyond its Nyquist order.
+    """
+    ratio, rig = campaign.believed.ratio, campaign.rig
+    lines = [order_lines(record, rig, ratio, orders) for record in records]
+    conditions = Conditions(
+        input_speed=np.array([line.slope[3] for line in lines]),
+        output_torque=np.array([line.mean[2] for line in lines]),
+        elapsed=np.array(
+            [record.elapsed + (record.time[0] + record.time[-1]) / 2.0 for record in records]
+        ),
+    )
+    values = np.array([stack(line.mean, line.phasors) for line in lines])
+    stiffness = campaign.believed.stiffness
+    covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
+    return Features(tuple(records), conditions, np.array(orders), values, covariance)
+
+
+def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[np.float64]:
+    """Return the covariance of one record's features, shape (n_features, n_features)."""
+    m = len(line.orders)
+    size = len(MEANS) + 2 * m * len(CHANNELS)
+    covariance = np.zeros((size, size))
+    # Where the mean (0) and the lines (1 .. 2 m) of each channel stand among the features.
+    places = [
+        np.concatenate([[channel] if channel in MEANS else [-1], len(MEANS) + 2 * m * channel
+                        + np.arange(2 * m)])
+        for channel in range(len(CHANNELS))
+    ]  # fmt: skip
+    for one, first in enumerate(places):
+        for other, second in enumerate(places):
+            share = line.row_covariance[one, other] / line.row_covariance[one, one]
+            block = share * line.covariance[one]
+            rows, columns = first >= 0, second >= 0
+            covariance[np.ix_(first[rows], second[columns])] += block[np.ix_(rows, columns)]
+    # The load is taken from the output torque: its error winds the drive up.
+    covariance[0, 0] += line.covariance[2, 0, 0] / stiffness**2
+    return covariance

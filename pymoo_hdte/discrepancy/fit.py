@@ -1,0 +1,269 @@
+"""Bounded least squares of a campaign: base parameters jointly with those of effects.
+
+Residuals are whitened by the full covariance of the features, so that their sum of squares is a
+chi-square. All base parameters are perturbed in one call of the forward model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import least_squares
+
+from pymoo_hdte.discrepancy.campaign import Campaign
+from pymoo_hdte.discrepancy.features import Features
+from pymoo_hdte.discrepancy.forward import coefficients_of, predict
+from pymoo_hdte.discrepancy.library import Candidate
+from pymoo_hdte.discrepancy.parameters import Layout, Parameter, base_parameters
+from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
+from pymoo_hdte.drive import Effect, mean_torsion
+
+_STEP = 1e-3
+"""Step of difference quotients, in units of a parameter's scale."""
+_EVALUATIONS = 25
+_LOST = 1e3
+"""Residual of a point at which the model cannot carry the torque."""
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """Features to fit, whitened, for a campaign.
+
+    Attributes
+    ----------
+    campaign : Campaign
+    features : Features
+    base : tuple of Parameter
+    torsion : tuple of TorsionPoints
+        Sweeps with the input locked.
+    """
+
+    campaign: Campaign
+    features: Features
+    base: tuple[Parameter, ...]
+    torsion: tuple[TorsionPoints, ...] = ()
+
+    @cached_property
+    def whiteners(self) -> NDArray[np.float64]:
+        """Lower triangles L, shape (r, f, f), of the covariance L L^T of each record."""
+        layout = Layout(self.base)
+        start = layout.array("start")
+        covariance = self.features.covariance + self._repeatability(layout, start)
+        return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+
+    def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
+        """Return the covariance that small changes of the static error give each record."""
+        rig, believed = self.campaign.rig, self.campaign.believed
+        lines = range(len(believed.error_orders))
+        spread = rig.repeatability / max(len(lines), 1) ** 0.5
+        moved = [start]
+        for line in lines:
+            for part in ("amplitude", "phase"):
+                shifted = start.copy()
+                amplitude = start[layout.index(f"error_amplitude_{line}")]
+                unit = spread if part == "amplitude" else spread / max(amplitude, spread)
+                shifted[layout.index(f"error_{part}_{line}")] += unit
+                moved.append(shifted)
+        predicted = self.predict(np.array(moved), ())
+        change = predicted[1:] - predicted[0]
+        covariance = np.einsum("vri,vrj->rij", change, change)
+        covariance[:, 0, 0] += spread**2
+        return covariance
+
+    def predict(self, vectors: Vector, effects: Sequence[Effect]) -> NDArray[np.float64]:
+        """Return features, shape (v, r, f), of vectors (v, n_base) of base parameters."""
+        values = self._named(vectors)
+        believed, rig = self.campaign.believed, self.campaign.rig
+        features = self.features
+        prediction = predict(
+            believed, rig, features.conditions, features.orders.tolist(), values, effects
+        )
+        return features.of_prediction(prediction)
+
+    def _named(self, vectors: Vector) -> dict[str, Vector]:
+        return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}
+
+    def torsion_residuals(self, vectors: Vector, effects: Sequence[Effect]) -> NDArray[np.float64]:
+        """Return whitened residuals (v, n_points) of the sweeps; none where there is no sweep."""
+        values = self._named(vectors)
+        coefficients = coefficients_of(self.campaign.believed, values, effects, 1)
+        stiffness = coefficients.stiffness * values["locked_stiffness"]
+        coefficients = replace(coefficients, stiffness=stiffness)
+        sensor = np.column_stack([values["output_torque_gain"], values["output_torque_zero"]])
+        found = [np.empty((len(vectors), 0))]
+        for points in self.torsion:
+            torsion = np.empty((len(vectors), len(points.angle)))
+            # Vectors that share the sensor's errors share the path of the torque.
+            for gain, zero in np.unique(sensor, axis=0):
+                rows = np.flatnonzero(np.all(sensor == (gain, zero), axis=1))
+                path = (points.path - zero) / (1.0 + gain)
+                torsion[rows] = mean_torsion(coefficients.rows(rows), path)[:, points.intervals]
+            found.append((torsion - points.angle) @ points.whitening.T)
+        return np.hstack(found)
+
+    def whiten(self, differences: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return whitened differences of features (..., r, f), flat: shape (..., r f)."""
+        white = np.empty_like(differences)
+        for record, triangle in enumerate(self.whiteners):
+            part = differences[..., record, :].reshape(-1, len(triangle)).T
+            solved = solve_triangular(triangle, part, lower=True)
+            white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
+        return white.reshape(*differences.shape[:-2], -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model with its fitted values.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+    parameters : tuple of Parameter
+        Base first, then those of the candidates.
+    values : ndarray, shape (n_parameters,)
+    residuals : ndarray, shape (n_residuals,)
+        Whitened: of running records, of sweeps, of priors.
+    jacobian : ndarray, shape (n_residuals, n_parameters)
+        Of the residuals, by parameters in units of their scale.
+    """
+
+    candidates: tuple[Candidate, ...]
+    parameters: tuple[Parameter, ...]
+    values: Vector
+    residuals: Vector
+    jacobian: NDArray[np.float64]
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of squares of all residuals."""
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def effects(self) -> tuple[Effect, ...]:
+        """The fitted effects."""
+        return built(self.candidates, self.values[-count(self.candidates) or len(self.values) :])
+
+    @cached_property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Names of the parameters that ended at a bound."""
+        layout = Layout(self.parameters)
+        lower, upper = layout.array("lower"), layout.array("upper")
+        near = 1e-3 * layout.array("scale")
+        stuck = (self.values <= lower + near) | (self.values >= upper - near)
+        return tuple(p.name for p, flag in zip(self.parameters, stuck, strict=True) if flag)
+
+    @cached_property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of the values, from the curvature at the optimum; shape (n, n)."""
+        scale = Layout(self.parameters).array("scale")
+        return np.linalg.pinv(self.jacobian.T @ self.jacobian) * np.outer(scale, scale)
+
+
+def count(candidates: Sequence[Candidate]) -> int:
+    """Return the number of parameters of candidates."""
+    return sum(len(candidate.parameters) for candidate in candidates)
+
+
+def built(candidates: Sequence[Candidate], values: Sequence[float] | Vector) -> tuple[Effect, ...]:
+    """Return the effects of candidates for their values, one after the other."""
+    effects, start = [], 0
+    for candidate in candidates:
+        end = start + len(candidate.parameters)
+        effects.append(candidate.build([float(value) for value in values[start:end]]))
+        start = end
+    return tuple(effects)
+
+
+class Objective:
+    """Whitened residuals and their Jacobian for a set of candidates."""
+
+    def __init__(self, data: Data, candidates: Sequence[Candidate]) -> None:
+        self.data = data
+        self.candidates = tuple(candidates)
+        added = [parameter for candidate in candidates for parameter in candidate.parameters]
+        self.parameters = (*data.base, *added)
+        layout = Layout(self.parameters)
+        self.scale, self.start = layout.array("scale"), layout.array("start")
+        self.lower, self.upper = layout.array("lower"), layout.array("upper")
+        self.prior = layout.array("prior")
+        self.bounded = np.isfinite(self.prior)
+
+    def residuals(self, values: Vector) -> Vector:
+        """Return residuals at values (n,), those of priors last."""
+        return self._batch(values[None, : len(self.data.base)], values)[0]
+
+    def _batch(self, vectors: Vector, values: Vector) -> NDArray[np.float64]:
+        """Return residuals (v, n_residuals) for base vectors, the effects being those of values."""
+        n_base = len(self.data.base)
+        effects = built(self.candidates, values[n_base:])
+        difference = self.data.predict(vectors, effects) - self.data.features.values
+        white = self.data.whiten(difference)
+        torsion = self.data.torsion_residuals(vectors, effects)
+        whole = np.tile(values, (len(vectors), 1))
+        whole[:, :n_base] = vectors
+        priors = ((whole - self.start) / self.prior)[:, self.bounded]
+        return np.nan_to_num(np.concatenate([white, torsion, priors], axis=1), nan=_LOST)
+
+    def jacobian(self, values: Vector) -> NDArray[np.float64]:
+        """Return the derivatives of the residuals by parameters in units of their scale."""
+        n_base = len(self.data.base)
+        # Steps lead away from the nearer bound: an effect's strength cannot fall below zero.
+        steps = np.where(values + _STEP * self.scale > self.upper, -_STEP, _STEP)
+        moved = np.tile(values[:n_base], (n_base + 1, 1))
+        moved[1:] += np.diag(steps[:n_base] * self.scale[:n_base])
+        batch = self._batch(moved, values)
+        columns = list((batch[1:] - batch[0]) / steps[:n_base, None])
+        for place in range(n_base, len(values)):
+            shifted = values.copy()
+            shifted[place] += steps[place] * self.scale[place]
+            columns.append((self.residuals(shifted) - batch[0]) / steps[place])
+        return np.array(columns).T
+
+
+def fit(
+    data: Data,
+    candidates: Sequence[Candidate] = (),
+    start: Vector | None = None,
+    evaluations: int = _EVALUATIONS,
+) -> Fit:
+    """Fit base parameters and those of candidates from ``start`` (by default their own starts)."""
+    objective = Objective(data, candidates)
+    scale = objective.scale
+    inner = 1e-6 * (objective.upper - objective.lower)
+    begin = objective.start if start is None else start
+    begin = np.clip(begin, objective.lower + inner, objective.upper - inner)
+    found = least_squares(
+        lambda scaled: objective.residuals(scaled * scale),
+        begin / scale,
+        jac=lambda scaled: objective.jacobian(scaled * scale),
+        bounds=(objective.lower / scale, objective.upper / scale),
+        max_nfev=evaluations,
+        xtol=1e-5,
+        ftol=1e-6,
+        gtol=1e-9,
+    )
+    values = found.x * scale
+    return Fit(objective.candidates, objective.parameters, values, found.fun, found.jac)
+
+
+def start_parameters(campaign: Campaign, features: Features) -> tuple[Parameter, ...]:
+    """Return the base parameters, with first guesses from the slowest record."""
+    believed = campaign.believed
+    slowest = int(np.argmin(np.abs(features.conditions.input_speed)))
+    values, places = features.values[slowest], features.places(0)
+    phases = []
+    for order in believed.error_orders:
+        line = int(np.argmin(np.abs(features.orders - order)))
+        real, imaginary = values[places[line]]
+        # amplitude sin(x + phase) has the phasor -i amplitude exp(i phase).
+        phases.append(float(np.angle(1j * (real + 1j * imaginary))))
+    load = features.conditions.output_torque
+    offset = float(np.median(features.values[:, 0] - load / believed.stiffness))
+    return base_parameters(believed, campaign.rig, phases, offset)

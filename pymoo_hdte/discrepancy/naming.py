@@ -1,0 +1,159 @@
+"""The verdict: is anything missing, which effect is it, and how sure is that answer.
+
+The base is fitted within its tolerances first. If it is not adequate, candidates are screened, the
+best few are fitted jointly with the base, and the one with the least BIC is named, provided that it
+removes most of the excess. What the data cannot tell from it is named beside it. A second effect
+must remove most of what the first leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.fit import Data, Fit, count, fit
+from pymoo_hdte.discrepancy.library import Candidate
+from pymoo_hdte.discrepancy.screening import Screened, screen
+
+STATUSES = ("adequate", "named", "class", "parameter", "unlisted")
+
+ADEQUATE = 1.25
+"""Chi-square per degree of freedom up to which a base is adequate."""
+SHARE = 0.9
+"""Least share of the excess chi-square that named effects remove."""
+SECOND_SHARE = 0.8
+"""Least share of the excess left by the first effect that a second one removes."""
+BIC_GAIN = 6.0
+"""Least gain of BIC, and the distance within which rivals cannot be told apart."""
+FITTED = 4
+"""Most candidates fitted in earnest after the screening."""
+PROMISING = 0.2
+"""Least reduction, as a share of the most promising candidate's, with which one is fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A set of effects fitted jointly with the base, with its evidence.
+
+    Attributes
+    ----------
+    fit : Fit
+    bic : float
+        Chi-square + parameters x ln(residuals).
+    share : float
+        Of the base's excess chi-square that it removes; 1 leaves nothing but noise.
+    """
+
+    fit: Fit
+    bic: float
+    share: float
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The effects."""
+        return self.fit.candidates
+
+    @property
+    def label(self) -> str:
+        """Their labels in one word."""
+        return "+".join(candidate.label for candidate in self.candidates)
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is missing.
+
+    Attributes
+    ----------
+    status : str
+        One of `STATUSES`.
+    base : Fit
+        Without any effect.
+    chosen : Rival or None
+    alternatives : tuple of Rival
+        Other sets that were fitted, by rising BIC.
+    equivalent : tuple of Rival
+        Those of them that the data cannot tell from the chosen one.
+    degrees_of_freedom : int
+    """
+
+    status: str
+    base: Fit
+    chosen: Rival | None
+    alternatives: tuple[Rival, ...]
+    equivalent: tuple[Rival, ...]
+    degrees_of_freedom: int
+
+
+def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
+    """Return the verdict on a fitted base."""
+    freedom = len(base.residuals) - len(base.values)
+    excess = base.chi_square - freedom
+    if base.chi_square <= ADEQUATE * freedom:
+        return Verdict("adequate", base, None, (), (), freedom)
+    singles = _fit_best(data, base, screen(data, base, candidates), excess)
+    first = singles[0]
+    rivals = list(singles)
+    if first.fit.chi_square > ADEQUATE * freedom:
+        pairs = _pairs(data, singles[:1], candidates, excess)
+        rivals = sorted([*singles, *pairs], key=lambda rival: rival.bic)
+    chosen = rivals[0]
+    if len(chosen.candidates) == 2 and not _second_earned(chosen, singles, freedom):
+        chosen = first
+    null = base.chi_square + len(base.values) * np.log(len(base.residuals))
+    if chosen.share < SHARE or null - chosen.bic < BIC_GAIN:
+        return Verdict("unlisted", base, chosen, tuple(rivals), (), freedom)
+    others = [rival for rival in rivals if rival is not chosen]
+    equivalent = tuple(
+        rival
+        for rival in others
+        if rival.bic - chosen.bic < BIC_GAIN
+        and len(rival.candidates) == len(chosen.candidates)
+        and {c.name for c in rival.candidates} != {c.name for c in chosen.candidates}
+    )
+    if all(candidate.name == "parameter" for candidate in chosen.candidates):
+        status = "parameter"
+    else:
+        status = "class" if equivalent else "named"
+    return Verdict(status, base, chosen, tuple(others), equivalent, freedom)
+
+
+def _fit_best(data: Data, base: Fit, screened: Sequence[Screened], excess: float) -> list[Rival]:
+    """Fit the most promising candidates jointly with what stands; by rising BIC."""
+    found = []
+    least = PROMISING * screened[0].reduction
+    for one in [one for one in screened[:FITTED] if one.reduction >= least]:
+        start = np.concatenate([base.values, one.start])
+        found.append(_rival(fit(data, (*base.candidates, one.candidate), start), excess))
+    return sorted(found, key=lambda rival: rival.bic)
+
+
+def _rival(fitted: Fit, excess: float) -> Rival:
+    parameters = len(fitted.values)
+    bic = fitted.chi_square + parameters * np.log(len(fitted.residuals))
+    freedom = len(fitted.residuals) - (parameters - count(fitted.candidates))
+    share = 1.0 - (fitted.chi_square - freedom) / excess
+    return Rival(fitted, float(bic), float(share))
+
+
+def _pairs(
+    data: Data, singles: Sequence[Rival], candidates: Sequence[Candidate], excess: float
+) -> list[Rival]:
+    """Return the best pairs that contain one of the best single effects."""
+    found: list[Rival] = []
+    for single in singles:
+        taken = {candidate.label for candidate in single.candidates}
+        others = [candidate for candidate in candidates if candidate.label not in taken]
+        screened = screen(data, single.fit, others)
+        found += _fit_best(data, single.fit, screened[:3], excess)
+    return found
+
+
+def _second_earned(pair: Rival, singles: Sequence[Rival], freedom: int) -> bool:
+    """Tell whether the second effect removes most of what the better of the two leaves alone."""
+    labels = {candidate.label for candidate in pair.candidates}
+    alone = [s.fit.chi_square for s in singles if s.candidates[0].label in labels]
+    left = min(alone) - freedom
+    return left > 0.0 and min(alone) - pair.fit.chi_square >= SECOND_SHARE * left

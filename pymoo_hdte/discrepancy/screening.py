@@ -1,0 +1,108 @@
+"""Which candidates could explain a misfit at all: their signatures held against what is left.
+
+A candidate of typical strength changes the features by its signature. What the base parameters can
+imitate of it is taken out; the share of the misfit along the rest is what the candidate could
+remove, to first order, were its strength free. Wrong only for strongly curved effects, which is why
+several strengths are tried and the best few candidates are fitted in earnest afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.features import Features
+from pymoo_hdte.discrepancy.fit import Data, Fit
+from pymoo_hdte.discrepancy.library import Candidate
+from pymoo_hdte.discrepancy.order_lines import residual_spectrum
+
+_FALSE_LINES = 1e-3
+"""Chance that noise alone shows any line in a whole campaign."""
+_MOST_LINES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A candidate, what it could remove of chi-square, and where to start its fit."""
+
+    candidate: Candidate
+    reduction: float
+    start: tuple[float, ...]
+
+
+def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
+    """Return all candidates, the most promising first.
+
+    Parameters
+    ----------
+    data : Data
+    fitted : Fit
+        What stands so far, perhaps with effects; its misfit is to be explained.
+    candidates : sequence of Candidate
+    """
+    orthonormal, _ = np.linalg.qr(fitted.jacobian)
+    left = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
+    base = fitted.values[None, : len(data.base)]
+    before = data.predict(base, fitted.effects)
+    before_torsion = data.torsion_residuals(base, fitted.effects)
+    priors = len(fitted.residuals) - before.size - before_torsion.size
+    found = []
+    for candidate in candidates:
+        signatures = []
+        for start in candidate.starts:
+            effects = (*fitted.effects, candidate.build(start))
+            change = data.whiten(data.predict(base, effects) - before)[0]
+            torsion = data.torsion_residuals(base, effects) - before_torsion
+            signature = np.concatenate([change, np.nan_to_num(torsion[0]), np.zeros(priors)])
+            signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
+        found.append(_best_start(candidate, np.array(signatures), left))
+    return sorted(found, key=lambda one: -one.reduction)
+
+
+def _best_start(
+    candidate: Candidate, signatures: NDArray[np.float64], left: NDArray[np.float64]
+) -> Screened:
+    """Return what the candidate could remove, and its strengths that would do so."""
+    starts = np.array(candidate.starts)
+    lower = np.array([parameter.lower for parameter in candidate.parameters])
+    upper = np.array([parameter.upper for parameter in candidate.parameters])
+    if all(parameter.name.endswith(("_cosine", "_sine")) for parameter in candidate.parameters):
+        # Cosine and sine part: their signatures span a plane.
+        solution, *_ = np.linalg.lstsq(signatures.T, -left, rcond=1e-10)
+        rest = left + signatures.T @ solution
+        reduction = float(left @ left - rest @ rest)
+        best = solution @ starts
+    else:
+        sizes = np.einsum("ij,ij->i", signatures, signatures)
+        along = -signatures @ left
+        strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
+        gains = np.where((strengths > 0.0) | (lower[0] < 0.0), along * strengths, 0.0)
+        place = int(np.argmax(gains))
+        reduction, best = float(gains[place]), starts[place].copy()
+        # The first parameter is the strength; the others are shapes.
+        best[0] *= np.clip(strengths[place], 0.2, 10.0) if lower[0] >= 0.0 else strengths[place]
+    return Screened(candidate, reduction, tuple(np.clip(best, lower, upper).tolist()))
+
+
+def unexpected_orders(features: Features, ratio: float, rig: object) -> list[float]:
+    """Return orders beyond those of the features at which records show more than noise.
+
+    The strongest first, summed over channels and records; fixed frequencies, whose order differs
+    from record to record, do not add up and come last.
+    """
+    total: dict[float, float] = {}
+    for record in features.records:
+        orders, amplitudes = residual_spectrum(record, rig, ratio, features.orders)  # type: ignore[arg-type]
+        power = amplitudes**2
+        threshold = np.log(power.size * len(features.records) / _FALSE_LINES)
+        for place in np.flatnonzero(power.max(axis=0) > threshold):
+            key = round(float(orders[place]), 9)
+            total[key] = total.get(key, 0.0) + float(power[:, place].sum())
+    strongest: list[float] = []
+    for order in sorted(total, key=lambda one: -total[one]):
+        if all(abs(order - other) > 2.5 / ratio for other in strongest):
+            strongest.append(order)
+    return strongest[:_MOST_LINES]

@@ -1,0 +1,112 @@
+"""The workflow from a campaign to a verdict: measure, fit the base, locate lines, judge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.campaign import Campaign
+from pymoo_hdte.discrepancy.features import Features, measure
+from pymoo_hdte.discrepancy.fit import Data, Fit, fit, start_parameters
+from pymoo_hdte.discrepancy.library import candidates
+from pymoo_hdte.discrepancy.naming import Verdict, judge
+from pymoo_hdte.discrepancy.screening import unexpected_orders
+from pymoo_hdte.discrepancy.torsion_curve import torsion_points
+
+FEWEST_RECORDS = 3
+"""Below this no effect could be told from the base parameters."""
+HIGHEST_ORDER = 14.0
+_SEPARATION = 0.9
+"""Least distance of two order lines, in cycles per output turn."""
+_MOST_LINES = 4
+_LINE_CHANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis:
+    """A campaign and what the workflow finds in it.
+
+    Attributes
+    ----------
+    campaign : Campaign
+    data : Data
+        Features of the training records.
+    verdict : Verdict
+    unexpected : tuple of float
+        Orders beyond the expected ones at which records show more than noise.
+    """
+
+    campaign: Campaign
+    data: Data
+    verdict: Verdict
+    unexpected: tuple[float, ...]
+
+    def held_out(self) -> Data | None:
+        """Return the features of the held-out records, or None where there are none."""
+        if not self.campaign.held_out:
+            return None
+        orders = self.data.features.orders.tolist()
+        features = measure(self.campaign, self.campaign.held_out, orders)
+        return Data(self.campaign, features, self.data.base)
+
+
+def expected_orders(campaign: Campaign) -> list[float]:
+    """Return the orders that are always looked at: of the error, their sums, of the output turn."""
+    believed = campaign.believed
+    lines = believed.error_orders
+    wanted = [1.0 / believed.ratio, 2.0 / believed.ratio, *lines]
+    wanted += [one + other for place, one in enumerate(lines) for other in lines[place:]]
+    wanted += [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
+    return _apart(wanted, campaign, HIGHEST_ORDER)
+
+
+def analyse(campaign: Campaign) -> Analysis:
+    """Return the verdict on a campaign.
+
+    Raises
+    ------
+    InvalidInput
+        If fewer than `FEWEST_RECORDS` records are there to be fitted.
+    """
+    if len(campaign.train) < FEWEST_RECORDS:
+        allowed = f"at least {FEWEST_RECORDS}, or base and effects cannot be told apart"
+        raise InvalidInput("number of train records", len(campaign.train), allowed)
+    ratio = campaign.believed.ratio
+    expected = expected_orders(campaign)
+    features = measure(campaign, campaign.train, expected)
+    unexpected = unexpected_orders(features, ratio, campaign.rig)
+    orders = _apart([*expected, *unexpected], campaign, HIGHEST_ORDER)
+    features = measure(campaign, campaign.train, orders)
+    sweeps = [record for record in campaign.torsion if record.role == "train"]
+    points = tuple(torsion_points(record, campaign.rig) for record in sweeps)
+    data = Data(campaign, features, start_parameters(campaign, features), points)
+    base = fit(data)
+    listed = candidates(campaign.believed, _strong_lines(features, base))
+    return Analysis(campaign, data, judge(data, base, listed), tuple(unexpected))
+
+
+def _apart(wanted: list[float], campaign: Campaign, highest: float) -> list[float]:
+    """Return orders, the first ones first served, that every record can tell apart."""
+    least = _SEPARATION / campaign.believed.ratio
+    for record in campaign.running:
+        nyquist = np.pi * record.sample_rate / abs(record.input_speed)
+        highest = min(highest, 0.9 * nyquist)
+    kept: list[float] = []
+    for order in wanted:
+        if order <= highest and all(abs(order - other) >= least for other in kept):
+            kept.append(order)
+    return sorted(kept)
+
+
+def _strong_lines(features: Features, base: Fit) -> list[float]:
+    """Return the orders at which the base leaves more than noise in any channel."""
+    misfit: NDArray[np.float64] = base.residuals[: features.values.size] ** 2
+    by_feature = misfit.reshape(features.values.shape).sum(axis=0)
+    power = sum(by_feature[features.places(channel)].sum(axis=1) for channel in range(4))
+    count = 8.0 * len(features.records)
+    threshold = count + 2.0 * np.sqrt(-np.log(_LINE_CHANCE) * count) - 2.0 * np.log(_LINE_CHANCE)
+    ranked = np.argsort(-np.asarray(power))
+    return [float(features.orders[k]) for k in ranked[:_MOST_LINES] if power[k] > threshold]
