@@ -31,6 +31,9 @@ _SLACK = 1e-7
 """SLSQP may end this far above a level, in units of the sampled range of f1."""
 _SPACING = 0.005
 """Neighbours closer than this need no solution between them before the pieces are filled."""
+_FLAT = 1e-4
+"""A variable that moves the objectives less than this, end to end, in units of their range, leaves
+SLSQP no slope to follow; its ends are tried."""
 _GAP_END = 1e-7
 """To this share of the front's width the ends of a gap are located."""
 
@@ -114,7 +117,11 @@ class FrontSearch:
         rough = [self._minimise(second, start, _ROUGH, constraint) for start in starts]
         rough.sort(key=merit)
         kept = rough[: max(1, len(rough) // 2)]
-        fine = [self._solution(self._minimise(second, x, _FINE, constraint)) for x in kept]
+        ended = [self._minimise(second, x, _FINE, constraint) for x in kept]
+        best = min(ended, key=merit)
+        flat = [end for end in _ends(best) if abs(merit(end) - merit(best)) < _FLAT]
+        ended += [self._minimise(second, x, _FINE, constraint) for x in flat]
+        fine = [self._solution(x) for x in ended]
         slack = level + _SLACK * self._scale[0]
         feasible = [solution for solution in fine if solution.objectives[0] <= slack]
         return min(feasible, key=lambda solution: solution.objectives[1], default=None)
@@ -151,6 +158,17 @@ class FrontSearch:
 
     def _solution(self, cube: NDArray[np.float64]) -> Solution:
         return Solution(cube, self._problem.evaluate(self.designs(cube)))
+
+
+def _ends(cube: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return copies of a design with one variable at either end of its range."""
+    copies = []
+    for variable in range(len(cube)):
+        for end in (0.0, 1.0):
+            moved = cube.copy()
+            moved[variable] = end
+            copies.append(moved)
+    return copies
 
 
 def true_front(
