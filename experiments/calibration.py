@@ -15,9 +15,16 @@ from matplotlib.figure import Figure
 
 from experiments.calibration_data import Outcome, collect, format_outcomes, gap, read_outcomes
 from experiments.figures import BLUE, GREY, ORANGE, grid
-from experiments.fitting import Bootstrap, Fit
-from experiments.ladder import NARROW, WIDE, ladder
-from experiments.predictions import FITS, PUBLISHED, held_out, predict, prototype_dte
+from experiments.fitting import BUDGETS, Bootstrap, Fit
+from experiments.ladder import NARROW, ladder
+from experiments.predictions import (
+    FITS,
+    PUBLISHED,
+    held_out,
+    predict,
+    prototype_dte,
+    surrogate_moments,
+)
 from experiments.registry import Context
 from experiments.result import Cell, Column, Finding, Picture, Result, Table, significant
 from experiments.store import write_atomically
@@ -25,15 +32,18 @@ from experiments.trade_off import WIDTHS
 from pymoo_hdte.drive import preset
 
 COMMITTED = Path(__file__).parent / "data" / "calibration.csv"
-SEEDS = (1,)
+SEEDS = {"table8": (1, 2), "table5": (1,)}
+"""Seeds of the fits, by direction; four numbers need no second look."""
 REPLICATES = 20
 LEAST_WIDTH = dict(zip(WIDTHS, (0.5, 0.1), strict=True))
 """Least distance of the ends of a front that counts as a trade-off, arcsec."""
 MATTERS = 0.01
 """Least total Sobol share with which a design variable matters to an objective."""
-BANDS_OF = {"published": NARROW, "calibrated": WIDE, "resonant": NARROW}
+BANDS_OF = {"published": NARROW, "calibrated": NARROW, "resonant": NARROW}
 """The reading of the bands under which each preset was made."""
 VARIABLES = ("K", "J_in", "B_in", "B_fc")
+EXACT_ORDER = 6
+"""Order of a surrogate that differs from its model by less than what is printed."""
 
 SETTING = (
     "Each rung of the ladder adds effects to Eq. (9), reads theta_s as a peak-to-peak (p2p) or a "
@@ -82,12 +92,18 @@ def best_rungs(outcomes: Sequence[Outcome], direction: str) -> list[Outcome]:
 
 def _campaign(context: Context) -> list[Outcome]:
     rungs = sorted(ladder(), key=lambda rung: -len(rung.effects))
-    fits = [Fit(rung, direction, seed) for direction in FITS for seed in SEEDS for rung in rungs]
+    fits = [
+        Fit(rung, direction, seed, budget)
+        for direction, budget in BUDGETS.items()
+        for seed in SEEDS[direction]
+        for rung in rungs
+    ]
     outcomes = collect(fits, context.campaign.run(fits, "calibration"))
     best = best_rungs(outcomes, "table8")[0]
     start = tuple(best.parameters.items())
     replicates = [
-        Bootstrap(best.candidate, start, best.direction, number) for number in range(REPLICATES)
+        Bootstrap(best.candidate, start, best.direction, number, BUDGETS[best.direction])
+        for number in range(REPLICATES)
     ]
     outcomes += collect(replicates, context.campaign.run(replicates, "bootstrap"))
     target = context.out / "calibration" / COMMITTED.name
@@ -99,12 +115,15 @@ def _numbers_table(best: Outcome) -> Table:
     names, seen, unseen = tuple(PUBLISHED), FITS["table8"], held_out("table8")
     presets = {name: predict(preset(name), bands, names) for name, bands in BANDS_OF.items()}
     before = presets["published"]
+    model = best.candidate.model(best.parameters)
+    exact = surrogate_moments(model, best.candidate.bands, EXACT_ORDER)
     rows = tuple(
         (
             name.replace("_", " "),
             "fitted" if name in seen else "held out",
             *(predicted[name] for predicted in presets.values()),
             best.predictions[name],
+            exact.get(name),
             PUBLISHED[name],
         )
         for name in names
@@ -120,17 +139,34 @@ def _numbers_table(best: Outcome) -> Table:
         )
         for role, part in (("fitted", seen), ("held out", unseen))
     )
+    farther = [
+        name.replace("_", " ")
+        for name in unseen
+        if abs(best.predictions[name] - PUBLISHED[name]) > abs(before[name] - PUBLISHED[name])
+    ]
+    moved = Finding(
+        not farther,
+        f"Held-out numbers that moved away from the paper: {', '.join(farther)}."
+        if farther
+        else "Every held-out number moved closer to the paper.",
+        check=True,
+    )
     columns = (
         Column("published number"),
         Column("role for the ladder"),
         *(Column(name, "arcsec", 4, f"preset, read as {bands}")
           for name, bands in BANDS_OF.items()),
         Column("best rung", "arcsec", 4),
+        Column("best rung, no surrogate", "arcsec", 4),
         Column("paper", "arcsec", 5, paper=True),
     )  # fmt: skip
     title = "Published numbers, predicted by the presets and by the best rung of the ladder"
-    note = f"The best rung is {best.candidate.name}. Predictions come from the drive model itself."
-    return Table("numbers", title, columns, rows, findings=findings, note=note)
+    note = (
+        f"The best rung is {best.candidate.name}; the preset calibrated is this rung with rounded "
+        "values. Means and standard deviations come through a surrogate of order 3, as in the "
+        f"paper; those of the model itself (order {EXACT_ORDER}) stand in the column beside."
+    )
+    return Table("numbers", title, columns, rows, findings=(*findings, moved), note=note)
 
 
 def _ladder_table(outcomes: Sequence[Outcome], direction: str, title: str) -> Table:
@@ -223,9 +259,13 @@ def _unexplained(best: Outcome) -> Iterator[str]:
         "so no rung gives that."
     )
     yield (
-        "The preset calibrated is not yet the best rung: that one lies near a torsional resonance, "
-        "where the surrogate of order 3 misses the model's mean by as much as the gains at stake, "
-        "and where Hill's method, which prescribes the input angle, is good to some 1e-3 only."
+        "The basin of the best rung was found by the global search of one earlier campaign, and is "
+        "among the starts of every fit since; the searches of the present seeds alone end "
+        "elsewhere. Other basins of this depth cannot be excluded."
+    )
+    yield (
+        "B_in cannot matter in any rung: at order 1, B_in N^2 is 1/250 of the reactance of J_in "
+        "N^2. J_in matters only where a load inertia brings the resonance near."
     )
 
 

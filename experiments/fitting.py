@@ -37,7 +37,11 @@ class Budget:
         return f"{self.population}x{self.generations}_{self.starts}x{self.local_evaluations}"
 
 
-FULL = Budget(population=20, generations=30, starts=3, local_evaluations=12)
+BUDGETS = {
+    "table8": Budget(population=20, generations=30, starts=4, local_evaluations=20),
+    "table5": Budget(population=16, generations=12, starts=2, local_evaluations=10),
+}
+"""By direction; the four numbers of the second are met by most rungs at once."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,7 @@ class Fit:
     candidate: Candidate
     direction: str
     seed: int
-    budget: Budget = FULL
+    budget: Budget
 
     @property
     def key(self) -> str:
@@ -82,7 +86,7 @@ class Bootstrap:
     parameters: tuple[tuple[str, float], ...]
     direction: str
     seed: int
-    budget: Budget = FULL
+    budget: Budget
 
     @property
     def key(self) -> str:

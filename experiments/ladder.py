@@ -35,7 +35,8 @@ _SHAPE = {
     "amplitude_2.02": (0.065, 6.5),
     "phase_2": (0.0, 2.0 * np.pi),
     "phase_2.02": (0.0, 2.0 * np.pi),
-    "std_arcsec": (4.0, 12.0),
+    # From where 3 std hold the +-35 % box of reading R1, to where theta_s stays positive.
+    "std_arcsec": (4.25, 12.0),
 }
 _LOGARITHMIC = ("amplitude_1", "amplitude_2.02", "load_inertia", "damping_factor")
 _OF_EFFECT = {
@@ -57,6 +58,8 @@ KNOWN = tuple(
         (0.545, 3.2, 0.015, 4.44, 0.78, 1.29, 2.99, 0.62, 7.1),
         (0.001, 8.7, 0.055, 3.95, 2.50, 1.26, 0.81, 3.52, 9.1),
         (0.0086, 9.8, 0.055, 3.95, 2.50, 1.26, 0.81, 3.52, 9.1),
+        (0.461, 4.153, 0.02615, 3.862, 0.9039, 0.6285, 4.222, 1.514, 7.033),
+        (0.453, 3.727, 0.05751, 4.651, 2.053, 0.0745, 2.739, 0.0, 9.416),
     )
 )
 """Basins that earlier, shorter searches ended in; every fit also starts from them."""

@@ -1,7 +1,5 @@
 """The calibration ladder: rules against closed forms, predictions against samples, recovery."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -9,20 +7,24 @@ from experiments import calibration
 from experiments.calibration import COMMITTED, best_rungs
 from experiments.calibration_data import Outcome, format_outcomes, gap, read_outcomes
 from experiments.campaign import Campaign
-from experiments.fitting import Bootstrap, Budget, Fit, _refine, _residuals, outcome_row
+from experiments.fitting import Budget, Fit, _refine, _residuals, outcome_row
 from experiments.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate, ladder
 from experiments.predictions import (
+    BAND,
     FITS,
     PUBLISHED,
-    _theta_rule,
     held_out,
     predict,
     prototype_dte,
+    surrogate_moments,
     uncertain_box,
 )
+from experiments.published_values import TABLE_9
 from experiments.registry import Context
+from experiments.scatter import dte_samples
 from experiments.trade_off import TRAITS, front_traits
-from pymoo_hdte.drive import preset
+from pymoo_hdte.drive import PARAMETERS, PRESETS, preset
+from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import TruncatedNormal
 
 FULL_LADDER = Candidate(EFFECTS, "semi_amplitude", NARROW)
@@ -43,28 +45,40 @@ def test_parameters_survive_the_way_to_the_search_space_and_back(rung):
     assert {effect.name for effect in rung.model(parameters).effects} == set(rung.effects)
 
 
-def test_theta_rule_integrates_polynomials_up_to_degree_nine():
-    nodes, weights = _theta_rule()
-    values, dense = TruncatedNormal(0.0, 1.0).quadrature(20)
-    for degree in range(10):
-        assert weights @ nodes**degree == pytest.approx(dense @ values**degree, abs=1e-12)
+@pytest.mark.parametrize(("name", "bands"), [("calibrated", NARROW), ("resonant", WIDE)])
+def test_moments_are_those_of_samples_of_the_surrogate(name, bands):
+    problem = RobustDTE(preset(name))
+    found = predict(problem.model, bands, tuple(PUBLISHED))
+    for design, nominal in {"initial": problem.nominal, **TABLE_9}.items():
+        tolerance = BAND["initial" if design == "initial" else "optimum"][bands]
+        values = dte_samples(problem, nominal, tolerance, 20_000, seed=1)
+        error = values.std() / np.sqrt(len(values))
+        assert abs(found[f"mean_{design}"] - values.mean()) < 4 * error
+        assert abs(found[f"std_{design}"] - values.std()) < 4 * error
+    assert found["prototypes_mean"] == prototype_dte(problem.model).mean()
 
 
-@pytest.mark.parametrize(("name", "bands"), [("calibrated", WIDE), ("resonant", NARROW)])
-def test_predictions_are_those_of_samples_of_the_model(name, bands):
-    model = preset(name)
-    found = predict(model, bands, tuple(PUBLISHED))
+def test_surrogates_of_high_order_give_the_moments_of_the_model():
+    model = preset("resonant")
+    found = surrogate_moments(model, NARROW, 6)
     rng, n = np.random.default_rng(1), 10_000
     theta_s = TruncatedNormal(model.nominal[0], model.kinematic_error.std).sample(rng, n)
-    tolerance = {WIDE: 0.35, NARROW: 0.05}[bands]
-    rest = model.nominal[1:] * rng.uniform(1 - tolerance, 1 + tolerance, (n, 4))
+    rest = model.nominal[1:] * rng.uniform(0.95, 1.05, (n, 4))
     values = model.dte_arcsec(np.column_stack([theta_s, rest]))
     assert abs(found["mean_initial"] - values.mean()) < 4 * values.std() / np.sqrt(n)
     assert found["std_initial"] == pytest.approx(values.std(), rel=0.03)
-    box = uncertain_box(model, bands)
+    box = uncertain_box(model, NARROW)
     sample = rng.uniform(box.lower, box.upper, (4000, 5))
     assert found["box_std"] == pytest.approx(model.dte_arcsec(sample).std(), rel=0.05)
-    assert found["prototypes_mean"] == prototype_dte(model).mean()
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_rolling_friction_moves_no_dte(name):
+    model = preset(name)
+    designs = np.tile(model.nominal, (2, 1))
+    designs[:, PARAMETERS.index("B_in")] *= [0.65, 1.35]
+    low, high = model.dte_arcsec(designs)
+    assert low == pytest.approx(high, rel=1e-3)
 
 
 def test_only_what_is_asked_for_is_predicted():
@@ -133,8 +147,8 @@ def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
     rung = Candidate(("load_inertia",), "semi_amplitude", NARROW)
     monkeypatch.setattr(calibration, "ladder", lambda: [rung])
     monkeypatch.setattr(calibration, "REPLICATES", 2)
-    monkeypatch.setattr(calibration, "Fit", partial(Fit, budget=budget))
-    monkeypatch.setattr(calibration, "Bootstrap", partial(Bootstrap, budget=budget))
+    monkeypatch.setattr(calibration, "SEEDS", {"table8": (1,), "table5": (1,)})
+    monkeypatch.setattr(calibration, "BUDGETS", dict.fromkeys(FITS, budget))
     context = Context(1, tmp_path, Campaign(tmp_path), full=True)
     first = calibration.run(context)
     written = tmp_path / "calibration" / COMMITTED.name

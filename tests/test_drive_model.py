@@ -24,7 +24,7 @@ PUBLISHED_STDS = {"accuracy_first": 16.233, "balanced": 15.773, "robustness_firs
 
 @pytest.mark.parametrize("preference", list(PUBLISHED_OPTIMA))
 def test_calibrated_keeps_its_stated_residuals_on_table_8(preference, rng):
-    """Within 3.2 % of the published means and stds, the design study's figure for candidate D."""
+    """Within 2 % of the published means and stds, which went through a surrogate."""
     model = preset("calibrated")
     n = 5_000
     theta_s = model.nominal[0] + model.kinematic_error.std * truncnorm.rvs(
@@ -33,8 +33,8 @@ def test_calibrated_keeps_its_stated_residuals_on_table_8(preference, rng):
     bands = PUBLISHED_OPTIMA[preference] * rng.uniform(0.95, 1.05, (n, 4))
     dte = model.dte_arcsec(np.column_stack([theta_s, bands]))
     sampling = 4 * dte.std() / np.sqrt(n)
-    assert abs(dte.mean() - PUBLISHED_MEANS[preference]) < 0.032 * dte.mean() + sampling
-    assert abs(dte.std() - PUBLISHED_STDS[preference]) < 0.032 * dte.std() + sampling
+    assert abs(dte.mean() - PUBLISHED_MEANS[preference]) < 0.02 * dte.mean() + sampling
+    assert abs(dte.std() - PUBLISHED_STDS[preference]) < 0.02 * dte.std() + sampling
 
 
 def test_theta_s_is_what_its_reading_says():
@@ -51,7 +51,7 @@ def test_theta_s_is_what_its_reading_says():
 def test_record_of_a_model_is_json_and_tells_models_apart():
     records = [json.dumps(preset(name).to_dict()) for name in ("calibrated", "resonant")]
     assert records[0] != records[1]
-    assert json.loads(records[0])["effects"][0] == {"name": "damping_reference", "factor": 8.7}
+    assert json.loads(records[0])["effects"][1] == {"name": "damping_reference", "factor": 4.011}
 
 
 def test_at_changes_the_operating_condition_only():
@@ -65,20 +65,21 @@ def test_at_changes_the_operating_condition_only():
 @pytest.mark.parametrize(
     ("old", "new", "field", "allowed"),
     [
-        ('name = "damping_reference"', 'name = "damping"', "effect[0].name", "'load_inertia'"),
-        ("factor = 8.7", "", "effect[0].factor", "missing"),
-        ("factor = 8.7", "factor = 0", "damping_reference.factor", "above 0"),
-        ("factor = 8.7", "factor = 8.7\nsize = 1", "effect[0].size", "no such field"),
-        ("depth = 0.055", "depth = 1.5", "mesh_stiffness_variation.depth", "below 1"),
-        ('{ value = 3.95, unit = "rad" }', "3.95", "effect[1].phase", "unit"),
+        ('name = "damping_reference"', 'name = "damping"', "effect[1].name", "'load_inertia'"),
+        ("factor = 4.011", "", "effect[1].factor", "missing"),
+        ("factor = 4.011", "factor = 0", "damping_reference.factor", "above 0"),
+        ("factor = 4.011", "factor = 4\nsize = 1", "effect[1].size", "no such field"),
+        ("depth = 0.03006", "depth = 1.5", "mesh_stiffness_variation.depth", "below 1"),
+        ('{ value = 3.852, unit = "rad" }', "3.852", "effect[2].phase", "unit"),
         ("orders = [1.0, 2.0, 2.02]", "orders = [1.0, 2.0]", "amplitudes", "(2)"),
         ("orders = [1.0, 2.0, 2.02]", "orders = [0.0, 2.0, 2.02]", "orders", "above 0"),
         ("orders = [1.0, 2.0, 2.02]", 'orders = "1, 2"', "orders", "list of numbers"),
-        ("amplitudes = [2.50, 1.0, 1.26]", "amplitudes = [0, 0, 0]", "amplitudes", "not all 0"),
-        ("phases = [0.0, 0.81, 3.52]", "phases = [0.0, nan, 3.52]", "phases[1]", "finite"),
+        ("amplitudes = [0.8405, 1.0, 0.4736]", "amplitudes = [0, 0, 0]", "amplitudes", "not all 0"),
+        ("phases = [0.0, 4.233, 1.764]", "phases = [0.0, nan, 1.764]", "phases[1]", "finite"),
         ('reading = "semi_amplitude"', 'reading = "rms"', "reading", "'peak_to_peak'"),
-        ("value = 9.1", "value = 0", "kinematic_error.std", "above 0"),
-        ('name = "mesh_stiffness_variation"\ndepth = 0.055\nphase = { value = 3.95, unit = "rad" }',
+        ("value = 7.126", "value = 0", "kinematic_error.std", "above 0"),
+        ('name = "mesh_stiffness_variation"\ndepth = 0.03006\n'
+         'phase = { value = 3.852, unit = "rad" }',
          'name = "damping_reference"\nfactor = 2', "effects", "each effect once"),
     ],
 )  # fmt: skip

@@ -14,6 +14,7 @@ from pymoo_hdte.drive import (
     MeshStiffnessVariation,
     UnstableDrive,
     floquet_multipliers,
+    harmonic_balance,
     preset,
     simulate,
     steady_state,
@@ -138,11 +139,17 @@ def test_damping_reference_and_load_inertia_do_what_their_names_say():
 
 @pytest.mark.parametrize("angle", ["prescribed", "free"])
 def test_integration_from_rest_reaches_the_steady_state(model, angle, rng):
-    tolerance = 1e-2 if (model.name, angle) == ("resonant", "free") else 1e-4
+    """Hill's method leaves out how the angle itself fluctuates; the harmonic balance does not."""
+    resonant = any(isinstance(effect, LoadInertia) for effect in model.effects)
+    tolerance = 1e-2 if resonant and angle == "free" else 1e-4
     designs = random_designs(model, 2, rng)
-    for design, expected in zip(designs, model.dte_arcsec(designs), strict=True):
+    balance = harmonic_balance(model.coefficients(designs)).spectrum()
+    balanced = balance.peak_to_peak(model.sheet.ratio) / ARCSEC
+    for design, expected, exact in zip(designs, model.dte_arcsec(designs), balanced, strict=True):
         run = simulate(model, design, angle=angle)
         assert run.dte_arcsec() == pytest.approx(expected, rel=tolerance)
+        if angle == "free":
+            assert run.dte_arcsec() == pytest.approx(exact, rel=1e-4)
         assert run.input_speed.mean() == pytest.approx(model.sheet.input_speed, rel=1e-4)
 
 
@@ -223,12 +230,12 @@ def test_two_error_lines_of_one_order_add_up(rng):
 
 
 def test_the_load_acts_even_if_the_error_has_odd_orders_only():
-    model = preset("calibrated")
+    model = preset("calibrated").at(5.0, 40.0)
     coefficients = model.coefficients(model.nominal[None])
     odd = replace(coefficients, error_orders=np.array([1.0]), error_phasors=np.array([[1e-9 + 0j]]))
     amplitudes = steady_state(odd).amplitudes()
     quasi_static = coefficients.stiffness_depth * coefficients.mean_mesh_torque / 2.583e4
-    assert amplitudes[2.0][0] == pytest.approx(quasi_static, rel=0.2)
+    assert amplitudes[2.0][0] == pytest.approx(quasi_static, rel=0.02)
 
 
 @pytest.mark.parametrize("depth", [0.3, 0.8])
