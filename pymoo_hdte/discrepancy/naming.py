@@ -19,12 +19,17 @@ from pymoo_hdte.discrepancy.screening import Screened, screen
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted")
 
-ADEQUATE = 1.25
+ADEQUATE = 1.15
 """Chi-square per degree of freedom up to which a base is adequate."""
 SHARE = 0.9
 """Least share of the excess chi-square that named effects remove."""
 SECOND_SHARE = 0.8
 """Least share of the excess left by the first effect that a second one removes."""
+GAIN = 25.0
+"""Reduction of chi-square, to first order, by which some candidate makes a base inadequate though
+its total looks well: one line of one channel is lost among a thousand features."""
+SHARE_ALIKE = 0.02
+"""Where neither form fits to the noise, rivals this close in share cannot be told apart."""
 BIC_GAIN = 6.0
 """Least gain of BIC, and the distance within which rivals cannot be told apart."""
 FITTED = 4
@@ -90,34 +95,52 @@ class Verdict:
 def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict on a fitted base."""
     freedom = len(base.residuals) - len(base.values)
+    screened = screen(data, base, candidates)
     excess = base.chi_square - freedom
-    if base.chi_square <= ADEQUATE * freedom:
+    if base.chi_square <= ADEQUATE * freedom and screened[0].reduction < GAIN:
         return Verdict("adequate", base, None, (), (), freedom)
-    singles = _fit_best(data, base, screen(data, base, candidates), excess)
-    first = singles[0]
+    singles = _fit_best(data, base, screened, excess)
     rivals = list(singles)
-    if first.fit.chi_square > ADEQUATE * freedom:
+    if singles[0].fit.chi_square > ADEQUATE * freedom:
         pairs = _pairs(data, singles[:1], candidates, excess)
         rivals = sorted([*singles, *pairs], key=lambda rival: rival.bic)
     chosen = rivals[0]
     if len(chosen.candidates) == 2 and not _second_earned(chosen, singles, freedom):
-        chosen = first
-    null = base.chi_square + len(base.values) * np.log(len(base.residuals))
-    if chosen.share < SHARE or null - chosen.bic < BIC_GAIN:
-        return Verdict("unlisted", base, chosen, tuple(rivals), (), freedom)
-    others = [rival for rival in rivals if rival is not chosen]
-    equivalent = tuple(
-        rival
-        for rival in others
-        if rival.bic - chosen.bic < BIC_GAIN
-        and len(rival.candidates) == len(chosen.candidates)
-        and {c.name for c in rival.candidates} != {c.name for c in chosen.candidates}
-    )
+        chosen = singles[0]
+    others = tuple(rival for rival in rivals if rival is not chosen)
+    if not _explains(chosen, base, freedom):
+        return Verdict("unlisted", base, chosen, others, (), freedom)
+    equivalent = tuple(rival for rival in others if _alike(rival, chosen, freedom))
     if all(candidate.name == "parameter" for candidate in chosen.candidates):
         status = "parameter"
     else:
         status = "class" if equivalent else "named"
-    return Verdict(status, base, chosen, tuple(others), equivalent, freedom)
+    return Verdict(status, base, chosen, others, equivalent, freedom)
+
+
+def _explains(rival: Rival, base: Fit, freedom: int) -> bool:
+    """Tell whether a set of effects removes what is wrong with the base."""
+    residuals = len(base.residuals)
+    gain = base.chi_square - rival.fit.chi_square
+    penalty = (len(rival.fit.values) - len(base.values)) * np.log(residuals)
+    adequate = rival.fit.chi_square <= ADEQUATE * freedom
+    return bool(gain - penalty >= BIC_GAIN and (adequate or rival.share >= SHARE))
+
+
+def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
+    """Tell whether the data cannot separate a rival with other effects from the chosen one.
+
+    Where even the chosen form leaves more than noise, that remainder is the scale on which chi-
+    squares differ: hidden and listed forms of one effect differ in kind.
+    """
+    names = {candidate.name for candidate in rival.candidates}
+    if len(rival.candidates) != len(chosen.candidates):
+        return False
+    if names == {candidate.name for candidate in chosen.candidates}:
+        return False
+    misfit = max(chosen.fit.chi_square / freedom, 1.0)
+    near = abs(rival.bic - chosen.bic) < BIC_GAIN * misfit
+    return near or (misfit > ADEQUATE and chosen.share - rival.share < SHARE_ALIKE)
 
 
 def _fit_best(data: Data, base: Fit, screened: Sequence[Screened], excess: float) -> list[Rival]:
