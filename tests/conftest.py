@@ -2,8 +2,13 @@
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from pymoo_hdte.drive import PRESETS, DriveModel, preset
+
+# The first call of a compiled function compiles it: no test is judged by its time.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 @pytest.fixture(params=PRESETS)
