@@ -1,0 +1,169 @@
+"""The report on a campaign, and what a correction does to the robust optimum."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_discrepancy_prove import CONDITIONS, analysed
+from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy import report
+from pymoo_hdte.discrepancy.locate import locate
+from pymoo_hdte.discrepancy.next_experiment import Proposal
+from pymoo_hdte.discrepancy.optimum import optimum_shift
+from pymoo_hdte.discrepancy.prove import prove
+from pymoo_hdte.discrepancy.report import FILES, write_report
+from pymoo_hdte.discrepancy.report_tables import certainty, gap_sentence, parameter_rows
+from pymoo_hdte.discrepancy.revise import accepted_fit, revised_model
+from pymoo_hdte.discrepancy.virtual_rig import run_campaign
+from pymoo_hdte.drive import (
+    LoadInertia,
+    MeshStiffnessVariation,
+    load_datasheet,
+    load_model,
+    preset,
+)
+from pymoo_hdte.units import ARCSEC
+
+PROPOSAL = Proposal("Turn it backwards.", "running", -600.0, 40.0, ("a", "b"), 12.0)
+
+
+@pytest.fixture(scope="module")
+def ripple():
+    rig = true_rig(effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7))
+    campaign = run_campaign(rig, BELIEVED, RIG, np.random.default_rng(5), CONDITIONS)
+    return analysed(campaign, "torque_ripple:input@6")
+
+
+@pytest.fixture(scope="module")
+def written(ripple, tmp_path_factory):
+    out = tmp_path_factory.mktemp("reports") / "ripple"
+    return write_report(ripple, locate(ripple), prove(ripple), PROPOSAL, out)
+
+
+def test_page_stands_alone_and_answers(written):
+    page = (written / "report.html").read_text()
+    assert not re.findall(r"<script|https?://|<link|@import|url\(", page)
+    sources = re.findall(r'src="([^"]*)"', page)
+    assert len(sources) == 5
+    for source in sources:
+        head, body = source.split(",", 1)
+        assert head == "data:image/svg+xml;base64"
+        assert b"</svg>" in base64.b64decode(body)
+    for question in ("Where is the model wrong?", "How sure", "Did the gap shrink", "test next"):
+        assert question in page
+    assert "torque ripple" in page
+    assert "Turn it backwards." in page
+
+
+def test_verdict_and_model_are_read_back(written, ripple):
+    assert {path.name for path in written.iterdir()} == set(FILES)
+    verdict = json.loads((written / "verdict.json").read_text())
+    assert verdict["status"] == "named"
+    held_out = verdict["held_out"]
+    assert held_out["unit"] == "arcsec"
+    assert {"before", "after", "noise_floor", "shrinkage"} <= held_out.keys()
+    assert held_out["channels"]["input_torque"]["after"] < 0.2
+    sheet = load_datasheet(written / "revised_model_sheet.toml")
+    assert load_model(written / "revised_model.toml", sheet) == revised_model(ripple)
+
+
+def test_same_analysis_gives_the_same_bytes(written, ripple, tmp_path):
+    again = write_report(ripple, locate(ripple), prove(ripple), PROPOSAL, tmp_path / "again")
+    for name in FILES:
+        assert (again / name).read_bytes() == (written / name).read_bytes()
+
+
+def test_earlier_report_is_replaced_and_nothing_else(written, ripple, tmp_path):
+    arguments = (ripple, locate(ripple), None, PROPOSAL)
+    out = tmp_path / "deep" / "out"
+    write_report(*arguments, out)
+    write_report(*arguments, out)
+    assert [path.name for path in out.parent.iterdir()] == ["out"]
+    assert "No record was held out" in (out / "report.html").read_text()
+    (out / "thesis.txt").write_text("years of work")
+    for foreign in (out, out / "thesis.txt"):
+        with pytest.raises(InvalidInput, match="folder of the report"):
+            write_report(*arguments, foreign)
+    assert (out / "thesis.txt").read_text() == "years of work"
+
+
+def test_failure_leaves_the_earlier_report(ripple, tmp_path, monkeypatch):
+    arguments = (ripple, locate(ripple), None, PROPOSAL, tmp_path / "out")
+    write_report(*arguments)
+    before = {name: (tmp_path / "out" / name).read_bytes() for name in FILES}
+
+    def fail(*_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(report, "_page", fail)
+    with pytest.raises(OSError, match="disk full"):
+        write_report(*arguments)
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert {name: (tmp_path / "out" / name).read_bytes() for name in FILES} == before
+
+
+def test_words_do_not_promise_what_is_not_there(ripple):
+    proof = prove(ripple)
+    assert "% of what the noise does not explain is gone" in gap_sentence(ripple, proof)
+    gap = proof.channels[proof.leading]
+    worse = replace(gap, after=2.0 * gap.before)
+    spoilt = replace(proof, channels=proof.channels | {proof.leading: worse})
+    assert "do not use it" in gap_sentence(ripple, spoilt)
+    unlisted = replace(ripple, verdict=replace(ripple.verdict, status="unlisted"))
+    assert "Nothing was added" in gap_sentence(unlisted, prove(unlisted))
+    assert "what it is is not" in certainty(unlisted)
+    assert "removes 100 %" in certainty(ripple)
+
+
+def test_parameters_are_told_in_the_reader_s_units(ripple):
+    rows = {row.name: row for row in parameter_rows(ripple)}
+    fitted = accepted_fit(ripple.verdict)
+    amplitude = rows["error amplitude of order 2"]
+    place = [parameter.name for parameter in fitted.parameters].index("error_amplitude_1")
+    assert amplitude.value == pytest.approx(fitted.values[place] / ARCSEC)
+    assert (amplitude.believed, amplitude.unit) == (pytest.approx(9.0), "arcsec")
+    assert amplitude.half_width == pytest.approx(
+        1.96 * fitted.covariance[place, place] ** 0.5 / ARCSEC
+    )
+    assert rows["error phase of order 1"].believed is None
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(0.0, "0"), (-2.5, "−2.5"), (1.97e-4, "1.97·10⁻⁴"), (123456.0, "1.23·10⁵"), (None, "–")],  # noqa: RUF001
+)
+def test_numbers_are_readable(value, shown):
+    assert report._number(value) == shown
+
+
+def test_optimum_of_the_same_model_does_not_move():
+    shift = optimum_shift(preset("calibrated"), preset("calibrated"))
+    assert not shift.obstacle
+    assert len(shift.choices) == 3
+    for choice in shift.choices:
+        assert choice.distance == 0.0
+        assert choice.delivered == pytest.approx(choice.promised, rel=1e-12)
+        assert np.array_equal(choice.reached, choice.promised)
+
+
+def test_old_optimum_is_judged_by_the_new_model():
+    old = preset("calibrated")
+    heavier = replace(old, effects=(LoadInertia(0.30), *old.effects[1:]))
+    for choice in optimum_shift(old, heavier).choices:
+        # What was chosen for the new model is not beaten in its own preference's leading objective.
+        leading = 1 if choice.preference == "robustness_first" else 0
+        assert choice.reached[leading] <= choice.delivered[leading] * (1.0 + 1e-3)
+        assert not np.allclose(choice.delivered, choice.promised, rtol=1e-3)
+
+
+def test_model_without_steady_state_has_no_optimum():
+    old = preset("calibrated")
+    unstable = replace(old, effects=(*old.effects[:2], MeshStiffnessVariation(0.95, 0.0)))
+    shift = optimum_shift(old, unstable)
+    assert shift.choices == ()
+    assert "no robust optimum" in shift.obstacle
