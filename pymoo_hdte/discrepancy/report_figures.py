@@ -71,7 +71,9 @@ def misfit_map(location: Location) -> Figure:
         axis.set_title(WORDS[CHANNELS[place]], fontsize=10)
         if place >= 2:
             _order_axis(axis, location.orders)
-    labels = [f"{location.speed_rpm[k]:.0f} r/min, {location.load_torque[k]:.0f} N m" for k in rows]
+    labels = [
+        f"{location.speed_rpm[k]:.0f} r/min, {location.load_torque[k]:z.0f} N m" for k in rows
+    ]
     axis.set_yticks(range(len(rows)), labels, fontsize=7)
     return figure
 
@@ -85,8 +87,12 @@ def gap_by_channel(proof: Proof) -> Figure:
     _dumbbells(axis, gaps, labels, relative=True)
     axis.axvline(1.0, color=GREY, linestyle=":", linewidth=1.5)
     axis.set_xscale("log")
+    # Without a gap the axis would otherwise blow differences of a few per cent up.
+    low, high = axis.get_xlim()
+    axis.set_xlim(min(low, 0.5), max(high, 10.0))
     axis.set_xlabel("gap on held-out records / noise floor (dotted: 1)", fontsize=9)
     axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter("")
     return figure
 
 
