@@ -1,0 +1,160 @@
+"""Where the model is wrong: the map channel x order x speed x load, and where it may be trusted.
+
+A cell's misfit is weighed by its own marginal covariance, so that it stays in its cell, and held
+against base parameters that the misfit itself did not bias: those fitted jointly with the named
+effects or, where nothing is named, those refitted to the cells that are clean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from pymoo_hdte.discrepancy.features import MEANS
+from pymoo_hdte.discrepancy.fit import Data, Fit, fit
+from pymoo_hdte.discrepancy.misfit_map import (
+    FALSE_DISCOVERIES,
+    Flags,
+    Location,
+    Values,
+    as_lines,
+    benjamini_hochberg,
+    cell_chi_square,
+    degrees_of_freedom,
+)
+from pymoo_hdte.discrepancy.misfit_words import sentences
+from pymoo_hdte.discrepancy.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.revise import accepted_fit
+from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+
+__all__ = ["Location", "locate", "refit_clean"]
+
+_ROUNDS = 15
+_EVALUATIONS = 3
+"""Of the residuals, in a round."""
+_SETTLED = 0.05
+"""Relative change of all weights that ends the rounds."""
+_CAUCHY = 4.0
+"""Square of the scale of Cauchy's weights, in variances."""
+_LEFT_OUT = 1e8
+"""Factor on the variance of a cell that is left out of a fit."""
+_LOST = 1e3
+"""Residual of a point at which the model cannot carry the torque."""
+
+
+def locate(analysis: Analysis) -> Location:
+    """Return the map of the misfit with its sentences.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of `workflow.analyse`.
+    """
+    data, verdict = analysis.data, analysis.verdict
+    best = accepted_fit(verdict)
+    named = bool(best.candidates)
+    if named:
+        base = _trusted_base(data, best)
+        change = data.predict(best.values[None, : len(base)], best.effects)
+        moved = cell_chi_square(data, (change - data.predict(base[None], ()))[0])
+    else:
+        base = refit_clean(data, verdict.base)
+        moved = np.zeros_like(cell_chi_square(data, data.features.values))
+    difference = data.features.values - data.predict(base[None], ())[0]
+    chi_square, sweep = _misfit(data, base)
+    freedom = degrees_of_freedom(data)
+    conditions = data.features.conditions
+    found = Location(
+        records=tuple(record.name for record in data.features.records),
+        speed_rpm=conditions.input_speed / REVOLUTION_PER_MINUTE,
+        load_torque=conditions.output_torque,
+        orders=np.concatenate([[0.0], data.features.orders]),
+        misfit=as_lines(data, difference),
+        chi_square=chi_square,
+        p_value=chi2.sf(chi_square, freedom),
+        moved=moved,
+        flagged=moved > freedom if named else _significant(chi_square, freedom),
+        sweep_p_value=sweep,
+        sweep_flagged=_wrong(sweep),
+        named=named,
+    )
+    sentence, trusted = sentences(found, data, analysis.unexpected)
+    return replace(found, sentence=sentence, trusted=trusted)
+
+
+def _trusted_base(data: Data, best: Fit) -> Values:
+    """Return the base values of a fit, within the tolerances that the base has."""
+    lower = np.array([parameter.lower for parameter in data.base])
+    upper = np.array([parameter.upper for parameter in data.base])
+    return np.clip(best.values[: len(data.base)], lower, upper)
+
+
+def refit_clean(data: Data, base: Fit) -> Values:
+    """Refit the base within its bounds to the cells that it does not contradict.
+
+    First with the weights of Cauchy's distribution, renewed after every fit, because a misfit that
+    the base has spread over all cells makes clean ones look wrong; then with the cells that are
+    still wrong left out. A torsion sweep that contradicts the running records is left out too.
+
+    Returns
+    -------
+    ndarray, shape (n_base,)
+    """
+    values, freedom = base.values, degrees_of_freedom(data)
+    chi_square, sweep = _misfit(data, values)
+    if not (_significant(chi_square, freedom).any() or _wrong(sweep)):
+        return values
+    factor = np.full_like(chi_square, np.inf)
+    for _ in range(_ROUNDS):
+        before, factor = factor, 1.0 + chi_square / (_CAUCHY * freedom)
+        if np.allclose(before, factor, rtol=_SETTLED, atol=0.0, equal_nan=True):
+            break
+        weakened = _weakened(data, factor, _wrong(sweep))
+        values = fit(weakened, (), values, _EVALUATIONS).values
+        chi_square, sweep = _misfit(data, values)
+    factor = np.where(_significant(chi_square, freedom), _LEFT_OUT, 1.0)
+    return fit(_weakened(data, factor, _wrong(sweep)), (), values).values
+
+
+def _misfit(data: Data, base: Values) -> tuple[Values, float | None]:
+    """Return the chi-square of all cells and the p-value of the sweep."""
+    difference = data.features.values - data.predict(base[None], ())[0]
+    return cell_chi_square(data, difference), _sweep_p_value(data, base)
+
+
+def _significant(chi_square: Values, freedom: Values) -> Flags:
+    return benjamini_hochberg(chi2.sf(chi_square, freedom), FALSE_DISCOVERIES)
+
+
+def _wrong(sweep: float | None) -> bool:
+    return sweep is not None and sweep < FALSE_DISCOVERIES
+
+
+def _weakened(data: Data, factor: Values, without_sweep: bool) -> Data:
+    """Return the data with the variances of cells (r, 4, 1 + m) multiplied by a factor."""
+    features = data.features
+    by_feature = np.ones_like(features.values)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            by_feature[:, channel] = factor[:, channel, 0]
+        for part in features.places(channel).T:
+            by_feature[:, part] = factor[:, channel, 1:]
+    covariance = features.covariance.copy()
+    diagonal = np.arange(features.values.shape[1])
+    # Added to the whole covariance, that of the repeatability included, not to the sensors' alone.
+    variance = np.sum(data.whiteners**2, axis=2)
+    covariance[:, diagonal, diagonal] += (by_feature - 1.0) * variance
+    weakened = replace(features, covariance=covariance)
+    return replace(data, features=weakened, torsion=() if without_sweep else data.torsion)
+
+
+def _sweep_p_value(data: Data, base: Values) -> float | None:
+    """Return the chance of a larger misfit of the torsion sweeps; None where there is none."""
+    residuals = data.torsion_residuals(base[None], ())[0]
+    if not residuals.size:
+        return None
+    known = np.nan_to_num(residuals, nan=_LOST)
+    return float(chi2.sf(known @ known, known.size))

@@ -1,0 +1,138 @@
+"""The map of a misfit: one cell for the mean or one order line of one channel in one record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.features import MEANS
+from pymoo_hdte.discrepancy.fit import Data
+from pymoo_hdte.discrepancy.order_lines import CHANNELS
+
+FALSE_DISCOVERIES = 0.01
+"""Share of flagged cells that may be clean, after Benjamini and Hochberg (J. R. Stat. Soc. B 1995);
+their rule holds for the positive dependence that shared parameters give neighbouring cells."""
+
+Values = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Location:
+    """Where the misfit lives. Cells have shape (r, 4, 1 + m): record, channel, order.
+
+    Channels are those of `order_lines.CHANNELS`. Order 0 is the mean.
+
+    Attributes
+    ----------
+    records : tuple of str, length r
+    speed_rpm, load_torque : ndarray, shape (r,)
+        r/min of the input, N.m.
+    orders : ndarray, shape (1 + m,)
+        Cycles per input turn.
+    misfit : complex ndarray, shape (r, 4, 1 + m)
+        Measured minus base model, rad and N.m; nan where a mean is a condition.
+    chi_square : ndarray, shape (r, 4, 1 + m)
+        Of the misfit: two degrees of freedom for a line, one for a mean.
+    p_value : ndarray, shape (r, 4, 1 + m)
+    moved : ndarray, shape (r, 4, 1 + m)
+        Chi-square of what the named effects change; zero where none is named.
+    flagged : ndarray of bool, shape (r, 4, 1 + m)
+        With named effects, the cells that they move by more than the root mean square of the
+        noise; otherwise those whose misfit is significant at `FALSE_DISCOVERIES`.
+    sweep_p_value : float or None
+        Of the torsion sweep, None without one.
+    sweep_flagged : bool
+    named : bool
+        Whether the flags come from named effects.
+    sentence, trusted : str
+        Where the misfit lives, and where the model may be trusted as it is.
+    """
+
+    records: tuple[str, ...]
+    speed_rpm: Values
+    load_torque: Values
+    orders: Values
+    misfit: NDArray[np.complex128]
+    chi_square: Values
+    p_value: Values
+    moved: Values
+    flagged: Flags
+    sweep_p_value: float | None
+    sweep_flagged: bool
+    named: bool
+    sentence: str = ""
+    trusted: str = ""
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of the map."""
+        return int(np.isfinite(self.chi_square).sum())
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ``verdict.json`` says of it, as plain types."""
+        flagged = [
+            {
+                "record": self.records[record],
+                "speed_rpm": float(self.speed_rpm[record]),
+                "load_Nm": float(self.load_torque[record]),
+                "channel": CHANNELS[channel],
+                "order": float(self.orders[order]),
+                "chi_square": float(self.chi_square[record, channel, order]),
+                "p_value": float(self.p_value[record, channel, order]),
+            }
+            for record, channel, order in np.argwhere(self.flagged)
+        ]
+        return {
+            "sentence": self.sentence,
+            "trusted": self.trusted,
+            "cells": self.cells,
+            "rule": "moved by the named effects" if self.named else "false discovery rate 1 %",
+            "flagged": flagged,
+            "torsion_sweep": {"p_value": self.sweep_p_value, "flagged": self.sweep_flagged},
+        }
+
+
+def degrees_of_freedom(data: Data) -> Values:
+    """Return those of each cell, shape (4, 1 + m)."""
+    freedom = np.full((len(CHANNELS), 1 + len(data.features.orders)), 2.0)
+    freedom[:, 0] = 1.0
+    return freedom
+
+
+def cell_chi_square(data: Data, difference: Values) -> Values:
+    """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m)."""
+    triangles = data.whiteners
+    covariance = triangles @ np.swapaxes(triangles, 1, 2)
+    found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            found[:, channel, 0] = difference[:, channel] ** 2 / covariance[:, channel, channel]
+        for line, pair in enumerate(data.features.places(channel)):
+            block = covariance[:, pair[:, None], pair]
+            part = difference[:, pair, None]
+            solved = np.linalg.solve(block, part)
+            found[:, channel, 1 + line] = np.sum(part * solved, axis=(1, 2))
+    return found
+
+
+def as_lines(data: Data, difference: Values) -> NDArray[np.complex128]:
+    """Return differences of features (r, f) as phasors of cells (r, 4, 1 + m)."""
+    found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan, dtype=complex)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            found[:, channel, 0] = difference[:, channel]
+        real, imaginary = data.features.places(channel).T
+        found[:, channel, 1:] = difference[:, real] + 1j * difference[:, imaginary]
+    return found
+
+
+def benjamini_hochberg(p_value: Values, rate: float) -> Flags:
+    """Return which hypotheses are rejected at a false discovery rate; nan never is."""
+    ordered = np.sort(p_value[np.isfinite(p_value)])
+    passed = np.flatnonzero(ordered <= rate * np.arange(1, len(ordered) + 1) / len(ordered))
+    limit = ordered[passed[-1]] if passed.size else -1.0
+    return np.asarray(p_value <= limit, dtype=bool)

@@ -1,0 +1,209 @@
+"""The verdict as a document of plain types, for ``verdict.json``: SI values with their units."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.fit import Fit
+from pymoo_hdte.discrepancy.library import Candidate, polar
+from pymoo_hdte.discrepancy.misfit_map import Location
+from pymoo_hdte.discrepancy.naming import Rival, Verdict
+from pymoo_hdte.discrepancy.next_experiment import Proposal
+from pymoo_hdte.discrepancy.revise import accepted_fit
+from pymoo_hdte.discrepancy.workflow import Analysis
+
+_DEVIATIONS = 1.959964
+"""Half-width of a central 95 % interval of a normal value, in standard deviations."""
+
+UNITS = {
+    "stiffness": "N.m/rad",
+    "damping": "N.m.s/rad",
+    "input_inertia": "kg.m2",
+    "input_damping": "N.m.s/rad",
+    "output_damping": "N.m.s/rad",
+    "load_inertia": "kg.m2",
+    "offset": "rad",
+    "locked_stiffness": "1",
+    "input_torque_gain": "1",
+    "input_torque_zero": "N.m",
+    "output_torque_gain": "1",
+    "output_torque_zero": "N.m",
+    "error_amplitude": "rad",
+    "error_phase": "rad",
+    "coefficient": "N.m/rad3",
+    "softening": "1",
+    "torsion": "rad",
+    "half_width": "rad",
+    "force": "N.m",
+    "depth": "1",
+    "level": "N.m",
+    "excess": "N.m",
+    "fading": "rad/s",
+    "amplitude": "rad",
+    "share": "1",
+    "inertia": "kg.m2",
+    "factor": "1",
+    "rate": "rad/s",
+    "phase": "rad",
+    "torque_ripple.amplitude": "N.m",
+    "nonlinear_drag.coefficient": "N.m.s2/rad2",
+}
+"""Of parameters, by name or, where the name has several meanings, by effect and name."""
+
+
+def verdict_document(
+    analysis: Analysis,
+    location: Location,
+    held_out: Mapping[str, Any] | None,
+    proposal: Proposal,
+) -> dict[str, Any]:
+    """Return the verdict with all that supports it; `json.dumps` takes it as it is.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    location : Location
+    held_out : mapping or None
+        ``before``, ``after``, ``noise_floor``, ``unit`` and more, of plain types; None where no
+        record was held out.
+    proposal : Proposal
+    """
+    verdict = analysis.verdict
+    absent = {"reason": "the campaign holds no held-out record, so that nothing can be proved"}
+    return {
+        "campaign": analysis.campaign.title,
+        "status": verdict.status,
+        "sentence": sentence(verdict),
+        "effects": _effects(verdict),
+        "alternatives": _alternatives(verdict),
+        "base": {
+            "chi_square": verdict.base.chi_square,
+            "degrees_of_freedom": verdict.degrees_of_freedom,
+            "parameters": base_parameters(accepted_fit(verdict)),
+        },
+        "held_out": absent if held_out is None else dict(held_out),
+        "next_experiment": proposal.as_dict(),
+        "location": location.summary(),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy", "numba")},
+        },
+    }
+
+
+def sentence(verdict: Verdict) -> str:
+    """Return the verdict in words."""
+    chosen = verdict.chosen
+    if verdict.status == "adequate" or chosen is None:
+        return "Nothing is missing: the believed drive explains the records within its tolerances."
+    what = " ".join(candidate.sentence for candidate in chosen.candidates)
+    if verdict.status == "unlisted":
+        return (
+            "Something is missing that no known effect explains: the best of them, "
+            f"{chosen.label}, removes {chosen.share:.0%} of the misfit only."
+        )
+    removed = f"This removes {chosen.share:.1%} of the misfit beyond noise."
+    if verdict.status == "class":
+        labels = " or ".join([chosen.label, *(rival.label for rival in verdict.equivalent)])
+        return f"{what} {removed} The data cannot tell {labels}."
+    return f"{what} {removed}"
+
+
+def _effects(verdict: Verdict) -> list[dict[str, Any]]:
+    """Return the accepted effects; none unless the verdict names or classes them."""
+    fitted, found = accepted_fit(verdict), []
+    start = len(fitted.values) - sum(len(one.parameters) for one in fitted.candidates)
+    for candidate in fitted.candidates:
+        rows = np.arange(start, start + len(candidate.parameters))
+        start += len(candidate.parameters)
+        bounded = [fitted.parameters[row].name for row in rows]
+        found.append(
+            {
+                "name": candidate.name,
+                "port": candidate.port,
+                "order": candidate.order,
+                "sentence": candidate.sentence,
+                "parameters": _parameters(candidate, fitted, rows),
+                "at_bound": [name for name in bounded if name in fitted.at_bounds],
+                "share": verdict.chosen.share if verdict.chosen else None,
+            }
+        )
+    return found
+
+
+def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> dict[str, Any]:
+    """Return values with intervals; cosine and sine part as amplitude and phase.
+
+    The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
+    """
+    values, covariance = fitted.values[rows], fitted.covariance[np.ix_(rows, rows)]
+    first = fitted.parameters[rows[0]].name
+    if not first.endswith("_cosine"):
+        return {
+            fitted.parameters[row].name: quantity(
+                fitted.values[row],
+                fitted.covariance[row, row],
+                candidate.name,
+                fitted.parameters[row].name,
+            )
+            for row in rows
+        }
+    name = first.removesuffix("_cosine")
+    cosine, sine = values
+    amplitude, phase = polar(cosine, sine)
+    size = max(amplitude, np.finfo(float).tiny)
+    along = np.array([cosine, sine]) / size
+    across = np.array([-sine, cosine]) / size
+    of_phase = min(float(across @ covariance @ across) / size**2, np.pi**2 / 3.0)
+    return {
+        name: quantity(amplitude, float(along @ covariance @ along), candidate.name, name),
+        "phase": quantity(phase, of_phase, candidate.name, "phase"),
+    }
+
+
+def quantity(value: float, variance: float, effect: str, name: str) -> dict[str, Any]:
+    """Return a value with its unit and its 95 % interval."""
+    half = _DEVIATIONS * float(np.sqrt(max(variance, 0.0)))
+    unit = UNITS.get(f"{effect}.{name}", UNITS.get(name, ""))
+    return {
+        "value": float(value),
+        "unit": unit,
+        "interval95": [float(value) - half, float(value) + half],
+    }
+
+
+def base_parameters(fitted: Fit) -> dict[str, Any]:
+    """Return the base values of a fit with units, intervals and whether they ended at a bound."""
+    added = sum(len(candidate.parameters) for candidate in fitted.candidates)
+    found = {}
+    for row, parameter in enumerate(fitted.parameters[: len(fitted.parameters) - added]):
+        kind = parameter.name.rstrip("0123456789").rstrip("_")
+        entry = quantity(fitted.values[row], fitted.covariance[row, row], "base", kind)
+        found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
+    return found
+
+
+def _alternatives(verdict: Verdict) -> list[dict[str, Any]]:
+    """Return the other sets of effects with their evidence, by rising BIC."""
+    chosen = verdict.chosen
+
+    def evidence(rival: Rival) -> dict[str, Any]:
+        return {
+            "effects": [
+                {"name": one.name, "port": one.port, "order": one.order} for one in rival.candidates
+            ],
+            "bic": rival.bic,
+            "bic_gap": rival.bic - chosen.bic if chosen else None,
+            "chi_square": rival.fit.chi_square,
+            "share": rival.share,
+            "at_bound": list(rival.fit.at_bounds),
+            "equivalent": rival in verdict.equivalent,
+        }
+
+    return [evidence(rival) for rival in sorted(verdict.alternatives, key=lambda one: one.bic)]

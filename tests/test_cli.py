@@ -1,0 +1,94 @@
+"""The command line: exit codes, what is printed where, nothing half-written."""
+
+import json
+
+import pytest
+
+from pymoo_hdte import cli
+from pymoo_hdte.checks import InvalidInput
+
+DOCUMENT = {
+    "status": "named",
+    "sentence": "There is play between the teeth.",
+    "effects": [{"name": "backlash", "port": "mesh"}],
+    "location": {"sentence": "In the mean."},
+    "next_experiment": {"description": "a sweep through zero"},
+}
+
+
+@pytest.fixture
+def ready(monkeypatch):
+    monkeypatch.setattr(cli, "_discrepancy", lambda campaign, out: DOCUMENT)
+
+
+def run(*options):
+    return cli.main(["discrepancy", "campaign", "--out", "report", *options])
+
+
+def test_the_verdict_is_printed_in_words(ready, capsys):
+    assert run() == 0
+    printed = capsys.readouterr().out
+    for words in ("named: backlash at the mesh", "play between", "In the mean", "through zero"):
+        assert words in printed
+
+
+def test_json_on_stdout_is_the_document(ready, capsys):
+    assert run("--json") == 0
+    assert json.loads(capsys.readouterr().out) == DOCUMENT
+
+
+def test_quiet_prints_nothing(ready, capsys):
+    assert run("--quiet") == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_missing_campaign_is_one_line_and_writes_nothing(tmp_path, capsys):
+    out = tmp_path / "report"
+    arguments = ["discrepancy", str(tmp_path / "nowhere"), "--out", str(out), "--quiet"]
+    assert cli.main(arguments) == 2
+    printed = capsys.readouterr().err
+    assert "nowhere" in printed
+    assert printed.count("\n") == 1
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (InvalidInput("believed.ratio", -1.0, "above 1"), "believed.ratio"),
+        (PermissionError(13, "Permission denied", "/kept"), "/kept: Permission denied"),
+    ],
+)
+def test_a_mistake_is_named_without_a_traceback(error, words, monkeypatch, capsys):
+    def fail(campaign, out):
+        raise error
+
+    monkeypatch.setattr(cli, "_discrepancy", fail)
+    assert run() == 2
+    printed = capsys.readouterr().err
+    assert words in printed
+    assert "Traceback" not in printed
+
+
+def test_an_interrupt_has_the_code_of_the_shell(monkeypatch, capsys):
+    def stop(campaign, out):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "_discrepancy", stop)
+    assert run() == 130
+    assert "nothing was written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("options", [[], ["discrepancy"], ["discrepancy", "x"]])
+def test_what_is_missing_is_a_usage_error(options, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(options)
+    assert stopped.value.code == 2
+    assert "usage: pymoo-hdte" in capsys.readouterr().err
+
+
+def test_help_has_an_example(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["discrepancy", "--help"])
+    assert stopped.value.code == 0
+    assert "pymoo-hdte discrepancy campaigns/rig-01 --out" in capsys.readouterr().out

@@ -1,0 +1,119 @@
+"""The next experiment: closed forms of the separation, and the twins that no record separates."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from planted_features import analysed, known_data, listed, measured
+
+from pymoo_hdte.discrepancy.experiment_grid import Grid, Model, separation
+from pymoo_hdte.discrepancy.fit import fit
+from pymoo_hdte.discrepancy.locate import locate
+from pymoo_hdte.discrepancy.naming import Rival, Verdict
+from pymoo_hdte.discrepancy.next_experiment import nearest_rivals, next_experiment
+from pymoo_hdte.discrepancy.verdict_file import verdict_document
+from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.units import ARCSEC
+
+
+def judged(data, chosen, *others, equivalent=()):
+    base = fit(data)
+    verdict = Verdict("named", base, chosen, others, equivalent, 1)
+    return Analysis(data.campaign, data, verdict, ())
+
+
+def rival(data, candidate, start, bic=0.0):
+    values = np.concatenate([[parameter.start for parameter in data.base], start])
+    return Rival(fit(data, (candidate,), values), bic, 1.0)
+
+
+def test_separation_in_closed_form():
+    # One feature, difference 3, noise 1, uncertainties 2 and 1 of the two predictions.
+    one = Model("one", np.array([[0.0]]), np.array([[[2.0]]]))
+    other = Model("other", np.array([[3.0]]), np.array([[[1.0]]]))
+    assert separation(one, other) == pytest.approx([9.0 / (1.0 + 4.0 + 1.0)])
+
+
+def test_an_eccentric_encoder_is_to_be_clocked_anew():
+    data = known_data()
+    candidate = listed(data, "eccentricity")
+    data, _ = measured((candidate.build((3.0 * ARCSEC, 1.0 * ARCSEC)),))
+    chosen = rival(data, candidate, candidate.starts[0])
+    proposal = next_experiment(judged(data, chosen))
+    assert proposal.test == "reclocked_encoder"
+    assert proposal.separates == ("eccentricity:sensor@0.009901", "kinematic_error:mesh@0.009901")
+    # Twice the line over its noise, 0.03 arcsec in each part of a correlation of 0.3.
+    pair = 2.0 * np.array([3.0, 1.0])
+    block = 0.03**2 * np.array([[1.0, 0.3], [0.3, 1.0]])
+    expected = pair @ np.linalg.solve(block, pair)
+    assert proposal.expected_separation == pytest.approx(expected, rel=0.05)
+
+
+def test_dry_friction_at_the_input_asks_for_the_other_direction():
+    data = known_data()
+    candidate = listed(data, "coulomb_friction")
+    assert candidate.port == "input"
+    data, _ = measured((candidate.build((0.02,)),))
+    chosen = rival(data, candidate, (0.02,))
+    proposal = next_experiment(judged(data, chosen))
+    assert proposal.speed_rpm < 0.0
+    assert "tare" in proposal.description
+    assert proposal.separates == ("coulomb_friction:input", "zero error of the input torque sensor")
+
+
+def test_a_rival_is_told_apart_by_a_record_that_the_two_predict_apart():
+    data = known_data()
+    ripple, line = listed(data, "torque_ripple", [6.0]), listed(data, "kinematic_error", [6.0])
+    data, _ = measured((ripple.build((0.005, 0.0)),), np.random.default_rng(7))
+    chosen, other = rival(data, ripple, ripple.starts[0]), rival(data, line, line.starts[0], 50.0)
+    proposal = next_experiment(judged(data, chosen, other))
+    assert proposal.separates == (chosen.label, other.label)
+    assert proposal.expected_separation > 9.0
+    assert (proposal.test == "running") == (proposal.speed_rpm is not None)
+
+
+def test_an_adequate_model_asks_for_its_least_certain_record():
+    data, _ = measured(rng=np.random.default_rng(8))
+    analysis = analysed(data, "adequate")
+    proposal = next_experiment(analysis)
+    grid = Grid.of(analysis)
+    variance = np.sum(grid.model(analysis.verdict.base).influence ** 2, axis=(1, 2))
+    assert proposal.separates is None
+    assert proposal.expected_separation == pytest.approx(variance[: len(grid.speed_rpm)].max())
+
+
+def test_a_superset_of_the_named_effects_is_no_rival():
+    def fake(*names):
+        return SimpleNamespace(
+            candidates=tuple(SimpleNamespace(name=name) for name in names), bic=0.0, fit=names
+        )
+
+    verdict = Verdict("named", None, fake("a"), (fake("a", "b"), fake("c"), fake("c", "a")), (), 1)
+    assert nearest_rivals(verdict) == [("c",)]
+
+
+def test_the_verdict_gives_amplitude_and_phase_with_their_intervals():
+    data = known_data()
+    candidate = listed(data, "kinematic_error", [3.0])
+    data, _ = measured((candidate.build((1.5 * ARCSEC, 0.5 * ARCSEC)),), np.random.default_rng(9))
+    analysis = analysed(data, "named", candidate, candidate.starts[0])
+    proposal = next_experiment(analysis)
+    document = verdict_document(analysis, locate(analysis), None, proposal)
+    document = json.loads(json.dumps(document, allow_nan=False))
+    effect = document["effects"][0]
+    amplitude, phase = effect["parameters"]["amplitude"], effect["parameters"]["phase"]
+    fitted = analysis.verdict.chosen.fit
+    drawn = np.random.default_rng(10).multivariate_normal(
+        fitted.values[-2:], fitted.covariance[-2:, -2:], 20000
+    )
+    for entry, sample in (
+        (amplitude, np.hypot(*drawn.T)),
+        (phase, np.arctan2(drawn[:, 1], drawn[:, 0])),
+    ):
+        half = (entry["interval95"][1] - entry["interval95"][0]) / 2.0
+        assert half == pytest.approx(1.96 * sample.std(), rel=0.05)
+        assert entry["value"] == pytest.approx(sample.mean(), abs=0.05 * half)
+    assert amplitude["interval95"][0] < np.hypot(1.5, 0.5) * ARCSEC < amplitude["interval95"][1]
+    assert (amplitude["unit"], phase["unit"]) == ("rad", "rad")
+    assert "reason" in document["held_out"]
