@@ -1,4 +1,4 @@
-"""Campaigns without raw records: features that a known drive gives, with noise of known covariance."""
+"""Campaigns without raw records: what a known drive gives, with noise of known covariance."""
 
 from dataclasses import replace
 from types import SimpleNamespace
