@@ -45,6 +45,16 @@ class Features:
     values: NDArray[np.float64]
     covariance: NDArray[np.float64]
 
+    def rows(self, rows: NDArray[np.int_]) -> Features:
+        """Return the features of some of the records."""
+        conditions = Conditions(
+            self.conditions.input_speed[rows],
+            self.conditions.output_torque[rows],
+            self.conditions.elapsed[rows],
+        )
+        records = tuple(self.records[row] for row in rows)
+        return Features(records, conditions, self.orders, self.values[rows], self.covariance[rows])
+
     def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
         """Return predicted features, shape (v, r, n_features)."""
         return stack(prediction.mean, prediction.phasors)

@@ -17,11 +17,11 @@ from scipy.optimize import least_squares
 
 from pymoo_hdte.discrepancy.campaign import Campaign
 from pymoo_hdte.discrepancy.features import Features
-from pymoo_hdte.discrepancy.forward import coefficients_of, predict
+from pymoo_hdte.discrepancy.forward import Prediction, coefficients_of, predict
 from pymoo_hdte.discrepancy.library import Candidate
 from pymoo_hdte.discrepancy.parameters import Layout, Parameter, base_parameters
 from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
-from pymoo_hdte.drive import Effect, mean_torsion
+from pymoo_hdte.drive import Balance, Effect, mean_torsion
 
 _STEP = 1e-3
 """Step of difference quotients, in units of a parameter's scale."""
@@ -77,15 +77,21 @@ class Data:
         covariance[:, 0, 0] += spread**2
         return covariance
 
-    def predict(self, vectors: Vector, effects: Sequence[Effect]) -> NDArray[np.float64]:
+    def predict(
+        self, vectors: Vector, effects: Sequence[Effect], start: Balance | None = None
+    ) -> NDArray[np.float64]:
         """Return features, shape (v, r, f), of vectors (v, n_base) of base parameters."""
+        return self.features.of_prediction(self.prediction(vectors, effects, start))
+
+    def prediction(
+        self, vectors: Vector, effects: Sequence[Effect], start: Balance | None = None
+    ) -> Prediction:
+        """Return what `predict` is made of, steady states included."""
         values = self._named(vectors)
         believed, rig = self.campaign.believed, self.campaign.rig
         features = self.features
-        prediction = predict(
-            believed, rig, features.conditions, features.orders.tolist(), values, effects
-        )
-        return features.of_prediction(prediction)
+        orders = features.orders.tolist()
+        return predict(believed, rig, features.conditions, orders, values, effects, start)
 
     def _named(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}
@@ -194,6 +200,7 @@ class Objective:
         self.lower, self.upper = layout.array("lower"), layout.array("upper")
         self.prior = layout.array("prior")
         self.bounded = np.isfinite(self.prior)
+        self.nearby: Balance | None = None
 
     def residuals(self, values: Vector) -> Vector:
         """Return residuals at values (n,), those of priors last."""
@@ -203,7 +210,10 @@ class Objective:
         """Return residuals (v, n_residuals) for base vectors, the effects being those of values."""
         n_base = len(self.data.base)
         effects = built(self.candidates, values[n_base:])
-        difference = self.data.predict(vectors, effects) - self.data.features.values
+        prediction = self.data.prediction(vectors, effects, self.nearby)
+        # The first vector is the point around which others are perturbed: the next call is near.
+        self.nearby = prediction.balance.rows(slice(len(self.data.features.records)))
+        difference = self.data.features.of_prediction(prediction) - self.data.features.values
         white = self.data.whiten(difference)
         torsion = self.data.torsion_residuals(vectors, effects)
         whole = np.tile(values, (len(vectors), 1))

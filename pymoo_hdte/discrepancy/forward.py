@@ -25,8 +25,13 @@ from pymoo_hdte.drive import (
     ThermalDrift,
     harmonic_balance,
 )
+from pymoo_hdte.drive.balance import BY_CASE
 from pymoo_hdte.drive.friction import PeriodicTorque
+from pymoo_hdte.drive.harmonic_balance import torus_of
+from pymoo_hdte.drive.mesh_laws import DeadZone, PeriodicClearance
+from pymoo_hdte.drive.torus import Torus
 
+CLEARANCES = (DeadZone, PeriodicClearance)
 TOLERANCE = 1e-8
 """Of the harmonic balance: far below the noise, and twice as fast as full precision."""
 
@@ -58,10 +63,12 @@ class Prediction:
     """Means, shape (v, r, 4), and phasors, (v, r, 4, m), of `CHANNELS` for v vectors, r records.
 
     SI. The mean of the output torque and of the input angle are conditions, not predictions.
+    ``balance`` has the steady states, vectors outermost.
     """
 
     mean: NDArray[np.float64]
     phasors: NDArray[np.complex128]
+    balance: Balance
 
 
 def predict(
@@ -71,6 +78,7 @@ def predict(
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
     effects: Sequence[Effect] = (),
+    start: Balance | None = None,
 ) -> Prediction:
     """Return what the sensors would show.
 
@@ -84,12 +92,16 @@ def predict(
         Parameters by name, those of `parameters.base_parameters`.
     effects : sequence of Effect
         Shared by all vectors.
+    start : Balance, optional
+        Steady states of the records for nearby values, to begin from.
     """
     count, records = len(values["offset"]), len(conditions)
     gain = 1.0 + values["output_torque_gain"][:, None]
     load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
     coefficients = coefficients_of(believed, values, effects, records)
-    balance = _balance(coefficients, np.tile(conditions.input_speed, count), load.ravel(), rig)
+    near = None if start is None else start.rows(np.tile(np.arange(records), count))
+    speed = np.tile(conditions.input_speed, count)
+    balance = steady_state(coefficients, speed, load.ravel(), rig, near)
     channels = [
         balance.transmission_error,
         balance.motor_torque + _driving(balance, effects),
@@ -101,34 +113,58 @@ def predict(
     phasors = np.moveaxis(lines, -1, 0).reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
     _read(believed, conditions, orders, values, effects, mean, phasors)
-    return Prediction(mean, phasors)
+    return Prediction(mean, phasors, balance)
 
 
-def _balance(
-    coefficients: Coefficients, speed: NDArray[np.float64], load: NDArray[np.float64], rig: Rig
+def steady_state(
+    coefficients: Coefficients,
+    speed: NDArray[np.float64],
+    load: NDArray[np.float64],
+    rig: Rig,
+    start: Balance | None = None,
 ) -> Balance:
     """Return the steady state of all rows.
 
-    Where none is found, as in rattling without load, the record cannot speak for or against the
-    laws: it is predicted without them.
+    Where a clearance would open because the load does not hold the flanks together, there is none:
+    the drive rattles. Such a record, or one for which none is found, cannot speak for or against
+    the laws and is predicted without them.
     """
     motor = SpeedLoop(rig.proportional, rig.integral)
-    balance = harmonic_balance(
-        coefficients, input_speed=speed, load_torque=load, motor=motor, tolerance=TOLERANCE
-    )
-    lost = np.flatnonzero(~balance.converged)
-    if lost.size:
-        plain = harmonic_balance(
-            replace(coefficients.rows(lost), laws=()),
-            input_speed=speed[lost],
-            load_torque=load[lost],
+
+    def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> Balance:
+        return harmonic_balance(
+            coefficients.rows(rows),
+            input_speed=speed[rows],
+            load_torque=load[rows],
             motor=motor,
-            torus=balance.torus,
+            torus=torus,
             tolerance=TOLERANCE,
+            start=None if start is None else start.rows(rows),
         )
-        for name in ("transmission_error", "motor_torque", "coupling_torque", "lead"):
-            getattr(balance, name)[lost] = getattr(plain, name)
-    return balance
+
+    torus, every = torus_of(coefficients), np.arange(len(speed))
+    if not any(isinstance(law, CLEARANCES) for _, law in coefficients.laws):
+        balance = solve(coefficients, every, torus)
+        if np.all(balance.converged):
+            return balance
+        held = balance.converged
+        plain = solve(replace(coefficients, laws=()), np.flatnonzero(~held), torus)
+        return _merged(balance.rows(held), plain, held)
+    plain = solve(replace(coefficients, laws=()), every, torus)
+    swing = np.abs(plain.torsion[:, 1:]).sum(axis=1)
+    held = np.abs(plain.torsion[:, 0]) > swing
+    balance = solve(coefficients, np.flatnonzero(held), torus)
+    held[held] = balance.converged
+    return _merged(balance.rows(balance.converged), plain.rows(~held), held)
+
+
+def _merged(held: Balance, plain: Balance, places: NDArray[np.bool_]) -> Balance:
+    """Put rows together again: ``held`` where ``places``, ``plain`` elsewhere."""
+    order = np.argsort(np.concatenate([np.flatnonzero(places), np.flatnonzero(~places)]))
+    joined = [
+        np.concatenate([getattr(held, name), getattr(plain, name)])[order] for name in BY_CASE
+    ]
+    return Balance(held.torus, *joined)
 
 
 def coefficients_of(

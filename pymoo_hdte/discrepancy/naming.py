@@ -34,6 +34,8 @@ BIC_GAIN = 6.0
 """Least gain of BIC, and the distance within which rivals cannot be told apart."""
 FITTED = 4
 """Most candidates fitted in earnest after the screening."""
+EVALUATIONS = {1: 25, 2: 10}
+"""Steps of a fit of one effect, and of a second one beside it."""
 PROMISING = 0.2
 """Least reduction, as a share of the most promising candidate's, with which one is fitted."""
 
@@ -149,7 +151,9 @@ def _fit_best(data: Data, base: Fit, screened: Sequence[Screened], excess: float
     least = PROMISING * screened[0].reduction
     for one in [one for one in screened[:FITTED] if one.reduction >= least]:
         start = np.concatenate([base.values, one.start])
-        found.append(_rival(fit(data, (*base.candidates, one.candidate), start), excess))
+        effects = (*base.candidates, one.candidate)
+        fitted = fit(data, effects, start, EVALUATIONS[len(effects)])
+        found.append(_rival(fitted, excess))
     return sorted(found, key=lambda rival: rival.bic)
 
 
@@ -170,7 +174,7 @@ def _pairs(
         taken = {candidate.label for candidate in single.candidates}
         others = [candidate for candidate in candidates if candidate.label not in taken]
         screened = screen(data, single.fit, others)
-        found += _fit_best(data, single.fit, screened[:3], excess)
+        found += _fit_best(data, single.fit, screened[:2], excess)
     return found
 
 

@@ -42,6 +42,8 @@ class Balance:
         Torque on the input, and between drive and load inertia, N.m.
     lead : ndarray of complex, shape (n, n_harmonics)
         Input angle ahead of the mean speed's, alpha - Omega t, rad; its mean is 0.
+    energy : ndarray of complex, shape (n, n_harmonics)
+        Half the square of the input speed, rad2/s2.
     converged : ndarray of bool, shape (n,)
     """
 
@@ -51,8 +53,20 @@ class Balance:
     motor_torque: Phasors
     coupling_torque: Phasors
     lead: Phasors
+    energy: Phasors
     converged: NDArray[np.bool_]
+
+    def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> Balance:
+        """Return some of the cases, each as often as its place is given."""
+        return Balance(self.torus, *(getattr(self, name)[rows] for name in BY_CASE))
 
     def spectrum(self) -> OrderSpectrum:
         """Return theta_d as an order spectrum."""
         return OrderSpectrum(self.torus.orders, self.transmission_error)
+
+
+BY_CASE = (
+    "transmission_error", "torsion", "motor_torque", "coupling_torque", "lead", "energy",
+    "converged",
+)  # fmt: skip
+"""Fields of `Balance` with a row a case, in their order."""

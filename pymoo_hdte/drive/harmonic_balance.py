@@ -19,12 +19,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.drive.balance import CONSTANT_TORQUE, Balance, Phasors, SpeedLoop
+from pymoo_hdte.drive.balance import BY_CASE, CONSTANT_TORQUE, Balance, Phasors, SpeedLoop
 from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.laws import PortState, Response
 from pymoo_hdte.drive.torus import (
     Torus,
     fundamental_orders,
+    largest_multiples,
     multiplication,
     stacked,
     unstacked,
@@ -32,8 +33,6 @@ from pymoo_hdte.drive.torus import (
 
 HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
-HIGHEST_FRACTION = 2
-"""Harmonics kept of every other angle."""
 _STEPS = 40
 _STATIC_STEPS = 8
 _NEARLY_CONSTANT = 0.02
@@ -43,11 +42,6 @@ _ROWS_AT_ONCE = 64
 Values = NDArray[np.float64]
 
 
-_BY_ROW = (
-    "transmission_error", "torsion", "motor_torque", "coupling_torque", "lead", "converged",
-)  # fmt: skip
-
-
 def torus_of(coefficients: Coefficients) -> Torus:
     """Return a torus that holds all excited orders with room for their combinations."""
     excited = [float(order) for order in coefficients.error_orders]
@@ -55,9 +49,12 @@ def torus_of(coefficients: Coefficients) -> Torus:
         scale = 1.0 / coefficients.ratio if port == "output" else 1.0
         excited += [scale * order for order in law.orders]
     fundamentals = fundamental_orders(excited)
-    whole = int(np.ceil(max(excited, default=0.0)))
-    highest = (max(HIGHEST, whole + 2), *[HIGHEST_FRACTION] * (len(fundamentals) - 1))
-    return Torus(fundamentals, highest)
+    needed = largest_multiples(fundamentals, excited)
+    # A line that the input angle itself shakes has a strong second harmonic over that angle.
+    whole = max(HIGHEST, 2 * int(np.ceil(max(excited, default=0.0))) + 1)
+    # The first fraction is that of the static error, whose beat the stiffness may modulate.
+    fractions = [most + (place == 0) for place, most in enumerate(needed[1:])]
+    return Torus(fundamentals, (whole, *fractions))
 
 
 def harmonic_balance(
@@ -68,6 +65,7 @@ def harmonic_balance(
     motor: SpeedLoop = CONSTANT_TORQUE,
     torus: Torus | None = None,
     tolerance: float = 1e-11,
+    start: Balance | None = None,
 ) -> Balance:
     """Return the steady state of the n designs of ``coefficients``.
 
@@ -81,18 +79,23 @@ def harmonic_balance(
         By default that of `torus_of`.
     tolerance : float
         Largest change of the torsion, relative to its size, at which the iteration ends.
+    start : Balance, optional
+        Nearby cases, a row each, to begin from; ignored if their torus is another.
     """
     n = len(coefficients.stiffness)
     speed = np.broadcast_to(coefficients.input_speed if input_speed is None else input_speed, n)
     load = np.broadcast_to(coefficients.load_torque if load_torque is None else load_torque, n)
     torus = torus_of(coefficients) if torus is None else torus
     parts = []
-    for start in range(0, n, _ROWS_AT_ONCE):
-        rows = slice(start, start + _ROWS_AT_ONCE)
+    for first in range(0, n, _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE)
         solver = _Solver(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
+        if start is not None and np.array_equal(start.torus.orders, torus.orders):
+            solver.begin(start.rows(rows))
         parts.append(solver.solve(tolerance))
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _BY_ROW}
-    return Balance(torus=torus, **joined)
+    return Balance(
+        torus, *(np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE)
+    )
 
 
 class _Solver:
@@ -125,6 +128,13 @@ class _Solver:
         self.energy = np.zeros((n, size), dtype=complex)
         self.energy[:, 0] = speed**2 / 2.0
         self.constant = np.zeros((n, 1))
+
+    def begin(self, near: Balance) -> None:
+        """Begin from nearby cases that have converged."""
+        kept = near.converged[:, None]
+        self.torsion = np.where(kept, near.torsion, self.torsion)
+        shape = near.energy / near.energy[:, :1]
+        self.energy = np.where(kept, shape * self.energy[:, :1], self.energy)
 
     def solve(self, tolerance: float) -> Balance:
         """Iterate until the torsion stands still; rows that never do are marked."""
@@ -313,6 +323,7 @@ class _Solver:
             motor_torque=torus.phasors(self._loop_torque() + self.constant),
             coupling_torque=torus.phasors(self.load + inertia * self.output_acceleration),
             lead=self._lead(),
+            energy=self.energy,
             converged=converged,
         )
 

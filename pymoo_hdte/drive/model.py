@@ -100,10 +100,14 @@ class DriveModel:
     effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
-        places = [(effect.name, getattr(effect, "port", "")) for effect in self.effects]
+        places = [
+            (effect.name, getattr(effect, "port", ""), getattr(law, "order", None))
+            for effect in self.effects
+            for law in [getattr(effect, "law", effect)]
+        ]
         if len(set(places)) != len(places):
             names = [effect.name for effect in self.effects]
-            raise InvalidInput("effects", names, "each effect once, at each port")
+            raise InvalidInput("effects", names, "each effect once, at each port and order")
 
     @property
     def nominal(self) -> NDArray[np.float64]:

@@ -31,6 +31,22 @@ def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
     return (1.0, *found)
 
 
+def multiples_of(fundamentals: Sequence[float], order: float) -> NDArray[np.int_]:
+    """Return the smallest whole multiples of the fundamentals, 1 first, that sum to ``order``."""
+    spans = [range(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1) for _ in fundamentals[1:]]
+    for parts in sorted(product(*spans), key=lambda parts: sum(map(abs, parts))):
+        rest = order - float(np.dot(parts, fundamentals[1:]))
+        if abs(rest - round(rest)) < _TOLERANCE:
+            return np.array([round(rest), *parts])
+    raise InvalidInput("order", order, f"a sum of multiples of {tuple(fundamentals)}")
+
+
+def largest_multiples(fundamentals: Sequence[float], orders: Sequence[float]) -> list[int]:
+    """Return the largest multiple of each fundamental in any of the ``orders``."""
+    found = np.abs([multiples_of(fundamentals, order) for order in orders])
+    return [int(most) for most in found.max(axis=0)]
+
+
 class Torus:
     """A grid over the phases of ``fundamentals`` and the harmonics up to ``highest`` of each.
 
@@ -99,13 +115,7 @@ class Torus:
         return None
 
     def _find(self, order: float) -> NDArray[np.int_]:
-        """Return the smallest whole multiples that sum to ``order``."""
-        spans = [range(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1) for _ in self.fundamentals[1:]]
-        for parts in sorted(product(*spans), key=lambda parts: sum(map(abs, parts))):
-            rest = order - float(np.dot(parts, self.fundamentals[1:]))
-            if abs(rest - round(rest)) < _TOLERANCE:
-                return np.array([round(rest), *parts])
-        raise InvalidInput("order", order, f"a sum of multiples of {self.fundamentals}")
+        return multiples_of(self.fundamentals, order)
 
     def path(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return grid values (n, G) in the order in which a slow beat passes them, twice over.
