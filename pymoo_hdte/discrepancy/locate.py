@@ -1,8 +1,9 @@
 """Where the model is wrong: the map channel x order x speed x load, and where it may be trusted.
 
 A cell's misfit is weighed by its own marginal covariance, so that it stays in its cell, and held
-against base parameters that the misfit itself did not bias: those fitted jointly with the named
-effects or, where nothing is named, those refitted to the cells that are clean.
+against base parameters that the misfit did not bias: those of the model with its named effects,
+refitted to the cells that it explains. Flagged is what the named effects move by more than the
+noise, and what the model with them still gets wrong.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from pymoo_hdte.discrepancy.misfit_words import sentences
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.revise import accepted_fit
 from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.drive import Effect
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 __all__ = ["Location", "locate", "refit_clean"]
@@ -53,76 +55,68 @@ def locate(analysis: Analysis) -> Location:
     analysis : Analysis
         Of `workflow.analyse`.
     """
-    data, verdict = analysis.data, analysis.verdict
-    best = accepted_fit(verdict)
-    named = bool(best.candidates)
-    if named:
-        base = _trusted_base(data, best)
-        change = data.predict(best.values[None, : len(base)], best.effects)
-        moved = cell_chi_square(data, (change - data.predict(base[None], ()))[0])
-    else:
-        base = refit_clean(data, verdict.base)
-        moved = np.zeros_like(cell_chi_square(data, data.features.values))
-    difference = data.features.values - data.predict(base[None], ())[0]
-    chi_square, sweep = _misfit(data, base)
+    data = analysis.data
+    clean = refit_clean(data, accepted_fit(analysis.verdict))
+    base = clean.values[None, : len(data.base)]
+    without, complete = data.predict(base, ())[0], data.predict(base, clean.effects)[0]
     freedom = degrees_of_freedom(data)
+    chi_square = cell_chi_square(data, data.features.values - without)
+    moved = cell_chi_square(data, complete - without)
+    left = cell_chi_square(data, data.features.values - complete)
+    sweep = _sweep_p_value(data, clean.values, ())
     conditions = data.features.conditions
     found = Location(
         records=tuple(record.name for record in data.features.records),
         speed_rpm=conditions.input_speed / REVOLUTION_PER_MINUTE,
         load_torque=conditions.output_torque,
         orders=np.concatenate([[0.0], data.features.orders]),
-        misfit=as_lines(data, difference),
+        misfit=as_lines(data, data.features.values - without),
         chi_square=chi_square,
         p_value=chi2.sf(chi_square, freedom),
         moved=moved,
-        flagged=moved > freedom if named else _significant(chi_square, freedom),
+        flagged=(moved > freedom) | _significant(left, freedom),
         sweep_p_value=sweep,
         sweep_flagged=_wrong(sweep),
-        named=named,
+        named=bool(clean.candidates),
     )
     sentence, trusted = sentences(found, data, analysis.unexpected)
     return replace(found, sentence=sentence, trusted=trusted)
 
 
-def _trusted_base(data: Data, best: Fit) -> Values:
-    """Return the base values of a fit, within the tolerances that the base has."""
-    lower = np.array([parameter.lower for parameter in data.base])
-    upper = np.array([parameter.upper for parameter in data.base])
-    return np.clip(best.values[: len(data.base)], lower, upper)
-
-
-def refit_clean(data: Data, base: Fit) -> Values:
-    """Refit the base within its bounds to the cells that it does not contradict.
+def refit_clean(data: Data, fitted: Fit) -> Fit:
+    """Refit a model within its bounds to the cells that it does not contradict.
 
     First with the weights of Cauchy's distribution, renewed after every fit, because a misfit that
-    the base has spread over all cells makes clean ones look wrong; then with the cells that are
+    the fit has spread over all cells makes clean ones look wrong; then with the cells that are
     still wrong left out. A torsion sweep that contradicts the running records is left out too.
 
-    Returns
-    -------
-    ndarray, shape (n_base,)
+    Parameters
+    ----------
+    data : Data
+    fitted : Fit
+        Its effects are kept; returned as it is where it contradicts nothing.
     """
-    values, freedom = base.values, degrees_of_freedom(data)
-    chi_square, sweep = _misfit(data, values)
+    freedom = degrees_of_freedom(data)
+    chi_square, sweep = _misfit(data, fitted)
     if not (_significant(chi_square, freedom).any() or _wrong(sweep)):
-        return values
+        return fitted
     factor = np.full_like(chi_square, np.inf)
     for _ in range(_ROUNDS):
         before, factor = factor, 1.0 + chi_square / (_CAUCHY * freedom)
         if np.allclose(before, factor, rtol=_SETTLED, atol=0.0, equal_nan=True):
             break
         weakened = _weakened(data, factor, _wrong(sweep))
-        values = fit(weakened, (), values, _EVALUATIONS).values
-        chi_square, sweep = _misfit(data, values)
+        fitted = fit(weakened, fitted.candidates, fitted.values, _EVALUATIONS)
+        chi_square, sweep = _misfit(data, fitted)
     factor = np.where(_significant(chi_square, freedom), _LEFT_OUT, 1.0)
-    return fit(_weakened(data, factor, _wrong(sweep)), (), values).values
+    return fit(_weakened(data, factor, _wrong(sweep)), fitted.candidates, fitted.values)
 
 
-def _misfit(data: Data, base: Values) -> tuple[Values, float | None]:
+def _misfit(data: Data, fitted: Fit) -> tuple[Values, float | None]:
     """Return the chi-square of all cells and the p-value of the sweep."""
-    difference = data.features.values - data.predict(base[None], ())[0]
-    return cell_chi_square(data, difference), _sweep_p_value(data, base)
+    predicted = data.predict(fitted.values[None, : len(data.base)], fitted.effects)[0]
+    chi_square = cell_chi_square(data, data.features.values - predicted)
+    return chi_square, _sweep_p_value(data, fitted.values, fitted.effects)
 
 
 def _significant(chi_square: Values, freedom: Values) -> Flags:
@@ -151,9 +145,9 @@ def _weakened(data: Data, factor: Values, without_sweep: bool) -> Data:
     return replace(data, features=weakened, torsion=() if without_sweep else data.torsion)
 
 
-def _sweep_p_value(data: Data, base: Values) -> float | None:
+def _sweep_p_value(data: Data, values: Values, effects: tuple[Effect, ...]) -> float | None:
     """Return the chance of a larger misfit of the torsion sweeps; None where there is none."""
-    residuals = data.torsion_residuals(base[None], ())[0]
+    residuals = data.torsion_residuals(values[None, : len(data.base)], effects)[0]
     if not residuals.size:
         return None
     known = np.nan_to_num(residuals, nan=_LOST)

@@ -41,13 +41,13 @@ class Location:
     moved : ndarray, shape (r, 4, 1 + m)
         Chi-square of what the named effects change; zero where none is named.
     flagged : ndarray of bool, shape (r, 4, 1 + m)
-        With named effects, the cells that they move by more than the root mean square of the
-        noise; otherwise those whose misfit is significant at `FALSE_DISCOVERIES`.
+        Cells that the named effects move by more than the root mean square of the noise, and
+        those whose misfit the model with them leaves significant at `FALSE_DISCOVERIES`.
     sweep_p_value : float or None
         Of the torsion sweep, None without one.
     sweep_flagged : bool
     named : bool
-        Whether the flags come from named effects.
+        Whether there are named effects.
     sentence, trusted : str
         Where the misfit lives, and where the model may be trusted as it is.
     """
@@ -90,7 +90,7 @@ class Location:
             "sentence": self.sentence,
             "trusted": self.trusted,
             "cells": self.cells,
-            "rule": "moved by the named effects" if self.named else "false discovery rate 1 %",
+            "rule": "moved by the named effects, or wrong at a false discovery rate of 1 %",
             "flagged": flagged,
             "torsion_sweep": {"p_value": self.sweep_p_value, "flagged": self.sweep_flagged},
         }
