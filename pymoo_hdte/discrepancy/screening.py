@@ -22,6 +22,8 @@ from pymoo_hdte.discrepancy.order_lines import residual_spectrum
 _FALSE_LINES = 1e-3
 """Chance that noise alone shows any line in a whole campaign."""
 _MOST_LINES = 6
+_SEEN_AT_REST = 50.0
+"""Reduction of chi-square beyond which a torsion sweep speaks for an effect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,8 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
     orthonormal, _ = np.linalg.qr(fitted.jacobian)
     left = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
     base = fitted.values[None, : len(data.base)]
-    before = data.predict(base, fitted.effects)
+    stands = data.prediction(base, fitted.effects)
+    before = data.features.of_prediction(stands)
     before_torsion = data.torsion_residuals(base, fitted.effects)
     priors = len(fitted.residuals) - before.size - before_torsion.size
     found = []
@@ -54,7 +57,7 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
         signatures = []
         for start in candidate.starts:
             effects = (*fitted.effects, candidate.build(start))
-            change = data.whiten(data.predict(base, effects) - before)[0]
+            change = data.whiten(data.predict(base, effects, stands.balance) - before)[0]
             torsion = data.torsion_residuals(base, effects) - before_torsion
             signature = np.concatenate([change, np.nan_to_num(torsion[0]), np.zeros(priors)])
             signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
@@ -85,6 +88,34 @@ def _best_start(
         # The first parameter is the strength; the others are shapes.
         best[0] *= np.clip(strengths[place], 0.2, 10.0) if lower[0] >= 0.0 else strengths[place]
     return Screened(candidate, reduction, tuple(np.clip(best, lower, upper).tolist()))
+
+
+def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> str | None:
+    """Return the name of the effect that the torsion sweeps alone speak for, if they do.
+
+    At rest a clearance is a jump at zero torque that no other law imitates, whereas in a running
+    record it may rattle and look like anything.
+    """
+    base = fitted.values[None, : len(data.base)]
+    before = data.torsion_residuals(base, fitted.effects)[0]
+    stiffness, offset = np.eye(len(data.base))[[0, -1]]
+    steps = np.array([0.01 * base[0, 0], 0.05])
+    moved = np.vstack([base + steps[0] * stiffness, base + steps[1] * offset])
+    imitated = (data.torsion_residuals(moved, fitted.effects) - before).T
+    orthonormal, _ = np.linalg.qr(imitated)
+    left = before - orthonormal @ (orthonormal.T @ before)
+    found: list[tuple[float, str]] = []
+    for candidate in candidates:
+        for start in candidate.starts:
+            effects = (*fitted.effects, candidate.build(start))
+            change = np.nan_to_num(data.torsion_residuals(base, effects)[0] - before)
+            change -= orthonormal @ (orthonormal.T @ change)
+            size = float(change @ change)
+            along = float(-change @ left)
+            if size > _SEEN_AT_REST and along > 0.0:
+                found.append((along**2 / size, candidate.name))
+    reduction, name = max(found, default=(0.0, ""))
+    return name if reduction > _SEEN_AT_REST else None
 
 
 def unexpected_orders(features: Features, ratio: float, rig: object) -> list[float]:

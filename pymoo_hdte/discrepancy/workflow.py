@@ -13,7 +13,7 @@ from pymoo_hdte.discrepancy.features import Features, measure
 from pymoo_hdte.discrepancy.fit import Data, Fit, fit, start_parameters
 from pymoo_hdte.discrepancy.library import candidates
 from pymoo_hdte.discrepancy.naming import Verdict, judge
-from pymoo_hdte.discrepancy.screening import unexpected_orders
+from pymoo_hdte.discrepancy.screening import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.torsion_curve import torsion_points
 
 FEWEST_RECORDS = 3
@@ -23,6 +23,7 @@ _SEPARATION = 0.9
 """Least distance of two order lines, in cycles per output turn."""
 _MOST_LINES = 4
 _LINE_CHANCE = 1e-6
+CLEARANCES = ("backlash", "clearance_variation")
 LEAST_LOAD = 0.5
 """N.m, a few times what a torque sensor's zero is known to."""
 
@@ -85,19 +86,13 @@ def analyse(campaign: Campaign) -> Analysis:
     sweeps = [record for record in campaign.torsion if record.role == "train"]
     points = tuple(torsion_points(record, campaign.rig) for record in sweeps)
     data = Data(campaign, features, start_parameters(campaign, features), points)
-    verdict = _judged(data)
-    if verdict.status == "unlisted":
-        loaded = _loaded(data)
-        again = _judged(loaded) if loaded is not data else verdict
-        if again.chosen is not None and again.status != "unlisted" and _opens(again):
-            return Analysis(campaign, loaded, again, tuple(unexpected))
-    return Analysis(campaign, data, verdict, tuple(unexpected))
-
-
-def _judged(data: Data) -> Verdict:
     base = fit(data)
-    listed = candidates(data.campaign.believed, _strong_lines(data.features, base))
-    return judge(data, base, listed)
+    listed = candidates(campaign.believed, _strong_lines(features, base))
+    if leading_sweep_effect(data, base, listed) in CLEARANCES:
+        data = _loaded(data)
+        base = fit(data)
+        listed = candidates(campaign.believed, _strong_lines(data.features, base))
+    return Analysis(campaign, data, judge(data, base, listed), tuple(unexpected))
 
 
 def _loaded(data: Data) -> Data:
@@ -113,14 +108,6 @@ def _loaded(data: Data) -> Data:
     if np.all(held) or held.sum() < FEWEST_RECORDS:
         return data
     return replace(data, features=features.rows(np.flatnonzero(held)))
-
-
-def _opens(verdict: Verdict) -> bool:
-    """Tell whether all effects named are clearances."""
-    chosen = verdict.chosen
-    return chosen is not None and all(
-        candidate.name in ("backlash", "clearance_variation") for candidate in chosen.candidates
-    )
 
 
 def _apart(wanted: list[float], campaign: Campaign, highest: float) -> list[float]:
