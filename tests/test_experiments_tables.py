@@ -86,7 +86,14 @@ def test_workers_and_repetition_do_not_change_a_byte(tmp_path):
 def test_ctrl_c_leaves_a_readable_report_and_code_130(tmp_path):
     arguments = ["table7", "--workers", "2", "--out", str(tmp_path)]
     command = [sys.executable, "-m", "experiments", *arguments]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    process = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # A shell starts background jobs deaf to Ctrl-C, and the suite may be one.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     while not list(tmp_path.glob("runs/*/*.csv")) and process.poll() is None:
         time.sleep(0.05)
     # A terminal sends Ctrl-C to the workers as well.
