@@ -84,7 +84,8 @@ class Campaign:
         return [self._read(job) for job in jobs]
 
     def _path(self, job: Job) -> Path:
-        source = fingerprint(Path(inspect.getfile(type(job))))
+        # A job's outcome may depend on any module of its package, not only on its own.
+        source = fingerprint(*sorted(Path(inspect.getfile(type(job))).parent.glob("*.py")))
         return self.out / "runs" / source / f"{job.key}.csv"
 
     def _time_path(self, job: Job) -> Path:

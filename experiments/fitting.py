@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -92,7 +93,8 @@ class Bootstrap:
     def key(self) -> str:
         """All settings in one name."""
         name = f"{self.direction}_{self.candidate.name}_{self.budget.name}"
-        return f"bootstrap_{name}_seed{self.seed}"
+        start = hashlib.sha256(repr(self.parameters).encode()).hexdigest()[:8]
+        return f"bootstrap_{name}_from{start}_seed{self.seed}"
 
     def execute(self) -> Run:
         """Refit locally; one row as `outcome_row` has it."""

@@ -83,7 +83,7 @@ def predict(model: DriveModel, bands: str, names: Sequence[str]) -> dict[str, fl
     for order in (2, 3):
         if f"rmse_{order}" in names:
             found[f"rmse_{order}"] = _surrogate_rmse(model, bands, order)
-    if "prototypes_mean" in names:
+    if any(name.startswith("prototypes") for name in names):
         values = prototype_dte(model)
         found["prototypes_mean"], found["prototypes_std"] = values.mean(), values.std()
     return {name: float(found[name]) for name in names}

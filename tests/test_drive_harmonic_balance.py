@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import PRESETS, DampingReference, LoadInertia, preset, simulate
+from pymoo_hdte.drive import (
+    PRESETS,
+    DampingReference,
+    LoadInertia,
+    MeshStiffnessVariation,
+    UnstableDrive,
+    preset,
+    simulate,
+)
 from pymoo_hdte.drive.balance import SpeedLoop
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.drive.friction import (
@@ -126,6 +134,93 @@ def test_the_loop_torque_is_what_its_gains_say():
     moving = balance.torus.orders != 0.0
     size = np.abs(expected).max()
     assert balance.motor_torque[:, moving] == pytest.approx(expected[:, moving], abs=5e-3 * size)
+
+
+def test_the_coupling_torque_is_the_load_and_what_the_load_inertia_takes():
+    model = preset("resonant")
+    coefficients = model.coefficients(model.nominal[None])
+    # With the input held at its speed the output's acceleration is that of -theta_d.
+    balance = harmonic_balance(coefficients, motor=SpeedLoop(1e4, 0.0))
+    frequency = coefficients.input_speed * balance.torus.orders
+    expected = coefficients.load_inertia * frequency**2 * balance.transmission_error
+    expected[:, 0] = coefficients.load_torque
+    size = np.abs(expected[:, 1:]).max()
+    assert balance.coupling_torque == pytest.approx(expected, abs=1e-4 * size)
+
+
+def test_laws_have_the_signs_that_their_names_say():
+    stiffness = np.array([2.5e4])
+
+    def torque(law, position=0.0, angle=0.0):
+        state = PortState(np.array([position]), np.ones(1), periodic_phase(angle), stiffness)
+        return float(np.ravel(law.respond(state).torque)[0])
+
+    # Beyond the clearance the spring has lost K b; within it, K d: nothing is left of K d.
+    assert torque(DeadZone(1e-4), 5e-4) == pytest.approx(-2.5e4 * 1e-4)
+    assert torque(DeadZone(1e-4), 5e-5) == pytest.approx(-2.5e4 * 5e-5, rel=1e-3)
+    assert torque(PeriodicClearance(1.0, 0.0, 1e-4), 5e-4) == pytest.approx(-2.5e4 * 1e-4)
+    assert torque(PeriodicClearance(1.0, np.pi, 1e-4), 5e-4) == pytest.approx(0.0, abs=1e-6)
+    # A ripple drives, everything else opposes.
+    assert torque(PeriodicTorque(6.0, 0.0, 0.1)) == pytest.approx(-0.1)
+    assert torque(PeriodicFriction(2.0, 0.0, 0.1)) == pytest.approx(0.1)
+    line = KinematicErrorLine(3.0, 2.0, 0.7)
+    model = preset("published")
+    coefficients = line.apply(model.coefficients(model.nominal[None]))
+    angle = 0.3
+    phasor = coefficients.error_phasors[0, -1] * np.exp(1j * coefficients.error_orders[-1] * angle)
+    assert phasor.real == pytest.approx(2.0 * np.sin(3.0 * angle + 0.7))
+
+
+def test_friction_of_the_output_varies_with_the_output_turn():
+    effect = LawAtPort("position_dependent_friction", "output", PeriodicFriction(1.0, 0.0, 1.0))
+    model = with_effects(preset("published"), effect)
+    coefficients = model.coefficients(model.nominal[None])
+    balance = harmonic_balance(coefficients, motor=SpeedLoop(10.0, 0.0))
+    place, _ = balance.torus.place(1.0 / 101.0)
+    # Slow and with a held input: the mesh carries the friction, torsion by torsion.
+    expected = 1.0 / coefficients.stiffness[0]
+    assert balance.torsion[0, place] == pytest.approx(expected, rel=1e-2)
+
+
+def test_an_unstable_drive_is_refused_with_laws_as_without():
+    effects = (
+        LoadInertia(0.395),
+        DampingReference(0.01),
+        MeshStiffnessVariation(0.3, 0.0),
+    )
+    model = replace(preset("published"), effects=effects).at(280.0, 40.0)
+    with pytest.raises(UnstableDrive):
+        model.dte_arcsec(model.nominal[None])
+    for more in (EFFECTS[5], KinematicReaction(1e-9)):
+        with pytest.raises(UnstableDrive):
+            with_effects(model, more).dte_arcsec(model.nominal[None])
+
+
+def test_no_designs_give_no_values_with_laws_either():
+    assert with_effects(preset("published"), EFFECTS[0]).dte_arcsec(np.empty((0, 5))).shape == (0,)
+
+
+@pytest.mark.parametrize("ratio", [60, 96, 101, 120, 161])
+def test_orders_of_the_output_turn_share_an_angle(ratio):
+    fundamentals = fundamental_orders([1.0, 2.0, 1.0 / ratio, 4.0 / ratio])
+    torus = Torus(fundamentals, (2, 4))
+    assert len(fundamentals) == 2
+    place, _ = torus.place(4.0 / ratio)
+    assert torus.orders[place] == pytest.approx(4.0 / ratio)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        lambda bad: PeriodicClearance(1.0, 0.0, bad),
+        lambda bad: PeriodicFriction(1.0, 0.0, bad),
+        lambda bad: PeriodicTorque(1.0, 0.0, bad),
+    ],
+)
+@pytest.mark.parametrize("bad", [np.nan, "a"])
+def test_strengths_of_periodic_laws_are_checked(law, bad):
+    with pytest.raises(InvalidInput, match=r"half_width|level|amplitude"):
+        law(bad)
 
 
 def test_every_row_may_have_its_own_condition():

@@ -84,6 +84,10 @@ class PeriodicFriction(Periodic):
 
     level: float
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        real_number("position_dependent_friction.level", self.level)
+
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
         sign, slope = _sign(state.speed)
@@ -96,6 +100,10 @@ class PeriodicTorque(Periodic):
     """A driving torque amplitude cos(order angle + phase), N.m: it acts with the motion."""
 
     amplitude: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        real_number("torque_ripple.amplitude", self.amplitude)
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents; negative, as the driving torque does not oppose."""

@@ -87,7 +87,7 @@ def harmonic_balance(
     load = np.broadcast_to(coefficients.load_torque if load_torque is None else load_torque, n)
     torus = torus_of(coefficients) if torus is None else torus
     parts = []
-    for first in range(0, n, _ROWS_AT_ONCE):
+    for first in range(0, max(n, 1), _ROWS_AT_ONCE):
         rows = slice(first, first + _ROWS_AT_ONCE)
         solver = _Solver(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
         if start is not None and np.array_equal(start.torus.orders, torus.orders):

@@ -86,6 +86,10 @@ class PeriodicClearance(Periodic):
 
     half_width: float
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        real_number("clearance_variation.half_width", self.half_width, at_least=0.0)
+
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
         return _dead_zone(state, 0.5 * self.half_width * (1.0 + self.cosine(state)))

@@ -254,8 +254,8 @@ def preset(name: str) -> DriveModel:
     """Return one of the `PRESETS` of the HS-20-100.
 
     ``"published"`` is Eq. (9) with the printed values; ``"calibrated"`` adds named effects whose
-    values were fitted to published statistics; ``"resonant"`` is a second fit, under another
-    reading of the bands, with a resonance between the excited orders.
+    values were fitted to published statistics; ``"resonant"`` is an earlier fit with a
+    disconnected front, a harder benchmark.
 
     Raises
     ------

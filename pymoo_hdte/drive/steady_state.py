@@ -50,6 +50,8 @@ def steady_state(coefficients: Coefficients) -> OrderSpectrum:
         If laws at ports are such that the harmonic balance finds no steady state.
     """
     if coefficients.laws or coefficients.reaction:
+        if coefficients.stiffness_depth != 0.0:
+            require_stable(coefficients)
         balance = harmonic_balance(coefficients)
         lost = int(np.sum(~balance.converged))
         if lost:

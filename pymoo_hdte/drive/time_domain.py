@@ -266,7 +266,10 @@ def _holding_torque(coefficients: Coefficients) -> float:
     if not (coefficients.laws or coefficients.reaction):
         mean = float(coefficients.mean_mesh_torque) / coefficients.ratio
         return float(coefficients.input_damping[0]) * coefficients.input_speed + mean
-    return float(harmonic_balance(coefficients).motor_torque[0, 0].real)
+    balance = harmonic_balance(coefficients)
+    if not balance.converged[0]:
+        raise ArithmeticError("no steady state found whose mean input torque holds the speed")
+    return float(balance.motor_torque[0, 0].real)
 
 
 def _aperiodic(coefficients: Coefficients) -> tuple[tuple[str, Law], ...]:

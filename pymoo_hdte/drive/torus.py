@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 
-_TOLERANCE = 1e-9
+_TOLERANCE = 1e-8
 _LARGEST_MULTIPLE = 4
 """An order whose fraction is up to this many times a known one needs no angle of its own."""
 
@@ -75,7 +75,7 @@ class Torus:
         half = [k for k in every if k > (0,) * len(k)]
         self._multiples = np.array([(0,) * len(self.highest), *half])
         self.orders = self._multiples @ np.array(self.fundamentals)
-        # Four points a cycle of the highest harmonic: cubic products do not fold back.
+        # Four points a cycle of the highest harmonic: no square folds back, of the cubes only its.
         grids = [2.0 * np.pi * np.arange(4 * most) / (4 * most) for most in self.highest]
         mesh = np.meshgrid(*grids, indexing="ij")
         self._shape = mesh[0].shape
