@@ -29,13 +29,19 @@ SETTING = (
 )
 
 
+FLOWCHART = (
+    "Fig. 16 is the flow chart of the algorithm and shows no result; its steps stand, one part "
+    "each, in pymoo_hdte.algorithms, and the variants here leave parts out."
+)
+
+
 def run(context: Context) -> Result:
     """Compare AMP-MOPSO with itself less one or both strategies."""
     comparisons = compare(context, PARTS, "ablation")
     return Result(
         title=f"Fig. 17: ablation of AMP-MOPSO, seeds 1 to {context.seeds}",
         command=f"python -m experiments ablation --seeds {context.seeds}",
-        paragraphs=(SETTING,),
+        paragraphs=(SETTING, FLOWCHART),
         tables=(
             quality_table(comparisons, TABLE_7, list(_evenness(comparisons))),
             coverage_table(comparisons, list(_gaps(comparisons))),
