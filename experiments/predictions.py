@@ -94,9 +94,7 @@ def surrogate_moments(model: DriveModel, bands: str, order: int) -> dict[str, fl
 
     Its box is that of `RobustDTE`: theta_s over mean +- 3 std, the others +-35 %.
     """
-    lower, upper = model.nominal * (1.0 - SURROGATE_BOX), model.nominal * (1.0 + SURROGATE_BOX)
-    lower[0], upper[0] = theta_s_scatter(model).support
-    surrogate = _fit(model, Box(PARAMETERS, lower, upper), order)
+    surrogate = _fit(model, uncertain_box(model, WIDE), order)
     found = {}
     for design, values in {"initial": tuple(model.nominal[1:]), **TABLE_9}.items():
         band = BAND["initial" if design == "initial" else "optimum"][bands]

@@ -26,7 +26,7 @@ from pymoo_hdte.drive import Balance, Effect, mean_torsion
 _STEP = 1e-3
 """Step of difference quotients, in units of a parameter's scale."""
 _EVALUATIONS = 25
-_LOST = 1e3
+LOST = 1e3
 """Residual of a point at which the model cannot carry the torque."""
 
 Vector = NDArray[np.float64]
@@ -52,11 +52,14 @@ class Data:
 
     @cached_property
     def whiteners(self) -> NDArray[np.float64]:
-        """Lower triangles L, shape (r, f, f), of the covariance L L^T of each record."""
+        """Lower triangles L, shape (r, f, f), of the `covariance` L L^T of each record."""
+        return np.asarray(np.linalg.cholesky(self.covariance), dtype=np.float64)
+
+    @cached_property
+    def covariance(self) -> NDArray[np.float64]:
+        """Of the features of each record, sensors and repeatability, shape (r, f, f)."""
         layout = Layout(self.base)
-        start = layout.array("start")
-        covariance = self.features.covariance + self._repeatability(layout, start)
-        return np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+        return self.features.covariance + self._repeatability(layout, layout.array("start"))
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
         """Return the covariance that small changes of the static error give each record."""
@@ -154,7 +157,7 @@ class Fit:
     @property
     def effects(self) -> tuple[Effect, ...]:
         """The fitted effects."""
-        return built(self.candidates, self.values[-count(self.candidates) or len(self.values) :])
+        return built(self.candidates, self.values[len(self.values) - count(self.candidates) :])
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:
@@ -219,7 +222,7 @@ class Objective:
         whole = np.tile(values, (len(vectors), 1))
         whole[:, :n_base] = vectors
         priors = ((whole - self.start) / self.prior)[:, self.bounded]
-        return np.nan_to_num(np.concatenate([white, torsion, priors], axis=1), nan=_LOST)
+        return np.nan_to_num(np.concatenate([white, torsion, priors], axis=1), nan=LOST)
 
     def jacobian(self, values: Vector) -> NDArray[np.float64]:
         """Return the derivatives of the residuals by parameters in units of their scale."""

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.features import MEANS
-from pymoo_hdte.discrepancy.fit import Data, Fit, fit
+from pymoo_hdte.discrepancy.fit import LOST, Data, Fit, fit
 from pymoo_hdte.discrepancy.misfit_map import (
     FALSE_DISCOVERIES,
     Flags,
@@ -43,8 +43,6 @@ _CAUCHY = 4.0
 """Square of the scale of Cauchy's weights, in variances."""
 _LEFT_OUT = 1e8
 """Factor on the variance of a cell that is left out of a fit."""
-_LOST = 1e3
-"""Residual of a point at which the model cannot carry the torque."""
 
 
 def locate(analysis: Analysis) -> Location:
@@ -139,7 +137,7 @@ def _weakened(data: Data, factor: Values, without_sweep: bool) -> Data:
     covariance = features.covariance.copy()
     diagonal = np.arange(features.values.shape[1])
     # Added to the whole covariance, that of the repeatability included, not to the sensors' alone.
-    variance = np.sum(data.whiteners**2, axis=2)
+    variance = np.diagonal(data.covariance, axis1=1, axis2=2)
     covariance[:, diagonal, diagonal] += (by_feature - 1.0) * variance
     weakened = replace(features, covariance=covariance)
     return replace(data, features=weakened, torsion=() if without_sweep else data.torsion)
@@ -150,5 +148,5 @@ def _sweep_p_value(data: Data, values: Values, effects: tuple[Effect, ...]) -> f
     residuals = data.torsion_residuals(values[None, : len(data.base)], effects)[0]
     if not residuals.size:
         return None
-    known = np.nan_to_num(residuals, nan=_LOST)
+    known = np.nan_to_num(residuals, nan=LOST)
     return float(chi2.sf(known @ known, known.size))

@@ -105,8 +105,7 @@ def degrees_of_freedom(data: Data) -> Values:
 
 def cell_chi_square(data: Data, difference: Values) -> Values:
     """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m)."""
-    triangles = data.whiteners
-    covariance = triangles @ np.swapaxes(triangles, 1, 2)
+    covariance = data.covariance
     found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan)
     for channel in range(len(CHANNELS)):
         if channel in MEANS:

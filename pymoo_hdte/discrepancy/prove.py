@@ -139,8 +139,7 @@ def prove(analysis: Analysis) -> Proof | None:
     overall = np.sqrt(np.mean(white**2, axis=(1, 2)))
     # Squares (2, r, channel, 1 + m) that each mean and line adds, and the same of the noise.
     squares = np.stack([_squares(data, difference**2, channel) for channel in range(3)], axis=2)
-    variances = np.einsum("rij,rkj->rik", data.whiteners, data.whiteners)
-    noise = np.diagonal(variances, axis1=1, axis2=2)
+    noise = np.diagonal(data.covariance, axis1=1, axis2=2)
     floor = np.stack([_squares(data, noise, channel) for channel in range(3)], axis=1)
     gaps = {
         name: _gap(squares[:, :, place].sum(axis=2), floor[:, place].sum(axis=1), name)

@@ -81,8 +81,9 @@ def analyse(campaign: Campaign) -> Analysis:
     expected = expected_orders(campaign)
     features = measure(campaign, campaign.train, expected)
     unexpected = unexpected_orders(features, ratio, campaign.rig)
-    orders = _apart([*expected, *unexpected], campaign, HIGHEST_ORDER)
-    features = measure(campaign, campaign.train, orders)
+    if unexpected:
+        orders = _apart([*expected, *unexpected], campaign, HIGHEST_ORDER)
+        features = measure(campaign, campaign.train, orders)
     sweeps = [record for record in campaign.torsion if record.role == "train"]
     points = tuple(torsion_points(record, campaign.rig) for record in sweeps)
     data = Data(campaign, features, start_parameters(campaign, features), points)

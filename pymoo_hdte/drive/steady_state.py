@@ -49,9 +49,9 @@ def steady_state(coefficients: Coefficients) -> OrderSpectrum:
     ArithmeticError
         If laws at ports are such that the harmonic balance finds no steady state.
     """
+    if coefficients.stiffness_depth != 0.0:
+        require_stable(coefficients)
     if coefficients.laws or coefficients.reaction:
-        if coefficients.stiffness_depth != 0.0:
-            require_stable(coefficients)
         balance = harmonic_balance(coefficients)
         lost = int(np.sum(~balance.converged))
         if lost:
@@ -61,7 +61,6 @@ def steady_state(coefficients: Coefficients) -> OrderSpectrum:
         orders = coefficients.error_orders
         response = transfer_function(coefficients, orders) * coefficients.error_phasors
         return OrderSpectrum(orders, response)
-    require_stable(coefficients)
     # The mean torque belongs to the family of order 0, whether or not an error line does.
     orders = np.concatenate([coefficients.error_orders, [0.0]])
     firsts, family = np.unique(np.round(np.mod(orders, 2.0), 9) % 2.0, return_inverse=True)

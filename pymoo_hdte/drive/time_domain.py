@@ -19,7 +19,7 @@ from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
 from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.harmonic_balance import harmonic_balance
 from pymoo_hdte.drive.hysteresis import SPRINGS, MaxwellSlip
-from pymoo_hdte.drive.laws import Law, PortState, periodic_phase
+from pymoo_hdte.drive.laws import PORTS, Law, PortState, periodic_phase
 from pymoo_hdte.drive.model import PARAMETERS, DriveModel
 from pymoo_hdte.units import ARCSEC
 
@@ -282,13 +282,17 @@ def _laws_at_ports(coefficients: Coefficients) -> Callable[[str, float, float, f
     Laws with memory are left out: their state is the integrator's (see `_springs`).
     """
     stiffness = coefficients.stiffness[:1]
-
-    def torque(port: str, position: float, speed: float, angle: float) -> float:
-        here = [
+    at_port = {
+        port: [
             law
             for place, law in coefficients.laws
             if place == port and not isinstance(law, MaxwellSlip)
         ]
+        for port in PORTS
+    }
+
+    def torque(port: str, position: float, speed: float, angle: float) -> float:
+        here = at_port[port]
         if not here:
             return 0.0
         state = PortState(np.array([position]), np.array([speed]), periodic_phase(angle), stiffness)
