@@ -32,7 +32,7 @@ from pymoo_hdte.drive.mesh_laws import DeadZone, PeriodicClearance
 from pymoo_hdte.drive.torus import Torus
 
 CLEARANCES = (DeadZone, PeriodicClearance)
-TOLERANCE = 1e-8
+TOLERANCE = 1e-7
 """Of the harmonic balance: far below the noise, and twice as fast as full precision."""
 
 

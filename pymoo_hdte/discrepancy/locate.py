@@ -104,10 +104,13 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
         if np.allclose(before, factor, rtol=_SETTLED, atol=0.0, equal_nan=True):
             break
         weakened = _weakened(data, factor, _wrong(sweep))
-        fitted = fit(weakened, fitted.candidates, fitted.values, _EVALUATIONS)
+        fitted = fit(
+                weakened, fitted.candidates, fitted.values, _EVALUATIONS, fitted.slopes
+            )
         chi_square, sweep = _misfit(data, fitted)
     factor = np.where(_significant(chi_square, freedom), _LEFT_OUT, 1.0)
-    return fit(_weakened(data, factor, _wrong(sweep)), fitted.candidates, fitted.values)
+    weakened = _weakened(data, factor, _wrong(sweep))
+    return fit(weakened, fitted.candidates, fitted.values, slopes=fitted.slopes)
 
 
 def _misfit(data: Data, fitted: Fit) -> tuple[Values, float | None]:

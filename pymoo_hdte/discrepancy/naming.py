@@ -152,7 +152,7 @@ def _fit_best(data: Data, base: Fit, screened: Sequence[Screened], excess: float
     for one in [one for one in screened[:FITTED] if one.reduction >= least]:
         start = np.concatenate([base.values, one.start])
         effects = (*base.candidates, one.candidate)
-        fitted = fit(data, effects, start, EVALUATIONS[len(effects)])
+        fitted = fit(data, effects, start, EVALUATIONS[len(effects)], base.slopes)
         found.append(_rival(fitted, excess))
     return sorted(found, key=lambda rival: rival.bic)
 
