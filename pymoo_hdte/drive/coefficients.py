@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.laws import Law
+from pymoo_hdte.drive.mesh_laws import PeriodicStiffness
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,14 @@ class Coefficients:
     def mean_mesh_torque(self) -> float | NDArray[np.float64]:
         """Mean of k d + c d' in steady state: load and bearing friction, N.m at the output."""
         return self.load_torque + self.output_damping * self.input_speed / self.ratio
+
+    @property
+    def stiffness_variations(self) -> tuple[PeriodicStiffness, ...]:
+        """All that the stiffness varies by with the input angle: its own order 2, and laws."""
+        laws = tuple(law for _, law in self.laws if isinstance(law, PeriodicStiffness))
+        if self.stiffness_depth == 0.0:
+            return laws
+        return (PeriodicStiffness(2.0, self.stiffness_phase, self.stiffness_depth), *laws)
 
 
 _BY_DESIGN = (

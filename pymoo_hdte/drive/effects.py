@@ -13,6 +13,7 @@ from typing import ClassVar, Protocol
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.mesh_laws import PeriodicStiffness
 from pymoo_hdte.drive.port_effects import (
     LAWS,
     KinematicErrorLine,
@@ -21,6 +22,9 @@ from pymoo_hdte.drive.port_effects import (
 )
 from pymoo_hdte.drive.sensor_effects import Eccentricity, ThermalDrift
 from pymoo_hdte.drive.toml_fields import Fields
+
+WAVE_GENERATOR_ORDER = 2.0
+"""Order of what the two lobes of the wave generator do, in cycles per input turn."""
 
 
 class Effect(Protocol):
@@ -101,9 +105,9 @@ class DampingReference:
 
 @dataclass(frozen=True)
 class MeshStiffnessVariation:
-    """Stiffness that varies twice per input turn, K (1 + depth cos(2 theta_in + phase)).
+    """Stiffness that varies with the input angle, K (1 + depth cos(order theta_in + phase)).
 
-    Under load it excites order 2 by itself and couples all orders that differ by 2. Gu, Tong,
+    Under load it excites its order by itself and couples all orders that differ by it. Gu, Tong,
     Huang, Li (J. Vibroengineering 2021, article 21633) use and measure a time-varying stiffness.
 
     Attributes
@@ -112,24 +116,32 @@ class MeshStiffnessVariation:
         kappa, dimensionless, at least 0 and below 1.
     phase : float
         psi, rad.
+    order : float
+        Cycles per input turn; 2 is that of the wave generator's two lobes.
     """
 
     name: ClassVar[str] = "mesh_stiffness_variation"
     depth: float
     phase: float
+    order: float = WAVE_GENERATOR_ORDER
 
     def __post_init__(self) -> None:
         real_number("mesh_stiffness_variation.depth", self.depth, at_least=0.0, below=1.0)
         real_number("mesh_stiffness_variation.phase", self.phase)
+        real_number("mesh_stiffness_variation.order", self.order, above=0.0)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
-        """Return the coefficients with the varying stiffness."""
-        return replace(coefficients, stiffness_depth=self.depth, stiffness_phase=self.phase)
+        """Return the coefficients with the varying stiffness; Hill's method knows order 2 only."""
+        if self.order == WAVE_GENERATOR_ORDER:
+            return replace(coefficients, stiffness_depth=self.depth, stiffness_phase=self.phase)
+        law = PeriodicStiffness(self.order, self.phase, self.depth)
+        return replace(coefficients, laws=(*coefficients.laws, ("mesh", law)))
 
     def to_dict(self) -> dict[str, object]:
         """Return the effect as a TOML-like table."""
+        order = {} if self.order == WAVE_GENERATOR_ORDER else {"order": self.order}
         phase = {"value": self.phase, "unit": "rad"}
-        return {"name": self.name, "depth": self.depth, "phase": phase}
+        return {"name": self.name, "depth": self.depth, "phase": phase} | order
 
 
 def effect_from_fields(table: Fields) -> Effect:
@@ -147,7 +159,9 @@ def effect_from_fields(table: Fields) -> Effect:
         case DampingReference.name:
             effect = DampingReference(table.number("factor"))
         case MeshStiffnessVariation.name:
-            effect = MeshStiffnessVariation(table.number("depth"), table.quantity("phase", "angle"))
+            depth, phase = table.number("depth"), table.quantity("phase", "angle")
+            order = table.number("order") if table.has("order") else WAVE_GENERATOR_ORDER
+            effect = MeshStiffnessVariation(depth, phase, order)
         case KinematicErrorLine.name:
             amplitude, phase = (
                 table.quantity("amplitude", "angle"),

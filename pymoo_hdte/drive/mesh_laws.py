@@ -1,4 +1,4 @@
-"""Laws of torque over torsion without memory: curved and missing stiffness."""
+"""Laws of torque over torsion without memory: curved, varying and missing stiffness."""
 
 from __future__ import annotations
 
@@ -46,6 +46,22 @@ class SoftWindup(Aperiodic):
         wound = np.tanh(state.position / self.torsion)
         lost = self.softening * state.stiffness
         return Response(-lost * self.torsion * wound, -lost * (1.0 - wound**2))
+
+
+@dataclass(frozen=True)
+class PeriodicStiffness(Periodic):
+    """T = depth K cos(order angle + phase) d: what a varying stiffness adds to its mean."""
+
+    depth: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        real_number("mesh_stiffness_variation.depth", self.depth, at_least=0.0, below=1.0)
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents."""
+        added = self.depth * state.stiffness * self.cosine(state)
+        return Response(added * state.position, added)
 
 
 ROUNDING = 0.05

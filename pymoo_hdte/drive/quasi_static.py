@@ -15,7 +15,7 @@ from pymoo_hdte.checks import finite_array
 from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.friction import CoulombFriction, StribeckFriction
 from pymoo_hdte.drive.laws import Law, PortState, Response, Values, periodic_phase
-from pymoo_hdte.drive.mesh_laws import DeadZone, PeriodicClearance
+from pymoo_hdte.drive.mesh_laws import DeadZone, PeriodicClearance, PeriodicStiffness
 
 _STEPS = 100
 _TOLERANCE = 1e-12
@@ -35,7 +35,7 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     Where a clearance leaves the torsion free, it moves no further than it must.
 
     The angle of the locked input is not known: a stiffness and clearances that vary with it are
-    taken at their means, which is wrong by up to ``stiffness_depth`` and by up to half the
+    taken at their means, which is wrong by up to the depth of the variation and by up to half the
     clearance, and angle-periodic friction as none. The static error is a constant and is left out.
 
     Parameters
@@ -164,7 +164,11 @@ class _Leg:
 def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     """Yield the legs of the path from rest."""
     torque = finite_array("torque", torque, (None,))
-    mesh_laws = tuple(_at_mean(law) for port, law in coefficients.laws if port == "mesh")
+    mesh_laws = tuple(
+        _at_mean(law)
+        for port, law in coefficients.laws
+        if port == "mesh" and not isinstance(law, PeriodicStiffness)
+    )
     mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
     held = _play(
         torque, sum(_breakaway(law) for port, law in coefficients.laws if port == "output")

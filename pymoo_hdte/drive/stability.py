@@ -5,6 +5,9 @@ Hill's method answers for an unstable drive too, so its callers ask here first.
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +15,8 @@ from pymoo_hdte.drive.coefficients import Coefficients
 
 _LEAST_STEPS = 64
 _MOST_STEPS = 4096
+"""Of each cycle of the fastest variation."""
+_LARGEST_DENOMINATOR = 1000
 _PHASE_PER_STEP = 1.0
 """Radians of the fastest torsional vibration that one step may span."""
 _ROUNDING = 1e-9
@@ -22,19 +27,23 @@ class UnstableDrive(ArithmeticError):
 
 
 def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
-    """Return the multipliers over one period of the stiffness (half an input turn), shape (n, 3).
+    """Return the multipliers over one period of the stiffness, shape (n, 3).
 
-    The state is (th_in', d', d). The transition matrix is a product of steps with the stiffness of
-    their midpoints, each the (2, 2) Pade approximant of the exponential: it is A-stable, so stiff
-    damping costs no small steps, and of second order in the step. Steps resolve the torsional
-    vibration; see `require_stable` for drives so slow that they cannot.
+    The period is that of all orders together: half an input turn for order 2, and for a constant
+    stiffness. Other laws are left out. The state is (th_in', d', d). The transition matrix is a
+    product of steps with the stiffness of their midpoints, each the (2, 2) Pade approximant of the
+    exponential: it is A-stable, so stiff damping costs no small steps, and of second order in the
+    step. Steps resolve the torsional vibration; see `require_stable` for drives so slow that they
+    cannot.
     """
-    steps = int(np.clip(np.ceil(_phase(coefficients)), _LEAST_STEPS, _MOST_STEPS))
-    step = np.pi / coefficients.input_speed / steps
+    period, cycles = _period(coefficients)
+    least, most = _LEAST_STEPS * cycles, _MOST_STEPS * cycles
+    steps = int(np.clip(np.ceil(_phase(coefficients, period)), least, most))
+    step = period / coefficients.input_speed / steps
     identity = np.eye(3)
     transition = np.tile(identity, (len(coefficients.stiffness), 1, 1))
     for index in range(steps):
-        angle = (index + 0.5) * np.pi / steps
+        angle = (index + 0.5) * period / steps
         scaled = step * _state_matrix(coefficients, angle)
         square = scaled @ scaled / 12.0
         forward, backward = identity + scaled / 2.0 + square, identity - scaled / 2.0 + square
@@ -42,13 +51,27 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
     return np.linalg.eigvals(transition).astype(np.complex128)
 
 
-def _phase(coefficients: Coefficients) -> float:
+def _period(coefficients: Coefficients) -> tuple[float, int]:
+    """Return the input angle in which the stiffness repeats, and its fastest cycles therein."""
+    orders = [
+        Fraction(law.order).limit_denominator(_LARGEST_DENOMINATOR)
+        for law in coefficients.stiffness_variations
+    ] or [Fraction(2)]
+    common = Fraction(
+        math.gcd(*(order.numerator for order in orders)),
+        math.lcm(*(order.denominator for order in orders)),
+    )
+    return 2.0 * math.pi / float(common), int(max(orders) / common)
+
+
+def _phase(coefficients: Coefficients, period: float) -> float:
     """Return the phase of the fastest torsional vibration in one period, in `_PHASE_PER_STEP`."""
     compliance = 1.0 / (coefficients.input_inertia * coefficients.ratio**2)
     compliance += 1.0 / coefficients.output_inertia
-    stiffest = coefficients.stiffness * (1.0 + coefficients.stiffness_depth)
+    depth = sum(law.depth for law in coefficients.stiffness_variations)
+    stiffest = coefficients.stiffness * (1.0 + depth)
     fastest = np.sqrt(np.max(stiffest * compliance, initial=0.0))
-    return float(fastest * np.pi / coefficients.input_speed / _PHASE_PER_STEP)
+    return float(fastest * period / coefficients.input_speed / _PHASE_PER_STEP)
 
 
 def require_stable(coefficients: Coefficients) -> None:
@@ -56,9 +79,12 @@ def require_stable(coefficients: Coefficients) -> None:
 
     A stiffness that varies a thousand times more slowly than the drive vibrates pumps no energy
     into it (tongues of parametric resonance shrink exponentially with their order), so such drives
-    pass as stable without integration.
+    pass as stable without integration, as does a constant stiffness.
     """
-    if not len(coefficients.stiffness) or _phase(coefficients) > 2.0 * _MOST_STEPS:
+    if not (len(coefficients.stiffness) and coefficients.stiffness_variations):
+        return
+    period, cycles = _period(coefficients)
+    if _phase(coefficients, period) > 2.0 * _MOST_STEPS * cycles:
         return
     largest = np.abs(floquet_multipliers(coefficients)).max(axis=1)
     worst = int(np.argmax(largest))
@@ -71,8 +97,11 @@ def require_stable(coefficients: Coefficients) -> None:
 
 
 def _state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.float64]:
-    variation = np.cos(2.0 * input_angle + coefficients.stiffness_phase)
-    stiffness = coefficients.stiffness * (1.0 + coefficients.stiffness_depth * variation)
+    variation = sum(
+        law.depth * np.cos(law.order * input_angle + law.phase)
+        for law in coefficients.stiffness_variations
+    )
+    stiffness = coefficients.stiffness * (1.0 + variation)
     ratio, damping = coefficients.ratio, coefficients.damping
     bearing = coefficients.output_damping
     matrix = np.zeros((len(stiffness), 3, 3))

@@ -49,8 +49,7 @@ def steady_state(coefficients: Coefficients) -> OrderSpectrum:
     ArithmeticError
         If laws at ports are such that the harmonic balance finds no steady state.
     """
-    if coefficients.stiffness_depth != 0.0:
-        require_stable(coefficients)
+    require_stable(coefficients)
     if coefficients.laws or coefficients.reaction:
         balance = harmonic_balance(coefficients)
         lost = int(np.sum(~balance.converged))
