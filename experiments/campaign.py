@@ -27,11 +27,15 @@ from experiments.workers import interrupts_held_off
 
 @dataclass(frozen=True)
 class Run:
-    """What one job gives: named columns of numbers (n, columns), and the seconds it took."""
+    """What one job gives: named columns of numbers (n, columns), and the seconds it took.
+
+    ``parts`` are the seconds of its parts, where somebody asks for them.
+    """
 
     columns: tuple[str, ...]
     values: NDArray[np.float64]
     seconds: float
+    parts: tuple[float, ...] = ()
 
 
 class Job(Protocol):
@@ -96,7 +100,8 @@ class Campaign:
         settings = self._path(job).parent / "versions.json"
         if not settings.is_file():
             write_atomically(settings, (json.dumps(environment(), indent=1) + "\n").encode())
-        write_atomically(self._time_path(job), f"{run.seconds!r}\n".encode())
+        times = "".join(f"{seconds!r}\n" for seconds in (run.seconds, *run.parts))
+        write_atomically(self._time_path(job), times.encode())
         # The values come last: their file is the sign that the job is finished.
         write_atomically(self._path(job), csv_bytes(run.columns, run.values.tolist()))
 
@@ -104,7 +109,8 @@ class Campaign:
         with self._path(job).open(newline="") as file:
             heading, *rows = csv.reader(file)
         values = np.array(rows, dtype=float).reshape(len(rows), len(heading))
-        return Run(tuple(heading), values, float(self._time_path(job).read_text()))
+        seconds, *parts = map(float, self._time_path(job).read_text().split())
+        return Run(tuple(heading), values, seconds, tuple(parts))
 
 
 def _run_in_executor(

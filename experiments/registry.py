@@ -64,6 +64,11 @@ EXPERIMENTS = (
     Experiment(
         "calibration", "Which effects the printed equations lack: a ladder of fitted models"
     ),
+    Experiment(
+        "blind",
+        "Blind campaigns: what the discrepancy workflow finds of what is hidden",
+        quick=False,
+    ),
     Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
     Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
 )

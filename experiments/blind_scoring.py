@@ -1,0 +1,221 @@
+"""One blind case run, analysed and scored against its truth, as a job of a campaign."""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from experiments.blind_cases import CALIBRATED, Case
+from experiments.blind_codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
+from experiments.blind_rivals import largest_residual_rule, sparse_regression
+from experiments.campaign import Run
+from pymoo_hdte.discrepancy import Campaign
+from pymoo_hdte.discrepancy.features import Features, measure
+from pymoo_hdte.discrepancy.fit import Data, Fit, fit, start_parameters
+from pymoo_hdte.discrepancy.locate import locate
+from pymoo_hdte.discrepancy.misfit_map import Flags, cell_chi_square, degrees_of_freedom
+from pymoo_hdte.discrepancy.naming import Verdict
+from pymoo_hdte.discrepancy.next_experiment import next_experiment
+from pymoo_hdte.discrepancy.parameters import MECHANICAL, Layout
+from pymoo_hdte.discrepancy.prove import Proof, prove
+from pymoo_hdte.discrepancy.revise import accepted_fit
+from pymoo_hdte.discrepancy.torsion_curve import torsion_points
+from pymoo_hdte.discrepancy.workflow import Analysis, analyse
+
+PARTS = ("analyse", "locate", "prove", "next_experiment")
+RIVALS = {
+    "largest_residual_rule": largest_residual_rule,
+    "sparse_regression": sparse_regression,
+}
+"""Simpler tools, from an analysis to a name, "adequate" or "unlisted"."""
+COMPARED = ("none", "single", "unlisted")
+"""Kinds on which the simpler tools are run too."""
+REVISED = ("single", "pair")
+"""Kinds that a right verdict adds a listed effect to."""
+GAPS = ("transmission_error", "leading", "overall")
+"""Gaps on held-out records: that of the verdict's document, that of the channel in which the base
+stands out of the noise most, and that of all features."""
+VERDICT_COLUMNS = (
+    "status",
+    "first",
+    "first_port",
+    "first_order",
+    "second",
+    "second_port",
+    "second_order",
+    "equivalents",
+    "truth_in_class",
+)
+NUMBERS = (
+    "cells_moved",
+    "cells_flagged",
+    "cells_both",
+    "bias_before",
+    "bias_after",
+    *(f"{gap}_{state}" for gap in GAPS for state in ("before", "after", "floor")),
+)
+COLUMNS = (*VERDICT_COLUMNS, *NUMBERS, *RIVALS)
+
+Scores = dict[str, float]
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class BlindJob:
+    """One case; its run has one row of `COLUMNS`, nan where a kind is not scored."""
+
+    case: Case
+
+    @property
+    def key(self) -> str:
+        """All fields of the case in one name."""
+        return self.case.key
+
+    def execute(self) -> Run:
+        """Run, analyse and score; an exception is a defect, shown and scored as wrong.
+
+        Seconds are those of the processor, so that other work on the machine does not count.
+        """
+        try:
+            scores, parts = score(self.case)
+        except Exception:
+            _show_defect(self.key)
+            scores, parts = {"status": code(ERROR, STATUSES)}, ()
+        row = [scores.get(column, np.nan) for column in COLUMNS]
+        return Run(COLUMNS, np.array([row]), sum(parts), parts)
+
+
+def score(case: Case) -> tuple[Scores, tuple[float, ...]]:
+    """Return the scores of a case and the seconds of the `PARTS` that it takes.
+
+    For a detection limit the verdict is all that counts.
+    """
+    campaign = case.run(case.effects())
+    analysis, analysed = _timed(analyse, campaign)
+    scores = verdict_scores(case, analysis.verdict)
+    if case.kind == "detection":
+        return scores, (analysed,)
+    location, located = _timed(locate, analysis)
+    proof, proved = _timed(prove, analysis)
+    _, proposed = _timed(next_experiment, analysis)
+    if case.kind != "parameter":
+        scores |= location_scores(truly_moved(case, analysis), location.flagged)
+    if case.kind in REVISED:
+        scores |= bias_scores(analysis.verdict, twin_fit(case.run(()), analysis.data.features))
+    if proof is not None:
+        scores |= gap_scores(proof)
+    if case.kind in COMPARED:
+        scores |= {name: code(_answer(tool, analysis), NAMES) for name, tool in RIVALS.items()}
+    return scores, (analysed, located, proved, proposed)
+
+
+def verdict_scores(case: Case, verdict: Verdict) -> Scores:
+    """Return what the verdict says, and whether its class holds all that is hidden."""
+    scores = {"status": code(verdict.status, STATUSES)}
+    candidates = verdict.chosen.candidates if verdict.chosen is not None else ()
+    for place, candidate in zip(("first", "second"), candidates, strict=False):
+        scores[place] = code(candidate.name, NAMES)
+        scores[f"{place}_port"] = code(candidate.port, PORTS)
+        scores[f"{place}_order"] = np.nan if candidate.order is None else candidate.order
+    truth = {"parameter"} if case.kind == "parameter" else set(case.names)
+    alike = [{candidate.name for candidate in rival.candidates} for rival in verdict.equivalent]
+    scores["equivalents"] = code_of_set(set().union(*alike))
+    scores["truth_in_class"] = float(any(truth <= names for names in alike))
+    return scores
+
+
+def truly_moved(case: Case, analysis: Analysis) -> Flags:
+    """Return the cells that the hidden effects move by more than the root mean square of the noise.
+
+    Runs with the effects and without differ by nothing else, not even by their noise.
+    """
+    kept = analysis.data.features
+    if not case.effects():
+        return np.zeros((len(kept.records), *degrees_of_freedom(analysis.data).shape), dtype=bool)
+    hidden, clean = (
+        _features(case.run(effects, CALIBRATED), kept).values for effects in (case.effects(), ())
+    )
+    moved: NDArray[np.float64] = cell_chi_square(analysis.data, hidden - clean)
+    return moved > degrees_of_freedom(analysis.data)
+
+
+def location_scores(moved: Flags, flagged: Flags) -> Scores:
+    """Return the numbers of cells moved, flagged and both."""
+    return {
+        "cells_moved": float(moved.sum()),
+        "cells_flagged": float(flagged.sum()),
+        "cells_both": float((moved & flagged).sum()),
+    }
+
+
+def twin_fit(twin: Campaign, kept: Features) -> Fit:
+    """Fit the base to a campaign without the effect, with the records and orders of ``kept``."""
+    features = _features(twin, kept)
+    sweeps = [record for record in twin.torsion if record.role == "train"]
+    points = tuple(torsion_points(record, twin.rig) for record in sweeps)
+    return fit(Data(twin, features, start_parameters(twin, features), points))
+
+
+def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
+    """Return how far the effect moves the base before and after the revision.
+
+    Root mean square over mechanical parameters and amplitudes of the static error, in tolerances.
+    """
+    layout = Layout(twin.parameters)
+    lines = [p.name for p in twin.parameters if p.name.startswith("error_amplitude_")]
+    rows = [layout.index(name) for name in (*MECHANICAL, *lines)]
+    scale = layout.array("scale")[rows]
+    return {
+        "bias_before": _bias(verdict.base, twin, rows, scale),
+        "bias_after": _bias(accepted_fit(verdict), twin, rows, scale),
+    }
+
+
+def gap_scores(proof: Proof) -> Scores:
+    """Return before, after and noise floor of `GAPS`."""
+    gaps = (proof.channels["transmission_error"], proof.channels[proof.leading], proof.overall)
+    scores = {}
+    for name, gap in zip(GAPS, gaps, strict=True):
+        scores[f"{name}_before"] = gap.before
+        scores[f"{name}_after"] = gap.after
+        scores[f"{name}_floor"] = gap.noise_floor
+    return scores
+
+
+def _features(campaign: Campaign, kept: Features) -> Features:
+    """Return the features of a campaign in the records and at the orders of ``kept``."""
+    names = {record.name for record in kept.records}
+    records = [record for record in campaign.train if record.name in names]
+    return measure(campaign, records, kept.orders.tolist())
+
+
+def _bias(fitted: Fit, twin: Fit, rows: list[int], scale: NDArray[np.float64]) -> float:
+    moved = (fitted.values[rows] - twin.values[rows]) / scale
+    return float(np.sqrt(np.mean(moved**2)))
+
+
+def _answer(tool: Callable[[Analysis], str], analysis: Analysis) -> str:
+    """Return what a simpler tool says; its defects must not look like the workflow's."""
+    try:
+        return tool(analysis)
+    except Exception:
+        _show_defect(tool.__name__)
+        return ERROR
+
+
+def _show_defect(where: str) -> None:
+    tqdm.write(f"{where}\n{traceback.format_exc()}", file=sys.stderr)
+
+
+def _timed(function: Callable[..., _Result], argument: object) -> tuple[_Result, float]:
+    begin = time.process_time()
+    result = function(argument)
+    return result, time.process_time() - begin
