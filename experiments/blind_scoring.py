@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from typing import TypeVar
 
 import numpy as np
@@ -15,7 +16,6 @@ from tqdm import tqdm
 
 from experiments.blind_cases import CALIBRATED, Case
 from experiments.blind_codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
-from experiments.blind_rivals import largest_residual_rule, sparse_regression
 from experiments.campaign import Run
 from pymoo_hdte.discrepancy import Campaign
 from pymoo_hdte.discrepancy.features import Features, measure
@@ -31,11 +31,8 @@ from pymoo_hdte.discrepancy.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy.workflow import Analysis, analyse
 
 PARTS = ("analyse", "locate", "prove", "next_experiment")
-RIVALS = {
-    "largest_residual_rule": largest_residual_rule,
-    "sparse_regression": sparse_regression,
-}
-"""Simpler tools, from an analysis to a name, "adequate" or "unlisted"."""
+RIVALS = ("largest_residual_rule", "sparse_regression")
+"""Simpler tools of `blind_rivals`, from an analysis to a name, "adequate" or "unlisted"."""
 COMPARED = ("none", "single", "unlisted")
 """Kinds on which the simpler tools are run too."""
 REVISED = ("single", "pair")
@@ -65,6 +62,7 @@ NUMBERS = (
 COLUMNS = (*VERDICT_COLUMNS, *NUMBERS, *RIVALS)
 
 Scores = dict[str, float]
+Tool = Callable[[Analysis], str]
 _Result = TypeVar("_Result")
 
 
@@ -84,8 +82,9 @@ class BlindJob:
 
         Seconds are those of the processor, so that other work on the machine does not count.
         """
+        tools = rivals()
         try:
-            scores, parts = score(self.case)
+            scores, parts = score(self.case, tools)
         except Exception:
             _show_defect(self.key)
             scores, parts = {"status": code(ERROR, STATUSES)}, ()
@@ -93,7 +92,16 @@ class BlindJob:
         return Run(COLUMNS, np.array([row]), sum(parts), parts)
 
 
-def score(case: Case) -> tuple[Scores, tuple[float, ...]]:
+def rivals() -> dict[str, Tool]:
+    """Return the simpler tools by name.
+
+    They are imported here only, so that a report of stored outcomes does not need their packages.
+    """
+    module = import_module("experiments.blind_rivals")
+    return {name: getattr(module, name) for name in RIVALS}
+
+
+def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, ...]]:
     """Return the scores of a case and the seconds of the `PARTS` that it takes.
 
     For a detection limit the verdict is all that counts.
@@ -113,7 +121,7 @@ def score(case: Case) -> tuple[Scores, tuple[float, ...]]:
     if proof is not None:
         scores |= gap_scores(proof)
     if case.kind in COMPARED:
-        scores |= {name: code(_answer(tool, analysis), NAMES) for name, tool in RIVALS.items()}
+        scores |= {name: code(_answer(tool, analysis), NAMES) for name, tool in tools.items()}
     return scores, (analysed, located, proved, proposed)
 
 
@@ -202,7 +210,7 @@ def _bias(fitted: Fit, twin: Fit, rows: list[int], scale: NDArray[np.float64]) -
     return float(np.sqrt(np.mean(moved**2)))
 
 
-def _answer(tool: Callable[[Analysis], str], analysis: Analysis) -> str:
+def _answer(tool: Tool, analysis: Analysis) -> str:
     """Return what a simpler tool says; its defects must not look like the workflow's."""
     try:
         return tool(analysis)

@@ -305,7 +305,7 @@ MADE_UP = [
 ]
 
 
-def made_up_score(case):
+def made_up_score(case, tools):
     if case.kind == "unlisted":
         raise ArithmeticError("a step too far")
     scores = dict(zip(COLUMNS, np.linspace(1.0, 2.0, len(COLUMNS)), strict=True))
@@ -320,6 +320,7 @@ def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
 ):
     monkeypatch.setattr(blind, "cases", lambda: MADE_UP)
     monkeypatch.setattr(blind_scoring, "score", made_up_score)
+    monkeypatch.setattr(blind_scoring, "rivals", dict)
     context = Context(1, tmp_path, Campaign(tmp_path), full=True)
     first = blind.run(context)
     assert "a step too far" in capsys.readouterr().err
@@ -340,7 +341,9 @@ def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
 
 
 def test_outcomes_survive_their_csv(tmp_path):
-    kept = [as_outcome(case, made_up_score(case)[0]) for case in MADE_UP if case.kind != "unlisted"]
+    kept = [
+        as_outcome(case, made_up_score(case, {})[0]) for case in MADE_UP if case.kind != "unlisted"
+    ]
     paths = tmp_path / "outcomes.csv", tmp_path / "seconds.csv"
     paths[0].write_text(format_outcomes(kept), encoding="utf-8")
     paths[1].write_text(format_seconds(kept), encoding="utf-8")
