@@ -71,7 +71,9 @@ def at_start(*chosen):
     parameters = (*base, *(parameter for one in chosen for parameter in one.parameters))
     starts = [start for one in chosen for start in one.starts[-1]]
     values = np.array([*(parameter.start for parameter in base), *starts])
-    return Fit(chosen, parameters, values, np.zeros(1), np.zeros((1, len(values))), np.zeros((0, 0, 0)))
+    return Fit(
+        chosen, parameters, values, np.zeros(1), np.zeros((1, len(values))), np.zeros((0, 0, 0))
+    )
 
 
 @pytest.mark.parametrize("candidate", LISTED, ids=lambda one: one.label)
@@ -141,7 +143,7 @@ def test_ratio_of_no_gear_is_refused(clean):
 
 def _of_ratio(campaign, ratio):
     record = campaign.running[0]
-    turned = replace(record, output_angle=record.input_angle / ratio)
+    turned = replace(record, output_angle=record.output_angle * BELIEVED.ratio / ratio)
     believed = replace(BELIEVED, ratio=ratio)
     return replace(campaign, believed=believed, running=(turned,), torsion=())
 

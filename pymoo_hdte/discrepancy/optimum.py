@@ -24,6 +24,7 @@ SURROGATE_ORDER = 3
 """That of the paper; with laws at ports it costs a harmonic balance in each of 4^5 runs."""
 GENERATIONS = 60
 PARTICLES = 60
+_SAME_DESIGN = 1e-3
 
 Values = NDArray[np.float64]
 
@@ -68,10 +69,32 @@ class OptimumShift:
     choices : tuple of Choice
     obstacle : str
         Empty unless a model cannot be optimised.
+    fronts : tuple of ndarray, shape (n, 2)
+        Mean and standard deviation of the DTE, arcsec, of the designs found before and after;
+        empty where there are no choices.
     """
 
     choices: tuple[Choice, ...]
     obstacle: str = ""
+    fronts: tuple[Values, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """How the optimum moved, in words, for the balanced preference."""
+        if not self.choices:
+            return self.obstacle
+        choice = next(one for one in self.choices if one.preference == "balanced")
+        promised, delivered, reached = (
+            f"mean {mean:.3g} and standard deviation {std:.3g} arcsec"
+            for mean, std in (choice.promised, choice.delivered, choice.reached)
+        )
+        judged = f"It was promised {promised}; by the revised model it has {delivered}."
+        if choice.distance < _SAME_DESIGN:
+            return f"The balanced design stays where it was. {judged}"
+        return (
+            f"The balanced design moves by {choice.distance:.2g} of its size. The old one: "
+            f"{judged[0].lower()}{judged[1:]} The new one reaches {reached}."
+        )
 
 
 def optimum_shift(before: DriveModel, after: DriveModel, seed: int = 1) -> OptimumShift:
@@ -82,7 +105,8 @@ def optimum_shift(before: DriveModel, after: DriveModel, seed: int = 1) -> Optim
     except (InvalidInput, ArithmeticError) as error:
         return OptimumShift((), f"One of the models has no robust optimum: {error}")
     fronts = [_front(problem, seed) for problem in (old, new)]
-    return OptimumShift(tuple(_choice(word, old, new, fronts) for word in PREFERENCES))
+    choices = tuple(_choice(word, old, new, fronts) for word in PREFERENCES)
+    return OptimumShift(choices, fronts=tuple(values for _, values in fronts))
 
 
 def _front(problem: RobustDTE, seed: int) -> tuple[Values, Values]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,8 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.effect_words import in_words
+from pymoo_hdte.discrepancy.limits import limits
 from pymoo_hdte.discrepancy.misfit_map import Location
 from pymoo_hdte.discrepancy.next_experiment import Proposal
 from pymoo_hdte.discrepancy.optimum import SURROGATE_ORDER, OptimumShift, optimum_shift
@@ -21,10 +25,13 @@ from pymoo_hdte.discrepancy.report_figures import (
     gap_by_order,
     misfit_map,
     misfit_overview,
+    optimum_fronts,
     overlay,
 )
 from pymoo_hdte.discrepancy.report_tables import (
+    STATUSES,
     certainty,
+    effect_rows,
     gap_sentence,
     metric_rows,
     parameter_rows,
@@ -76,10 +83,11 @@ def write_report(
         If it cannot be written.
     """
     out = Path(out)
-    _refuse_foreign(out)
+    check_folder(out)
     document = verdict_document(
         analysis, location, None if proof is None else proof.as_dict(), proposal
     )
+    document["limits"] = limits(analysis)
     model_files, shift = _revision(analysis)
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
@@ -105,6 +113,7 @@ def _revision(analysis: Analysis) -> tuple[dict[str, str], OptimumShift]:
 def _shift_document(shift: OptimumShift) -> dict[str, Any]:
     names = ("promised", "delivered", "reached")
     return {
+        "sentence": shift.sentence,
         "obstacle": shift.obstacle,
         "choices": [
             {
@@ -144,14 +153,19 @@ def _page(
             "orders": data_uri(gap_by_order(proof)),
             "overlay": data_uri(overlay(proof)),
         }
+    if shift.choices:
+        pictures["optimum"] = data_uri(optimum_fronts(shift))
     return environment.get_template("report.html.j2").render(
         campaign=analysis.campaign,
         verdict=analysis.verdict,
         document=document,
         location=location,
         proof=proof,
+        status=STATUSES[analysis.verdict.status],
+        effects=effect_rows(document["effects"]),
         certainty=certainty(analysis),
         gap=gap_sentence(analysis, proof),
+        next_test=in_words(document["next_experiment"]["description"]),
         pictures=pictures,
         rivals=rival_rows(analysis.verdict),
         parameters=parameter_rows(analysis),
@@ -175,7 +189,11 @@ def _number(value: float | None, digits: int = 3) -> str:
     return f"{mantissa}·10{power}".replace("-", "\N{MINUS SIGN}")
 
 
-def _refuse_foreign(out: Path) -> None:
+def check_folder(out: Path) -> None:
+    """Refuse a folder that could not take a report, before anybody waits for one.
+
+    Errors as in `write_report`.
+    """
     allowed = "a folder that is new, empty or an earlier report"
     if out.is_symlink() or (out.exists() and not out.is_dir()):
         raise InvalidInput("folder of the report", str(out), allowed)
@@ -183,6 +201,11 @@ def _refuse_foreign(out: Path) -> None:
         present = {path.name for path in out.iterdir()}
         if present and not {VERDICT_FILE, PAGE_FILE} <= present <= set(FILES):
             raise InvalidInput("folder of the report", str(out), allowed)
+    parent = next(folder for folder in out.absolute().parents if folder.exists())
+    if not parent.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(parent))
+    if not os.access(parent, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(parent))
 
 
 def _write_folder(out: Path, files: dict[str, str]) -> None:
@@ -193,6 +216,12 @@ def _write_folder(out: Path, files: dict[str, str]) -> None:
         draft.mkdir()
         for name, text in files.items():
             (draft / name).write_text(text, encoding="utf-8", newline="\n")
-        if out.exists():
-            out.replace(Path(workshop) / "earlier")
-        draft.replace(out)
+        earlier = Path(workshop) / "earlier"
+        try:
+            if out.exists():
+                out.replace(earlier)
+            draft.replace(out)
+        except BaseException:
+            if earlier.exists() and not out.exists():
+                earlier.replace(out)
+            raise

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.gap import Gap
 from pymoo_hdte.discrepancy.misfit_map import Location
+from pymoo_hdte.discrepancy.optimum import OptimumShift
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.prove import Overlay, Proof
 
@@ -127,6 +128,25 @@ def overlay(proof: Proof) -> Figure:
         _draw_overlay(axis, one)
     panels[0].legend(fontsize=8, frameon=False, ncols=4, loc="upper right")
     panels[-1].set_xlabel("input turns")
+    return figure
+
+
+def optimum_fronts(shift: OptimumShift) -> Figure:
+    """Draw both fronts, and what becomes of the designs chosen on the first."""
+    figure = Figure(figsize=(6.4, 3.4), layout="constrained")
+    axis = figure.subplots()
+    looks = ((BEFORE, "s", "before"), (AFTER, "o", "after"))
+    for front, (colour, marker, word) in zip(shift.fronts, looks, strict=True):
+        axis.plot(*front.T, marker, color=colour, mfc="none", markersize=5, label=f"front {word}")
+    for choice in shift.choices:
+        axis.plot(*np.transpose([choice.promised, choice.delivered]), color=GREY, linewidth=1.0)
+    delivered = np.transpose([choice.delivered for choice in shift.choices])
+    axis.plot(*delivered, "x", color="black", markersize=8, label="old choices, revised model")
+    axis.margins(0.15)
+    axis.set_xlabel("mean DTE [arcsec]", fontsize=9)
+    axis.set_ylabel("standard deviation [arcsec]", fontsize=9)
+    axis.legend(fontsize=8, frameon=False)
+    _tidy(axis)
     return figure
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from pymoo_hdte.discrepancy.campaign import Campaign
+from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.gap import Gap
-from pymoo_hdte.discrepancy.naming import ADEQUATE, BIC_GAIN, SHARE, Rival, Verdict
+from pymoo_hdte.discrepancy.naming import ADEQUATE, SHARE, Rival, Verdict
 from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.discrepancy.prove import Proof
 from pymoo_hdte.discrepancy.revise import accepted_fit
@@ -26,7 +29,23 @@ UNITS = {
     "input_torque_zero": "N m",
     "output_torque_zero": "N m",
 }
-METRICS = ("mae", "rmse", "mape_percent", "max_error", "mean_error", "r2")
+METRICS = {
+    "mae": "mean absolute error",
+    "rmse": "root mean square error",
+    "mape_percent": "mean absolute error [%]",
+    "max_error": "largest error",
+    "r2": "R²",
+    "mean_error": "mean error",
+}
+
+STATUSES = {
+    "adequate": "nothing missing",
+    "named": "found",
+    "class": "one of several",
+    "parameter": "believed value wrong",
+    "unlisted": "unknown effect",
+}
+"""Those of a verdict, for the reader."""
 
 _NORMAL_95 = 1.96
 
@@ -46,6 +65,18 @@ class ParameterRow:
 
 
 @dataclass(frozen=True)
+class EffectRow:
+    """A parameter of a named effect with its 95 % interval."""
+
+    effect: str
+    parameter: str
+    value: float
+    lower: float
+    upper: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class RivalRow:
     """Evidence for a set of effects; ``bic`` above that of the best."""
 
@@ -60,66 +91,85 @@ class RivalRow:
 def certainty(analysis: Analysis) -> str:
     """Return how sure the verdict is, in words."""
     verdict = analysis.verdict
-    freedom = verdict.degrees_of_freedom
-    left = verdict.base.chi_square / freedom
+    left = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate" or verdict.chosen is None:
         return (
-            f"The fitted base leaves {left:.2f} of the noise's variance; up to {ADEQUATE:g} it is "
-            "adequate. What is too small for these records may still be there."
+            f"The misfit of the believed drive, fitted within its tolerances, has {left:.2f} times "
+            f"the variance of the noise; up to {ADEQUATE:g} counts as noise. An effect too small "
+            "for these records may still be there."
         )
-    chosen = verdict.chosen
-    share = f"{_percent(chosen.share)} of the misfit beyond noise"
+    share = _percent(verdict.chosen.share)
     if verdict.status == "unlisted":
         return (
-            f"The best known effect, {chosen.label}, removes {share}; a name takes "
-            f"{_percent(SHARE)}. That the model misses something is certain "
-            f"({left:.3g} times the noise's variance), what it is is not."
+            "That something is missing is certain; what it is, is not. The nearest known effect "
+            f"explains {share} of the misfit; a name takes {_percent(SHARE)}, or what is left to "
+            "be noise."
         )
-    after = chosen.fit.chi_square / freedom
+    return " ".join(_evidence(verdict, verdict.chosen, share))
+
+
+def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
+    after = chosen.fit.chi_square / verdict.degrees_of_freedom
     words = [
-        f"It removes {share} ({left:.3g} times the noise's variance before, {after:.3g} after)."
+        f"It explains {share} of the misfit that is not noise; what is left has {after:.3g} times "
+        "the variance of the noise."
     ]
     if after > ADEQUATE:
-        words.append("That is still more than noise: something else is missing, too.")
+        words.append("That is more than noise: its form is not quite right or more is missing.")
     rivals = [
         rival
         for rival in verdict.alternatives
         if _names(rival) != _names(chosen) and len(rival.candidates) == len(chosen.candidates)
     ]
     if verdict.equivalent:
-        labels = ", ".join(rival.label for rival in verdict.equivalent)
-        words.append(f"These data cannot tell it from {labels}.")
+        shares = ", ".join(_percent(rival.share) for rival in verdict.equivalent)
+        words.append(f"What these data cannot tell from it explains {shares}.")
     elif rivals:
-        lead = rivals[0].bic - chosen.bic
         words.append(
-            f"The next best, {rivals[0].label}, is worse by {lead:.3g} in BIC; "
-            f"{BIC_GAIN:g} would do."
+            f"The next best, {in_words(rivals[0].label)}, explains {_percent(rivals[0].share)}."
         )
     if chosen.fit.at_bounds:
-        words.append(f"At a bound, so judge with care: {', '.join(chosen.fit.at_bounds)}.")
-    return " ".join(words)
+        names = ", ".join(name.replace("_", " ") for name in chosen.fit.at_bounds)
+        words.append(f"At the edge of what was allowed, so judge with care: {names}.")
+    return words
 
 
 def gap_sentence(analysis: Analysis, proof: Proof | None) -> str:
     """Return how much the gap shrank on held-out records, in words."""
     if proof is None:
         return "No record was held out, so nothing can be said about conditions not fitted."
-    gap = proof.channels[proof.leading]
+    gap, error = proof.channels[proof.leading], proof.channels["transmission_error"]
     where = f"{len(proof.records)} held-out records, {proof.leading.replace('_', ' ')}"
+    noise = f"noise alone {gap.noise_floor:.3g} {gap.unit}"
     if not accepted_fit(analysis.verdict).candidates:
-        return (
-            f"Nothing was added. On {where}, the fitted base leaves {_size(gap.before, gap)}; the "
-            f"noise alone is {_size(gap.noise_floor, gap)}."
-        )
-    words = f"On {where}: {gap.before:.3g} → {_size(gap.after, gap)}, noise {gap.noise_floor:.3g}"
+        return f"Nothing was added. On {where}: off by {gap.before:.3g} {gap.unit}, {noise}."
+    words = f"On {where}: off by {gap.before:.3g} before, {gap.after:.3g} after, {noise}"
     if gap.after > gap.before or proof.overall.after > proof.overall.before:
         return f"{words}. The revised model is worse there: do not use it."
     if gap.shrinkage is not None:
         words += f"; {_percent(min(gap.shrinkage, 1.0))} of what the noise does not explain is gone"
-    error = proof.channels["transmission_error"]
+    if error is not gap:
+        words += f". Transmission error: {error.before:.3g} before, {error.after:.3g} after, "
+        words += f"noise alone {error.noise_floor:.3g} {error.unit}"
     if error.after > max(error.before, 1.5 * error.noise_floor):
-        words += ". But the transmission error is met less well than before"
+        words += ". So the transmission error is met less well than before"
     return f"{words}."
+
+
+def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
+    """Return the parameters of the effects of a verdict document; angles in arcsec."""
+    rows = []
+    for effect in effects:
+        where = "" if effect["order"] is None else f", order {effect['order']:.4g}"
+        for name, quantity in effect["parameters"].items():
+            angle = quantity["unit"] == "rad" and name != "phase"
+            size, unit = (ARCSEC, "arcsec") if angle else (1.0, quantity["unit"])
+            value, low, high = (
+                number / size for number in (quantity["value"], *quantity["interval95"])
+            )
+            label = f"{effect['name'].replace('_', ' ')} ({effect['port']}{where})"
+            rows.append(EffectRow(label, name.replace("_", " "), value, low, high, unit))
+    return rows
 
 
 def rival_rows(verdict: Verdict) -> list[RivalRow]:
@@ -131,12 +181,12 @@ def rival_rows(verdict: Verdict) -> list[RivalRow]:
     best = min(rival.bic for rival in rivals)
     return [
         RivalRow(
-            rival.label,
+            in_words(rival.label),
             _role(verdict, rival),
             rival.fit.chi_square,
             rival.share,
             rival.bic - best,
-            ", ".join(rival.fit.at_bounds) or "none",
+            ", ".join(name.replace("_", " ") for name in rival.fit.at_bounds) or "none",
         )
         for rival in rivals
     ]
@@ -163,7 +213,11 @@ def metric_rows(proof: Proof | None) -> list[tuple[str, float, float]]:
     if proof is None or proof.metrics is None:
         return []
     before, after = proof.metrics
-    return [(name, getattr(before, name), getattr(after, name)) for name in METRICS]
+    rows = [(word, getattr(before, name), getattr(after, name)) for name, word in METRICS.items()]
+    ends = zip(
+        ("lower", "upper"), before.mean_error_interval, after.mean_error_interval, strict=True
+    )
+    return rows + [(f"mean error, {end} end (95 %)", one, two) for end, one, two in ends]
 
 
 def record_rows(
@@ -220,10 +274,6 @@ def _role(verdict: Verdict, rival: Rival) -> str:
 
 def _names(rival: Rival) -> set[str]:
     return {candidate.name for candidate in rival.candidates}
-
-
-def _size(value: float, gap: Gap) -> str:
-    return f"{value:.3g} {gap.unit}"
 
 
 def _percent(share: float) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.library import Candidate, polar
 from pymoo_hdte.discrepancy.misfit_map import Location
@@ -105,14 +106,13 @@ def sentence(verdict: Verdict) -> str:
     what = " ".join(candidate.sentence for candidate in chosen.candidates)
     if verdict.status == "unlisted":
         return (
-            "Something is missing that no known effect explains: the best of them, "
-            f"{chosen.label}, removes {chosen.share:.0%} of the misfit only."
+            "Something is missing that no known effect explains. The nearest is "
+            f"{in_words(chosen.label)}."
         )
-    removed = f"This removes {chosen.share:.1%} of the misfit beyond noise."
     if verdict.status == "class":
-        labels = " or ".join([chosen.label, *(rival.label for rival in verdict.equivalent)])
-        return f"{what} {removed} The data cannot tell {labels}."
-    return f"{what} {removed}"
+        others = "; or ".join(in_words(rival.label) for rival in verdict.equivalent)
+        return f"{what} Or, which these data cannot tell from it: {others}."
+    return what
 
 
 def _effects(verdict: Verdict) -> list[dict[str, Any]]:

@@ -1,0 +1,18 @@
+"""Names of effects as a reader wants them."""
+
+from __future__ import annotations
+
+import re
+
+_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*):([a-z]+)(?:@([\d.e+-]*\d))?")
+
+
+def in_words(text: str) -> str:
+    """Return a text with all labels of candidates, such as ``torque_ripple:input@6``, in words."""
+    return _LABEL.sub(_words, text).replace(")+", ") and ")
+
+
+def _words(label: re.Match[str]) -> str:
+    name, port, order = label.groups()
+    where = port if order is None else f"{port}, order {order}"
+    return f"{name.replace('_', ' ')} ({where})"

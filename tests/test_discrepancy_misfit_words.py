@@ -1,0 +1,189 @@
+"""Words on a misfit: what is planted is what is said, for effects that no list holds."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from planted_features import known_data
+from virtual_rig_cases import BELIEVED, RIG
+
+from pymoo_hdte.discrepancy.effect_words import in_words
+from pymoo_hdte.discrepancy.misfit_map import Location
+from pymoo_hdte.discrepancy.misfit_words import sentences
+from pymoo_hdte.discrepancy.records import RunningRecord
+from pymoo_hdte.discrepancy.stray_lines import StrayLines, stray_lines
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+
+CONDITIONS = [(rpm, load) for rpm in (10.0, 200.0, 1000.0, 2000.0) for load in (0.0, 10.0, 40.0)]
+SPEED, LOAD = np.array(CONDITIONS).T
+ORDERS = np.array([0.0, 6.0 / 101.0, 1.0, 2.0, 6.0])
+NOISE = np.array([0.02 * ARCSEC, 5e-6, 3e-4, 1e-7])
+"""Of a line of each channel; smaller than everything planted."""
+
+
+def planted(lines):
+    """Return the map of complex misfits ``lines``: (channel, place of the order) to records."""
+    misfit = np.zeros((len(SPEED), 4, len(ORDERS)), dtype=complex)
+    for (channel, place), values in lines.items():
+        misfit[:, channel, place] = values
+    misfit[:, 2:, 0] = np.nan
+    chi_square = np.abs(misfit / NOISE[:, None]) ** 2
+    flagged = np.nan_to_num(chi_square) > 30.0
+    return Location(
+        records=tuple(f"run_{k}" for k in range(len(SPEED))),
+        speed_rpm=SPEED,
+        load_torque=LOAD,
+        orders=ORDERS,
+        misfit=misfit,
+        chi_square=chi_square,
+        p_value=np.where(flagged, 0.0, 1.0),
+        moved=np.zeros(chi_square.shape),
+        flagged=flagged,
+        sweep_p_value=None,
+        sweep_flagged=False,
+        named=False,
+    )
+
+
+def said(lines, **changes):
+    where, trusted = sentences(replace(planted(lines), **changes), known_data(), ())
+    return where, trusted
+
+
+def test_a_torque_of_the_load_is_no_compliance():
+    torque = 0.02 * LOAD * np.exp(0.3j)
+    lines = {(0, 1): torque / BELIEVED.stiffness, (1, 1): torque / BELIEVED.ratio, (2, 1): torque}
+    where, trusted = said(lines)
+    assert "order 0.05941 (6 per output turn)" in where
+    assert "hardly changes with speed and grows with load" in where
+    assert "torque-like and comes from the load" in where
+    assert "compliance" not in where
+    assert "in all records without load" in trusted
+
+
+def test_a_torque_on_the_input_leaves_the_output_alone():
+    where, trusted = said({(1, 4): np.full(12, 0.02), (3, 4): 1e-3 / SPEED})
+    assert "At order 6 in the input torque and input angle." in where
+    assert "is the same at all speeds and loads" in where
+    assert "torque-like and acts on the input" in where
+    assert "in the transmission error and output torque" in trusted
+
+
+def test_friction_of_the_output_needs_torque_that_does_not_arrive():
+    torque = np.full(12, 1.0)
+    where, _ = said({(0, 0): torque / BELIEVED.stiffness, (1, 0): torque / BELIEVED.ratio})
+    assert "At the mean in the transmission error and input torque." in where
+    assert "acts on the output of the drive" in where
+
+
+def test_an_encoder_s_line_is_kinematic():
+    where, trusted = said({(0, 1): np.full(12, 3.0 * ARCSEC)})
+    assert "At order 0.05941 (6 per output turn) in the transmission error." in where
+    assert "is the same at all speeds and loads" in where
+    assert "kinematic" in where
+    assert "at all orders but order 0.05941" in trusted
+
+
+def test_a_stiffness_that_depends_on_speed_is_a_compliance():
+    twist = LOAD / BELIEVED.stiffness * (0.02 + 0.1 * SPEED / 2000.0)
+    where, _ = said({(0, 0): twist})
+    assert "grows with speed" in where
+    assert "grows with load" in where
+    assert "compliance" in where
+    assert "sweep" not in where
+    assert (
+        "the sweep with the input locked shows it" in said({(0, 0): twist}, sweep_flagged=True)[0]
+    )
+
+
+def test_a_further_inertia_shows_at_speed_only():
+    torque = 2.0 * (SPEED / 2000.0) ** 6
+    lines = {(0, 3): torque / BELIEVED.stiffness, (1, 3): torque / BELIEVED.ratio, (2, 3): torque}
+    where, trusted = said(lines)
+    assert "shows at speed only" in where
+    assert "grows with speed" in where
+    assert "in all records up to" in trusted
+
+
+def test_nothing_is_said_of_nothing():
+    where, trusted = said({})
+    assert where == "Nowhere: all means and order lines agree within the noise."
+    assert "wherever it was measured" in trusted
+
+
+def recorded(torque_on_input, twist=None):
+    """Return data of records with an input torque over time, and a twist over time and angle."""
+    rng = np.random.default_rng(7)
+    records = []
+    for rpm in (600.0, 1000.0, 1400.0, 2000.0):
+        speed = rpm * REVOLUTION_PER_MINUTE
+        time = np.arange(0.0, 2.0 * np.pi * BELIEVED.ratio / speed, 2e-3)
+        count = len(time)
+        output = speed * time / BELIEVED.ratio
+        output = output - (0.0 if twist is None else twist(time, speed * time))
+        records.append(
+            RunningRecord(
+                name=f"run_{rpm:.0f}",
+                role="train",
+                time=time,
+                input_angle=speed * time
+                + BELIEVED.ratio * RIG.angle_noise * rng.standard_normal(count),
+                output_angle=output + RIG.angle_noise * rng.standard_normal(count),
+                input_torque=torque_on_input(time)
+                + RIG.input_torque_noise * rng.standard_normal(count),
+                output_torque=RIG.output_torque_noise * rng.standard_normal(count),
+                input_speed=speed,
+                load_torque=0.0,
+                sample_rate=500.0,
+                samples_averaged=1,
+                elapsed=0.0,
+            )
+        )
+    speeds = np.array([record.input_speed for record in records])
+    features = SimpleNamespace(
+        records=records,
+        conditions=SimpleNamespace(input_speed=speeds),
+        orders=np.array([1.0, 2.0, 3.5]),
+    )
+    campaign = SimpleNamespace(believed=BELIEVED, rig=RIG)
+    return SimpleNamespace(campaign=campaign, features=features)
+
+
+def test_a_fixed_frequency_is_found_though_its_orders_differ():
+    data = recorded(np.zeros_like, lambda time, _: 8.0 * ARCSEC * np.sin(2.0 * np.pi * 83.0 * time))
+    found = stray_lines(data, (3.5,))
+    assert found.frequency == pytest.approx(83.0, rel=5e-3)
+    assert found.broad == ()
+    # Without anything unexpected nobody looks.
+    assert stray_lines(data, ()) == StrayLines()
+
+
+def test_a_line_of_an_order_is_no_fixed_frequency():
+    data = recorded(np.zeros_like, lambda _, angle: 5.0 * ARCSEC * np.sin(3.5 * angle))
+    assert stray_lines(data, (3.5,)) == StrayLines()
+
+
+def test_bursts_fill_a_broad_band():
+    def bursts(time):
+        return 0.3 * np.sum(
+            [np.exp(-(((time - at) / 0.01) ** 2)) for at in (0.7, 1.1, 2.4)], axis=0
+        )
+
+    found = stray_lines(recorded(bursts), (3.5,))
+    assert found.broad == ("input_torque",)
+    assert found.frequency is None
+
+
+@pytest.mark.parametrize(
+    ("label", "words"),
+    [
+        ("torque_ripple:input@6", "torque ripple (input, order 6)"),
+        ("eccentricity:sensor is one.", "eccentricity (sensor) is one."),
+        ("turns at kinematic_error:mesh@0.0099.", "turns at kinematic error (mesh, order 0.0099)."),
+        ("a_b:mesh+c:input@2", "a b (mesh) and c (input, order 2)"),
+        ("nothing: to say", "nothing: to say"),
+    ],
+)
+def test_labels_become_words(label, words):
+    assert in_words(label) == words
