@@ -164,6 +164,9 @@ def test_no_held_out_record_is_no_error(campaign):
     assert alone.held_out == ()
 
 
+LINES_OF_ERROR = """static_error_orders = [1, 2, 2.04]
+static_error_amplitudes_arcsec = [4, 9, 5]"""
+NO_LINES = "static_error_orders = []\nstatic_error_amplitudes_arcsec = []"
 BAD_FIELDS = {
     "unknown key": ("ratio = 50", "ratio = 50\nrattle = 1", "line 6: believed.rattle"),
     "missing key": ("angle_noise_arcsec = 0.7\n", "", "line 18: rig.angle_noise_arcsec"),
@@ -185,6 +188,31 @@ BAD_FIELDS = {
     "wrong ratio": ("ratio = 50", "ratio = 48", "slow.csv.gz.*transmission error"),
     "wrong turn": ("ratio = 50", "ratio = 52", "slow.csv.gz.*one output turn"),
     "wrong stiffness": ("rad = 25830", "rad = 450", "torsion.csv.gz.*slope"),
+    "stiffness in N.m/arcmin": ("rad = 25830", "rad = 7.5", "torsion.csv.gz.*slope"),
+    "inertia in g.cm2": (
+        "inertia_kgm2 = 0.000197",
+        "inertia_kgm2 = 1970",
+        "line 8: believed.input_in",
+    ),
+    "inertia in kg.cm2": (
+        "load_inertia_kgm2 = 0.08",
+        "load_inertia_kgm2 = 8000",
+        "line 12: .*load_in",
+    ),
+    "amplitudes in rad": ("[4, 9, 5]", "[4, 9e-6, 5]", "line 14: .*arcsec is 9e-06"),
+    "no line": (LINES_OF_ERROR, NO_LINES, "line 13: believed.static_error_orders"),
+    "frozen base": ("\ntolerance = 0.1", "\ntolerance = 0", "line 15: believed.tolerance"),
+    "frozen error": ("error_tolerance = 0.3", "error_tolerance = 0", "line 16: .*error_tolerance"),
+    "noise in mN.m": (
+        "torque_noise_Nm = 0.003",
+        "torque_noise_Nm = 3",
+        "line 23: rig.input_torque_n",
+    ),
+    "angle noise in rad": (
+        "angle_noise_arcsec = 0.7",
+        "angle_noise_arcsec = 1e5",
+        "line 21: .*angle_n",
+    ),
 }
 
 

@@ -8,7 +8,12 @@ from dataclasses import dataclass
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.believed import Believed, Rig
-from pymoo_hdte.discrepancy.plausibility import check_running, check_torsion
+from pymoo_hdte.discrepancy.plausibility import (
+    check_believed,
+    check_noise,
+    check_running,
+    check_torsion,
+)
 from pymoo_hdte.discrepancy.records import RunningRecord, TorsionRecord
 
 __all__ = ["Believed", "Campaign", "Rig", "RunningRecord", "TorsionRecord"]
@@ -32,8 +37,9 @@ class Campaign:
     Raises
     ------
     InvalidInput
-        For no running record, a name used twice, the same measurement under two names, or a record
-        that contradicts the believed drive (see `plausibility`).
+        For no running record, a name used twice, the same measurement under two names, beliefs that
+        no drive can have, or a record that contradicts them or the stated noise (see
+        `plausibility`).
     """
 
     title: str
@@ -51,12 +57,14 @@ class Campaign:
         if not self.running:
             raise InvalidInput("running records", 0, "at least one")
         self._check_each_once()
+        check_believed(self.believed)
         for record in self.running:
             with _named(record.name):
                 check_running(record, self.believed, self.rig)
         for sweep in self.torsion:
             with _named(sweep.name):
                 check_torsion(sweep, self.believed)
+        check_noise(self.running, self.torsion, self.believed, self.rig)
 
     @property
     def train(self) -> tuple[RunningRecord, ...]:

@@ -59,8 +59,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         try:
             return Campaign(title, drive, believed, rig, running, torsion)
         except InvalidInput as error:
-            field = _place_in_files(error, records)
-            raise InvalidInput(field, error.value, error.allowed) from None
+            raise _placed_in_files(error, records) from None
 
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> None:
@@ -179,9 +178,7 @@ def _build(kind: type[Checked], names: Names, table: Fields, place: str, **known
     except InvalidInput as error:
         if error.field not in names:
             raise
-        key, factor = names[error.field]
-        value = error.value / factor if isinstance(error.value, float) else error.value
-        raise InvalidInput(f"{place}.{key}", value, error.allowed) from None
+        raise _placed_in_table(error, error.field, names, place) from None
 
 
 def _si(raw: Any, field: str, factor: float) -> Any:
@@ -192,8 +189,29 @@ def _si(raw: Any, field: str, factor: float) -> Any:
     return raw if isinstance(raw, int) and factor == 1.0 else number
 
 
+def _placed_in_table(error: InvalidInput, attribute: str, names: Names, place: str) -> InvalidInput:
+    """Return an error about an attribute as one about its field in the file, in its unit."""
+    key, factor = names[attribute]
+    value = error.value
+    if isinstance(value, float):
+        value /= factor
+    elif isinstance(value, tuple):
+        value = tuple(number / factor for number in value)
+    return InvalidInput(f"{place}.{key}", value, error.allowed)
+
+
+def _placed_in_files(
+    error: InvalidInput, records: Sequence[RunningRecord | TorsionRecord]
+) -> InvalidInput:
+    """Return an error of `Campaign` as one about its files."""
+    table, _, attribute = error.field.partition(".")
+    names = {"believed": BELIEVED, "rig": RIG}.get(table)
+    if names is not None and attribute in names:
+        return _placed_in_table(error, attribute, names, f"{CAMPAIGN_FILE}.{table}")
+    return InvalidInput(_place_in_files(error, records), error.value, error.allowed)
+
+
 def _place_in_files(error: InvalidInput, records: Sequence[RunningRecord | TorsionRecord]) -> str:
-    """Translate the field of an error of `Campaign`."""
     lengths = {record.name: len(record.time) for record in records}
     name, _, channel = error.field.partition(": ")
     if channel:

@@ -7,15 +7,102 @@ from radians, N.mm from N.m, and one channel from another.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.believed import Believed, Rig
 from pymoo_hdte.discrepancy.records import RunningRecord, TorsionRecord
+from pymoo_hdte.units import ARCSEC
 
 LARGEST_TRANSMISSION_ERROR = 0.02
 """rad; ten times the wind-up of the drive of the paper at its rated torque."""
+LEAST_AMPLITUDE = 1e-3 * ARCSEC
+"""rad; no encoder would show a line of the static error that is smaller, but not zero."""
+LEAST_FREQUENCY = 0.5
+"""Hz, of an inertia on the mesh; those of the drive of the paper swing at 18, 90 and 900 Hz."""
+LEAST_TOLERANCE = 1e-3
+"""No parameter of a drive is known better; a base held fixed turns its own errors into effects."""
+NOISE_FACTOR = 30.0
+"""Largest ratio of the noise that is stated to what the rows of the records show."""
+
+
+def check_believed(believed: Believed) -> None:
+    """Refuse beliefs that no drive can have.
+
+    Raises
+    ------
+    InvalidInput
+        If an inertia would swing on the mesh below `LEAST_FREQUENCY`, the static error has no line
+        or one beyond what drives have, or a tolerance is below `LEAST_TOLERANCE`.
+    """
+    for name in ("tolerance", "error_tolerance"):
+        value = getattr(believed, name)
+        if value < LEAST_TOLERANCE:
+            raise InvalidInput(f"believed.{name}", value, f"at least {LEAST_TOLERANCE:g}")
+    heaviest = believed.stiffness / (2.0 * math.pi * LEAST_FREQUENCY) ** 2
+    for name, referred in (
+        ("input_inertia", believed.ratio**2),
+        ("output_inertia", 1.0),
+        ("load_inertia", 1.0),
+    ):
+        value = getattr(believed, name)
+        if not value * referred <= heaviest:
+            allowed = (
+                f"at most {heaviest / referred:.3g} kg.m2, or its natural frequency on the mesh "
+                f"of {believed.stiffness:g} N.m/rad would be below {LEAST_FREQUENCY:g} Hz"
+            )
+            raise InvalidInput(f"believed.{name}", value, allowed)
+    if not believed.error_orders:
+        raise InvalidInput("believed.error_orders", (), "at least one; its amplitude may be zero")
+    for amplitude in believed.error_amplitudes:
+        if not (amplitude == 0.0 or LEAST_AMPLITUDE <= amplitude <= LARGEST_TRANSMISSION_ERROR):
+            least, most = LEAST_AMPLITUDE / ARCSEC, LARGEST_TRANSMISSION_ERROR / ARCSEC
+            allowed = f"zero, or {least:.2g} to {most:.2g} arcsec"
+            raise InvalidInput("believed.error_amplitudes", amplitude, allowed)
+
+
+def check_noise(
+    running: Sequence[RunningRecord],
+    torsion: Sequence[TorsionRecord],
+    believed: Believed,
+    rig: Rig,
+) -> None:
+    """Refuse a stated noise so large that no record shows it: it would hide every misfit.
+
+    A record may scatter more than stated, because an effect moves it from row to row.
+
+    Raises
+    ------
+    InvalidInput
+        If all records scatter less than stated by more than `NOISE_FACTOR`.
+    """
+    averaged = np.sqrt([record.samples_averaged for record in running])
+    errors = [record.transmission_error(believed.ratio) for record in running]
+    shown = {
+        # Both encoders stand in a transmission error.
+        "angle_noise": _scatters(errors) * averaged / math.sqrt(2.0),
+        "input_torque_noise": _scatters([record.input_torque for record in running]) * averaged,
+        "output_torque_noise": _scatters([record.output_torque for record in running]) * averaged,
+    }
+    if torsion:
+        shown["torsion_angle_noise"] = _scatters([record.output_angle for record in torsion])
+    for name, scatters in shown.items():
+        stated, largest = getattr(rig, name), float(scatters.max())
+        if not stated <= NOISE_FACTOR * largest:
+            allowed = (
+                f"at most {NOISE_FACTOR:g} times what the records show from row to row, "
+                f"which is {largest / stated:.2g} times that"
+            )
+            raise InvalidInput(f"rig.{name}", stated, allowed)
+
+
+def _scatters(channels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return the standard deviation of the noise of each channel's rows, or more."""
+    # Third differences of white noise have 1 + 9 + 9 + 1 times its variance.
+    return np.array([np.sqrt(np.mean(np.diff(rows, 3) ** 2) / 20.0) for rows in channels])
 
 
 def check_running(record: RunningRecord, believed: Believed, rig: Rig) -> None:

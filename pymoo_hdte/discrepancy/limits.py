@@ -1,0 +1,84 @@
+"""What a campaign cannot tell, whatever the verdict: conditions that no fitted record varies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.workflow import Analysis
+
+_SAME_SPEED = 1.1
+"""Ratio of the largest to the smallest speed up to which records run at one speed."""
+_SAME_LOAD = 0.1
+"""Range of loads, as a share of the largest, up to which records carry one load."""
+_RESOLVED = 0.5
+"""Largest distance, in cycles per output turn, at which a line stands for an order."""
+
+
+def limits(analysis: Analysis) -> list[str]:
+    """Return a sentence for everything that the records of a campaign cannot tell.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of `workflow.analyse`.
+    """
+    return [*_unproven(analysis), *_unvaried(analysis), *_unseen(analysis)]
+
+
+def _unproven(analysis: Analysis) -> list[str]:
+    found = []
+    if not analysis.campaign.held_out:
+        found.append("No record was held out: nothing is proven about conditions not fitted.")
+    fitted = {record.name for record in analysis.data.features.records}
+    left_out = [record.name for record in analysis.campaign.train if record.name not in fitted]
+    if left_out:
+        found.append(
+            f"Not fitted, because the load does not hold the tooth flanks together: "
+            f"{', '.join(left_out)}."
+        )
+    return found
+
+
+def _unvaried(analysis: Analysis) -> list[str]:
+    records, found = analysis.data.features.records, []
+    speeds = np.array([record.input_speed for record in records])
+    loads = np.array([record.load_torque for record in records])
+    if np.abs(speeds).max() <= _SAME_SPEED * np.abs(speeds).min():
+        found.append(
+            "All fitted records run at one speed: dry friction, friction that changes with speed "
+            "and damping cannot be told apart."
+        )
+    if np.ptp(loads) <= _SAME_LOAD * np.abs(loads).max():
+        found.append(
+            "All fitted records carry one load: an error that grows with load cannot be told from "
+            "one that does not."
+        )
+    if np.all(speeds > 0.0) or np.all(speeds < 0.0):
+        found.append(
+            "All fitted records turn one way: only the stated zero error of the input torque "
+            f"sensor, {analysis.campaign.rig.input_torque_zero:g} N.m, tells dry friction at the "
+            "input from it."
+        )
+    if np.ptp([record.elapsed for record in records]) == 0.0:
+        found.append("All fitted records stand at one time of the session: no drift can be seen.")
+    if not analysis.data.torsion:
+        found.append(
+            "No torsion sweep was fitted: a clearance cannot be told from a soft wind-up, nor "
+            "hysteresis from damping, where the running records do not pass through zero torque."
+        )
+    return found
+
+
+def _unseen(analysis: Analysis) -> list[str]:
+    believed, orders = analysis.campaign.believed, analysis.data.features.orders
+    unseen = _unresolved(believed.error_orders, orders.tolist(), _RESOLVED / believed.ratio)
+    if not unseen:
+        return []
+    named = ", ".join(f"{order:.4g}" for order in unseen)
+    return [f"The records do not resolve the believed static error of order {named}."]
+
+
+def _unresolved(wanted: Sequence[float], orders: Sequence[float], near: float) -> list[float]:
+    return [order for order in wanted if min(abs(order - line) for line in orders) > near]

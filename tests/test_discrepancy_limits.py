@@ -1,0 +1,66 @@
+"""What a campaign cannot tell is said, and only where it cannot."""
+
+import re
+from dataclasses import replace
+
+import pytest
+from quick_campaigns import quick_campaign
+
+from pymoo_hdte.discrepancy.features import measure
+from pymoo_hdte.discrepancy.fit import Data
+from pymoo_hdte.discrepancy.limits import limits
+from pymoo_hdte.discrepancy.workflow import Analysis
+
+ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0]
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    clean = quick_campaign(1)
+    turned = replace(clean.running[0], input_speed=-clean.running[0].input_speed)
+    # The channels are turned, too, so that nothing but the direction differs.
+    angles = {"input_angle": -turned.input_angle, "output_angle": -turned.output_angle}
+    return replace(clean, running=(replace(turned, **angles), *clean.running[1:]))
+
+
+def said(campaign, fitted=None, orders=ORDERS):
+    """Return all limits of a campaign of which some records, by default all, were fitted."""
+    features = measure(campaign, fitted or campaign.train, orders)
+    data = Data(campaign, features, (), campaign.torsion)
+    return limits(Analysis(campaign, data, None, ()))
+
+
+def trained(campaign, keep):
+    return [replace(one, role="train") for one in campaign.running if keep(one)]
+
+
+def test_a_full_campaign_has_no_limits(campaign):
+    assert said(campaign) == []
+
+
+CASES = {
+    "held out": (lambda c: said(replace(c, running=c.train)), "nothing is proven"),
+    "speed": (lambda c: said(c, trained(c, lambda r: r.input_speed > 200.0)), "one speed"),
+    "load": (lambda c: said(c, trained(c, lambda r: r.load_torque == 40.0)), "one load"),
+    "no load": (lambda c: said(c, trained(c, lambda r: r.load_torque == 0.0)), "one load"),
+    "direction": (lambda c: said(c, c.train[1:]), "turn one way"),
+    "drift": (
+        lambda c: said(c, [replace(one, elapsed=5.0) for one in c.train]),
+        "no drift can be seen",
+    ),
+    "sweep": (lambda c: said(replace(c, torsion=())), "No torsion sweep"),
+    "order": (lambda c: said(c, orders=[1.0, 2.0, 3.0]), "order 2.02."),
+    "rattle": (lambda c: said(c, c.train[:-1]), r"Not fitted.*: run_2000rpm_40Nm\."),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_what_is_missing_is_said(campaign, case):
+    found, words = CASES[case]
+    assert any(re.search(words, sentence) for sentence in found(campaign))
+
+
+def test_only_what_is_missing_is_said(campaign):
+    assert len(said(replace(campaign, torsion=()))) == 1
+    assert len(said(campaign, orders=[1.0, 2.0, 3.0])) == 1
+    assert len(said(replace(campaign, running=campaign.train))) == 1

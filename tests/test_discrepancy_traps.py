@@ -1,0 +1,43 @@
+"""The two traps of design section 7: without their safeguards a clean drive looks faulty."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from quick_campaigns import quick_campaign
+
+from pymoo_hdte.discrepancy.fit import Data
+from pymoo_hdte.discrepancy.plausibility import LEAST_TOLERANCE
+from pymoo_hdte.discrepancy.workflow import analyse
+
+
+@pytest.fixture(scope="module", params=[1, 2])
+def clean(request):
+    return quick_campaign(request.param)
+
+
+def test_a_clean_drive_is_adequate(clean):
+    """Fails when either safeguard is taken out of the code."""
+    assert analyse(clean).verdict.status == "adequate"
+
+
+def test_a_frozen_base_makes_effects_of_its_own_errors(clean):
+    frozen = replace(clean.believed, tolerance=LEAST_TOLERANCE)
+    assert analyse(replace(clean, believed=frozen)).verdict.status != "adequate"
+
+
+def test_repeatability_left_out_is_a_false_alarm(clean):
+    exact = replace(clean.rig, repeatability=0.0)
+    assert analyse(replace(clean, rig=exact)).verdict.status != "adequate"
+
+
+def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, monkeypatch):
+    carried = Data._repeatability
+
+    def of_the_transmission_error(self, layout, start):
+        own = np.zeros(self.features.values.shape[1])
+        own[[0, *self.features.places(0).ravel()]] = 1.0
+        return carried(self, layout, start) * np.outer(own, own)
+
+    monkeypatch.setattr(Data, "_repeatability", of_the_transmission_error)
+    assert analyse(clean).verdict.status != "adequate"
