@@ -110,10 +110,13 @@ class Outcome:
 
     @property
     def bias_ratio(self) -> float | None:
-        """Bias of the base after the revision over that before it; 1 where the workflow failed."""
+        """Bias of the base after the revision over that before it; 1 where the workflow failed.
+
+        None where the effect moves the base by less than its standard error.
+        """
         if self.status == ERROR:
             return 1.0
-        if "bias_before" not in self.numbers:
+        if self.numbers.get("bias_before", 0.0) <= self.numbers.get("bias_error", 0.0):
             return None
         return self.numbers["bias_after"] / self.numbers["bias_before"]
 

@@ -40,6 +40,9 @@ REVISED = ("single", "pair")
 GAPS = ("transmission_error", "leading", "overall")
 """Gaps on held-out records: that of the verdict's document, that of the channel in which the base
 stands out of the noise most, and that of all features."""
+DETERMINED = 0.5
+"""Standard error, in tolerances, up to which the records and not the bounds say what a parameter
+is: damping of the output bearings has one of 150."""
 VERDICT_COLUMNS = (
     "status",
     "first",
@@ -57,6 +60,9 @@ NUMBERS = (
     "cells_both",
     "bias_before",
     "bias_after",
+    "bias_error",
+    "bias_of_all_before",
+    "bias_of_all_after",
     *(f"{gap}_{state}" for gap in GAPS for state in ("before", "after", "floor")),
 )
 COLUMNS = (*VERDICT_COLUMNS, *NUMBERS, *RIVALS)
@@ -173,18 +179,23 @@ def twin_fit(twin: Campaign, kept: Features) -> Fit:
 
 
 def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
-    """Return how far the effect moves the base before and after the revision.
+    """Return how far the effect moves the base before and after the revision, in tolerances.
 
-    Root mean square over mechanical parameters and amplitudes of the static error, in tolerances.
+    Root mean square over mechanical parameters and amplitudes of the static error: over all of
+    them, and over those that the twin determines (`DETERMINED`), with its standard error of these.
     """
     layout = Layout(twin.parameters)
     lines = [p.name for p in twin.parameters if p.name.startswith("error_amplitude_")]
-    rows = [layout.index(name) for name in (*MECHANICAL, *lines)]
+    rows = np.array([layout.index(name) for name in (*MECHANICAL, *lines)])
     scale = layout.array("scale")[rows]
-    return {
-        "bias_before": _bias(verdict.base, twin, rows, scale),
-        "bias_after": _bias(accepted_fit(verdict), twin, rows, scale),
-    }
+    error = np.sqrt(np.diagonal(twin.covariance)[rows]) / scale
+    known = error < DETERMINED
+    scores = {"bias_error": _root_mean_square(error[known])}
+    for state, fitted in (("before", verdict.base), ("after", accepted_fit(verdict))):
+        moved = (fitted.values[rows] - twin.values[rows]) / scale
+        scores[f"bias_{state}"] = _root_mean_square(moved[known])
+        scores[f"bias_of_all_{state}"] = _root_mean_square(moved)
+    return scores
 
 
 def gap_scores(proof: Proof) -> Scores:
@@ -205,9 +216,8 @@ def _features(campaign: Campaign, kept: Features) -> Features:
     return measure(campaign, records, kept.orders.tolist())
 
 
-def _bias(fitted: Fit, twin: Fit, rows: list[int], scale: NDArray[np.float64]) -> float:
-    moved = (fitted.values[rows] - twin.values[rows]) / scale
-    return float(np.sqrt(np.mean(moved**2)))
+def _root_mean_square(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _answer(tool: Tool, analysis: Analysis) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from experiments.blind_codes import STATUSES
 from experiments.blind_data import Outcome
 from experiments.blind_limits import LIMITS, curve, size_at
-from experiments.blind_scoring import COMPARED, PARTS, RIVALS
+from experiments.blind_scoring import COMPARED, DETERMINED, PARTS, RIVALS
 from experiments.blind_targets import (
     Estimate,
     Judged,
@@ -102,7 +102,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
         counts = [sum(one.status == status for one in chosen)
                   for status in ("class", "unlisted", "adequate", "error")]  # fmt: skip
         biases = [median([one.numbers.get(f"bias_{state}") for one in chosen]).value
-                  for state in ("before", "after")]  # fmt: skip
+                  for state in ("before", "after", "error")]  # fmt: skip
         gaps = [one.gap("leading") for one in chosen]
         rows.append((
             _plain(name), len(chosen), right.value, right.low, right.high,
@@ -124,6 +124,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
         Column("F1 of cells", "", 3, "median"),
         Column("before", "", 2, "bias of the base, in tolerances"),
         Column("after", "", 2, "bias of the base, in tolerances"),
+        Column("standard error", "", 2, "bias of the base, in tolerances"),
         Column("ratio", "", 2, "bias of the base, in tolerances"),
         Column("transmission error", "", 3, "held-out shrinkage"),
         Column("leading channel", "", 3, "held-out shrinkage"),
@@ -131,11 +132,22 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
     )
     note = (
         "Medians. The bias is the root mean square distance of mechanical parameters and error "
-        "amplitudes from a fit to the same rig and noise without the effect. The leading channel "
-        "is that in which the base stands out of the noise most; the end is its."
+        "amplitudes from a fit to the same rig and noise without the effect, of those that this "
+        f"fit knows to better than {DETERMINED:g} tolerances; beside it the standard error of the "
+        "same fit. A ratio counts where the bias exceeds that error. Root mean square over all "
+        f"cases: {_pooled(outcomes, 'bias')} of the bias is left, with the parameters that no "
+        f"record determines {_pooled(outcomes, 'bias_of_all')}. The leading channel is that in "
+        "which the base stands out of the noise most; the end is its."
     )
     return Table("effects", "Each listed effect at its typical size", columns, tuple(rows),
                  note=note)  # fmt: skip
+
+
+def _pooled(outcomes: Sequence[Outcome], name: str) -> str:
+    """Return the ratio of root mean squares over all cases, after the revision to before it."""
+    numbers = [one.numbers for one in select(outcomes, "single") if f"{name}_before" in one.numbers]
+    squares = [sum(one[f"{name}_{state}"] ** 2 for one in numbers) for state in ("after", "before")]
+    return significant((squares[0] / squares[1]) ** 0.5, 2) if numbers else "none"
 
 
 def limits_table(outcomes: Sequence[Outcome]) -> Table:

@@ -159,9 +159,19 @@ def test_bias_is_in_tolerances_over_mechanical_parameters_and_amplitudes():
     for name, off in (("stiffness", 0.3), ("error_amplitude_1", -0.4), ("error_phase_0", 7.0)):
         moved[layout.index(name)] += off * layout.array("scale")[layout.index(name)]
     verdict = analysed(data, "adequate").verdict
-    scores = bias_scores(replace(verdict, base=replace(twin, values=moved)), twin)
-    assert scores["bias_before"] == pytest.approx(0.5 / np.sqrt(6 + 3))
-    assert scores["bias_after"] == pytest.approx(scores["bias_before"])
+    verdict = analysed(data, "adequate").verdict
+    verdict = replace(verdict, base=replace(twin, values=moved))
+    scores = bias_scores(verdict, twin)
+    assert scores["bias_of_all_before"] == pytest.approx(0.5 / np.sqrt(6 + 3))
+    assert scores["bias_of_all_after"] == scores["bias_of_all_before"]
+    assert scores["bias_after"] == scores["bias_before"] >= scores["bias_of_all_before"]
+    # What no record determines does not count, however far it goes.
+    lost = moved.copy()
+    lost[layout.index("output_damping")] = np.inf
+    far = bias_scores(replace(verdict, base=replace(twin, values=lost)), twin)
+    assert far["bias_before"] == scores["bias_before"]
+    assert far["bias_of_all_before"] == np.inf
+    assert 0.0 < scores["bias_error"] < blind_scoring.DETERMINED
 
 
 def as_outcome(case, scores):
@@ -235,6 +245,8 @@ def test_numbers_of_a_case_give_its_scores():
     assert found.shrinkage("leading") == pytest.approx(0.9)
     assert found.closed("leading", 1.5)
     assert not found.closed("leading", 1.3)
+    small = replace(found, numbers=numbers | {"bias_error": 0.6})
+    assert small.bias_ratio is None
     failed = Outcome(ECCENTRIC, "error", ())
     assert (failed.f1, failed.bias_ratio, failed.shrinkage("leading")) == (0.0, 1.0, 0.0)
     assert not failed.closed("leading", 1.5)
