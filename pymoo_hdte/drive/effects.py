@@ -171,9 +171,12 @@ def effect_from_fields(table: Fields) -> Effect:
         case KinematicReaction.name:
             effect = KinematicReaction(table.number("share"))
         case Eccentricity.name:
-            effect = Eccentricity(
-                table.quantity("amplitude", "angle"), table.quantity("phase", "angle")
+            amplitude, phase = (
+                table.quantity("amplitude", "angle"),
+                table.quantity("phase", "angle"),
             )
+            order = table.number("order") if table.has("order") else 1.0
+            effect = Eccentricity(amplitude, phase, order)
         case ThermalDrift.name:
             effect = ThermalDrift(table.quantity("rate", "angle rate"))
         case _:

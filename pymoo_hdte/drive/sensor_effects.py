@@ -23,16 +23,20 @@ class Eccentricity:
     ----------
     amplitude, phase : float
         rad.
+    order : float
+        Cycles per output turn: 1 off centre, 2 oval or tilted, more for the scale itself.
     """
 
     name: ClassVar[str] = "eccentricity"
     port: ClassVar[str] = "sensor"
     amplitude: float
     phase: float
+    order: float = 1.0
 
     def __post_init__(self) -> None:
         real_number("eccentricity.amplitude", self.amplitude)
         real_number("eccentricity.phase", self.phase)
+        real_number("eccentricity.order", self.order, above=0.0)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients as they are."""
@@ -40,12 +44,13 @@ class Eccentricity:
 
     def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
         """Return what is added to the reading of true output angles (n,), rad, shape (n,)."""
-        return np.asarray(self.amplitude * np.cos(output_angle + self.phase))
+        return np.asarray(self.amplitude * np.cos(self.order * output_angle + self.phase))
 
     def to_dict(self) -> dict[str, object]:
         """Return the effect as a TOML-like table."""
         amplitude, phase = with_unit(self.amplitude, "angle"), with_unit(self.phase, "angle")
-        return {"name": self.name, "amplitude": amplitude, "phase": phase}
+        table = {"name": self.name, "amplitude": amplitude, "phase": phase}
+        return table if self.order == 1.0 else table | {"order": self.order}
 
 
 @dataclass(frozen=True)
