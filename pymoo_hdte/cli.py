@@ -73,9 +73,10 @@ def _discrepancy(folder: Path, out: Path) -> dict[str, Any]:
     from pymoo_hdte.discrepancy.locate import locate
     from pymoo_hdte.discrepancy.next_experiment import next_experiment
     from pymoo_hdte.discrepancy.prove import prove
-    from pymoo_hdte.discrepancy.report import VERDICT_FILE, write_report
+    from pymoo_hdte.discrepancy.report import VERDICT_FILE, check_folder, write_report
     from pymoo_hdte.discrepancy.workflow import analyse
 
+    check_folder(out)
     analysis = analyse(read_campaign(folder))
     written = write_report(
         analysis, locate(analysis), prove(analysis), next_experiment(analysis), out
@@ -96,7 +97,12 @@ def _summary(document: dict[str, Any], out: Path) -> str:
         f"{document['status']}{': ' + names if names else ''}",
         document["sentence"],
         document["location"]["sentence"],
+        *document["limits"],
         f"Next: {document['next_experiment']['description']}",
         f"Report: {out / 'report.html'}",
     ]
     return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -12,6 +12,7 @@ DOCUMENT = {
     "sentence": "There is play between the teeth.",
     "effects": [{"name": "backlash", "port": "mesh"}],
     "location": {"sentence": "In the mean."},
+    "limits": ["No record was held out."],
     "next_experiment": {"description": "a sweep through zero"},
 }
 
@@ -28,7 +29,13 @@ def run(*options):
 def test_the_verdict_is_printed_in_words(ready, capsys):
     assert run() == 0
     printed = capsys.readouterr().out
-    for words in ("named: backlash at the mesh", "play between", "In the mean", "through zero"):
+    for words in (
+        "named: backlash at the mesh",
+        "play between",
+        "In the mean",
+        "held out",
+        "through zero",
+    ):
         assert words in printed
 
 
