@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy import report, workflow, write_campaign
 from pymoo_hdte.drive import load_datasheet, load_model, simulate
 
 ROW = "run_2000rpm_40Nm.csv.gz"
+IDLE = "run_2000rpm_00Nm.csv.gz"
 SWEEP = "torsion_locked_input.csv.gz"
 
 
@@ -129,6 +130,10 @@ FAULTS = {
     "degrees": (column(ROW, "output_angle_rad", np.degrees), f"{ROW}, .*both angles in rad"),
     "degrees swept": (column(SWEEP, "output_angle_rad", np.degrees), f"{SWEEP}, .*slope"),
     "mN.m": (column(ROW, "input_torque_Nm", scaled(1e3)), f"{ROW}, .*mean of input_torque"),
+    "mN.m, no load": (
+        column(IDLE, "input_torque_Nm", scaled(1e3)),
+        f"{IDLE}, .*overcomes friction",
+    ),
     "rad/s": (toml("rpm = 2000", "rpm = 209.44"), "run_2000rpm_00Nm.*mean speed"),
     "g.cm2": (toml("input_inertia_kgm2 = 0.000197", "input_inertia_kgm2 = 1970"), "line 8: beli"),
     "noise in mN.m": (toml("torque_noise_Nm = 0.003", "torque_noise_Nm = 3"), "line 23: rig.input"),

@@ -274,6 +274,14 @@ def test_a_wrong_unit_or_a_dead_channel_is_refused(campaign, fault):
         replace(campaign, running=(replace(slow, **scaled),))
 
 
+@pytest.mark.parametrize("factor", [1e3, -1.0])
+def test_a_motor_torque_that_no_friction_explains_is_refused(campaign, factor):
+    loaded, empty, _ = campaign.running
+    spoilt = replace(empty, input_torque=factor * empty.input_torque)
+    with pytest.raises(InvalidInput, match="empty: mean of input_torque"):
+        replace(campaign, running=(loaded, spoilt))
+
+
 def test_swapped_channels_are_refused(campaign):
     slow = campaign.running[0]
     torques = replace(slow, input_torque=slow.output_torque, output_torque=slow.input_torque)

@@ -58,9 +58,10 @@ class Campaign:
             raise InvalidInput("running records", 0, "at least one")
         self._check_each_once()
         check_believed(self.believed)
+        largest_load = max(abs(record.load_torque) for record in self.running)
         for record in self.running:
             with _named(record.name):
-                check_running(record, self.believed, self.rig)
+                check_running(record, self.believed, self.rig, largest_load)
         for sweep in self.torsion:
             with _named(sweep.name):
                 check_torsion(sweep, self.believed)

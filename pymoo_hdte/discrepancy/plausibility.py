@@ -105,8 +105,16 @@ def _scatters(channels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     return np.array([np.sqrt(np.mean(np.diff(rows, 3) ** 2) / 20.0) for rows in channels])
 
 
-def check_running(record: RunningRecord, believed: Believed, rig: Rig) -> None:
+def check_running(record: RunningRecord, believed: Believed, rig: Rig, largest_load: float) -> None:
     """Refuse a running record whose channels contradict its condition or the drive.
+
+    Parameters
+    ----------
+    record : RunningRecord
+    believed : Believed
+    rig : Rig
+    largest_load : float
+        Of the campaign, N.m: the scale of torques where a record has no load.
 
     Raises
     ------
@@ -123,7 +131,7 @@ def check_running(record: RunningRecord, believed: Believed, rig: Rig) -> None:
                 "both angles in rad with one common zero"
             )
             raise InvalidInput("largest transmission error", largest, allowed)
-        _check_torques(record, believed.ratio, rig)
+        _check_torques(record, believed.ratio, rig, largest_load)
 
 
 def check_torsion(record: TorsionRecord, believed: Believed) -> None:
@@ -159,17 +167,22 @@ def _check_travel(record: RunningRecord, ratio: float) -> None:
         raise InvalidInput("travel of input_angle", abs(travel), allowed)
 
 
-def _check_torques(record: RunningRecord, ratio: float, rig: Rig) -> None:
+def _check_torques(record: RunningRecord, ratio: float, rig: Rig, largest_load: float) -> None:
     load = record.load_torque
     measured = float(np.mean(record.output_torque))
     slack = 10.0 * rig.output_torque_zero + 3.0 * float(np.std(record.output_torque))
     if not abs(measured - load) <= 0.3 * abs(load) + slack:
         raise InvalidInput("mean of output_torque", measured, f"near the load of {load:g} N.m")
-    if load == 0.0:
-        return
     motor = float(np.mean(record.input_torque))
-    share = abs(load) / ratio
     slack = 10.0 * rig.input_torque_zero
+    if load == 0.0:
+        most = 10.0 * largest_load / ratio + slack if largest_load else math.inf
+        # Only the motor drives, against friction.
+        if not -slack <= math.copysign(1.0, record.input_speed) * motor <= most:
+            allowed = "a torque that overcomes friction, small beside that under load"
+            raise InvalidInput("mean of input_torque", motor, allowed)
+        return
+    share = abs(load) / ratio
     # Friction adds to the load when the motor drives it and may reverse the torque when not.
     least = 0.3 * share - slack if load * record.input_speed > 0.0 else -math.inf
     if not (least <= math.copysign(1.0, load) * motor and abs(motor) <= 10.0 * share + slack):
