@@ -32,6 +32,9 @@ CONSTANT_TORQUE = SpeedLoop()
 class Balance:
     """Steady state of n cases, as harmonics of the input angle.
 
+    Phasors multiply exp(i order alpha) with the input angle alpha as it is, in either direction: in
+    reverse alpha falls with time, and order lines of a measured record compare as they are.
+
     Attributes
     ----------
     torus : Torus
