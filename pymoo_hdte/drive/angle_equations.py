@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive.balance import CONSTANT_TORQUE, Phasors, SpeedLoop
 from pymoo_hdte.drive.coefficients import Coefficients
+from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.laws import PortState, Response
-from pymoo_hdte.drive.torus import Torus
+from pymoo_hdte.drive.torus import Matrices, Torus
 
 _STATIC_STEPS = 8
 
@@ -164,6 +165,24 @@ class AngleEquations:
         second = along[:, self.torus.size :]
         second = np.where(self._backward[:, None], second[:, ::-1], second)
         return self.torus.back(np.hstack([second, second]))
+
+    def recall_matrix(self, torsion: Phasors) -> Matrices | None:
+        """Return how the mesh torque hangs on the torsion elsewhere, if a law has memory.
+
+        Shape (n, 2 H, 2 H), to be added to what ``mesh_slope`` gives.
+        """
+        position, every = self.torus.signal(torsion), np.arange(self.torus.size, dtype=float)
+        passed = self._path(np.broadcast_to(every, position.shape))
+        total = None
+        for _, law in self.coefficients.laws:
+            if isinstance(law, MaxwellSlip):
+                weights, steps = law.recall(self._path(position))
+                places = np.take_along_axis(np.broadcast_to(passed, steps.shape), steps, axis=2)
+                on_grid = np.array([self._back(one) for one in weights])
+                elsewhere = np.array([self._back(one) for one in places]).astype(int)
+                one = -self.torus.recall_matrix(on_grid, elsewhere)
+                total = one if total is None else total + one
+        return total
 
     def output_residual(self, motion: Motion) -> Phasors:
         """Return what is left of the second equation, N.m."""

@@ -2,18 +2,21 @@
 
 The terms of `angle_equations` are evaluated on a grid (`torus`) and brought to zero harmonic by
 harmonic (Newton's method; alternating time and frequency, Cameron and Griffin, J. Applied Mechanics
-56, 1989); what couples speed and torsion is weak and followed by iteration.
+56, 1989); what couples speed and torsion is weak and followed by iteration. Hysteresis enters the
+step with its memory: the torque of a spring that sticks hangs on the torsion where it last slipped.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.angle_equations import AngleEquations, Motion, Values, mean
 from pymoo_hdte.drive.balance import BY_CASE, CONSTANT_TORQUE, Balance, Phasors, SpeedLoop
 from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.torus import (
+    Matrices,
     Torus,
     fundamental_orders,
     largest_multiples,
@@ -27,6 +30,9 @@ HIGHEST = 8
 _STEPS = 40
 _NEARLY_CONSTANT = 0.02
 """Variation of the mesh stiffness, relative, up to which its mean serves in Newton's step."""
+_SHRINKS = 0.9
+"""A step is followed in full again only where it is shorter than this share of the one before."""
+_LEAST_PART = 0.1
 _ROWS_AT_ONCE = 64
 
 
@@ -117,12 +123,16 @@ class _Solver:
         """Iterate until the torsion stands still; rows that never do are marked."""
         equations, left = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
+        before, part = np.full_like(size, np.inf), np.ones_like(size)
         for _ in range(_STEPS):
             torsion, energy = self.torsion[left], self.energy[left]
             change, energy_change = _newton_step(equations, torsion, energy, size[left])
-            self.torsion[left] = torsion + change
-            self.energy[left] = equations.at_wanted_speed(energy + energy_change)
-            settled = np.abs(change).max(axis=1) <= tolerance * size[left, 0]
+            longest = np.abs(change).max(axis=1, keepdims=True)
+            part[left] = _part(part[left], longest <= _SHRINKS * before[left])
+            before[left] = longest
+            self.torsion[left] = torsion + part[left] * change
+            self.energy[left] = equations.at_wanted_speed(energy + part[left] * energy_change)
+            settled = longest[:, 0] <= tolerance * size[left, 0]
             self.converged[left] = settled
             if np.all(settled):
                 break
@@ -150,6 +160,12 @@ class _Solver:
         )
 
 
+def _part(part: Values, shrinks: NDArray[np.bool_]) -> Values:
+    """Return the part of a step to take: between kinks, full ones may go round in circles."""
+    longer, shorter = np.minimum(2.0 * part, 1.0), np.maximum(0.5 * part, _LEAST_PART)
+    return np.where(shrinks, longer, shorter)
+
+
 def _newton_step(
     equations: AngleEquations, torsion: Phasors, energy: Phasors, size: Values
 ) -> tuple[Phasors, Phasors]:
@@ -163,7 +179,8 @@ def _newton_step(
     energy_change = -equations.coefficients.ratio * equations.input_residual(motion) / operator
     energy_change[:, 0] = 0.0
     right = (equations.output_residual(motion) + coupling * energy_change) / share
-    change = _torsion_change(equations, motion, impedance, right)
+    recall = equations.recall_matrix(torsion)
+    change = _torsion_change(equations, motion, impedance, recall, right)
     # Where a law takes the stiffness away, a full step may lead far off.
     longest = np.abs(change).max(axis=1, keepdims=True)
     change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
@@ -176,15 +193,22 @@ def _newton_step(
 
 
 def _torsion_change(
-    equations: AngleEquations, motion: Motion, impedance: Phasors, right: Phasors
+    equations: AngleEquations,
+    motion: Motion,
+    impedance: Phasors,
+    recall: Matrices | None,
+    right: Phasors,
 ) -> Phasors:
     """Return the change of the torsion that the linearised mesh answers ``right`` with."""
     orders, slope = equations.torus.orders, motion.mesh_slope
     viscous = 1j * orders * equations.speed * mean(motion.mesh_damping) - impedance
     level = mean(slope)
-    if np.all(np.abs(slope - level) <= _NEARLY_CONSTANT * np.abs(level)):
+    nearly_constant = np.all(np.abs(slope - level) <= _NEARLY_CONSTANT * np.abs(level))
+    if nearly_constant and recall is None:
         return right / (level + viscous)
     matrix = equations.torus.product_matrix(slope) + multiplication(viscous)
+    if recall is not None:
+        matrix += recall
     # The mean has no imaginary part: an equation for it must not be missing.
     empty = len(orders)
     matrix[:, empty, empty] = np.abs(matrix[:, 0, 0])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.laws import Aperiodic, PortState, Response, Values
@@ -44,6 +45,18 @@ class MaxwellSlip(Aperiodic):
         torque = np.tensordot(self._stiffnesses, stretch, axes=1)
         slope = np.tensordot(self._stiffnesses, sticking, axes=1)
         return Response(state.back(torque), state.back(slope))
+
+    def recall(self, path: Values) -> tuple[Values, NDArray[np.int_]]:
+        """Return how torques hang on where springs last slipped: weights and steps of ``path``.
+
+        Both have shape (springs, n, steps). A spring that sticks answers to the way since then, so
+        the torque changes by minus weight times the change of the position at that step.
+        """
+        _, sticking = slip_along(path, self._slips)
+        slipped = np.where(sticking == 0.0, np.arange(path.shape[1]), -1)
+        last = np.maximum.accumulate(slipped, axis=2)
+        weights = self._stiffnesses[:, None, None] * sticking * (last >= 0)
+        return weights, np.maximum(last, 0)
 
     def rates(self, speed: float, stretch: Values) -> Values:
         """Return how fast the springs stretch, (4,), for an integrator that keeps their state."""

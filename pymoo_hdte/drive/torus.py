@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 
+Matrices = NDArray[np.float64]
+
 _TOLERANCE = 1e-8
 _LARGEST_MULTIPLE = 4
 """An order whose fraction is up to this many times a known one needs no angle of its own."""
@@ -171,6 +173,20 @@ class Torus:
         # The mean counts once, a line with its conjugate twice.
         matrix[:, 0] *= 0.5
         return matrix
+
+    def recall_matrix(self, weights: NDArray[np.float64], places: NDArray[np.int_]) -> Matrices:
+        """Return the real matrices of weights times the signal at other points of the grid.
+
+        ``weights`` and ``places`` have shape (terms, n, G); the terms are summed. Matrices act as
+        those of `product_matrix`.
+        """
+        synthesis = np.concatenate([self._cosine, -self._sine]).T
+        analysis = np.concatenate([self._analysis.real, self._analysis.imag])
+        recalled = sum(
+            weight[..., None] * synthesis[place]
+            for weight, place in zip(weights, places, strict=True)
+        )
+        return np.asarray(analysis @ recalled)
 
 
 def stacked(phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
