@@ -196,8 +196,9 @@ def test_an_unstable_drive_is_refused_with_laws_as_without():
             with_effects(model, more).dte_arcsec(model.nominal[None])
 
 
-def test_no_designs_give_no_values_with_laws_either():
-    assert with_effects(preset("published"), EFFECTS[0]).dte_arcsec(np.empty((0, 5))).shape == (0,)
+@pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)
+def test_no_designs_give_no_values_with_laws_either(effect):
+    assert with_effects(preset("published"), effect).dte_arcsec(np.empty((0, 5))).shape == (0,)
 
 
 @pytest.mark.parametrize("ratio", [60, 96, 101, 120, 161])

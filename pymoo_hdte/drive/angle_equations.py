@@ -157,8 +157,7 @@ class AngleEquations:
     def _path(self, values: Values) -> Values:
         """Return grid values in the order in which a row passes them, twice over."""
         along = self.torus.path(values)
-        along[self._backward] = along[self._backward, ::-1]
-        return along
+        return np.where(self._backward[:, None], along[:, ::-1], along)
 
     def _back(self, along: Values) -> Values:
         """Return the second passage of values along `_path` on the grid."""
@@ -171,17 +170,19 @@ class AngleEquations:
 
         Shape (n, 2 H, 2 H), to be added to what ``mesh_slope`` gives.
         """
-        position, every = self.torus.signal(torsion), np.arange(self.torus.size, dtype=float)
-        passed = self._path(np.broadcast_to(every, position.shape))
-        total = None
-        for _, law in self.coefficients.laws:
-            if isinstance(law, MaxwellSlip):
-                weights, steps = law.recall(self._path(position))
-                places = np.take_along_axis(np.broadcast_to(passed, steps.shape), steps, axis=2)
-                on_grid = np.array([self._back(one) for one in weights])
-                elsewhere = np.array([self._back(one) for one in places]).astype(int)
-                one = -self.torus.recall_matrix(on_grid, elsewhere)
-                total = one if total is None else total + one
+        springs = [law for _, law in self.coefficients.laws if isinstance(law, MaxwellSlip)]
+        if not springs:
+            return None
+        along = self._path(self.torus.signal(torsion))
+        every = np.arange(self.torus.size, dtype=float)
+        passed = self._path(np.tile(every, (len(along), 1)))
+        total = np.zeros((len(along), *[2 * len(self.torus.orders)] * 2))
+        for law in springs:
+            weights, steps = law.recall(along)
+            places = np.take_along_axis(np.broadcast_to(passed, steps.shape), steps, axis=2)
+            on_grid = np.array([self._back(one) for one in weights])
+            elsewhere = np.array([self._back(one) for one in places]).astype(int)
+            total -= self.torus.recall_matrix(on_grid, elsewhere)
         return total
 
     def output_residual(self, motion: Motion) -> Phasors:

@@ -126,13 +126,15 @@ class Torus:
         the sequence of extremes but not on time sees the same as in the real, slower beat; the
         second passage is free of the start from rest.
         """
-        turns = values.reshape(len(values), self._shape[0], -1).swapaxes(1, 2)
-        return np.tile(turns.reshape(len(values), -1), 2)
+        points = self._shape[0]
+        turns = values.reshape(len(values), points, self.size // points).swapaxes(1, 2)
+        return np.tile(turns.reshape(len(values), self.size), 2)
 
     def back(self, along: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the second passage of values along `path` on the grid, shape (n, G)."""
-        second = along[:, self.size :].reshape(len(along), -1, self._shape[0])
-        return second.swapaxes(1, 2).reshape(len(along), -1)
+        points = self._shape[0]
+        second = along[:, self.size :].reshape(len(along), self.size // points, points)
+        return second.swapaxes(1, 2).reshape(len(along), self.size)
 
     def signal(self, phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return values on the grid, shape (n, G), of Re sum phasor exp(i order alpha)."""
