@@ -164,7 +164,7 @@ class Torus:
         """
         axes = tuple(range(1, 1 + len(self._shape)))
         spectrum = np.fft.fftn(factor.reshape(-1, *self._shape), axes=axes) / self.size
-        flat = spectrum.reshape(len(factor), -1)
+        flat = spectrum.reshape(len(factor), self.size)
         below, above = flat[:, self._differences], flat[:, self._sums]
         size = len(self.orders)
         matrix = np.empty((len(factor), 2 * size, 2 * size))
