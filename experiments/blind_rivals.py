@@ -180,9 +180,9 @@ def sparse_regression(analysis: Analysis) -> str:
         clean = chi2.sf(train.target @ train.target, freedom) > FALSE_ALARMS
         return "adequate" if clean else "unlisted"
     excess = float(target @ target) - freedom
-    if explained(laws[:, support], target) < LEAST_SHARE * excess:
-        return "unlisted"
     positive = np.array([term.positive for term in library])
+    if explained(laws[:, support], target, positive[support]) < LEAST_SHARE * excess:
+        return "unlisted"
     shares: dict[str, float] = {}
     for name in dict.fromkeys(term.name for term in library):
         kept = support & np.array([term.name == name for term in library])
