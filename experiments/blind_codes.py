@@ -5,13 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from pymoo_hdte.discrepancy.hidden_forms import HIDDEN_FORMS
+from pymoo_hdte.discrepancy.line_candidates import ENCODER_LINE
 from pymoo_hdte.discrepancy.naming import STATUSES as VERDICTS
 from pymoo_hdte.discrepancy.parameters import MECHANICAL
 
 ERROR = "error"
 """Status of a case in which the workflow raised an exception."""
 STATUSES = (*VERDICTS, ERROR)
-NAMES = (*HIDDEN_FORMS, "parameter", *(status for status in STATUSES if status != "parameter"))
+NAMES = (
+    *HIDDEN_FORMS,
+    ENCODER_LINE,
+    "parameter",
+    *(status for status in STATUSES if status != "parameter"),
+)
 """What a tool may answer: an effect, or a status where it names none."""
 PORTS = ("input", "output", "mesh", "sensor", "base", *MECHANICAL)
 

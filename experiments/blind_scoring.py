@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from experiments.blind_cases import CALIBRATED, Case
+from experiments.blind_cases import Case
 from experiments.blind_codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
 from experiments.campaign import Run
 from pymoo_hdte.discrepancy import Campaign
@@ -121,9 +121,10 @@ def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, .
     proof, proved = _timed(prove, analysis)
     _, proposed = _timed(next_experiment, analysis)
     if case.kind != "parameter":
-        scores |= location_scores(truly_moved(case, analysis), location.flagged)
-    if case.kind in REVISED:
-        scores |= bias_scores(analysis.verdict, twin_fit(case.run(()), analysis.data.features))
+        twin = case.run(()) if case.effects() else campaign
+        scores |= location_scores(truly_moved(analysis, twin), location.flagged)
+        if case.kind in REVISED:
+            scores |= bias_scores(analysis.verdict, twin_fit(twin, analysis.data.features))
     if proof is not None:
         scores |= gap_scores(proof)
     if case.kind in COMPARED:
@@ -146,18 +147,16 @@ def verdict_scores(case: Case, verdict: Verdict) -> Scores:
     return scores
 
 
-def truly_moved(case: Case, analysis: Analysis) -> Flags:
+def truly_moved(analysis: Analysis, twin: Campaign) -> Flags:
     """Return the cells that the hidden effects move by more than the root mean square of the noise.
 
-    Runs with the effects and without differ by nothing else, not even by their noise.
+    The twin is the same run without them: it differs by nothing else, not even by its noise, but
+    for the rounding of the encoders, a hundredth of that noise's variance.
     """
     kept = analysis.data.features
-    if not case.effects():
-        return np.zeros((len(kept.records), *degrees_of_freedom(analysis.data).shape), dtype=bool)
-    hidden, clean = (
-        _features(case.run(effects, CALIBRATED), kept).values for effects in (case.effects(), ())
+    moved: NDArray[np.float64] = cell_chi_square(
+        analysis.data, kept.values - _features(twin, kept).values
     )
-    moved: NDArray[np.float64] = cell_chi_square(analysis.data, hidden - clean)
     return moved > degrees_of_freedom(analysis.data)
 
 

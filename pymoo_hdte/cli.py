@@ -69,6 +69,8 @@ def _parser() -> argparse.ArgumentParser:
 def _discrepancy(folder: Path, out: Path) -> dict[str, Any]:
     """Analyse a campaign and write its report; return the verdict's document."""
     # The workflow takes a second to import, which --help need not wait for.
+    from threadpoolctl import threadpool_limits
+
     from pymoo_hdte.discrepancy import read_campaign
     from pymoo_hdte.discrepancy.locate import locate
     from pymoo_hdte.discrepancy.next_experiment import next_experiment
@@ -78,9 +80,10 @@ def _discrepancy(folder: Path, out: Path) -> dict[str, Any]:
 
     check_folder(out)
     analysis = analyse(read_campaign(folder))
-    written = write_report(
-        analysis, locate(analysis), prove(analysis), next_experiment(analysis), out
-    )
+    with threadpool_limits(limits=1):
+        written = write_report(
+            analysis, locate(analysis), prove(analysis), next_experiment(analysis), out
+        )
     document: dict[str, Any] = json.loads((written / VERDICT_FILE).read_text(encoding="utf-8"))
     return document
 

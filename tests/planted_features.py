@@ -60,7 +60,9 @@ def measured(effects=(), rng=None, **changes):
 
 
 def listed(data, name, orders=()):
-    return next(c for c in candidates(data.campaign.believed, orders) if c.name == name)
+    return next(
+        c for c in candidates(data.campaign.believed, ORDERS.tolist(), orders) if c.name == name
+    )
 
 
 def analysed(data, status="unlisted", candidate=None, start=()):

@@ -84,7 +84,7 @@ def test_a_local_misfit_does_not_bias_the_refitted_base():
 def test_a_named_line_flags_the_cells_that_it_moves():
     data, truth = measured()
     candidate = listed(data, "kinematic_error", [3.0])
-    effect = candidate.build((1.5 * ARCSEC, 0.5 * ARCSEC))
+    effect, *_ = candidate.build((1.5 * ARCSEC, 0.5 * ARCSEC))
     data, truth = measured((effect,), np.random.default_rng(5), stiffness=1.03)
     found = locate(analysed(data, "named", candidate, candidate.starts[0]))
     moved = (data.predict(truth[None], (effect,)) - data.predict(truth[None], ()))[0]

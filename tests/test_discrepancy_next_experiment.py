@@ -38,7 +38,7 @@ def test_separation_in_closed_form():
 def test_an_eccentric_encoder_is_to_be_clocked_anew():
     data = known_data()
     candidate = listed(data, "eccentricity")
-    data, _ = measured((candidate.build((3.0 * ARCSEC, 1.0 * ARCSEC)),))
+    data, _ = measured(candidate.build((3.0 * ARCSEC, 1.0 * ARCSEC)))
     chosen = rival(data, candidate, candidate.starts[0])
     proposal = next_experiment(judged(data, chosen))
     assert proposal.test == "reclocked_encoder"
@@ -54,7 +54,7 @@ def test_dry_friction_at_the_input_asks_for_the_other_direction():
     data = known_data()
     candidate = listed(data, "coulomb_friction")
     assert candidate.port == "input"
-    data, _ = measured((candidate.build((0.02,)),))
+    data, _ = measured(candidate.build((0.02,)))
     chosen = rival(data, candidate, (0.02,))
     proposal = next_experiment(judged(data, chosen))
     assert proposal.speed_rpm < 0.0
@@ -65,7 +65,7 @@ def test_dry_friction_at_the_input_asks_for_the_other_direction():
 def test_a_rival_is_told_apart_by_a_record_that_the_two_predict_apart():
     data = known_data()
     ripple, line = listed(data, "torque_ripple", [6.0]), listed(data, "kinematic_error", [6.0])
-    data, _ = measured((ripple.build((0.005, 0.0)),), np.random.default_rng(7))
+    data, _ = measured(ripple.build((0.005, 0.0)), np.random.default_rng(7))
     chosen, other = rival(data, ripple, ripple.starts[0]), rival(data, line, line.starts[0], 50.0)
     proposal = next_experiment(judged(data, chosen, other))
     assert proposal.separates == (chosen.label, other.label)
@@ -96,7 +96,7 @@ def test_a_superset_of_the_named_effects_is_no_rival():
 def test_the_verdict_gives_amplitude_and_phase_with_their_intervals():
     data = known_data()
     candidate = listed(data, "kinematic_error", [3.0])
-    data, _ = measured((candidate.build((1.5 * ARCSEC, 0.5 * ARCSEC)),), np.random.default_rng(9))
+    data, _ = measured(candidate.build((1.5 * ARCSEC, 0.5 * ARCSEC)), np.random.default_rng(9))
     analysis = analysed(data, "named", candidate, candidate.starts[0])
     proposal = next_experiment(analysis)
     document = verdict_document(analysis, locate(analysis), None, proposal)
@@ -105,7 +105,7 @@ def test_the_verdict_gives_amplitude_and_phase_with_their_intervals():
     amplitude, phase = effect["parameters"]["amplitude"], effect["parameters"]["phase"]
     fitted = analysis.verdict.chosen.fit
     drawn = np.random.default_rng(10).multivariate_normal(
-        fitted.values[-2:], fitted.covariance[-2:, -2:], 20000
+        fitted.values[-4:-2], fitted.covariance[-4:-2, -4:-2], 20000
     )
     for entry, sample in (
         (amplitude, np.hypot(*drawn.T)),

@@ -49,6 +49,7 @@ class Grid:
     data: Data
     speed_rpm: Values
     load_torque: Values
+    slopes: Values
 
     @classmethod
     def of(cls, analysis: Analysis) -> Grid:
@@ -58,7 +59,6 @@ class Grid:
         measured = np.unique([abs(record.input_speed) for record in features.records])
         places = np.linspace(0, len(measured) - 1, min(_SPEEDS, len(measured))).round().astype(int)
         largest = max(abs(record.load_torque) for record in features.records)
-        # Forward only: the harmonic balance takes no other direction.
         grid = np.array(
             [(speed, share * largest) for speed in measured[places] for share in _LOADS]
         )
@@ -74,11 +74,13 @@ class Grid:
         )
         sweep = _sweep(_SWEEP_SHARE * largest, analysis.campaign.rig.torsion_angle_noise)
         data = replace(analysis.data, features=planned, torsion=(sweep,) if largest else ())
-        return cls(data, speed / REVOLUTION_PER_MINUTE, load)
+        # Those without effects serve for all models: how uncertain a test is needs no more.
+        slopes = Objective(data, ()).slopes_at(analysis.verdict.base.values)
+        return cls(data, speed / REVOLUTION_PER_MINUTE, load, slopes)
 
     def model(self, fitted: Fit) -> Model:
         """Return the predictions of a fit with their uncertainty."""
-        objective = Objective(self.data, fitted.candidates)
+        objective = Objective(self.data, fitted.candidates, self.slopes)
         scale = Layout(fitted.parameters).array("scale")
         covariance = fitted.covariance / np.outer(scale, scale)
         size, vectors = np.linalg.eigh(covariance)

@@ -16,9 +16,9 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import least_squares
 
 from pymoo_hdte.discrepancy.campaign import Campaign
+from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.features import Features
 from pymoo_hdte.discrepancy.forward import Prediction, coefficients_of, predict
-from pymoo_hdte.discrepancy.library import Candidate
 from pymoo_hdte.discrepancy.parameters import Layout, Parameter, base_parameters
 from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
 from pymoo_hdte.drive import Balance, Effect, mean_torsion
@@ -26,6 +26,8 @@ from pymoo_hdte.drive import Balance, Effect, mean_torsion
 _STEP = 1e-3
 """Step of difference quotients, in units of a parameter's scale."""
 _EVALUATIONS = 25
+_FREED = 10.0
+"""Factor by which a base parameter whose tolerance is lifted may be off."""
 LOST = 1e3
 """Residual of a point at which the model cannot carry the torque."""
 
@@ -160,16 +162,30 @@ class Fit:
     @property
     def effects(self) -> tuple[Effect, ...]:
         """The fitted effects."""
+        return tuple(effect for parts in self.effects_by_candidate for effect in parts)
+
+    @property
+    def effects_by_candidate(self) -> tuple[tuple[Effect, ...], ...]:
+        """The fitted effects of each candidate."""
         return built(self.candidates, self.values[len(self.values) - count(self.candidates) :])
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:
         """Names of the parameters that ended at a bound."""
+        return tuple(
+            parameter.name
+            for parameter, side in zip(self.parameters, self.bound_sides, strict=True)
+            if side != 0.0
+        )
+
+    @cached_property
+    def bound_sides(self) -> Vector:
+        """-1 for parameters at the lower bound, 1 for those at the upper one, else 0; shape (n,)."""
         layout = Layout(self.parameters)
-        lower, upper = layout.array("lower"), layout.array("upper")
         near = 1e-3 * layout.array("scale")
-        stuck = (self.values <= lower + near) | (self.values >= upper - near)
-        return tuple(p.name for p, flag in zip(self.parameters, stuck, strict=True) if flag)
+        above = self.values >= layout.array("upper") - near
+        below = self.values <= layout.array("lower") + near
+        return above.astype(float) - below.astype(float)
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
@@ -183,8 +199,10 @@ def count(candidates: Sequence[Candidate]) -> int:
     return sum(len(candidate.parameters) for candidate in candidates)
 
 
-def built(candidates: Sequence[Candidate], values: Sequence[float] | Vector) -> tuple[Effect, ...]:
-    """Return the effects of candidates for their values, one after the other."""
+def built(
+    candidates: Sequence[Candidate], values: Sequence[float] | Vector
+) -> tuple[tuple[Effect, ...], ...]:
+    """Return the effects of each of the candidates for their values, one after the other."""
     effects, start = [], 0
     for candidate in candidates:
         end = start + len(candidate.parameters)
@@ -216,7 +234,9 @@ class Objective:
         self.candidates = tuple(candidates)
         self.slopes = slopes
         added = [parameter for candidate in candidates for parameter in candidate.parameters]
-        self.parameters = (*data.base, *added)
+        freed = {candidate.frees for candidate in candidates}
+        base = [_without_tolerance(one) if one.name in freed else one for one in data.base]
+        self.parameters = (*base, *added)
         layout = Layout(self.parameters)
         self.scale, self.start = layout.array("scale"), layout.array("start")
         self.lower, self.upper = layout.array("lower"), layout.array("upper")
@@ -225,42 +245,55 @@ class Objective:
         self.nearby: Balance | None = None
 
     def residuals(self, values: Vector) -> Vector:
-        """Return residuals at values (n,), those of priors last."""
+        """Return residuals at values (n,), those of sweeps and priors last."""
+        difference, others = self.differences(values)
+        return np.nan_to_num(np.concatenate([self.data.whiten(difference), others]), nan=LOST)
+
+    def differences(self, values: Vector) -> tuple[NDArray[np.float64], Vector]:
+        """Return predicted minus measured features (r, f), and residuals of sweeps and priors."""
         base, effects = self._parts(values)
         difference = self._features(base, effects)[0] - self.data.features.values
-        torsion = self.data.torsion_residuals(base, effects)[0]
         priors = ((values - self.start) / self.prior)[self.bounded]
-        found = np.concatenate([self.data.whiten(difference), torsion, priors])
-        return np.nan_to_num(found, nan=LOST)
+        return difference, np.concatenate([self._torsion(base, effects)[0], priors])
 
     def jacobian(self, values: Vector) -> NDArray[np.float64]:
         """Return the derivatives of the residuals by parameters in units of their scale."""
-        base, effects = self._parts(values)
-        n_base = base.shape[1]
-        # Steps lead away from the nearer bound: an effect's strength cannot fall below zero.
-        steps = np.where(values + _STEP * self.scale > self.upper, -_STEP, _STEP)
-        moved = np.vstack([base, base + np.diag(steps[:n_base] * self.scale[:n_base])])
+        features, others = self.derivatives(values)
+        return np.concatenate([self.data.whiten(features), others], axis=1).T
+
+    def derivatives(self, values: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return derivatives by parameters in units of their scale.
+
+        Of the features, not whitened, (n, r, f); of sweeps and priors, whitened, (n, n_others).
+        """
+        n_base, steps = len(self.data.base), self._steps(values)
         slopes = self.slopes_at(values) if self.slopes is None else self.slopes
-        torsion = np.nan_to_num(self.data.torsion_residuals(moved, effects), nan=LOST)
-        priors = np.diag(self.scale / self.prior)[:, self.bounded]
-        of_base = [
-            self.data.whiten(slopes),
-            (torsion[1:] - torsion[0]) / steps[:n_base, None],
-            priors[:n_base],
-        ]
-        columns = list(np.concatenate(of_base, axis=1))
-        here = self.residuals(values)
+        moved = values + np.diag(steps * self.scale)
+        base, effects = self._parts(values)
+        torsion = self._torsion(np.vstack([base, moved[:n_base, :n_base]]), effects)
+        features, sweeps = list(slopes), list((torsion[1:] - torsion[0]) / steps[:n_base, None])
+        here = self._features(base, effects)[0]
         for place in range(n_base, len(values)):
-            shifted = values.copy()
-            shifted[place] += steps[place] * self.scale[place]
-            columns.append((self.residuals(shifted) - here) / steps[place])
-        return np.array(columns).T
+            base, effects = self._parts(moved[place])
+            features.append((self._features(base, effects)[0] - here) / steps[place])
+            sweeps.append((self._torsion(base, effects)[0] - torsion[0]) / steps[place])
+        priors = np.diag(self.scale / self.prior)[:, self.bounded]
+        return np.array(features), np.concatenate([np.array(sweeps), priors], axis=1)
+
+    def _steps(self, values: Vector) -> Vector:
+        """Return steps of quotients; an effect's strength cannot fall below zero."""
+        return np.where(values + _STEP * self.scale > self.upper, -_STEP, _STEP)
+
+    def _torsion(
+        self, vectors: NDArray[np.float64], effects: tuple[Effect, ...]
+    ) -> NDArray[np.float64]:
+        return np.nan_to_num(self.data.torsion_residuals(vectors, effects), nan=LOST)
 
     def slopes_at(self, values: Vector) -> NDArray[np.float64]:
         """Return derivatives of the features by base parameters in units of their scale."""
         base, effects = self._parts(values)
         n_base = base.shape[1]
-        steps = np.where(values + _STEP * self.scale > self.upper, -_STEP, _STEP)[:n_base]
+        steps = self._steps(values)[:n_base]
         features = self._features(
             np.vstack([base, base + np.diag(steps * self.scale[:n_base])]), effects
         )
@@ -269,7 +302,8 @@ class Objective:
     def _parts(self, values: Vector) -> tuple[NDArray[np.float64], tuple[Effect, ...]]:
         """Return the base parameters as one row, and the effects."""
         n_base = len(self.data.base)
-        return values[None, :n_base], built(self.candidates, values[n_base:])
+        parts = built(self.candidates, values[n_base:])
+        return values[None, :n_base], tuple(effect for part in parts for effect in part)
 
     def _features(
         self, vectors: NDArray[np.float64], effects: tuple[Effect, ...]
@@ -278,6 +312,10 @@ class Objective:
         prediction = self.data.prediction(vectors, effects, self.nearby)
         self.nearby = prediction.balance.rows(slice(len(self.data.features.records)))
         return self.data.features.of_prediction(prediction)
+
+
+def _without_tolerance(parameter: Parameter) -> Parameter:
+    return replace(parameter, lower=parameter.start / _FREED, upper=parameter.start * _FREED)
 
 
 def fit(

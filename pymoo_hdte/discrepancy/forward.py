@@ -237,9 +237,9 @@ def _read(
         if isinstance(effect, ThermalDrift):
             mean[..., 0] -= effect.rate * conditions.elapsed
         if isinstance(effect, Eccentricity):
-            once = np.isclose(orders, 1.0 / believed.ratio)
+            line = np.isclose(orders, effect.order / believed.ratio)
             # theta_out is theta_in / N but for the transmission error, a part in 10^3.
-            phasors[..., 0, once] -= effect.amplitude * np.exp(1j * effect.phase)
+            phasors[..., 0, line] -= effect.amplitude * np.exp(1j * effect.phase)
     for channel, name in ((1, "input_torque"), (2, "output_torque")):
         gain = 1.0 + values[f"{name}_gain"][:, None]
         mean[..., channel] = gain * mean[..., channel] + values[f"{name}_zero"][:, None]

@@ -11,10 +11,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.features import MEANS
-from pymoo_hdte.discrepancy.fit import LOST, Data, Fit, fit
+from pymoo_hdte.discrepancy.fit import LOST, Data, Fit, Objective, fit
 from pymoo_hdte.discrepancy.misfit_map import (
     FALSE_DISCOVERIES,
     Flags,
@@ -34,9 +35,11 @@ from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 __all__ = ["Location", "locate", "refit_clean"]
 
+_LINEARISATIONS = 2
 _ROUNDS = 15
-_EVALUATIONS = 3
-"""Of the residuals, in a round."""
+"""Of renewed weights, for one linearisation."""
+_EVALUATIONS = 10
+"""Of the residuals, when the weights stand."""
 _SETTLED = 0.05
 """Relative change of all weights that ends the rounds."""
 _CAUCHY = 4.0
@@ -84,9 +87,9 @@ def locate(analysis: Analysis) -> Location:
 def refit_clean(data: Data, fitted: Fit) -> Fit:
     """Refit a model within its bounds to the cells that it does not contradict.
 
-    First with the weights of Cauchy's distribution, renewed after every fit, because a misfit that
-    the fit has spread over all cells makes clean ones look wrong; then with the cells that are
-    still wrong left out. A torsion sweep that contradicts the running records is left out too.
+    First with the weights of Cauchy's distribution, because a misfit that the fit has spread over
+    all cells makes clean ones look wrong; then with the cells that are still wrong left out. A
+    torsion sweep that contradicts the running records is left out too.
 
     Parameters
     ----------
@@ -98,19 +101,41 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
     chi_square, sweep = _misfit(data, fitted)
     if not (_significant(chi_square, freedom).any() or _wrong(sweep)):
         return fitted
-    factor = np.full_like(chi_square, np.inf)
-    for _ in range(_ROUNDS):
-        before, factor = factor, 1.0 + chi_square / (_CAUCHY * freedom)
-        if np.allclose(before, factor, rtol=_SETTLED, atol=0.0, equal_nan=True):
-            break
-        weakened = _weakened(data, factor, _wrong(sweep))
-        fitted = fit(
-                weakened, fitted.candidates, fitted.values, _EVALUATIONS, fitted.slopes
-            )
-        chi_square, sweep = _misfit(data, fitted)
+    values = fitted.values
+    for _ in range(_LINEARISATIONS):
+        values = _robust_step(data, replace(fitted, values=values))
+    fitted = replace(fitted, values=values)
+    chi_square, sweep = _misfit(data, fitted)
     factor = np.where(_significant(chi_square, freedom), _LEFT_OUT, 1.0)
     weakened = _weakened(data, factor, _wrong(sweep))
-    return fit(weakened, fitted.candidates, fitted.values, slopes=fitted.slopes)
+    return fit(weakened, fitted.candidates, values, _EVALUATIONS, fitted.slopes)
+
+
+def _robust_step(data: Data, fitted: Fit) -> Values:
+    """Return values with which the linearised model misses least by Cauchy's measure.
+
+    Weights are renewed after every solution of the bounded linear problem until they settle.
+    """
+    freedom = degrees_of_freedom(data)
+    _, sweep = _misfit(data, fitted)
+    kept = replace(data, torsion=()) if _wrong(sweep) else data
+    objective = Objective(kept, fitted.candidates, fitted.slopes)
+    difference, others = objective.differences(fitted.values)
+    slopes, others_slopes = objective.derivatives(fitted.values)
+    lower = (objective.lower - fitted.values) / objective.scale
+    upper = (objective.upper - fitted.values) / objective.scale
+    step, factor = np.zeros(len(lower)), np.full((len(difference), *freedom.shape), np.inf)
+    for _ in range(_ROUNDS):
+        missed = difference + np.tensordot(step, slopes, 1)
+        before, factor = factor, 1.0 + cell_chi_square(data, missed) / (_CAUCHY * freedom)
+        if np.allclose(before, factor, rtol=_SETTLED, atol=0.0, equal_nan=True):
+            break
+        weakened = _weakened(data, factor, False)
+        matrix = np.concatenate([weakened.whiten(slopes), others_slopes], axis=1).T
+        right = -np.concatenate([weakened.whiten(difference), others])
+        # Values may lie at a bound, and beyond it by rounding.
+        step = lsq_linear(matrix, right, (np.minimum(lower, 0.0), np.maximum(upper, 0.0))).x
+    return np.clip(fitted.values + step * objective.scale, objective.lower, objective.upper)
 
 
 def _misfit(data: Data, fitted: Fit) -> tuple[Values, float | None]:

@@ -13,18 +13,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.fit import Data, Fit, count, fit
-from pymoo_hdte.discrepancy.library import Candidate
+from pymoo_hdte.discrepancy.library import out_of_tolerance
 from pymoo_hdte.discrepancy.screening import Screened, screen
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted")
 
-ADEQUATE = 1.15
-"""Chi-square per degree of freedom up to which a base is adequate."""
+_DEVIATIONS = 4.0
+"""Standard deviations of chi-square up to which a base is adequate."""
 SHARE = 0.9
 """Least share of the excess chi-square that named effects remove."""
+EXACT = 2.0
+"""Chi-square per degree of freedom down to which effects of an exact form must explain."""
+EXACT_SHARE = 0.9999
+"""Share that does as well: of a line ten thousand times the noise, the angle's own noise and the
+integrator's steps show."""
 SECOND_SHARE = 0.8
 """Least share of the excess left by the first effect that a second one removes."""
+SECOND_LEAST = 0.02
+"""Least share of the whole excess that a second one removes beside a law of no exact form."""
 GAIN = 25.0
 """Reduction of chi-square, to first order, by which some candidate makes a base inadequate though
 its total looks well: one line of one channel is lost among a thousand features."""
@@ -94,39 +102,53 @@ class Verdict:
     degrees_of_freedom: int
 
 
+def adequate(freedom: int) -> float:
+    """Return chi-square per degree of freedom up to which a model is adequate; 1.15 for 1400."""
+    return float(1.0 + _DEVIATIONS * np.sqrt(2.0 / freedom))
+
+
 def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict on a fitted base."""
     freedom = len(base.residuals) - len(base.values)
+    candidates = [*candidates, *out_of_tolerance(base.at_bounds)]
     screened = screen(data, base, candidates)
     excess = base.chi_square - freedom
-    if base.chi_square <= ADEQUATE * freedom and screened[0].reduction < GAIN:
+    if base.chi_square <= adequate(freedom) * freedom and screened[0].reduction < GAIN:
         return Verdict("adequate", base, None, (), (), freedom)
     singles = _fit_best(data, base, screened, excess)
     rivals = list(singles)
-    if singles[0].fit.chi_square > ADEQUATE * freedom:
+    if singles[0].fit.chi_square > adequate(freedom) * freedom:
         pairs = _pairs(data, singles[:1], candidates, excess)
         rivals = sorted([*singles, *pairs], key=lambda rival: rival.bic)
     chosen = rivals[0]
-    if len(chosen.candidates) == 2 and not _second_earned(chosen, singles, freedom):
-        chosen = singles[0]
-    others = tuple(rival for rival in rivals if rival is not chosen)
+    if len(chosen.candidates) == 2 and not _second_earned(chosen, singles, base, freedom):
+        alone = _explains(singles[0], base, freedom) or not _explains(chosen, base, freedom)
+        chosen = singles[0] if alone else chosen
+    others = [rival for rival in rivals if rival is not chosen]
+    chosen = _refined(data, chosen, excess)
     if not _explains(chosen, base, freedom):
-        return Verdict("unlisted", base, chosen, others, (), freedom)
+        return Verdict("unlisted", base, chosen, tuple(others), (), freedom)
+    others = [_refined(data, r, excess) if _alike(r, chosen, freedom) else r for r in others]
     equivalent = tuple(rival for rival in others if _alike(rival, chosen, freedom))
-    if all(candidate.name == "parameter" for candidate in chosen.candidates):
+    if not all(candidate.listed for candidate in chosen.candidates):
+        status = "unlisted"
+    elif all(candidate.name == "parameter" for candidate in chosen.candidates):
         status = "parameter"
     else:
         status = "class" if equivalent else "named"
-    return Verdict(status, base, chosen, others, equivalent, freedom)
+    return Verdict(status, base, chosen, tuple(others), equivalent, freedom)
 
 
 def _explains(rival: Rival, base: Fit, freedom: int) -> bool:
     """Tell whether a set of effects removes what is wrong with the base."""
     residuals = len(base.residuals)
     gain = base.chi_square - rival.fit.chi_square
-    penalty = (len(rival.fit.values) - len(base.values)) * np.log(residuals)
-    adequate = rival.fit.chi_square <= ADEQUATE * freedom
-    return bool(gain - penalty >= BIC_GAIN and (adequate or rival.share >= SHARE))
+    penalty = sum(candidate.unknowns for candidate in rival.candidates) * np.log(residuals)
+    if all(candidate.exact for candidate in rival.candidates):
+        enough = rival.fit.chi_square <= EXACT * freedom or rival.share >= EXACT_SHARE
+    else:
+        enough = rival.fit.chi_square <= adequate(freedom) * freedom or rival.share >= SHARE
+    return bool(gain - penalty >= BIC_GAIN and enough)
 
 
 def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
@@ -142,7 +164,12 @@ def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
         return False
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
     near = abs(rival.bic - chosen.bic) < BIC_GAIN * misfit
-    return near or (misfit > ADEQUATE and chosen.share - rival.share < SHARE_ALIKE)
+    return near or (misfit > adequate(freedom) and chosen.share - rival.share < SHARE_ALIKE)
+
+
+def _refined(data: Data, rival: Rival, excess: float) -> Rival:
+    """Fit a rival to the end, with slopes of its own."""
+    return _rival(fit(data, rival.candidates, rival.fit.values), excess)
 
 
 def _fit_best(data: Data, base: Fit, screened: Sequence[Screened], excess: float) -> list[Rival]:
@@ -159,9 +186,12 @@ def _fit_best(data: Data, base: Fit, screened: Sequence[Screened], excess: float
 
 def _rival(fitted: Fit, excess: float) -> Rival:
     parameters = len(fitted.values)
-    bic = fitted.chi_square + parameters * np.log(len(fitted.residuals))
+    unknowns = len(fitted.values) - count(fitted.candidates)
+    unknowns += sum(candidate.unknowns for candidate in fitted.candidates)
+    bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
     freedom = len(fitted.residuals) - (parameters - count(fitted.candidates))
-    share = 1.0 - (fitted.chi_square - freedom) / excess
+    gain = excess + freedom - fitted.chi_square
+    share = gain / max(excess, gain)
     return Rival(fitted, float(bic), float(share))
 
 
@@ -172,15 +202,23 @@ def _pairs(
     found: list[Rival] = []
     for single in singles:
         taken = {candidate.label for candidate in single.candidates}
-        others = [candidate for candidate in candidates if candidate.label not in taken]
+        others = [one for one in candidates if one.label not in taken and one.frees is None]
         screened = screen(data, single.fit, others)
         found += _fit_best(data, single.fit, screened[:2], excess)
     return found
 
 
-def _second_earned(pair: Rival, singles: Sequence[Rival], freedom: int) -> bool:
-    """Tell whether the second effect removes most of what the better of the two leaves alone."""
+def _second_earned(pair: Rival, singles: Sequence[Rival], base: Fit, freedom: int) -> bool:
+    """Tell whether the second effect removes most of what the better of the two leaves alone.
+
+    What a law of no exact form leaves may be its form: there it must also count beside the whole.
+    """
     labels = {candidate.label for candidate in pair.candidates}
-    alone = [s.fit.chi_square for s in singles if s.candidates[0].label in labels]
-    left = min(alone) - freedom
-    return left > 0.0 and min(alone) - pair.fit.chi_square >= SECOND_SHARE * left
+    first = min(
+        (single for single in singles if single.candidates[0].label in labels),
+        key=lambda single: single.fit.chi_square,
+    )
+    left = first.fit.chi_square - freedom
+    removed = first.fit.chi_square - pair.fit.chi_square
+    counts = removed >= SECOND_LEAST * (base.chi_square - freedom)
+    return left > 0.0 and removed >= SECOND_SHARE * left and (first.candidates[0].exact or counts)

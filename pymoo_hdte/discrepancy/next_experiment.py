@@ -16,6 +16,7 @@ import numpy as np
 from pymoo_hdte.discrepancy.experiment_grid import Grid, Model, separation
 from pymoo_hdte.discrepancy.features import MEANS
 from pymoo_hdte.discrepancy.fit import Fit
+from pymoo_hdte.discrepancy.line_candidates import ENCODER_LINE
 from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.workflow import Analysis
@@ -27,6 +28,9 @@ TESTS = ("running", "torsion_sweep", "reclocked_encoder")
 SEPARATED = 9.0
 """Least expected chi-square, three standard deviations, at which a test tells two models apart."""
 _RIVALS = 2
+OF_ENCODER = ("eccentricity", ENCODER_LINE)
+LARGEST_TURNS = 100
+"""Cycles per output turn; faster lines of the drive betray themselves by its response."""
 
 
 @dataclass(frozen=True)
@@ -126,27 +130,31 @@ def _most_uncertain(grid: Grid, model: Model) -> Proposal:
 
 
 def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
-    """Return the test for a line once per output turn: of the drive, or of the encoder."""
-    once = 1.0 / grid.data.campaign.believed.ratio
+    """Return the test for a line of whole cycles per output turn: of the drive, or the encoder."""
+    ratio = grid.data.campaign.believed.ratio
     for place, candidate in enumerate(chosen.candidates):
-        of_encoder = candidate.name == "eccentricity"
-        order = candidate.order
-        of_drive = candidate.name == "kinematic_error" and order is not None
-        if not (of_encoder or (of_drive and abs(order - once) < 1e-6)):  # type: ignore[operator]
+        if candidate.order is None or candidate.name not in (*OF_ENCODER, "kinematic_error"):
             continue
-        twin = f"kinematic_error:mesh@{once:.4g}" if of_encoder else "eccentricity:sensor"
-        effects = list(chosen.effects)
+        turns = round(candidate.order * ratio)
+        if turns > LARGEST_TURNS or abs(candidate.order * ratio - turns) > 1e-6:
+            continue
+        of_encoder = "eccentricity" if turns == 1 else ENCODER_LINE
+        twin = "kinematic_error:mesh" if candidate.name in OF_ENCODER else f"{of_encoder}:sensor"
+        twin = f"{twin}@{candidate.order:.4g}"
+        parts = chosen.effects_by_candidate
         base = chosen.values[: len(grid.data.base)]
-        without = grid.predict(base, effects[:place] + effects[place + 1 :])
-        # Half a turn reverses the encoder's line and leaves the drive's.
-        change = 2.0 * (grid.predict(base, effects) - without)[: len(grid.speed_rpm)]
+        others = [effect for k, part in enumerate(parts) if k != place for effect in part]
+        without = grid.predict(base, others)
+        # Half a period reverses the encoder's line and leaves the drive's.
+        change = 2.0 * (grid.predict(base, chosen.effects) - without)[: len(grid.speed_rpm)]
         expected = np.sum(change**2, axis=1)
         test = int(np.argmax(expected))
         _, speed, load, _ = grid.condition(test)
         text = (
-            f"{candidate.label} and {twin} predict the same in every record: turn the disc of the "
-            f"output encoder by half a turn on its shaft and repeat a record at {speed:.4g} r/min "
-            f"with {load:.3g} N.m. The line turns with the encoder, or it stays."
+            f"{candidate.label} and {twin} predict nearly the same in every record: turn the disc "
+            f"of the output encoder by {180.0 / turns:.3g} degrees on its shaft and repeat a "
+            f"record at {speed:.4g} r/min with {load:.3g} N.m. The line turns with the encoder, or "
+            "it stays."
         )
         labels = (candidate.label, twin)
         return Proposal(text, "reclocked_encoder", speed, load, labels, float(expected[test]))
@@ -160,7 +168,8 @@ def _zero_twin(grid: Grid, analysis: Analysis, chosen: Fit) -> Proposal | None:
     the forward record says how well the rest of the mean input torque is known.
     """
     one_way = len({record.input_speed > 0.0 for record in analysis.campaign.train}) == 1
-    for candidate, effect in zip(chosen.candidates, chosen.effects, strict=True):
+    for candidate, parts in zip(chosen.candidates, chosen.effects_by_candidate, strict=True):
+        effect = parts[0] if parts else None
         if not (one_way and isinstance(effect, LawAtPort) and effect.port == "input"):
             continue
         if not isinstance(effect.law, CoulombFriction):

@@ -7,7 +7,7 @@ hide an effect. The errors of torque sensors are unknown constants with a prior 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +78,9 @@ def base_parameters(
         found.append(Parameter(f"error_phase_{line}", phase, phase - 9.0, phase + 9.0, 0.1))
     found.append(Parameter("offset", offset, offset - 1.0, offset + 1.0, 1e-5))
     # A stiffness that varies with the input angle is not its mean where the input was locked.
-    found.append(_within("locked_stiffness", 1.0, believed.tolerance))
+    locked = _within("locked_stiffness", 1.0, believed.tolerance)
+    # The prior only keeps it in place where no sweep speaks of it.
+    found.append(replace(locked, prior=locked.scale))
     for name in READING[1:]:
         # What rigs are said to keep is taken for a standard deviation: sensors exceed it.
         size = max(float(getattr(rig, name)), 1e-9)

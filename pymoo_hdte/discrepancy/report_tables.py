@@ -11,7 +11,7 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign import Campaign
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.gap import Gap
-from pymoo_hdte.discrepancy.naming import ADEQUATE, SHARE, Rival, Verdict
+from pymoo_hdte.discrepancy.naming import SHARE, Rival, Verdict, adequate
 from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.discrepancy.prove import Proof
 from pymoo_hdte.discrepancy.revise import accepted_fit
@@ -91,14 +91,20 @@ class RivalRow:
 def certainty(analysis: Analysis) -> str:
     """Return how sure the verdict is, in words."""
     verdict = analysis.verdict
+    limit = adequate(verdict.degrees_of_freedom)
     left = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate" or verdict.chosen is None:
         return (
             f"The misfit of the believed drive, fitted within its tolerances, has {left:.2f} times "
-            f"the variance of the noise; up to {ADEQUATE:g} counts as noise. An effect too small "
+            f"the variance of the noise; up to {limit:.2f} counts as noise. An effect too small "
             "for these records may still be there."
         )
     share = _percent(verdict.chosen.share)
+    if not all(candidate.listed for candidate in verdict.chosen.candidates):
+        return (
+            f"No effect of the list is as likely: this explains {share} of the misfit. An error of "
+            "the encoder takes no part in the motion of the drive."
+        )
     if verdict.status == "unlisted":
         return (
             "That something is missing is certain; what it is, is not. The nearest known effect "
@@ -114,7 +120,7 @@ def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
         f"It explains {share} of the misfit that is not noise; what is left has {after:.3g} times "
         "the variance of the noise."
     ]
-    if after > ADEQUATE:
+    if after > adequate(verdict.degrees_of_freedom):
         words.append("That is more than noise: its form is not quite right or more is missing.")
     rivals = [
         rival

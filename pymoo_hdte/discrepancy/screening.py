@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.features import Features
 from pymoo_hdte.discrepancy.fit import Data, Fit
-from pymoo_hdte.discrepancy.library import Candidate
 from pymoo_hdte.discrepancy.order_lines import residual_spectrum
 
 _FALSE_LINES = 1e-3
@@ -45,7 +45,8 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
         What stands so far, perhaps with effects; its misfit is to be explained.
     candidates : sequence of Candidate
     """
-    orthonormal, _ = np.linalg.qr(fitted.jacobian)
+    # A parameter at its bound cannot give way any further.
+    orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
     left = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
     base = fitted.values[None, : len(data.base)]
     stands = data.prediction(base, fitted.effects)
@@ -54,15 +55,32 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
     priors = len(fitted.residuals) - before.size - before_torsion.size
     found = []
     for candidate in candidates:
+        if candidate.frees is not None:
+            found.append(_freed(candidate, fitted, orthonormal, left))
+            continue
         signatures = []
         for start in candidate.starts:
-            effects = (*fitted.effects, candidate.build(start))
+            effects = (*fitted.effects, *candidate.build(start))
             change = data.whiten(data.predict(base, effects, stands.balance) - before)[0]
             torsion = data.torsion_residuals(base, effects) - before_torsion
             signature = np.concatenate([change, np.nan_to_num(torsion[0]), np.zeros(priors)])
             signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
         found.append(_best_start(candidate, np.array(signatures), left))
     return sorted(found, key=lambda one: -one.reduction)
+
+
+def _freed(
+    candidate: Candidate,
+    fitted: Fit,
+    orthonormal: NDArray[np.float64],
+    left: NDArray[np.float64],
+) -> Screened:
+    """Return what a parameter at its bound could remove if it went beyond."""
+    place = [parameter.name for parameter in fitted.parameters].index(str(candidate.frees))
+    signature = fitted.jacobian[:, place] * fitted.bound_sides[place]
+    signature = signature - orthonormal @ (orthonormal.T @ signature)
+    along, size = float(-signature @ left), float(signature @ signature)
+    return Screened(candidate, along**2 / size if along > 0.0 and size > 0.0 else 0.0, ())
 
 
 def _best_start(
@@ -107,7 +125,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
     found: list[tuple[float, str]] = []
     for candidate in candidates:
         for start in candidate.starts:
-            effects = (*fitted.effects, candidate.build(start))
+            effects = (*fitted.effects, *candidate.build(start))
             change = np.nan_to_num(data.torsion_residuals(base, effects)[0] - before)
             change -= orthonormal @ (orthonormal.T @ change)
             size = float(change @ change)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.candidate import HARMONIC_NAMES, Candidate, polar
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.fit import Fit
-from pymoo_hdte.discrepancy.library import Candidate, polar
 from pymoo_hdte.discrepancy.misfit_map import Location
 from pymoo_hdte.discrepancy.naming import Rival, Verdict
 from pymoo_hdte.discrepancy.next_experiment import Proposal
@@ -104,6 +104,8 @@ def sentence(verdict: Verdict) -> str:
     if verdict.status == "adequate" or chosen is None:
         return "Nothing is missing: the believed drive explains the records within its tolerances."
     what = " ".join(candidate.sentence for candidate in chosen.candidates)
+    if not all(candidate.listed for candidate in chosen.candidates):
+        return f"Something is missing that is none of the known effects. {what}"
     if verdict.status == "unlisted":
         return (
             "Something is missing that no known effect explains. The nearest is "
@@ -142,28 +144,32 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> di
 
     The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
     """
-    values, covariance = fitted.values[rows], fitted.covariance[np.ix_(rows, rows)]
-    first = fitted.parameters[rows[0]].name
-    if not first.endswith("_cosine"):
+    names = [fitted.parameters[row].name for row in rows]
+    if not (names and names[0].endswith("_cosine")):
         return {
-            fitted.parameters[row].name: quantity(
-                fitted.values[row],
-                fitted.covariance[row, row],
-                candidate.name,
-                fitted.parameters[row].name,
-            )
-            for row in rows
+            name: quantity(fitted.values[row], fitted.covariance[row, row], candidate.name, name)
+            for name, row in zip(names, rows, strict=True)
         }
-    name = first.removesuffix("_cosine")
-    cosine, sine = values
+    name = names[0].removesuffix("_cosine")
+    found: dict[str, Any] = {}
+    for prefix, pair in zip(HARMONIC_NAMES, rows.reshape(-1, 2), strict=False):
+        found |= _line(prefix, name, candidate.name, fitted, pair)
+    return found
+
+
+def _line(
+    prefix: str, name: str, effect: str, fitted: Fit, rows: NDArray[np.int_]
+) -> dict[str, Any]:
+    """Return amplitude and phase, with intervals, of the cosine and sine part at two rows."""
+    (cosine, sine), covariance = fitted.values[rows], fitted.covariance[np.ix_(rows, rows)]
     amplitude, phase = polar(cosine, sine)
     size = max(amplitude, np.finfo(float).tiny)
     along = np.array([cosine, sine]) / size
     across = np.array([-sine, cosine]) / size
     of_phase = min(float(across @ covariance @ across) / size**2, np.pi**2 / 3.0)
     return {
-        name: quantity(amplitude, float(along @ covariance @ along), candidate.name, name),
-        "phase": quantity(phase, of_phase, candidate.name, "phase"),
+        f"{prefix}{name}": quantity(amplitude, float(along @ covariance @ along), effect, name),
+        f"{prefix}phase": quantity(phase, of_phase, effect, "phase"),
     }
 
 

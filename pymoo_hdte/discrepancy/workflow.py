@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign import Campaign
+from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.features import Features, measure
 from pymoo_hdte.discrepancy.fit import Data, Fit, fit, start_parameters
 from pymoo_hdte.discrepancy.library import candidates
@@ -66,8 +68,11 @@ def expected_orders(campaign: Campaign) -> list[float]:
     return _apart(wanted, campaign, HIGHEST_ORDER)
 
 
+@threadpool_limits.wrap(limits=1)
 def analyse(campaign: Campaign) -> Analysis:
     """Return the verdict on a campaign.
+
+    In one thread: the matrices are small, and threads that wait for each other cost a multiple.
 
     Raises
     ------
@@ -88,12 +93,18 @@ def analyse(campaign: Campaign) -> Analysis:
     points = tuple(torsion_points(record, campaign.rig) for record in sweeps)
     data = Data(campaign, features, start_parameters(campaign, features), points)
     base = fit(data)
-    listed = candidates(campaign.believed, _strong_lines(features, base))
+    listed = _candidates(data, base)
     if leading_sweep_effect(data, base, listed) in CLEARANCES:
         data = _loaded(data)
         base = fit(data)
-        listed = candidates(campaign.believed, _strong_lines(data.features, base))
+        listed = _candidates(data, base)
     return Analysis(campaign, data, judge(data, base, listed), tuple(unexpected))
+
+
+def _candidates(data: Data, base: Fit) -> list[Candidate]:
+    features = data.features
+    seen = _strong_lines(features, base)
+    return candidates(data.campaign.believed, features.orders.tolist(), seen)
 
 
 def _loaded(data: Data) -> Data:

@@ -1,0 +1,117 @@
+"""A candidate: one effect that the workflow can name, with its unknowns, their ranges, its words.
+
+A candidate turns a vector of values into effects of the drive model; the laws themselves stand in
+`pymoo_hdte.drive`. Amplitude and phase of a line are searched as its cosine and sine parts, in
+which the prediction is close to linear. A periodic effect brings its harmonics along: a ripple of
+order 6 with a little of order 12 is one effect and not two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.parameters import Parameter
+from pymoo_hdte.drive import Effect
+
+Values = Sequence[float]
+
+HARMONIC_NAMES = ("", "second_", "third_")
+"""Prefixes of the parameters of a line's harmonics."""
+_HARMONIC_SHARE = 0.2
+"""Typical size of a further harmonic, as a share of the first."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect at one port, perhaps at one order.
+
+    Attributes
+    ----------
+    name, port : str
+    parameters : tuple of Parameter
+        Its unknowns; ``start`` is a typical strength.
+    starts : tuple of tuple of float
+        Where the joint fit begins, and the directions that the screening tries.
+    build : callable
+        From values to the effects of the drive model that make it up.
+    sentence : str
+        What it is, for the report.
+    order : float or None
+        Cycles per input turn, where the candidate has one.
+    exact : bool
+        Whether its form leaves nothing open, so that it must explain the misfit down to the noise;
+        the curve of a friction or a stiffness is only ever approximately the library's.
+    listed : bool
+        Whether its name may stand in a verdict; if not, it is there so that what it explains is
+        not laid at another's door.
+    frees : str or None
+        Base parameter whose tolerance it lifts.
+    """
+
+    name: str
+    port: str
+    parameters: tuple[Parameter, ...]
+    starts: tuple[tuple[float, ...], ...]
+    build: Callable[[Values], tuple[Effect, ...]]
+    sentence: str
+    order: float | None = None
+    exact: bool = False
+    listed: bool = True
+    frees: str | None = None
+
+    @property
+    def label(self) -> str:
+        """Name, port and order in one word."""
+        order = "" if self.order is None else f"@{self.order:.4g}"
+        return f"{self.name}:{self.port}{order}"
+
+    @property
+    def unknowns(self) -> int:
+        """Number of parameters that it adds to a fit or sets free."""
+        return len(self.parameters) + (self.frees is not None)
+
+
+def unknown(name: str, lower: float, upper: float, typical: float) -> Parameter:
+    """Return a parameter that starts at its typical size."""
+    return Parameter(name, typical, lower, upper, abs(typical))
+
+
+def wave(name: str, largest: float, typical: float, harmonics: int = 1) -> tuple[Parameter, ...]:
+    """Return the cosine and sine parts of a line and of its harmonics.
+
+    Parameters
+    ----------
+    name : str
+        Of the amplitude.
+    largest, typical : float
+        Amplitudes.
+    harmonics : int
+        1 for the line alone.
+    """
+    found = []
+    for place, prefix in enumerate(HARMONIC_NAMES[:harmonics]):
+        size = typical if place == 0 else _HARMONIC_SHARE * typical
+        start = typical if place == 0 else 0.0
+        found.append(Parameter(f"{prefix}{name}_cosine", start, -largest, largest, size))
+        found.append(Parameter(f"{prefix}{name}_sine", 0.0, -largest, largest, size))
+    return tuple(found)
+
+
+def wave_starts(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:
+    """Return one start along each part of a `wave`."""
+    sizes = np.diag([parameter.scale for parameter in parameters])
+    return tuple(tuple(row) for row in sizes.tolist())
+
+
+def lines_of(values: Values) -> list[tuple[int, float, float]]:
+    """Return (multiple of the order, amplitude, phase) for the values of a `wave`."""
+    parts = np.reshape(values, (-1, 2))
+    return [(place + 1, *polar(cosine, sine)) for place, (cosine, sine) in enumerate(parts)]
+
+
+def polar(cosine: float, sine: float) -> tuple[float, float]:
+    """Return amplitude and phase of cosine cos(x) - sine sin(x) = amplitude cos(x + phase)."""
+    return float(np.hypot(cosine, sine)), float(np.arctan2(sine, cosine))

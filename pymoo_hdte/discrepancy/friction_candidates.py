@@ -1,0 +1,98 @@
+"""Candidates that resist the motion of a shaft: friction of several kinds, and drag."""
+
+from __future__ import annotations
+
+from pymoo_hdte.discrepancy.candidate import (
+    Candidate,
+    Values,
+    lines_of,
+    unknown,
+    wave,
+    wave_starts,
+)
+from pymoo_hdte.drive import Effect, LawAtPort
+from pymoo_hdte.drive.friction import (
+    CoulombFriction,
+    NonlinearDrag,
+    PeriodicFriction,
+    StribeckFriction,
+)
+
+RATED_SPEED = 209.4
+"""rad/s of the input; where the drag is scaled."""
+TYPICAL_LEVEL = {"input": 0.01, "output": 1.0}
+"""Dry friction of a shaft, N.m."""
+
+
+def friction_candidates(ratio: float) -> list[Candidate]:
+    """Return the candidates for a drive of this ratio."""
+    return [
+        _coulomb("input"),
+        _coulomb("output"),
+        _stribeck(),
+        _periodic("input", 1.0, 1.0),
+        _periodic("input", 2.0, 1.0),
+        _periodic("output", 1.0, ratio),
+        _drag(),
+    ]
+
+
+def _coulomb(port: str) -> Candidate:
+    scale = TYPICAL_LEVEL[port]
+    return Candidate(
+        "coulomb_friction",
+        port,
+        (unknown("level", 0.0, 20 * scale, scale),),
+        ((scale,),),
+        lambda v: (LawAtPort("coulomb_friction", port, CoulombFriction(v[0])),),
+        f"Dry friction at the {port}: a torque that does not depend on speed.",
+    )
+
+
+def _stribeck() -> Candidate:
+    return Candidate(
+        "stribeck_friction",
+        "input",
+        (
+            unknown("level", 0.0, 0.2, 0.01),
+            unknown("excess", 0.0, 0.3, 0.01),
+            unknown("fading", 1.0, 150.0, 20.0),
+        ),
+        ((0.01, 0.01, 8.0), (0.01, 0.01, 25.0), (0.01, 0.01, 70.0)),
+        lambda v: (LawAtPort("stribeck_friction", "input", StribeckFriction(*v)),),
+        "Dry friction at the input that falls with speed.",
+    )
+
+
+def _periodic(port: str, order: float, slower: float) -> Candidate:
+    name = "position_dependent_friction"
+
+    def build(v: Values) -> tuple[Effect, ...]:
+        return tuple(
+            LawAtPort(name, port, PeriodicFriction(multiple * order, phase, level))
+            for multiple, level, phase in lines_of(v)
+        )
+
+    scale = TYPICAL_LEVEL[port]
+    parts = wave("level", 20 * scale, scale, harmonics=2)
+    return Candidate(
+        name,
+        port,
+        parts,
+        wave_starts(parts),
+        build,
+        f"Friction that varies {order:g} times in a turn of the {port}.",
+        order / slower,
+    )
+
+
+def _drag() -> Candidate:
+    coefficient = 0.02 / RATED_SPEED**2
+    return Candidate(
+        "nonlinear_drag",
+        "input",
+        (unknown("coefficient", 0.0, 20 * coefficient, coefficient),),
+        ((coefficient,),),
+        lambda v: (LawAtPort("nonlinear_drag", "input", NonlinearDrag(v[0])),),
+        "A drag at the input that grows faster than the speed.",
+    )

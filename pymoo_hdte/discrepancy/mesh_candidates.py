@@ -1,0 +1,97 @@
+"""Candidates at the mesh: curves of the stiffness, clearances, hysteresis, varying stiffness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.believed import Believed
+from pymoo_hdte.discrepancy.candidate import (
+    Candidate,
+    Values,
+    lines_of,
+    polar,
+    unknown,
+    wave,
+    wave_starts,
+)
+from pymoo_hdte.drive import Effect, LawAtPort, MeshStiffnessVariation
+from pymoo_hdte.drive.hysteresis import MaxwellSlip
+from pymoo_hdte.drive.mesh_laws import CubicStiffness, DeadZone, PeriodicClearance, SoftWindup
+from pymoo_hdte.units import ARCSEC
+
+RATED_TORQUE = 40.0
+"""N.m; where strengths of mesh laws are scaled."""
+WIDEST = 40 * ARCSEC
+"""Largest half width of a clearance."""
+
+
+def mesh_candidates(believed: Believed) -> list[Candidate]:
+    """Return the candidates at the mesh of a drive."""
+    windup = RATED_TORQUE / believed.stiffness
+    cubic = 0.1 * believed.stiffness / windup**2
+    hardening = Candidate(
+        "hardening_stiffness",
+        "mesh",
+        (unknown("coefficient", 0.0, 6.0 * cubic, cubic),),
+        ((cubic,),),
+        lambda v: (LawAtPort("hardening_stiffness", "mesh", CubicStiffness(v[0])),),
+        "The drive grows stiffer under torque.",
+    )
+    soft = Candidate(
+        "soft_windup",
+        "mesh",
+        (unknown("softening", 0.0, 0.9, 0.2), unknown("torsion", 5e-6, windup, 0.2 * windup)),
+        tuple((0.2, share * windup) for share in (0.05, 0.15, 0.4)),
+        lambda v: (LawAtPort("soft_windup", "mesh", SoftWindup(v[0], v[1])),),
+        "The drive is softer near zero torque.",
+    )
+    backlash = Candidate(
+        "backlash",
+        "mesh",
+        (unknown("half_width", 0.0, WIDEST, 4 * ARCSEC),),
+        ((3 * ARCSEC,), (8 * ARCSEC,)),
+        lambda v: (LawAtPort("backlash", "mesh", DeadZone(v[0])),),
+        "There is play between the teeth.",
+    )
+    slip = unknown("torsion", 0.01 * windup, 2 * windup, 0.2 * windup)
+    hysteresis = Candidate(
+        "hysteresis",
+        "mesh",
+        (unknown("force", 0.0, 10.0, 1.0), slip),
+        tuple((1.0, share * windup) for share in (0.1, 0.3, 0.8)),
+        lambda v: (LawAtPort("hysteresis", "mesh", MaxwellSlip(v[0], v[1])),),
+        "The torsion lags behind the torque: dry friction inside the mesh.",
+    )
+    return [hardening, soft, backlash, hysteresis, _varying(), _clearance(1.0), _clearance(2.0)]
+
+
+def _varying() -> Candidate:
+    parts = wave("depth", 0.25, 0.02, harmonics=3)
+    return Candidate(
+        "mesh_stiffness_variation",
+        "mesh",
+        parts,
+        wave_starts(parts),
+        lambda v: tuple(
+            MeshStiffnessVariation(depth, phase, 2.0 * multiple)
+            for multiple, depth, phase in lines_of(v)
+        ),
+        "The stiffness varies twice in an input turn.",
+    )
+
+
+def _clearance(order: float) -> Candidate:
+    def build(v: Values) -> tuple[Effect, ...]:
+        width, phase = polar(v[0], v[1])
+        return (LawAtPort("clearance_variation", "mesh", PeriodicClearance(order, phase, width)),)
+
+    size = 5 * ARCSEC
+    return Candidate(
+        "clearance_variation",
+        "mesh",
+        wave("half_width", WIDEST, size),
+        tuple((size * np.cos(turn), size * np.sin(turn)) for turn in np.arange(4) * np.pi / 2),
+        build,
+        f"The play between the teeth varies, order {order:g} of the input.",
+        order,
+    )
