@@ -11,7 +11,12 @@ from pymoo_hdte.drive.effects import EFFECT_NAMES, effect_from_fields
 from pymoo_hdte.drive.toml_fields import Fields
 from pymoo_hdte.units import ARCSEC
 
-EFFECTS = [Eccentricity(5.0 * ARCSEC, 0.7), Eccentricity(1e-5, 0.2, 46.0), ThermalDrift(2e-9)]
+EFFECTS = [
+    Eccentricity(5.0 * ARCSEC, 0.7),
+    Eccentricity(1e-5, 0.2, 46.0),
+    ThermalDrift(2e-9),
+    ThermalDrift(2e-9, 600.0),
+]
 phases = st.floats(-np.pi, np.pi)
 
 
@@ -37,6 +42,14 @@ def test_drift_grows_with_the_session_and_not_with_the_angle():
     elapsed = np.array([0.0, 1.0, 10.0, 100.0, 1000.0])
     assert drift.reading(angle, elapsed) == pytest.approx(3e-9 * elapsed)
     assert drift.reading(angle, 500.0) == pytest.approx(np.full(5, 1.5e-6))
+
+
+@given(st.floats(1.0, 1e4), st.floats(0.0, 1e5))
+def test_a_drift_that_settles_starts_at_its_rate_and_is_halved_after_its_time(time, elapsed):
+    drift, steady = ThermalDrift(3e-9, time), ThermalDrift(3e-9)
+    assert drift.after(time) == pytest.approx(steady.after(time) / 2.0)
+    assert drift.after(1e-6 * time) == pytest.approx(steady.after(1e-6 * time), rel=2e-6)
+    assert 0.0 <= drift.after(elapsed) < 3e-9 * time
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)

@@ -69,6 +69,11 @@ class Candidate:
         return f"{self.name}:{self.port}{order}"
 
     @property
+    def is_wave(self) -> bool:
+        """Whether all its unknowns are parts of lines, in which a prediction is close to linear."""
+        return all(one.name.endswith(("_cosine", "_sine")) for one in self.parameters)
+
+    @property
     def unknowns(self) -> int:
         """Number of parameters that it adds to a fit or sets free."""
         return len(self.parameters) + (self.frees is not None)

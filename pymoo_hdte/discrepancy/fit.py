@@ -180,7 +180,7 @@ class Fit:
 
     @cached_property
     def bound_sides(self) -> Vector:
-        """-1 for parameters at the lower bound, 1 for those at the upper one, else 0; shape (n,)."""
+        """-1 for parameters at their lower bound, 1 at the upper one, 0 elsewhere; shape (n,)."""
         layout = Layout(self.parameters)
         near = 1e-3 * layout.array("scale")
         above = self.values >= layout.array("upper") - near

@@ -235,7 +235,7 @@ def _read(
     mean[..., 0] += values["offset"][:, None]
     for effect in effects:
         if isinstance(effect, ThermalDrift):
-            mean[..., 0] -= effect.rate * conditions.elapsed
+            mean[..., 0] -= effect.after(conditions.elapsed)
         if isinstance(effect, Eccentricity):
             line = np.isclose(orders, effect.order / believed.ratio)
             # theta_out is theta_in / N but for the transmission error, a part in 10^3.

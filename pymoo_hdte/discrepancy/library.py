@@ -71,7 +71,7 @@ def _others(believed: Believed) -> list[Candidate]:
             "load_inertia",
             "output",
             (unknown("inertia", 0.0, 10 * inertia, 0.3 * inertia),),
-            ((0.3 * inertia,), (1.0 * inertia,)),
+            ((0.15 * inertia,), (0.4 * inertia,), (1.0 * inertia,)),
             lambda v: (LoadInertia(v[0]),),
             "There is more inertia on the output than believed.",
             exact=True,
@@ -87,9 +87,9 @@ def _others(believed: Believed) -> list[Candidate]:
         Candidate(
             "thermal_drift",
             "sensor",
-            (unknown("rate", -1e-6, 1e-6, 1e-9),),
-            ((1e-9,),),
-            lambda v: (ThermalDrift(v[0]),),
+            (unknown("rate", -1e-6, 1e-6, 1e-9), unknown("time", 50.0, 1e5, 1000.0)),
+            ((1e-9, 200.0), (1e-9, 1000.0), (1e-9, 1e4)),
+            lambda v: (ThermalDrift(v[0], v[1]),),
             "The reading of the output angle drifts with time.",
         ),
     ]

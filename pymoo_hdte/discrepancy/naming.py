@@ -36,8 +36,9 @@ SECOND_LEAST = 0.02
 GAIN = 25.0
 """Reduction of chi-square, to first order, by which some candidate makes a base inadequate though
 its total looks well: one line of one channel is lost among a thousand features."""
-SHARE_ALIKE = 0.02
-"""Where neither form fits to the noise, rivals this close in share cannot be told apart."""
+ALIKE = 2.0
+"""Where no form fits to the noise, a rival that leaves less than this multiple of what the chosen
+one leaves cannot be excluded: what is left is the form, not the noise."""
 BIC_GAIN = 6.0
 """Least gain of BIC, and the distance within which rivals cannot be told apart."""
 FITTED = 4
@@ -116,6 +117,8 @@ def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     if base.chi_square <= adequate(freedom) * freedom and screened[0].reduction < GAIN:
         return Verdict("adequate", base, None, (), (), freedom)
     singles = _fit_best(data, base, screened, excess)
+    if singles[0].fit.chi_square > adequate(freedom) * freedom:
+        singles[0] = _searched(data, base, singles[0], excess)
     rivals = list(singles)
     if singles[0].fit.chi_square > adequate(freedom) * freedom:
         pairs = _pairs(data, singles[:1], candidates, excess)
@@ -164,7 +167,23 @@ def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
         return False
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
     near = abs(rival.bic - chosen.bic) < BIC_GAIN * misfit
-    return near or (misfit > adequate(freedom) and chosen.share - rival.share < SHARE_ALIKE)
+    left = (rival.fit.chi_square - freedom) / (chosen.fit.chi_square - freedom)
+    return near or (misfit > adequate(freedom) and left < ALIKE)
+
+
+def _searched(data: Data, base: Fit, rival: Rival, excess: float) -> Rival:
+    """Return the best of fits from all starts of a single effect, with slopes of their own.
+
+    An inertia that is half as large again moves a resonance past lines: the way there is not
+    downhill from everywhere.
+    """
+    found = [_refined(data, rival, excess)]
+    (candidate,) = rival.candidates
+    if len(candidate.starts) > 1 and not candidate.is_wave:
+        begins = [np.concatenate([base.values, start]) for start in candidate.starts]
+        fits = [fit(data, rival.candidates, begin) for begin in begins]
+        found += [_rival(fitted, excess) for fitted in fits]
+    return min(found, key=lambda one: one.bic)
 
 
 def _refined(data: Data, rival: Rival, excess: float) -> Rival:

@@ -51,6 +51,7 @@ UNITS = {
     "inertia": "kg.m2",
     "factor": "1",
     "rate": "rad/s",
+    "time": "s",
     "phase": "rad",
     "torque_ripple.amplitude": "N.m",
     "nonlinear_drag.coefficient": "N.m.s2/rad2",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from pymoo_hdte.checks import InvalidInput
@@ -25,6 +26,8 @@ _SEPARATION = 0.9
 """Least distance of two order lines, in cycles per output turn."""
 _MOST_LINES = 4
 _LINE_CHANCE = 1e-6
+_SECOND_CHANCE = 0.01
+"""That noise alone makes a line of one speed seem to be one of two."""
 CLEARANCES = ("backlash", "clearance_variation")
 LEAST_LOAD = 0.5
 """N.m, a few times what a torque sensor's zero is known to."""
@@ -136,11 +139,25 @@ def _apart(wanted: list[float], campaign: Campaign, highest: float) -> list[floa
 
 
 def _strong_lines(features: Features, base: Fit) -> list[float]:
-    """Return the orders at which the base leaves more than noise in any channel."""
-    misfit: NDArray[np.float64] = base.residuals[: features.values.size] ** 2
-    by_feature = misfit.reshape(features.values.shape).sum(axis=0)
-    power = sum(by_feature[features.places(channel)].sum(axis=1) for channel in range(4))
-    count = 8.0 * len(features.records)
-    threshold = count + 2.0 * np.sqrt(-np.log(_LINE_CHANCE) * count) - 2.0 * np.log(_LINE_CHANCE)
-    ranked = np.argsort(-np.asarray(power))
-    return [float(features.orders[k]) for k in ranked[:_MOST_LINES] if power[k] > threshold]
+    """Return the orders at which the base leaves more than noise in any channel.
+
+    What is seen at one speed only is no order but a frequency, if there are several speeds.
+    """
+    misfit: NDArray[np.float64] = (base.residuals[: features.values.size] ** 2).reshape(
+        features.values.shape
+    )
+    by_line = np.array([misfit[:, features.places(channel)].sum(axis=2) for channel in range(4)])
+    power = by_line.sum(axis=0)
+    speed = np.abs([record.input_speed for record in features.records])
+    groups = [power[speed == one].sum(axis=0) for one in np.unique(speed)]
+    total, strongest = power.sum(axis=0), np.max(groups, axis=0)
+    strong = total > _threshold(8 * len(speed), _LINE_CHANCE)
+    if len(groups) > 1:
+        fewest = min(np.sum(speed == one) for one in np.unique(speed))
+        strong &= total - strongest > _threshold(8 * (len(speed) - fewest), _SECOND_CHANCE)
+    ranked = [k for k in np.argsort(-total) if strong[k]]
+    return [float(features.orders[k]) for k in ranked[:_MOST_LINES]]
+
+
+def _threshold(freedom: int, chance: float) -> float:
+    return float(chi2.isf(chance, freedom))

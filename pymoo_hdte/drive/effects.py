@@ -8,6 +8,7 @@ respond to the static error as a rigid drive would. Further ones are in `port_ef
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
@@ -178,7 +179,9 @@ def effect_from_fields(table: Fields) -> Effect:
             order = table.number("order") if table.has("order") else 1.0
             effect = Eccentricity(amplitude, phase, order)
         case ThermalDrift.name:
-            effect = ThermalDrift(table.quantity("rate", "angle rate"))
+            rate = table.quantity("rate", "angle rate")
+            time = table.quantity("time", "time") if table.has("time") else math.inf
+            effect = ThermalDrift(rate, time)
         case _:
             effect = law_from_fields(name, table)
     table.finish()

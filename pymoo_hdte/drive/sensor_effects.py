@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -55,29 +56,40 @@ class Eccentricity:
 
 @dataclass(frozen=True)
 class ThermalDrift:
-    """The reading of the output angle drifts steadily while the rig warms up.
+    """The reading of the output angle drifts while the rig warms up: rate t / (1 + t / time).
 
     Attributes
     ----------
     rate : float
-        rad/s.
+        At the start of the session, rad/s.
+    time : float
+        After which the drift is half of what steady drift would be, s; infinite for a steady one.
     """
 
     name: ClassVar[str] = "thermal_drift"
     port: ClassVar[str] = "sensor"
     rate: float
+    time: float = math.inf
 
     def __post_init__(self) -> None:
         real_number("thermal_drift.rate", self.rate)
+        if self.time != math.inf:
+            real_number("thermal_drift.time", self.time, above=0.0)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients as they are."""
         return coefficients
 
+    def after(self, elapsed: Values) -> Values:
+        """Return what is added after ``elapsed`` seconds of the session, rad."""
+        return np.asarray(self.rate * elapsed / (1.0 + elapsed / self.time))
+
     def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
         """Return what is added after ``elapsed`` seconds of the session, rad, shape (n,)."""
-        return np.broadcast_to(self.rate * np.asarray(elapsed, dtype=float), np.shape(output_angle))
+        drift = self.after(np.asarray(elapsed, dtype=float))
+        return np.broadcast_to(drift, np.shape(output_angle))
 
     def to_dict(self) -> dict[str, object]:
         """Return the effect as a TOML-like table."""
-        return {"name": self.name, "rate": with_unit(self.rate, "angle rate")}
+        table = {"name": self.name, "rate": with_unit(self.rate, "angle rate")}
+        return table if self.time == math.inf else table | {"time": with_unit(self.time, "time")}

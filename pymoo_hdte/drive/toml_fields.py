@@ -15,6 +15,7 @@ UNITS: dict[str, dict[str, float]] = {
     "angle": {"rad": 1.0, "deg": math.pi / 180.0, "arcsec": ARCSEC},
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "angle rate": {"rad/s": 1.0},
+    "time": {"s": 1.0},
     "speed": {"rad/s": 1.0, "r/min": REVOLUTION_PER_MINUTE},
     "torque": {"N.m": 1.0},
     "stiffness": {"N.m/rad": 1.0},
