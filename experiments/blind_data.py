@@ -20,7 +20,7 @@ from experiments.blind_scoring import NUMBERS, PARTS, RIVALS
 from experiments.campaign import Run
 from experiments.provenance import environment
 from pymoo_hdte.discrepancy.gap import Gap
-from pymoo_hdte.discrepancy.revise import EXPLAINED
+from pymoo_hdte.discrepancy.naming import EXPLAINED
 
 CONFIDENT = ("named", "parameter")
 """Statuses that leave no choice."""

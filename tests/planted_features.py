@@ -1,6 +1,7 @@
 """Campaigns without raw records: what a known drive gives, with noise of known covariance."""
 
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,22 +9,27 @@ from virtual_rig_cases import BELIEVED, PHASES, RIG
 
 from pymoo_hdte.discrepancy.features import Features
 from pymoo_hdte.discrepancy.fit import Data, fit
-from pymoo_hdte.discrepancy.forward import Conditions
+from pymoo_hdte.discrepancy.forward import Conditions, coefficients_of
 from pymoo_hdte.discrepancy.library import candidates
 from pymoo_hdte.discrepancy.naming import Rival, Verdict
 from pymoo_hdte.discrepancy.parameters import Layout, base_parameters
+from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 ORDERS = np.array([1.0 / 101.0, 1.0, 2.0, 2.02, 3.0, 6.0])
+SWEEP_NOISE = 0.05 * ARCSEC
 CONDITIONS = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 30.0, 40.0)]
 
+NO_BENDS = np.zeros((len(CONDITIONS), 3, 1 + len(ORDERS)))
 
-def known_data():
+
+def known_data(conditions=CONDITIONS, orders=ORDERS):
     """Noise of a typical campaign, no record behind it, and features all zero."""
-    speed, load = np.array(CONDITIONS).T
-    size = 2 + 8 * len(ORDERS)
-    m = len(ORDERS)
+    speed, load = np.array(conditions).T
+    size = 2 + 8 * len(orders)
+    m = len(orders)
     lines = np.repeat([0.03 * ARCSEC, 1e-4, 6e-3, 3.0 * ARCSEC], 2 * m)
     deviation = np.concatenate([[0.03 * ARCSEC, 1e-4], lines])
     correlation = np.eye(size)
@@ -32,12 +38,12 @@ def known_data():
     names = [f"run_{k}" for k in range(len(speed))]
     records = tuple(
         SimpleNamespace(name=name, input_speed=s * REVOLUTION_PER_MINUTE, load_torque=t)
-        for name, (s, t) in zip(names, CONDITIONS, strict=True)
+        for name, (s, t) in zip(names, conditions, strict=True)
     )
     features = Features(
         records,
-        Conditions(speed * REVOLUTION_PER_MINUTE, load, 100.0 * np.arange(len(speed))),
-        ORDERS,
+        Conditions(speed * REVOLUTION_PER_MINUTE, load, 100.0 * np.arange(len(speed)), NO_BENDS),
+        np.array(orders),
         np.zeros((len(speed), size)),
         np.tile(correlation * np.outer(deviation, deviation), (len(speed), 1, 1)),
     )
@@ -45,9 +51,12 @@ def known_data():
     return Data(campaign, features, base_parameters(BELIEVED, RIG, PHASES, 0.0))
 
 
-def measured(effects=(), rng=None, **changes):
-    """Data whose features a true drive gives, with noise of their covariance from ``rng``."""
-    data = known_data()
+def measured(effects=(), rng=None, data=None, **changes):
+    """Data whose features a true drive gives, with noise of their covariance from ``rng``.
+
+    ``changes`` are factors on base parameters; records and orders are those of ``data``.
+    """
+    data = known_data() if data is None else data
     layout = Layout(data.base)
     truth = layout.array("start")
     for name, value in changes.items():
@@ -59,10 +68,30 @@ def measured(effects=(), rng=None, **changes):
     return replace(data, features=replace(data.features, values=values)), truth
 
 
-def listed(data, name, orders=()):
-    return next(
-        c for c in candidates(data.campaign.believed, ORDERS.tolist(), orders) if c.name == name
-    )
+def with_sweep(data, effects=(), rng=None, **changes):
+    """Add a torsion sweep up, down and up again that the same drive gives, whatever it means."""
+    turns = np.array([0.0, 40.0, -40.0, 40.0])
+    legs = [np.linspace(one, other, 21) for one, other in pairwise(turns)]
+    path = np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])])
+    values = {p.name: np.array([p.start * changes.get(p.name, 1.0)]) for p in data.base}
+    coefficients = coefficients_of(data.campaign.believed, values, effects, 1)
+    stiffness = coefficients.stiffness * values["locked_stiffness"]
+    angle = mean_torsion(replace(coefficients, stiffness=stiffness), path)[0]
+    if rng is not None:
+        angle = angle + SWEEP_NOISE * rng.standard_normal(len(angle))
+    torque = (path[:-1] + path[1:]) / 2.0
+    covariance = SWEEP_NOISE**2 * np.eye(len(angle))
+    points = TorsionPoints(torque, angle, covariance, path, np.arange(len(angle)))
+    return replace(data, torsion=(points,))
+
+
+def library(data, seen=()):
+    """All candidates; lines of unexpected order at those that were seen."""
+    return candidates(data.campaign.believed, data.features.orders.tolist(), seen)
+
+
+def listed(data, name, seen=()):
+    return next(candidate for candidate in library(data, seen) if candidate.name == name)
 
 
 def analysed(data, status="unlisted", candidate=None, start=()):

@@ -79,7 +79,7 @@ def test_output_encoder_reads_what_its_errors_say():
     angle, clock = np.linspace(0.0, 6.0, 50), np.full(50, 600.0)
     encoder = OutputEncoder(eccentricity=1e-5, drift=2e-5, drift_time=600.0, interpolation=3e-6)
     expected = 1e-5 * (np.cos(angle) + 0.2 * np.cos(2 * angle)) + 3e-6 * np.sin(angle)
-    expected += 2e-5 * (1.0 - np.exp(-1.0))
+    expected += 2e-5 * (1.0 - 0.8 * np.exp(-1.0) - 0.2 * np.exp(-3.0))
     assert encoder.reading(angle, clock) - angle == pytest.approx(expected, abs=1e-15)
 
 

@@ -44,12 +44,19 @@ def test_drift_grows_with_the_session_and_not_with_the_angle():
     assert drift.reading(angle, 500.0) == pytest.approx(np.full(5, 1.5e-6))
 
 
-@given(st.floats(1.0, 1e4), st.floats(0.0, 1e5))
-def test_a_drift_that_settles_starts_at_its_rate_and_is_halved_after_its_time(time, elapsed):
+@given(st.floats(100.0, 1e4), st.floats(0.0, 1e4))
+def test_a_drift_that_settles_starts_at_its_rate_and_bends(time, elapsed):
     drift, steady = ThermalDrift(3e-9, time), ThermalDrift(3e-9)
-    assert drift.after(time) == pytest.approx(steady.after(time) / 2.0)
     assert drift.after(1e-6 * time) == pytest.approx(steady.after(1e-6 * time), rel=2e-6)
-    assert 0.0 <= drift.after(elapsed) < 3e-9 * time
+    assert drift.after(50.0 * time) == pytest.approx(3e-9 * time)
+    step = 1e-2 * time
+    near = drift.after(elapsed + step * np.arange(-2, 3))
+    second, third, fourth = drift.bends(np.array([elapsed]))[:, 0]
+    scale = abs(second)
+    assert np.diff(near[1:4], 2)[0] / step**2 == pytest.approx(second, abs=1e-3 * scale)
+    assert third * time == pytest.approx(-second)
+    assert fourth * time == pytest.approx(-third)
+    assert np.all(steady.bends(np.array([elapsed])) == 0.0)
 
 
 @pytest.mark.parametrize("effect", EFFECTS, ids=lambda effect: effect.name)

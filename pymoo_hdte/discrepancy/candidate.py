@@ -69,9 +69,12 @@ class Candidate:
         return f"{self.name}:{self.port}{order}"
 
     @property
-    def is_wave(self) -> bool:
-        """Whether all its unknowns are parts of lines, in which a prediction is close to linear."""
-        return all(one.name.endswith(("_cosine", "_sine")) for one in self.parameters)
+    def linear(self) -> bool:
+        """Whether a prediction is close to linear in all its unknowns: parts of lines, and a mean.
+
+        Each of `starts` then goes along one of them.
+        """
+        return all(one.name.endswith(("_cosine", "_sine", "mean")) for one in self.parameters)
 
     @property
     def unknowns(self) -> int:
@@ -106,7 +109,7 @@ def wave(name: str, largest: float, typical: float, harmonics: int = 1) -> tuple
 
 
 def wave_starts(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:
-    """Return one start along each part of a `wave`."""
+    """Return one start along each part of a `wave`, and along its mean."""
     sizes = np.diag([parameter.scale for parameter in parameters])
     return tuple(tuple(row) for row in sizes.tolist())
 

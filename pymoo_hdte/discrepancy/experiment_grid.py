@@ -67,7 +67,12 @@ class Grid:
         nearest = np.argmin(distance, axis=1)
         planned = Features(
             records=tuple(features.records[k] for k in nearest),
-            conditions=Conditions(speed, load, np.full(len(grid), conditions.elapsed.max())),
+            conditions=Conditions(
+                speed,
+                load,
+                np.full(len(grid), conditions.elapsed.max()),
+                conditions.bends[nearest],
+            ),
             orders=features.orders,
             values=np.zeros((len(grid), features.values.shape[1])),
             covariance=features.covariance[nearest],

@@ -51,6 +51,7 @@ class Features:
             self.conditions.input_speed[rows],
             self.conditions.output_torque[rows],
             self.conditions.elapsed[rows],
+            self.conditions.bends[rows],
         )
         records = tuple(self.records[row] for row in rows)
         return Features(records, conditions, self.orders, self.values[rows], self.covariance[rows])
@@ -91,6 +92,7 @@ def measure(
         elapsed=np.array(
             [record.elapsed + (record.time[0] + record.time[-1]) / 2.0 for record in records]
         ),
+        bends=np.array([line.bends for line in lines]),
     )
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness

@@ -45,12 +45,18 @@ class Data:
     base : tuple of Parameter
     torsion : tuple of TorsionPoints
         Sweeps with the input locked.
+    reference : ndarray, shape (n_base,), optional
+        Base values at which the repeatability is carried to all channels; by default the starts.
+    reference_effects : tuple of Effect
+        Effects that are there then: a resonance that they move magnifies what does not repeat.
     """
 
     campaign: Campaign
     features: Features
     base: tuple[Parameter, ...]
     torsion: tuple[TorsionPoints, ...] = ()
+    reference: Vector | None = None
+    reference_effects: tuple[Effect, ...] = ()
 
     @cached_property
     def whiteners(self) -> NDArray[np.float64]:
@@ -61,7 +67,8 @@ class Data:
     def covariance(self) -> NDArray[np.float64]:
         """Of the features of each record, sensors and repeatability, shape (r, f, f)."""
         layout = Layout(self.base)
-        return self.features.covariance + self._repeatability(layout, layout.array("start"))
+        start = layout.array("start") if self.reference is None else self.reference
+        return self.features.covariance + self._repeatability(layout, start)
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
         """Return the covariance that small changes of the static error give each record."""
@@ -76,7 +83,7 @@ class Data:
                 unit = spread if part == "amplitude" else spread / max(amplitude, spread)
                 shifted[layout.index(f"error_{part}_{line}")] += unit
                 moved.append(shifted)
-        predicted = self.predict(np.array(moved), ())
+        predicted = self.predict(np.array(moved), self.reference_effects)
         change = predicted[1:] - predicted[0]
         covariance = np.einsum("vri,vrj->rij", change, change)
         covariance[:, 0, 0] += spread**2

@@ -48,11 +48,14 @@ class Conditions:
         Measured mean, N.m: load with the sensor's gain and zero.
     elapsed : ndarray
         Middle of the record within the session, s.
+    bends : complex ndarray, shape (r, 3, 1 + m)
+        What a drift that bends within a record leaves in it: see `OrderLines`.
     """
 
     input_speed: NDArray[np.float64]
     output_torque: NDArray[np.float64]
     elapsed: NDArray[np.float64]
+    bends: NDArray[np.complex128]
 
     def __len__(self) -> int:
         return len(self.input_speed)
@@ -235,7 +238,9 @@ def _read(
     mean[..., 0] += values["offset"][:, None]
     for effect in effects:
         if isinstance(effect, ThermalDrift):
-            mean[..., 0] -= effect.after(conditions.elapsed)
+            left = np.einsum("kr,rkm->rm", effect.bends(conditions.elapsed), conditions.bends)
+            mean[..., 0] -= effect.after(conditions.elapsed) + left[:, 0].real
+            phasors[..., 0, :] -= left[:, 1:]
         if isinstance(effect, Eccentricity):
             line = np.isclose(orders, effect.order / believed.ratio)
             # theta_out is theta_in / N but for the transmission error, a part in 10^3.

@@ -68,13 +68,15 @@ def _periodic(port: str, order: float, slower: float) -> Candidate:
     name = "position_dependent_friction"
 
     def build(v: Values) -> tuple[Effect, ...]:
-        return tuple(
+        varying = [
             LawAtPort(name, port, PeriodicFriction(multiple * order, phase, level))
-            for multiple, level, phase in lines_of(v)
-        )
+            for multiple, level, phase in lines_of(v[:-1])
+        ]
+        return (*varying, LawAtPort("coulomb_friction", port, CoulombFriction(v[-1])))
 
     scale = TYPICAL_LEVEL[port]
-    parts = wave("level", 20 * scale, scale, harmonics=2)
+    mean = unknown("mean", 0.0, 20 * scale, scale)
+    parts = (*wave("level", 20 * scale, scale, harmonics=2), mean)
     return Candidate(
         name,
         port,

@@ -103,14 +103,19 @@ def stribeck_friction(believed: Believed, rng: np.random.Generator, size: float)
 
 
 def position_dependent_friction(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
-    """Draw friction once or twice in an input turn, or once in an output turn."""
+    """Draw friction that varies once or twice in an input turn, or once in an output turn.
+
+    Its mean keeps it from turning negative: friction that drives would shake the rig by itself.
+    """
     port, order, low, high = [
         ("input", 1.0, 0.005, 0.02),
         ("input", 2.0, 0.005, 0.02),
         ("output", 1.0, 0.4, 1.6),
     ][rng.integers(3)]
+    level = size * rng.uniform(low, high)
     return port, {
-        "periodic": size * rng.uniform(low, high),
+        "coulomb": 1.2 * level,
+        "periodic": level,
         "periodic_order": order,
         "periodic_phase": uniform_phase(rng),
         "periodic_second": uniform_phase(rng),
@@ -185,7 +190,7 @@ def damping_reference(believed: Believed, rng: np.random.Generator, size: float)
 
 
 def thermal_drift(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
-    """Draw a reading of the output angle that drifts to 2 to 10 arcsec, exponentially."""
+    """Draw a reading of the output angle that drifts to 2 to 10 arcsec, with two time constants."""
     return "sensor", {
         "drift": size * rng.uniform(2.0, 10.0) * ARCSEC * float(rng.choice([-1.0, 1.0])),
         "drift_time": rng.uniform(300.0, 2000.0),

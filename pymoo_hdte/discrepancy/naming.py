@@ -19,6 +19,8 @@ from pymoo_hdte.discrepancy.library import out_of_tolerance
 from pymoo_hdte.discrepancy.screening import Screened, screen
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted")
+EXPLAINED = ("named", "class", "parameter")
+"""Statuses that say what is missing."""
 
 _DEVIATIONS = 4.0
 """Standard deviations of chi-square up to which a base is adequate."""
@@ -179,7 +181,7 @@ def _searched(data: Data, base: Fit, rival: Rival, excess: float) -> Rival:
     """
     found = [_refined(data, rival, excess)]
     (candidate,) = rival.candidates
-    if len(candidate.starts) > 1 and not candidate.is_wave:
+    if len(candidate.starts) > 1 and not candidate.linear:
         begins = [np.concatenate([base.values, start]) for start in candidate.starts]
         fits = [fit(data, rival.candidates, begin) for begin in begins]
         found += [_rival(fitted, excess) for fitted in fits]

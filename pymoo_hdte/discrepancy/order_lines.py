@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import factorial
 
 from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 from pymoo_hdte.discrepancy.believed import Rig
@@ -56,6 +57,9 @@ class OrderLines:
         Of the noise of one row between channels. The covariance of channel a with channel b is
         ``covariance[a] * row_covariance[a, b] / row_covariance[a, a]``: the input encoder stands
         both in the transmission error and in the input angle.
+    bends : complex ndarray, shape (3, 1 + m)
+        Mean and phasors that signals (t - t_mid)^k / k!, k = 2, 3, 4, leave: a drift is no straight
+        line in a record of ten minutes, and an order that turns once in it takes what is bent.
     """
 
     orders: NDArray[np.float64]
@@ -64,6 +68,7 @@ class OrderLines:
     phasors: NDArray[np.complex128]
     covariance: NDArray[np.float64]
     row_covariance: NDArray[np.float64]
+    bends: NDArray[np.complex128]
 
 
 def order_lines(
@@ -95,6 +100,8 @@ def order_lines(
     scales = 1.0 / np.concatenate([[1.0], gains, gains])
     unit = (inverse @ inverse.T)[np.ix_(kept, kept)] * np.outer(scales, scales)
     noise = row_covariance(rig, ratio, record.samples_averaged)
+    bends = inverse @ (fit.basis.T @ _bent(record))
+    lines = (bends[2 : 2 + m] + 1j * bends[2 + m :]).T / gains
     return OrderLines(
         orders=fit.orders,
         mean=fit.coefficients[0],
@@ -102,6 +109,7 @@ def order_lines(
         phasors=np.asarray((real + 1j * imaginary) / gains, dtype=complex),
         covariance=np.diag(noise)[:, None, None] * unit,
         row_covariance=noise,
+        bends=np.column_stack([bends[0], lines]),
     )
 
 
@@ -212,7 +220,7 @@ class _Fit:
         for order in checked:
             real_number("orders", float(order), above=0.0, below=_nyquist_order(record))
         angle = np.outer(record.input_angle, checked)
-        time = record.time - (record.time[0] + record.time[-1]) / 2.0
+        time = _centred(record)
         design = np.column_stack([np.ones_like(time), time, np.cos(angle), -np.sin(angle)])
         scale = np.linalg.norm(design, axis=0)
         basis, triangle = np.linalg.qr(design / scale)
@@ -230,6 +238,16 @@ class _Fit:
         triangle = triangle * scale
         coefficients = np.linalg.solve(triangle, basis.T @ values)
         return cls(checked, values, basis, triangle, coefficients)
+
+
+def _centred(record: RunningRecord) -> NDArray[np.float64]:
+    return np.asarray(record.time - (record.time[0] + record.time[-1]) / 2.0)
+
+
+def _bent(record: RunningRecord) -> NDArray[np.float64]:
+    """Return (t - t_mid)^k / k! for k = 2, 3, 4, shape (n, 3)."""
+    powers = np.arange(2, 5)
+    return np.asarray(_centred(record)[:, None] ** powers / factorial(powers))
 
 
 def _speed(record: RunningRecord) -> float:

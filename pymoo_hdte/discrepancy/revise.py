@@ -16,7 +16,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.believed import Believed
 from pymoo_hdte.discrepancy.campaign import Campaign
 from pymoo_hdte.discrepancy.fit import Fit
-from pymoo_hdte.discrepancy.naming import Verdict
+from pymoo_hdte.discrepancy.naming import EXPLAINED, Verdict
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.drive import (
     DampingReference,
@@ -30,9 +30,6 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.drive.datasheet import Nominal
 from pymoo_hdte.units import ARCSEC
-
-EXPLAINED = ("named", "class", "parameter")
-"""Statuses whose chosen effects enter the model."""
 
 SHEET_FILE = "revised_model_sheet.toml"
 MODEL_FILE = "revised_model.toml"

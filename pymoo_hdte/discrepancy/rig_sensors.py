@@ -21,7 +21,8 @@ class OutputEncoder:
     eccentricity, eccentricity_phase, eccentricity_second : float
         e (cos(theta_out + phase) + 0.2 cos(2 theta_out + second)), rad.
     drift, drift_time : float
-        Drift (1 - exp(-t / drift_time)) over the session, rad and s.
+        Drift over the session, rad and s: four fifths of it as 1 - exp(-t / drift_time), the rest
+        three times as fast.
     interpolation, interpolation_lines, interpolation_phase : float
         Amplitude of the interpolation error, rad, and its periods in one turn.
     """
@@ -42,7 +43,8 @@ class OutputEncoder:
         once = np.cos(angle + self.eccentricity_phase)
         twice = np.cos(2.0 * angle + self.eccentricity_second)
         fine = np.sin(self.interpolation_lines * angle + self.interpolation_phase)
-        drifted = self.drift * -np.expm1(-clock / self.drift_time)
+        ages = clock / self.drift_time
+        drifted = self.drift * -(0.8 * np.expm1(-ages) + 0.2 * np.expm1(-3.0 * ages))
         return (
             angle + self.eccentricity * (once + 0.2 * twice) + self.interpolation * fine + drifted
         )

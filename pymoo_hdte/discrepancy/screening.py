@@ -90,7 +90,7 @@ def _best_start(
     starts = np.array(candidate.starts)
     lower = np.array([parameter.lower for parameter in candidate.parameters])
     upper = np.array([parameter.upper for parameter in candidate.parameters])
-    if candidate.is_wave:
+    if candidate.linear:
         # Cosine and sine part: their signatures span a plane.
         solution, *_ = np.linalg.lstsq(signatures.T, -left, rcond=1e-10)
         rest = left + signatures.T @ solution

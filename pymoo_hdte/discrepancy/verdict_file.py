@@ -44,6 +44,7 @@ UNITS = {
     "force": "N.m",
     "depth": "1",
     "level": "N.m",
+    "mean": "N.m",
     "excess": "N.m",
     "fading": "rad/s",
     "amplitude": "rad",
@@ -145,31 +146,29 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> di
 
     The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
     """
-    names = [fitted.parameters[row].name for row in rows]
-    if not (names and names[0].endswith("_cosine")):
-        return {
-            name: quantity(fitted.values[row], fitted.covariance[row, row], candidate.name, name)
-            for name, row in zip(names, rows, strict=True)
-        }
-    name = names[0].removesuffix("_cosine")
     found: dict[str, Any] = {}
-    for prefix, pair in zip(HARMONIC_NAMES, rows.reshape(-1, 2), strict=False):
-        found |= _line(prefix, name, candidate.name, fitted, pair)
+    for row in rows:
+        name, variance = fitted.parameters[row].name, fitted.covariance[row, row]
+        if name.endswith("_cosine"):
+            found |= _line(name.removesuffix("_cosine"), candidate.name, fitted, row)
+        elif not name.endswith("_sine"):
+            found[name] = quantity(fitted.values[row], variance, candidate.name, name)
     return found
 
 
-def _line(
-    prefix: str, name: str, effect: str, fitted: Fit, rows: NDArray[np.int_]
-) -> dict[str, Any]:
-    """Return amplitude and phase, with intervals, of the cosine and sine part at two rows."""
+def _line(name: str, effect: str, fitted: Fit, row: int) -> dict[str, Any]:
+    """Return amplitude and phase, with intervals, of the cosine part at a row and the sine next."""
+    rows = np.array([row, row + 1])
     (cosine, sine), covariance = fitted.values[rows], fitted.covariance[np.ix_(rows, rows)]
     amplitude, phase = polar(cosine, sine)
     size = max(amplitude, np.finfo(float).tiny)
     along = np.array([cosine, sine]) / size
     across = np.array([-sine, cosine]) / size
     of_phase = min(float(across @ covariance @ across) / size**2, np.pi**2 / 3.0)
+    prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
+    quantity_name = name.removeprefix(prefix)
     return {
-        f"{prefix}{name}": quantity(amplitude, float(along @ covariance @ along), effect, name),
+        name: quantity(amplitude, float(along @ covariance @ along), effect, quantity_name),
         f"{prefix}phase": quantity(phase, of_phase, effect, "phase"),
     }
 

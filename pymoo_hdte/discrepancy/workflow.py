@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.features import Features, measure
 from pymoo_hdte.discrepancy.fit import Data, Fit, fit, start_parameters
 from pymoo_hdte.discrepancy.library import candidates
-from pymoo_hdte.discrepancy.naming import Verdict, judge
+from pymoo_hdte.discrepancy.naming import EXPLAINED, SHARE, Verdict, judge
 from pymoo_hdte.discrepancy.screening import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.torsion_curve import torsion_points
 
@@ -29,6 +29,8 @@ _LINE_CHANCE = 1e-6
 _SECOND_CHANCE = 0.01
 """That noise alone makes a line of one speed seem to be one of two."""
 CLEARANCES = ("backlash", "clearance_variation")
+_SAME_NOISE = 1.5
+"""Largest ratio of variances up to which the noise is that of the believed drive."""
 LEAST_LOAD = 0.5
 """N.m, a few times what a torque sensor's zero is known to."""
 
@@ -101,7 +103,28 @@ def analyse(campaign: Campaign) -> Analysis:
         data = _loaded(data)
         base = fit(data)
         listed = _candidates(data, base)
-    return Analysis(campaign, data, judge(data, base, listed), tuple(unexpected))
+    verdict = judge(data, base, listed)
+    data, verdict = _with_noise_of(verdict, data, listed)
+    return Analysis(campaign, data, verdict, tuple(unexpected))
+
+
+def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
+    """Judge again where the named effect changes how the drive answers to what does not repeat.
+
+    The repeatability is a motion, which all channels show by way of the model's own response.
+    """
+    if verdict.chosen is None or verdict.chosen.share < SHARE:
+        return data, verdict
+    fitted = verdict.chosen.fit
+    values = fitted.values[: len(data.base)]
+    renewed = replace(data, reference=values, reference_effects=fitted.effects)
+    ratio = np.diagonal(renewed.covariance, axis1=1, axis2=2) / np.diagonal(
+        data.covariance, axis1=1, axis2=2
+    )
+    if ratio.max() <= _SAME_NOISE:
+        return data, verdict
+    again = judge(renewed, fit(renewed), listed)
+    return (renewed, again) if again.status in EXPLAINED else (data, verdict)
 
 
 def _candidates(data: Data, base: Fit) -> list[Candidate]:

@@ -56,14 +56,14 @@ class Eccentricity:
 
 @dataclass(frozen=True)
 class ThermalDrift:
-    """The reading of the output angle drifts while the rig warms up: rate t / (1 + t / time).
+    """The output angle reads what grows while the rig warms up: rate time (1 - exp(-t / time)).
 
     Attributes
     ----------
     rate : float
         At the start of the session, rad/s.
     time : float
-        After which the drift is half of what steady drift would be, s; infinite for a steady one.
+        Time constant, s; infinite for a steady drift, rate t.
     """
 
     name: ClassVar[str] = "thermal_drift"
@@ -82,7 +82,14 @@ class ThermalDrift:
 
     def after(self, elapsed: Values) -> Values:
         """Return what is added after ``elapsed`` seconds of the session, rad."""
-        return np.asarray(self.rate * elapsed / (1.0 + elapsed / self.time))
+        if self.time == math.inf:
+            return np.asarray(self.rate * elapsed)
+        return np.asarray(-self.rate * self.time * np.expm1(-elapsed / self.time))
+
+    def bends(self, elapsed: Values) -> Values:
+        """Return the second to fourth derivative of `after`, rad/s^2 to rad/s^4, shape (3, n)."""
+        rate = self.rate * np.exp(-elapsed / self.time)
+        return np.array([rate / (-self.time) ** power for power in (1, 2, 3)])
 
     def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
         """Return what is added after ``elapsed`` seconds of the session, rad, shape (n,)."""
