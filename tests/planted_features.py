@@ -22,8 +22,6 @@ ORDERS = np.array([1.0 / 101.0, 1.0, 2.0, 2.02, 3.0, 6.0])
 SWEEP_NOISE = 0.05 * ARCSEC
 CONDITIONS = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 30.0, 40.0)]
 
-NO_BENDS = np.zeros((len(CONDITIONS), 3, 1 + len(ORDERS)))
-
 
 def known_data(conditions=CONDITIONS, orders=ORDERS):
     """Noise of a typical campaign, no record behind it, and features all zero."""
@@ -35,6 +33,7 @@ def known_data(conditions=CONDITIONS, orders=ORDERS):
     correlation = np.eye(size)
     correlation[2 : 2 + m, 2 + m : 2 + 2 * m] = 0.3 * np.eye(m)
     correlation[2 + m : 2 + 2 * m, 2 : 2 + m] = 0.3 * np.eye(m)
+    no_bends = np.zeros((len(speed), 3, 1 + m), dtype=complex)
     names = [f"run_{k}" for k in range(len(speed))]
     records = tuple(
         SimpleNamespace(name=name, input_speed=s * REVOLUTION_PER_MINUTE, load_torque=t)
@@ -42,7 +41,7 @@ def known_data(conditions=CONDITIONS, orders=ORDERS):
     )
     features = Features(
         records,
-        Conditions(speed * REVOLUTION_PER_MINUTE, load, 100.0 * np.arange(len(speed)), NO_BENDS),
+        Conditions(speed * REVOLUTION_PER_MINUTE, load, 100.0 * np.arange(len(speed)), no_bends),
         np.array(orders),
         np.zeros((len(speed), size)),
         np.tile(correlation * np.outer(deviation, deviation), (len(speed), 1, 1)),

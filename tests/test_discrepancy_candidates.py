@@ -1,0 +1,171 @@
+"""The library of effects: its names, its ranges, and the waves that its lines are made of."""
+
+import tomllib
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from planted_features import ORDERS, known_data, library, listed
+from virtual_rig_cases import BELIEVED
+
+from pymoo_hdte.discrepancy.candidate import lines_of, polar, wave, wave_starts
+from pymoo_hdte.discrepancy.forward import coefficients_of
+from pymoo_hdte.discrepancy.library import candidates, out_of_tolerance
+from pymoo_hdte.discrepancy.parameters import MECHANICAL
+from pymoo_hdte.discrepancy.revise import model_toml
+from pymoo_hdte.drive import preset
+from pymoo_hdte.drive.effects import effect_from_fields
+from pymoo_hdte.drive.toml_fields import Fields
+from pymoo_hdte.units import ARCSEC
+
+NAMES = {
+    "hardening_stiffness", "soft_windup", "hysteresis", "backlash", "clearance_variation",
+    "coulomb_friction", "stribeck_friction", "position_dependent_friction", "nonlinear_drag",
+    "mesh_stiffness_variation", "kinematic_error", "kinematic_reaction", "eccentricity",
+    "torque_ripple", "load_inertia", "damping_reference", "thermal_drift",
+}  # fmt: skip
+"""Of design section 7, "Words"."""
+SEEN = [3.0, 6.0, 46.0 / BELIEVED.ratio]
+LISTED = candidates(BELIEVED, [*ORDERS, *SEEN, 2.0 * 46.0 / BELIEVED.ratio], SEEN)
+parts = st.floats(-1e3, 1e3)
+
+
+def label(candidate):
+    return candidate.label
+
+
+def values_of(candidate):
+    """Any values within the bounds of a candidate."""
+    return st.tuples(*(st.floats(one.lower, one.upper) for one in candidate.parameters))
+
+
+def orders_of(candidate):
+    """Orders, in cycles per input turn, of the effects of a candidate that is a line."""
+    effects = candidate.build(candidate.starts[-1])
+    slower = BELIEVED.ratio if candidate.port == "sensor" else 1.0
+    return [getattr(effect, "law", effect).order / slower for effect in effects]
+
+
+def test_every_name_of_the_design_is_listed_and_no_other():
+    assert {candidate.name for candidate in LISTED if candidate.listed} == NAMES
+
+
+def test_what_is_not_listed_is_the_encoder_s_alone():
+    assert {(one.name, one.port) for one in LISTED if not one.listed} == {
+        ("encoder_line", "sensor")
+    }
+
+
+def test_labels_tell_candidates_apart():
+    assert len({candidate.label for candidate in LISTED}) == len(LISTED)
+
+
+@pytest.mark.parametrize("candidate", LISTED, ids=label)
+def test_starts_are_within_the_bounds(candidate):
+    lower = [parameter.lower for parameter in candidate.parameters]
+    upper = [parameter.upper for parameter in candidate.parameters]
+    for start in candidate.starts:
+        assert np.all(np.array(lower) <= start)
+        assert np.all(np.array(start) <= upper)
+        assert np.any(np.array(start) != 0.0)
+    assert all(parameter.lower <= parameter.start <= parameter.upper > parameter.lower
+               for parameter in candidate.parameters)  # fmt: skip
+    assert all(parameter.scale > 0.0 for parameter in candidate.parameters)
+
+
+@settings(max_examples=15)
+@pytest.mark.parametrize("candidate", LISTED, ids=label)
+@given(data=st.data())
+def test_a_model_takes_the_effects_and_its_file_gives_them_back(candidate, data):
+    effects = candidate.build(data.draw(values_of(candidate)))
+    model = replace(preset("calibrated"), effects=effects)
+    tables = tomllib.loads(model_toml(model))["effect"]
+    assert tuple(effect_from_fields(Fields(table, "effect")) for table in tables) == effects
+    assert effects[0].name == candidate.name or not candidate.listed
+
+
+@given(parts, parts, st.floats(-10.0, 10.0))
+def test_polar_is_the_same_wave(cosine, sine, angle):
+    amplitude, phase = polar(cosine, sine)
+    wanted = cosine * np.cos(angle) - sine * np.sin(angle)
+    assert amplitude * np.cos(angle + phase) == pytest.approx(wanted, abs=1e-12 * (1 + amplitude))
+
+
+@given(st.lists(st.tuples(parts, parts), min_size=1, max_size=3))
+def test_lines_of_a_wave_come_back(pairs):
+    lines = lines_of(list(chain(*pairs)))
+    assert [multiple for multiple, _, _ in lines] == list(range(1, len(pairs) + 1))
+    for (_, amplitude, phase), (cosine, sine) in zip(lines, pairs, strict=True):
+        phasor = amplitude * np.exp(1j * phase)
+        assert phasor == pytest.approx(cosine + 1j * sine, abs=1e-12 * (1.0 + amplitude))
+
+
+@given(st.floats(1e-6, 1e3), st.integers(1, 3))
+def test_starts_of_a_wave_span_its_parts(typical, harmonics):
+    unknowns = wave("amplitude", 2.0 * typical, typical, harmonics)
+    starts = np.array(wave_starts(unknowns))
+    assert len(unknowns) == 2 * harmonics
+    assert np.linalg.matrix_rank(starts / typical) == 2 * harmonics
+    assert np.count_nonzero(starts) == 2 * harmonics
+    assert np.max(starts) == typical
+    assert len({parameter.name for parameter in unknowns}) == 2 * harmonics
+
+
+def test_cosine_and_sine_are_real_and_imaginary_part_of_the_static_error():
+    line = listed(known_data(), "kinematic_error", [3.0])
+    values = {parameter.name: np.array([parameter.start]) for parameter in known_data().base}
+    effects = line.build((2.0 * ARCSEC, 0.7 * ARCSEC, -0.1 * ARCSEC, 0.3 * ARCSEC))
+    plain = coefficients_of(BELIEVED, values, (), 1)
+    found = coefficients_of(BELIEVED, values, effects, 1)
+    assert found.error_orders[3:].tolist() == [3.0, 6.0]
+    added = found.error_phasors[0, 3:] / ARCSEC
+    assert added == pytest.approx([2.0 + 0.7j, -0.1 + 0.3j], rel=1e-12)
+    assert np.array_equal(found.error_phasors[:, :3], plain.error_phasors)
+
+
+@pytest.mark.parametrize("seen", [[3.0], [1.0, 6.0], [1.01], [46.0 / 101.0, 0.5], [2.0, 4.0]])
+def test_lines_have_harmonics_only_where_the_features_look(seen):
+    orders = sorted({*ORDERS.tolist(), *seen})
+    for candidate in candidates(BELIEVED, orders, seen):
+        if candidate.name not in ("kinematic_error", "torque_ripple", "encoder_line"):
+            continue
+        first, *further = orders_of(candidate)
+        assert any(np.isclose(first, order, rtol=1e-12) for order in seen)
+        held = [order for order in orders if np.isclose(order, 2.0 * first, rtol=1e-9)]
+        if candidate.name == "kinematic_error":
+            held = [order for order in held if order not in BELIEVED.error_orders]
+        assert further == pytest.approx(held, rel=1e-9)
+        assert len(candidate.parameters) == 2 * (1 + len(held))
+
+
+def test_a_believed_order_of_the_error_is_no_further_line_of_it():
+    names = [(one.name, one.order) for one in candidates(BELIEVED, ORDERS.tolist(), [1.0, 3.0])]
+    assert ("kinematic_error", 1.0) not in names
+    assert ("kinematic_error", 3.0) in names
+    assert ("torque_ripple", 1.0) in names
+
+
+def test_an_order_that_is_no_whole_number_of_output_turns_is_not_the_encoder_s():
+    names = [one.label for one in candidates(BELIEVED, [*ORDERS, 0.4567], [0.4567, 3.0])]
+    assert "encoder_line:sensor@3" in names
+    assert "kinematic_error:mesh@0.4567" in names
+    assert "encoder_line:sensor@0.4567" not in names
+
+
+def test_only_parameters_of_the_drive_can_be_out_of_tolerance():
+    base = [parameter.name for parameter in known_data().base]
+    freed = [candidate.frees for candidate in out_of_tolerance(base)]
+    # Load inertia and damping have effects of their own names.
+    assert set(freed) == set(MECHANICAL) - {"load_inertia", "damping"}
+    for candidate in out_of_tolerance(base):
+        assert candidate.build(()) == ()
+        assert candidate.unknowns == 1
+        assert not candidate.parameters
+
+
+def test_unknowns_count_what_a_fit_gains():
+    for candidate in library(known_data(), [3.0]):
+        assert candidate.unknowns == len(candidate.parameters)
