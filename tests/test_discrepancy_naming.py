@@ -1,0 +1,217 @@
+"""The verdict on planted features: what is named, what is not, and which rule decides."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted_features import CONDITIONS, known_data, library, measured
+from scipy.stats import chi2
+
+from pymoo_hdte.discrepancy import naming
+from pymoo_hdte.discrepancy.fit import fit
+from pymoo_hdte.discrepancy.naming import adequate, judge
+from pymoo_hdte.discrepancy.parameters import Layout
+from pymoo_hdte.discrepancy.verdict_file import sentence
+from pymoo_hdte.units import ARCSEC
+
+SCALE = 46.0 / 101.0
+"""Order of a line that an encoder shows 46 times in its turn."""
+ORDERS = [1.0 / 101.0, SCALE, 1.0, 2.0, 2.02, 3.0, 4.0, 5.0, 6.0]
+EMPTY = known_data(CONDITIONS[::2], ORDERS)
+RIPPLE, LINE = "torque_ripple:input@5", "kinematic_error:mesh@3"
+SOFT, CUBIC = "soft_windup:mesh", "hardening_stiffness:mesh"
+REACTION, INERTIA = "kinematic_reaction:input", "load_inertia:output"
+SEEN = [3.0, 5.0]
+FEW = [RIPPLE, LINE, SOFT, REACTION, INERTIA, "nonlinear_drag:input"]
+"""Rivals enough where the rule is tested and not the choice among all."""
+
+
+def of_labels(labels, seen=SEEN):
+    found = {candidate.label: candidate for candidate in library(EMPTY, seen)}
+    return [found[label] for label in labels]
+
+
+def planted(effects, seed=4, seen=SEEN, **changes):
+    """Data of a drive with effects, given as a mapping of labels to values."""
+    built = [
+        effect
+        for candidate, values in zip(of_labels(effects, seen), effects.values(), strict=True)
+        for effect in candidate.build(values)
+    ]
+    return measured(tuple(built), np.random.default_rng(seed), EMPTY, **changes)[0]
+
+
+def disturbed(data, chi_square):
+    """Add to one record's input torque a line that no drive has, worth so much of chi-square."""
+    values, place = data.features.values.copy(), data.features.places(1)[6, 0]
+    shift = np.zeros_like(values)
+    shift[3, place] = 1.0
+    worth = np.sum(data.whiten(shift) ** 2)
+    return replace(
+        data, features=replace(data.features, values=values + shift * np.sqrt(chi_square / worth))
+    )
+
+
+def verdict_on(data, labels=None, seen=SEEN):
+    rivals = library(data, seen) if labels is None else of_labels(labels, seen)
+    return judge(data, fit(data), rivals)
+
+
+def labels_of(verdict):
+    return {candidate.label for candidate in verdict.chosen.candidates}
+
+
+@pytest.fixture(scope="module")
+def ripple():
+    data = planted({RIPPLE: (0.003, 0.001)})
+    return data, verdict_on(data)
+
+
+def test_adequacy_in_closed_form():
+    assert adequate(1400) == pytest.approx(1.0 + 4.0 * np.sqrt(2.0 / 1400.0))
+    assert adequate(1400) == pytest.approx(1.15, abs=0.005)
+    # Chi-square has the variance 2 f: four standard deviations, of a normal one in 30000.
+    for freedom in (100, 1000, 10000):
+        assert chi2.sf(freedom * adequate(freedom), freedom) < 3e-4
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
+    stiffness, inertia = np.random.default_rng(seed).uniform(0.92, 1.08, 2)
+    verdict = verdict_on(planted({}, seed, stiffness=stiffness, input_inertia=inertia))
+    assert verdict.status == "adequate"
+    assert verdict.chosen is None
+    assert verdict.base.chi_square == pytest.approx(
+        verdict.degrees_of_freedom, abs=4.0 * np.sqrt(2.0 * verdict.degrees_of_freedom)
+    )
+
+
+@pytest.mark.parametrize(
+    ("label", "values"),
+    [
+        (SOFT, (0.3, 3e-4)),
+        (REACTION, (1.0,)),
+        (INERTIA, (0.03,)),
+    ],
+)
+def test_a_planted_effect_is_named_with_its_values(label, values):
+    verdict = verdict_on(planted({label: values}), None if label == SOFT else FEW)
+    assert verdict.status == "named"
+    assert labels_of(verdict) == {label}
+    fitted = verdict.chosen.fit
+    rows = slice(-len(values), None)
+    deviation = np.sqrt(np.diag(fitted.covariance))[rows]
+    assert np.all(np.abs(fitted.values[rows] - values) < 4.0 * deviation)
+    assert fitted.chi_square < adequate(verdict.degrees_of_freedom) * verdict.degrees_of_freedom
+
+
+def test_evidence_in_closed_form(ripple):
+    data, verdict = ripple
+    assert verdict.status == "named"
+    assert labels_of(verdict) == {RIPPLE}
+    base, chosen = verdict.base, verdict.chosen
+    assert verdict.degrees_of_freedom == len(base.residuals) - len(data.base)
+    penalty = len(chosen.fit.values) * np.log(len(base.residuals))
+    assert chosen.bic == pytest.approx(chosen.fit.chi_square + penalty)
+    assert chosen.share == 1.0
+    for rival in verdict.alternatives:
+        removed = base.chi_square - rival.fit.chi_square
+        excess = base.chi_square - verdict.degrees_of_freedom
+        assert rival.share == pytest.approx(min(removed / excess, 1.0))
+        assert rival.bic > chosen.bic
+
+
+def test_the_same_data_give_the_same_verdict_to_the_last_bit(ripple):
+    data, verdict = ripple
+    again = verdict_on(data)
+    assert again.status == verdict.status
+    assert again.chosen.fit.values.tobytes() == verdict.chosen.fit.values.tobytes()
+    assert [one.label for one in again.alternatives] == [one.label for one in verdict.alternatives]
+
+
+def test_two_effects_are_both_named():
+    data = planted({RIPPLE: (0.003, 0.0), LINE: (1.0 * ARCSEC, 0.0)})
+    verdict = verdict_on(data, FEW)
+    assert verdict.status == "named"
+    assert labels_of(verdict) == {RIPPLE, LINE}
+
+
+def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():
+    verdict = verdict_on(planted({}, stiffness=1.2), FEW)
+    assert verdict.status == "parameter"
+    assert [candidate.frees for candidate in verdict.chosen.candidates] == ["stiffness"]
+    place = Layout(verdict.base.parameters).index("stiffness")
+    deviation = np.sqrt(verdict.chosen.fit.covariance[place, place])
+    wanted = 1.2 * EMPTY.base[place].start
+    assert verdict.chosen.fit.values[place] == pytest.approx(wanted, abs=4.0 * deviation)
+
+
+def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
+    label = "eccentricity:sensor@0.009901"
+    seen = [1.0 / 101.0]
+    verdict = verdict_on(planted({label: (2.0 * ARCSEC, 0.5 * ARCSEC)}, seen=seen), seen=seen)
+    assert verdict.status == "class"
+    names = {
+        one.name for rival in (verdict.chosen, *verdict.equivalent) for one in rival.candidates
+    }
+    assert names == {"eccentricity", "kinematic_error"}
+
+
+def test_an_error_of_the_encoder_s_scale_is_described_though_it_is_in_no_list():
+    label = f"encoder_line:sensor@{SCALE:.4g}"
+    verdict = verdict_on(planted({label: (2.0 * ARCSEC, 0.0)}, seen=[SCALE]), seen=[SCALE])
+    assert verdict.status == "unlisted"
+    assert labels_of(verdict) == {label}
+    assert "encoder errs 46 times in its turn" in sentence(verdict)
+
+
+def test_what_one_record_alone_shows_is_unlisted():
+    verdict = verdict_on(disturbed(planted({}), 1000.0), FEW)
+    assert verdict.status == "unlisted"
+    assert verdict.chosen.share < 0.5
+
+
+def test_a_line_too_small_for_the_whole_chi_square_is_found_by_its_gain(monkeypatch):
+    data = planted({RIPPLE: (3e-5, 0.0)})
+    verdict = verdict_on(data, [RIPPLE, LINE])
+    freedom = verdict.degrees_of_freedom
+    assert verdict.base.chi_square < adequate(freedom) * freedom
+    assert (verdict.status, labels_of(verdict)) == ("named", {RIPPLE})
+    monkeypatch.setattr(naming, "GAIN", 1e9)
+    assert verdict_on(data, [RIPPLE, LINE]).status == "adequate"
+
+
+def test_a_line_must_explain_down_to_the_noise(monkeypatch):
+    """Most of an excess is not enough for a form that leaves nothing open."""
+    data = disturbed(planted({RIPPLE: (5e-4, 0.0)}), 1000.0)
+    verdict = verdict_on(data, [RIPPLE, LINE])
+    assert verdict.status == "unlisted"
+    assert naming.SHARE < verdict.chosen.share < naming.EXACT_SHARE
+    monkeypatch.setattr(naming, "EXACT", 10.0)
+    found = verdict_on(data, [RIPPLE, LINE])
+    assert (found.status, labels_of(found)) == ("named", {RIPPLE})
+
+
+def test_a_curve_need_explain_its_share_only():
+    data = disturbed(planted({CUBIC: (2e9,)}), 500.0)
+    verdict = verdict_on(data, [CUBIC, RIPPLE])
+    freedom = verdict.degrees_of_freedom
+    assert verdict.chosen.fit.chi_square > naming.EXACT * freedom
+    assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC})
+
+
+def test_a_second_effect_must_remove_most_of_what_is_left(monkeypatch):
+    # The first leaves 200 beyond the noise, of which the second takes 100.
+    data = disturbed(planted({RIPPLE: (3e-3, 0.0), LINE: (0.04 * ARCSEC, 0.0)}), 110.0)
+    monkeypatch.setattr(naming, "EXACT", 10.0)
+    assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE}
+    monkeypatch.setattr(naming, "SECOND_SHARE", 0.4)
+    assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE, LINE}
+
+
+def test_a_second_effect_beside_a_curve_must_count_beside_the_whole(monkeypatch):
+    data = planted({CUBIC: (6e9,), LINE: (0.034 * ARCSEC, 0.0)})
+    verdict = verdict_on(data, [CUBIC, LINE])
+    assert labels_of(verdict) == {CUBIC}
+    monkeypatch.setattr(naming, "SECOND_LEAST", 0.0)
+    assert labels_of(verdict_on(data, [CUBIC, LINE])) == {CUBIC, LINE}
