@@ -203,11 +203,17 @@ def test_a_target_without_permission_is_refused_before_the_analysis(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.fixture(scope="module")
+def analysed(clean):
+    return workflow.analyse(clean)
+
+
 @pytest.mark.parametrize("stage", ["_page", "_revision", "_write_folder"])
-def test_an_interrupted_run_leaves_nothing(stage, folder, tmp_path, monkeypatch, capsys):
+def test_an_interrupted_run_leaves_nothing(stage, folder, analysed, tmp_path, monkeypatch, capsys):
     def stop(*_):
         raise KeyboardInterrupt
 
+    monkeypatch.setattr(workflow, "analyse", lambda campaign: analysed)
     monkeypatch.setattr(report, stage, stop)
     assert run(folder, tmp_path / "deep" / "out") == cli.INTERRUPTED
     assert [path.name for path in tmp_path.iterdir()] == ["rig"]
