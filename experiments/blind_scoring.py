@@ -181,14 +181,18 @@ def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
     """Return how far the effect moves the base before and after the revision, in tolerances.
 
     Root mean square over mechanical parameters and amplitudes of the static error: over all of
-    them, and over those that the twin determines (`DETERMINED`), with its standard error of these.
+    them, and over those that twin and revised fit determine (`DETERMINED`), with the twin's
+    standard error of these.
     """
     layout = Layout(twin.parameters)
     lines = [p.name for p in twin.parameters if p.name.startswith("error_amplitude_")]
     rows = np.array([layout.index(name) for name in (*MECHANICAL, *lines)])
     scale = layout.array("scale")[rows]
-    error = np.sqrt(np.diagonal(twin.covariance)[rows]) / scale
-    known = error < DETERMINED
+    error, revised = (
+        np.sqrt(np.diagonal(fitted.covariance)[rows]) / scale
+        for fitted in (twin, accepted_fit(verdict))
+    )
+    known = np.maximum(error, revised) < DETERMINED
     scores = {"bias_error": _root_mean_square(error[known])}
     for state, fitted in (("before", verdict.base), ("after", accepted_fit(verdict))):
         moved = (fitted.values[rows] - twin.values[rows]) / scale

@@ -196,9 +196,16 @@ class Fit:
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
-        """Of the values, from the curvature at the optimum; shape (n, n)."""
-        scale = Layout(self.parameters).array("scale")
-        return np.linalg.pinv(self.jacobian.T @ self.jacobian) * np.outer(scale, scale)
+        """Of the values, from the curvature at the optimum and the bounds; shape (n, n).
+
+        The bounds count as the variance of a uniform distribution between them: what no record
+        determines is as uncertain as they are wide.
+        """
+        layout = Layout(self.parameters)
+        scale = layout.array("scale")
+        width = (layout.array("upper") - layout.array("lower")) / scale
+        information = self.jacobian.T @ self.jacobian + np.diag(12.0 / width**2)
+        return np.linalg.inv(information) * np.outer(scale, scale)
 
 
 def count(candidates: Sequence[Candidate]) -> int:

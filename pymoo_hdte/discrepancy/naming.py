@@ -26,7 +26,7 @@ _DEVIATIONS = 4.0
 """Standard deviations of chi-square up to which a base is adequate."""
 SHARE = 0.9
 """Least share of the excess chi-square that named effects remove."""
-EXACT = 2.0
+EXACT = 1.3
 """Chi-square per degree of freedom down to which effects of an exact form must explain."""
 EXACT_SHARE = 0.9999
 """Share that does as well: of a line ten thousand times the noise, the angle's own noise and the
@@ -42,7 +42,10 @@ ALIKE = 2.0
 """Where no form fits to the noise, a rival that leaves less than this multiple of what the chosen
 one leaves cannot be excluded: what is left is the form, not the noise."""
 BIC_GAIN = 6.0
-"""Least gain of BIC, and the distance within which rivals cannot be told apart."""
+"""Least gain of BIC of a named effect."""
+VERY_STRONG = 10.0
+"""Distance of BIC within which rivals cannot be told apart (Kass, Raftery, J. Am. Stat. Assoc.
+1995): one parameter more in a rival that fits as well costs 7 already."""
 FITTED = 4
 """Most candidates fitted in earnest after the screening."""
 EVALUATIONS = {1: 25, 2: 10}
@@ -119,10 +122,10 @@ def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     if base.chi_square <= adequate(freedom) * freedom and screened[0].reduction < GAIN:
         return Verdict("adequate", base, None, (), (), freedom)
     singles = _fit_best(data, base, screened, excess)
-    if singles[0].fit.chi_square > adequate(freedom) * freedom:
+    if not _explains(singles[0], base, freedom):
         singles[0] = _searched(data, base, singles[0], excess)
     rivals = list(singles)
-    if singles[0].fit.chi_square > adequate(freedom) * freedom:
+    if _second_could_count(singles[0], freedom):
         pairs = _pairs(data, singles[:1], candidates, excess)
         rivals = sorted([*singles, *pairs], key=lambda rival: rival.bic)
     chosen = rivals[0]
@@ -142,6 +145,13 @@ def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     else:
         status = "class" if equivalent else "named"
     return Verdict(status, base, chosen, tuple(others), equivalent, freedom)
+
+
+def _second_could_count(single: Rival, freedom: int) -> bool:
+    """Tell whether a second effect beside this one could be earned at all."""
+    if single.fit.chi_square <= adequate(freedom) * freedom:
+        return False
+    return single.candidates[0].exact or single.share <= 1.0 - SECOND_LEAST
 
 
 def _explains(rival: Rival, base: Fit, freedom: int) -> bool:
@@ -168,7 +178,7 @@ def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
     if names == {candidate.name for candidate in chosen.candidates}:
         return False
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
-    near = abs(rival.bic - chosen.bic) < BIC_GAIN * misfit
+    near = abs(rival.bic - chosen.bic) < VERY_STRONG * misfit
     left = (rival.fit.chi_square - freedom) / (chosen.fit.chi_square - freedom)
     return near or (misfit > adequate(freedom) and left < ALIKE)
 

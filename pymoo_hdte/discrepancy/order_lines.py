@@ -5,8 +5,8 @@ A channel is fitted by a straight line in time and by lines at the given orders:
     value(t) = mean + slope (t - t_mid) + Re sum_j phasor_j exp(i order_j theta_in)
 
 so that lines that do not close over the record (order 2.02) do not leak into each other. theta_in
-is the measured, absolute input angle; its noise counts as noise of a channel, not of theta_in in
-the exponent, which would add order x |phasor| x N x angle_noise: 0.2 % of a line of order 6.
+is the measured, absolute input angle; its noise counts as noise of all channels: of the two that
+hold it, and of each by the slope of its lines, order x |phasor| x N x angle_noise.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class OrderLines:
     row_covariance : ndarray, shape (4, 4)
         Of the noise of one row between channels. The covariance of channel a with channel b is
         ``covariance[a] * row_covariance[a, b] / row_covariance[a, a]``: the input encoder stands
-        both in the transmission error and in the input angle.
+        in the transmission error, in the input angle, and in the slopes of all lines.
     bends : complex ndarray, shape (3, 1 + m)
         Mean and phasors that signals (t - t_mid)^k / k!, k = 2, 3, 4, leave: a drift is no straight
         line in a record of ten minutes, and an order that turns once in it takes what is bent.
@@ -99,14 +99,18 @@ def order_lines(
     kept = np.r_[0, 2 : 2 + 2 * m]
     scales = 1.0 / np.concatenate([[1.0], gains, gains])
     unit = (inverse @ inverse.T)[np.ix_(kept, kept)] * np.outer(scales, scales)
+    phasors = np.asarray((real + 1j * imaginary) / gains, dtype=complex)
     noise = row_covariance(rig, ratio, record.samples_averaged)
+    # The angle's noise stands in the exponent too, where a line is steep; it is as good as white.
+    steepness = fit.orders * phasors
+    noise = noise + 0.5 * (steepness @ steepness.conj().T).real * noise[3, 3]
     bends = inverse @ (fit.basis.T @ _bent(record))
     lines = (bends[2 : 2 + m] + 1j * bends[2 + m :]).T / gains
     return OrderLines(
         orders=fit.orders,
         mean=fit.coefficients[0],
         slope=fit.coefficients[1],
-        phasors=np.asarray((real + 1j * imaginary) / gains, dtype=complex),
+        phasors=phasors,
         covariance=np.diag(noise)[:, None, None] * unit,
         row_covariance=noise,
         bends=np.column_stack([bends[0], lines]),

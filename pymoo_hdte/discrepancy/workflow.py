@@ -55,12 +55,19 @@ class Analysis:
     unexpected: tuple[float, ...]
 
     def held_out(self) -> Data | None:
-        """Return the features of the held-out records, or None where there are none."""
-        if not self.campaign.held_out:
+        """Return the features of the held-out records, or None where there are none.
+
+        Where records that rattle were left out of the fit, they are here too.
+        """
+        records = self.campaign.held_out
+        if not records:
             return None
-        orders = self.data.features.orders.tolist()
-        features = measure(self.campaign, self.campaign.held_out, orders)
-        return Data(self.campaign, features, self.data.base)
+        features = measure(self.campaign, records, self.data.features.orders.tolist())
+        if len(self.data.features.records) < len(self.campaign.train):
+            features = features.rows(np.flatnonzero(_flanks_held(features)))
+        if not features.records:
+            return None
+        return replace(self.data, features=features, torsion=())
 
 
 def expected_orders(campaign: Campaign) -> list[float]:
@@ -138,14 +145,19 @@ def _loaded(data: Data) -> Data:
 
     With a clearance such a drive rattles and has no steady state to be fitted.
     """
-    features = data.features
+    held = _flanks_held(data.features)
+    if np.all(held) or held.sum() < FEWEST_RECORDS:
+        return data
+    return replace(data, features=data.features.rows(np.flatnonzero(held)))
+
+
+def _flanks_held(features: Features) -> NDArray[np.bool_]:
+    """Return which records carry a load beyond the swing of their torque, shape (r,)."""
     m = len(features.orders)
     lines = features.values[:, features.places(2)].reshape(len(features.records), m, 2)
     swing = np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)
-    held = np.abs(features.conditions.output_torque) > np.maximum(swing, LEAST_LOAD)
-    if np.all(held) or held.sum() < FEWEST_RECORDS:
-        return data
-    return replace(data, features=features.rows(np.flatnonzero(held)))
+    load = np.abs(features.conditions.output_torque)
+    return np.asarray(load > np.maximum(swing, LEAST_LOAD))
 
 
 def _apart(wanted: list[float], campaign: Campaign, highest: float) -> list[float]:

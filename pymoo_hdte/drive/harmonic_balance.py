@@ -21,6 +21,7 @@ from pymoo_hdte.drive.torus import (
     fundamental_orders,
     largest_multiples,
     multiplication,
+    shared_torus,
     stacked,
     unstacked,
 )
@@ -28,6 +29,8 @@ from pymoo_hdte.drive.torus import (
 HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
 _STEPS = 40
+_WITHOUT_MEMORY = 10
+"""Steps before those that heed the memory of hysteresis, which cost ten times as much."""
 _NEARLY_CONSTANT = 0.02
 """Variation of the mesh stiffness, relative, up to which its mean serves in Newton's step."""
 _SHRINKS = 0.9
@@ -48,7 +51,7 @@ def torus_of(coefficients: Coefficients) -> Torus:
     whole = max(HIGHEST, 2 * int(np.ceil(max(excited, default=0.0))) + 1)
     # The first fraction is that of the static error, whose beat the stiffness may modulate.
     fractions = [most + (place == 0) for place, most in enumerate(needed[1:])]
-    return Torus(fundamentals, (whole, *fractions))
+    return shared_torus(fundamentals, (whole, *fractions))
 
 
 def harmonic_balance(
@@ -124,9 +127,10 @@ class _Solver:
         equations, left = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
         before, part = np.full_like(size, np.inf), np.ones_like(size)
-        for _ in range(_STEPS):
+        for step in range(_STEPS):
             torsion, energy = self.torsion[left], self.energy[left]
-            change, energy_change = _newton_step(equations, torsion, energy, size[left])
+            recall = equations.recall_matrix(torsion) if step >= _WITHOUT_MEMORY else None
+            change, energy_change = _newton_step(equations, torsion, energy, size[left], recall)
             longest = np.abs(change).max(axis=1, keepdims=True)
             part[left] = _part(part[left], longest <= _SHRINKS * before[left])
             before[left] = longest
@@ -167,9 +171,15 @@ def _part(part: Values, shrinks: NDArray[np.bool_]) -> Values:
 
 
 def _newton_step(
-    equations: AngleEquations, torsion: Phasors, energy: Phasors, size: Values
+    equations: AngleEquations,
+    torsion: Phasors,
+    energy: Phasors,
+    size: Values,
+    recall: Matrices | None,
 ) -> tuple[Phasors, Phasors]:
     """Return a Newton step of torsion and E together, at most ``size`` (n, 1) of the torsion.
+
+    ``recall`` is what laws with a memory add to its matrix.
 
     E is eliminated: near the steady state it answers to the mesh torque harmonic by harmonic.
     """
@@ -179,7 +189,6 @@ def _newton_step(
     energy_change = -equations.coefficients.ratio * equations.input_residual(motion) / operator
     energy_change[:, 0] = 0.0
     right = (equations.output_residual(motion) + coupling * energy_change) / share
-    recall = equations.recall_matrix(torsion)
     change = _torsion_change(equations, motion, impedance, recall, right)
     # Where a law takes the stiffness away, a full step may lead far off.
     longest = np.abs(change).max(axis=1, keepdims=True)

@@ -8,6 +8,7 @@ by point, and the discrete Fourier transform leads to the orders and back withou
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -47,6 +48,12 @@ def largest_multiples(fundamentals: Sequence[float], orders: Sequence[float]) ->
     """Return the largest multiple of each fundamental in any of the ``orders``."""
     found = np.abs([multiples_of(fundamentals, order) for order in orders])
     return [int(most) for most in found.max(axis=0)]
+
+
+@lru_cache(maxsize=8)
+def shared_torus(fundamentals: tuple[float, ...], highest: tuple[int, ...]) -> Torus:
+    """Return a torus that all callers share: its tables take longer than a solution."""
+    return Torus(fundamentals, highest)
 
 
 class Torus:
