@@ -18,6 +18,8 @@ from pymoo_hdte.drive import Effect
 
 Values = Sequence[float]
 
+Place = tuple[str, str, float | None]
+"""Name, port and order of an effect in a drive model."""
 HARMONIC_NAMES = ("", "second_", "third_")
 """Prefixes of the parameters of a line's harmonics."""
 _HARMONIC_SHARE = 0.2
@@ -69,6 +71,17 @@ class Candidate:
         return f"{self.name}:{self.port}{order}"
 
     @property
+    def places(self) -> frozenset[Place]:
+        """Where its effects stand in a drive model, which takes one of a name at each place."""
+        effects = self.build(self.starts[0])
+        places = {
+            (effect.name, str(getattr(effect, "port", "")), getattr(law, "order", None))
+            for effect in effects
+            for law in [getattr(effect, "law", effect)]
+        }
+        return frozenset(places)
+
+    @property
     def linear(self) -> bool:
         """Whether a prediction is close to linear in all its unknowns: parts of lines, and a mean.
 
@@ -118,6 +131,14 @@ def lines_of(values: Values) -> list[tuple[int, float, float]]:
     """Return (multiple of the order, amplitude, phase) for the values of a `wave`."""
     parts = np.reshape(values, (-1, 2))
     return [(place + 1, *polar(cosine, sine)) for place, (cosine, sine) in enumerate(parts)]
+
+
+def harmonics_among(orders: Sequence[float], order: float, most: int) -> int:
+    """Return how many of order, 2 order, 3 order, ... the ``orders`` hold; at least 1."""
+    count = 1
+    while count < most and any(abs((count + 1) * order - one) < 1e-6 for one in orders):
+        count += 1
+    return count
 
 
 def polar(cosine: float, sine: float) -> tuple[float, float]:

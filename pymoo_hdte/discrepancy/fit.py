@@ -131,7 +131,8 @@ class Data:
         white = np.empty_like(differences)
         for record, triangle in enumerate(self.whiteners):
             part = differences[..., record, :].reshape(-1, len(triangle)).T
-            solved = solve_triangular(triangle, part, lower=True)
+            # What is not known is not a number; it is counted as lost afterwards.
+            solved = solve_triangular(triangle, part, lower=True, check_finite=False)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)
 

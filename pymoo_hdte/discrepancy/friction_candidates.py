@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pymoo_hdte.discrepancy.candidate import (
     Candidate,
     Values,
+    harmonics_among,
     lines_of,
     unknown,
     wave,
@@ -24,15 +27,15 @@ TYPICAL_LEVEL = {"input": 0.01, "output": 1.0}
 """Dry friction of a shaft, N.m."""
 
 
-def friction_candidates(ratio: float) -> list[Candidate]:
-    """Return the candidates for a drive of this ratio."""
+def friction_candidates(ratio: float, orders: Sequence[float]) -> list[Candidate]:
+    """Return the candidates for a drive of this ratio and features of these orders."""
     return [
         _coulomb("input"),
         _coulomb("output"),
         _stribeck(),
-        _periodic("input", 1.0, 1.0),
-        _periodic("input", 2.0, 1.0),
-        _periodic("output", 1.0, ratio),
+        _periodic("input", 1.0, 1.0, orders),
+        _periodic("input", 2.0, 1.0, orders),
+        _periodic("output", 1.0, ratio, orders),
         _drag(),
     ]
 
@@ -64,7 +67,7 @@ def _stribeck() -> Candidate:
     )
 
 
-def _periodic(port: str, order: float, slower: float) -> Candidate:
+def _periodic(port: str, order: float, slower: float, orders: Sequence[float]) -> Candidate:
     name = "position_dependent_friction"
 
     def build(v: Values) -> tuple[Effect, ...]:
@@ -76,7 +79,7 @@ def _periodic(port: str, order: float, slower: float) -> Candidate:
 
     scale = TYPICAL_LEVEL[port]
     mean = unknown("mean", 0.0, 20 * scale, scale)
-    parts = (*wave("level", 20 * scale, scale, harmonics=2), mean)
+    parts = (*wave("level", 20 * scale, scale, harmonics_among(orders, order / slower, 2)), mean)
     return Candidate(
         name,
         port,

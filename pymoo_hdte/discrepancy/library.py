@@ -30,8 +30,8 @@ def candidates(
         Orders at which something was seen, for effects whose order is not known beforehand.
     """
     return [
-        *mesh_candidates(believed),
-        *friction_candidates(believed.ratio),
+        *mesh_candidates(believed, orders),
+        *friction_candidates(believed.ratio, orders),
         *line_candidates(believed, orders, seen),
         *_others(believed),
     ]

@@ -10,7 +10,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.discrepancy.believed import Believed
-from pymoo_hdte.discrepancy.candidate import Candidate, Values, lines_of, wave, wave_starts
+from pymoo_hdte.discrepancy.candidate import (
+    Candidate,
+    Values,
+    harmonics_among,
+    lines_of,
+    wave,
+    wave_starts,
+)
 from pymoo_hdte.drive import Eccentricity, Effect, KinematicErrorLine, LawAtPort
 from pymoo_hdte.drive.friction import PeriodicTorque
 from pymoo_hdte.units import ARCSEC
@@ -51,10 +58,6 @@ def _holds(orders: Sequence[float], order: float) -> bool:
     return any(abs(order - one) < 1e-6 for one in orders)
 
 
-def _harmonics(orders: Sequence[float], order: float) -> int:
-    return 2 if _holds(orders, 2.0 * order) else 1
-
-
 def _kinematic_line(order: float, orders: Sequence[float]) -> Candidate:
     def build(v: Values) -> tuple[Effect, ...]:
         return tuple(
@@ -62,7 +65,7 @@ def _kinematic_line(order: float, orders: Sequence[float]) -> Candidate:
             for multiple, amplitude, phase in lines_of(v)
         )
 
-    parts = wave("amplitude", LARGEST_ERROR, TYPICAL_ERROR, _harmonics(orders, order))
+    parts = wave("amplitude", LARGEST_ERROR, TYPICAL_ERROR, harmonics_among(orders, order, 2))
     return Candidate(
         "kinematic_error",
         "mesh",
@@ -82,7 +85,7 @@ def _torque_ripple(order: float, orders: Sequence[float]) -> Candidate:
             for multiple, amplitude, phase in lines_of(v)
         )
 
-    parts = wave("amplitude", 0.5, 0.01, _harmonics(orders, order))
+    parts = wave("amplitude", 0.5, 0.01, harmonics_among(orders, order, 2))
     return Candidate(
         "torque_ripple",
         "input",
@@ -102,7 +105,9 @@ def _encoder(name: str, turns: float, ratio: float, orders: Sequence[float]) -> 
             for multiple, amplitude, phase in lines_of(v)
         )
 
-    parts = wave("amplitude", LARGEST_ERROR, TYPICAL_ERROR, _harmonics(orders, turns / ratio))
+    parts = wave(
+        "amplitude", LARGEST_ERROR, TYPICAL_ERROR, harmonics_among(orders, turns / ratio, 2)
+    )
     sentence = (
         "The output encoder sits off centre."
         if turns == 1.0

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pymoo_hdte.discrepancy.believed import Believed
 from pymoo_hdte.discrepancy.candidate import (
     Candidate,
     Values,
+    harmonics_among,
     lines_of,
     polar,
     unknown,
@@ -25,8 +28,8 @@ WIDEST = 40 * ARCSEC
 """Largest half width of a clearance."""
 
 
-def mesh_candidates(believed: Believed) -> list[Candidate]:
-    """Return the candidates at the mesh of a drive."""
+def mesh_candidates(believed: Believed, orders: Sequence[float]) -> list[Candidate]:
+    """Return the candidates at the mesh of a drive, for features of these orders."""
     windup = RATED_TORQUE / believed.stiffness
     cubic = 0.1 * believed.stiffness / windup**2
     hardening = Candidate(
@@ -62,11 +65,19 @@ def mesh_candidates(believed: Believed) -> list[Candidate]:
         lambda v: (LawAtPort("hysteresis", "mesh", MaxwellSlip(v[0], v[1])),),
         "The torsion lags behind the torque: dry friction inside the mesh.",
     )
-    return [hardening, soft, backlash, hysteresis, _varying(), _clearance(1.0), _clearance(2.0)]
+    return [
+        hardening,
+        soft,
+        backlash,
+        hysteresis,
+        _varying(orders),
+        _clearance(1.0),
+        _clearance(2.0),
+    ]
 
 
-def _varying() -> Candidate:
-    parts = wave("depth", 0.25, 0.02, harmonics=3)
+def _varying(orders: Sequence[float]) -> Candidate:
+    parts = wave("depth", 0.25, 0.02, harmonics_among(orders, 2.0, 3))
     return Candidate(
         "mesh_stiffness_variation",
         "mesh",

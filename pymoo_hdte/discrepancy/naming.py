@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.candidate import Candidate
+from pymoo_hdte.discrepancy.candidate import Candidate, Place
 from pymoo_hdte.discrepancy.fit import Data, Fit, count, fit
 from pymoo_hdte.discrepancy.library import out_of_tolerance
 from pymoo_hdte.discrepancy.screening import Screened, screen
@@ -46,8 +46,10 @@ BIC_GAIN = 6.0
 VERY_STRONG = 10.0
 """Distance of BIC within which rivals cannot be told apart (Kass, Raftery, J. Am. Stat. Assoc.
 1995): one parameter more in a rival that fits as well costs 7 already."""
-FITTED = 4
+FITTED = 5
 """Most candidates fitted in earnest after the screening."""
+OF_ONE_NAME = 2
+"""Most of them of one name: a law that holds another as a special case must not crowd it out."""
 EVALUATIONS = {1: 25, 2: 10}
 """Steps of a fit of one effect, and of a second one beside it."""
 PROMISING = 0.2
@@ -75,6 +77,11 @@ class Rival:
     def candidates(self) -> tuple[Candidate, ...]:
         """The effects."""
         return self.fit.candidates
+
+    @property
+    def listed(self) -> bool:
+        """Whether a verdict may name all of them."""
+        return all(candidate.listed for candidate in self.candidates)
 
     @property
     def label(self) -> str:
@@ -138,7 +145,12 @@ def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
         return Verdict("unlisted", base, chosen, tuple(others), (), freedom)
     others = [_refined(data, r, excess) if _alike(r, chosen, freedom) else r for r in others]
     equivalent = tuple(rival for rival in others if _alike(rival, chosen, freedom))
-    if not all(candidate.listed for candidate in chosen.candidates):
+    listed = next((rival for rival in equivalent if rival.listed), None)
+    if not chosen.listed and listed is not None:
+        others = [chosen if rival is listed else rival for rival in others]
+        equivalent = tuple(chosen if rival is listed else rival for rival in equivalent)
+        chosen = listed
+    if not chosen.listed:
         status = "unlisted"
     elif all(candidate.name == "parameter" for candidate in chosen.candidates):
         status = "parameter"
@@ -172,10 +184,9 @@ def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
     Where even the chosen form leaves more than noise, that remainder is the scale on which chi-
     squares differ: hidden and listed forms of one effect differ in kind.
     """
-    names = {candidate.name for candidate in rival.candidates}
     if len(rival.candidates) != len(chosen.candidates):
         return False
-    if names == {candidate.name for candidate in chosen.candidates}:
+    if _named(rival) == _named(chosen):
         return False
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
     near = abs(rival.bic - chosen.bic) < VERY_STRONG * misfit
@@ -198,6 +209,10 @@ def _searched(data: Data, base: Fit, rival: Rival, excess: float) -> Rival:
     return min(found, key=lambda one: one.bic)
 
 
+def _named(rival: Rival) -> set[tuple[str, str]]:
+    return {(candidate.name, candidate.port) for candidate in rival.candidates}
+
+
 def _refined(data: Data, rival: Rival, excess: float) -> Rival:
     """Fit a rival to the end, with slopes of its own."""
     return _rival(fit(data, rival.candidates, rival.fit.values), excess)
@@ -207,12 +222,18 @@ def _fit_best(data: Data, base: Fit, screened: Sequence[Screened], excess: float
     """Fit the most promising candidates jointly with what stands; by rising BIC."""
     found = []
     least = PROMISING * screened[0].reduction
-    for one in [one for one in screened[:FITTED] if one.reduction >= least]:
+    for one in _varied([one for one in screened if one.reduction >= least])[:FITTED]:
         start = np.concatenate([base.values, one.start])
         effects = (*base.candidates, one.candidate)
         fitted = fit(data, effects, start, EVALUATIONS[len(effects)], base.slopes)
         found.append(_rival(fitted, excess))
     return sorted(found, key=lambda rival: rival.bic)
+
+
+def _varied(screened: Sequence[Screened]) -> list[Screened]:
+    """Return the candidates without those behind `OF_ONE_NAME` better ones of their name."""
+    names = [one.candidate.name for one in screened]
+    return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < OF_ONE_NAME]
 
 
 def _rival(fitted: Fit, excess: float) -> Rival:
@@ -232,8 +253,8 @@ def _pairs(
     """Return the best pairs that contain one of the best single effects."""
     found: list[Rival] = []
     for single in singles:
-        taken = {candidate.label for candidate in single.candidates}
-        others = [one for one in candidates if one.label not in taken and one.frees is None]
+        taken = frozenset[Place]().union(*(one.places for one in single.candidates))
+        others = [one for one in candidates if not taken & one.places and one.frees is None]
         screened = screen(data, single.fit, others)
         found += _fit_best(data, single.fit, screened[:2], excess)
     return found

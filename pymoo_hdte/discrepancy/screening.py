@@ -91,11 +91,11 @@ def _best_start(
     lower = np.array([parameter.lower for parameter in candidate.parameters])
     upper = np.array([parameter.upper for parameter in candidate.parameters])
     if candidate.linear:
-        # Cosine and sine part: their signatures span a plane.
-        solution, *_ = np.linalg.lstsq(signatures.T, -left, rcond=1e-10)
-        rest = left + signatures.T @ solution
-        reduction = float(left @ left - rest @ rest)
-        best = solution @ starts
+        best, reduction = _least_squares(signatures, starts, left)
+        lines = np.hypot(*best[: 2 * (len(best) // 2)].reshape(-1, 2).T)
+        if lines[1:].any() and lines[1:].max() > lines[0]:
+            # A line that is weaker than its harmonic is not what the harmonic belongs to.
+            best, reduction = _least_squares(signatures[:2], starts[:2], left)
     else:
         sizes = np.einsum("ij,ij->i", signatures, signatures)
         along = -signatures @ left
@@ -106,6 +106,15 @@ def _best_start(
         # The first parameter is the strength; the others are shapes.
         best[0] *= np.clip(strengths[place], 0.2, 10.0) if lower[0] >= 0.0 else strengths[place]
     return Screened(candidate, reduction, tuple(np.clip(best, lower, upper).tolist()))
+
+
+def _least_squares(
+    signatures: NDArray[np.float64], starts: NDArray[np.float64], left: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """Return the values along the starts that remove most, and what they remove."""
+    solution, *_ = np.linalg.lstsq(signatures.T, -left, rcond=1e-10)
+    rest = left + signatures.T @ solution
+    return solution @ starts, float(left @ left - rest @ rest)
 
 
 def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> str | None:

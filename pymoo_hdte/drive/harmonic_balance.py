@@ -98,7 +98,9 @@ def harmonic_balance(
         solver = _Solver(equations)
         if start is not None and np.array_equal(start.torus.orders, torus.orders):
             solver.begin(start.rows(rows))
-        solver.solve(tolerance)
+        # A row that runs away is marked as not converged, and says no more than that.
+        with np.errstate(over="ignore", invalid="ignore"):
+            solver.solve(tolerance)
         parts.append(solver.result())
     return Balance(
         torus, *(np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE)
