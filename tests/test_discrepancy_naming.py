@@ -205,7 +205,7 @@ def test_a_second_effect_must_remove_most_of_what_is_left(monkeypatch):
     data = disturbed(planted({RIPPLE: (3e-3, 0.0), LINE: (0.04 * ARCSEC, 0.0)}), 110.0)
     monkeypatch.setattr(naming, "EXACT", 10.0)
     assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE}
-    monkeypatch.setattr(naming, "SECOND_SHARE", 0.4)
+    monkeypatch.setattr(naming, "SHARE", 0.4)
     assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE, LINE}
 
 

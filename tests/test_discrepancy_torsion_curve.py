@@ -155,7 +155,7 @@ def test_the_clearance_adds_its_half_width_on_the_side_of_the_load():
 
 
 def test_a_clearance_that_varies_with_the_angle_counts_by_its_mean():
-    varying = drive(("mesh", PeriodicClearance(2.0, 0.3, 10.0 * ARCSEC)))
+    varying = drive(("mesh", PeriodicClearance(2.0, 0.3, 5.0 * ARCSEC, 4.0 * ARCSEC)))
     constant = drive(("mesh", DeadZone(5.0 * ARCSEC)))
     assert np.array_equal(quasi_static_torsion(varying, LOOP), quasi_static_torsion(constant, LOOP))
 

@@ -47,7 +47,7 @@ EFFECTS = [
     LawAtPort("hardening_stiffness", "mesh", CubicStiffness(1.2e9)),
     LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 2e-4)),
     LawAtPort("backlash", "mesh", DeadZone(5 * ARCSEC)),
-    LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 5 * ARCSEC)),
+    LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 3 * ARCSEC, 2 * ARCSEC)),
     LawAtPort("hysteresis", "mesh", MaxwellSlip(1.0, 2e-4)),
     LawAtPort("coulomb_friction", "output", CoulombFriction(2.0)),
     LawAtPort("stribeck_friction", "input", StribeckFriction(0.05, 0.05, 50.0)),
@@ -158,8 +158,8 @@ def test_laws_have_the_signs_that_their_names_say():
     # Beyond the clearance the spring has lost K b; within it, K d: nothing is left of K d.
     assert torque(DeadZone(1e-4), 5e-4) == pytest.approx(-2.5e4 * 1e-4)
     assert torque(DeadZone(1e-4), 5e-5) == pytest.approx(-2.5e4 * 5e-5, rel=1e-3)
-    assert torque(PeriodicClearance(1.0, 0.0, 1e-4), 5e-4) == pytest.approx(-2.5e4 * 1e-4)
-    assert torque(PeriodicClearance(1.0, np.pi, 1e-4), 5e-4) == pytest.approx(0.0, abs=1e-6)
+    assert torque(PeriodicClearance(1.0, 0.0, 5e-5, 5e-5), 5e-4) == pytest.approx(-2.5e4 * 1e-4)
+    assert torque(PeriodicClearance(1.0, np.pi, 5e-5, 5e-5), 5e-4) == pytest.approx(0.0, abs=1e-6)
     # A ripple drives, everything else opposes.
     assert torque(PeriodicTorque(6.0, 0.0, 0.1)) == pytest.approx(-0.1)
     assert torque(PeriodicFriction(2.0, 0.0, 0.1)) == pytest.approx(0.1)
@@ -213,7 +213,7 @@ def test_orders_of_the_output_turn_share_an_angle(ratio):
 @pytest.mark.parametrize(
     "law",
     [
-        lambda bad: PeriodicClearance(1.0, 0.0, bad),
+        lambda bad: PeriodicClearance(1.0, 0.0, bad, 0.0),
         lambda bad: PeriodicFriction(1.0, 0.0, bad),
         lambda bad: PeriodicTorque(1.0, 0.0, bad),
     ],
@@ -292,7 +292,7 @@ def test_maxwell_slip_obeys_masing(force, torsion, reach):
         (CubicStiffness(1e9), (1e-4, -2e-3)),
         (SoftWindup(0.3, 2e-4), (1e-5, -2e-4, 1e-3)),
         (DeadZone(1e-4), (5e-5, 3e-4, -2e-4)),
-        (PeriodicClearance(2.0, 0.3, 1e-4), (1e-5, 3e-4)),
+        (PeriodicClearance(2.0, 0.3, 5e-5, 5e-5), (1e-5, 3e-4)),
     ],
 )
 def test_slopes_are_the_derivatives_of_torques(law, positions):

@@ -28,7 +28,7 @@ EFFECTS = [
     LawAtPort("hardening_stiffness", "mesh", CubicStiffness(1.2e9)),
     LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 2e-4)),
     LawAtPort("backlash", "mesh", DeadZone(5 * ARCSEC)),
-    LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 5 * ARCSEC)),
+    LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 3 * ARCSEC, 2 * ARCSEC)),
     LawAtPort("hysteresis", "mesh", MaxwellSlip(1.0, 2e-4)),
     LawAtPort("coulomb_friction", "output", CoulombFriction(2.0)),
     LawAtPort("stribeck_friction", "input", StribeckFriction(0.05, 0.05, 50.0)),

@@ -202,11 +202,30 @@ class Fit:
         The bounds count as the variance of a uniform distribution between them: what no record
         determines is as uncertain as they are wide.
         """
+        scale = Layout(self.parameters).array("scale")
+        return np.linalg.inv(self.information) * np.outer(scale, scale)
+
+    @property
+    def information(self) -> NDArray[np.float64]:
+        """Inverse of the covariance, by parameters in units of their scale."""
+        return self.jacobian.T @ self.jacobian + np.diag(12.0 / self._widths**2)
+
+    @property
+    def evidence(self) -> float:
+        """Minus twice the logarithm of the model's probability, by Laplace's approximation.
+
+        Chi-square and, for each parameter, how much the data narrowed what its bounds allow
+        (MacKay, Neural Computation 4, 1992): what no record determines costs nothing.
+        """
+        _, narrowed = np.linalg.slogdet(
+            self.information * np.outer(self._widths, self._widths) / 12.0
+        )
+        return self.chi_square + float(narrowed)
+
+    @property
+    def _widths(self) -> Vector:
         layout = Layout(self.parameters)
-        scale = layout.array("scale")
-        width = (layout.array("upper") - layout.array("lower")) / scale
-        information = self.jacobian.T @ self.jacobian + np.diag(12.0 / width**2)
-        return np.linalg.inv(information) * np.outer(scale, scale)
+        return np.asarray((layout.array("upper") - layout.array("lower")) / layout.array("scale"))
 
 
 def count(candidates: Sequence[Candidate]) -> int:

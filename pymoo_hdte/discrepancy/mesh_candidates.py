@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from pymoo_hdte.discrepancy.believed import Believed
 from pymoo_hdte.discrepancy.candidate import (
     Candidate,
@@ -26,6 +24,8 @@ RATED_TORQUE = 40.0
 """N.m; where strengths of mesh laws are scaled."""
 WIDEST = 40 * ARCSEC
 """Largest half width of a clearance."""
+VARYING_MOST = 15 * ARCSEC
+"""Largest variation of it in a turn."""
 
 
 def mesh_candidates(believed: Believed, orders: Sequence[float]) -> list[Candidate]:
@@ -93,15 +93,20 @@ def _varying(orders: Sequence[float]) -> Candidate:
 
 def _clearance(order: float) -> Candidate:
     def build(v: Values) -> tuple[Effect, ...]:
-        width, phase = polar(v[0], v[1])
-        return (LawAtPort("clearance_variation", "mesh", PeriodicClearance(order, phase, width)),)
+        variation, phase = polar(v[0], v[1])
+        law = PeriodicClearance(order, phase, v[2], variation, locked=v[3])
+        return (LawAtPort("clearance_variation", "mesh", law),)
 
-    size = 5 * ARCSEC
+    size = 4 * ARCSEC
+    means = (unknown("mean", 0.0, WIDEST, size), unknown("locked_mean", 0.0, 2 * WIDEST, size))
     return Candidate(
         "clearance_variation",
         "mesh",
-        wave("half_width", WIDEST, size),
-        tuple((size * np.cos(turn), size * np.sin(turn)) for turn in np.arange(4) * np.pi / 2),
+        (*wave("variation", VARYING_MOST, size), *means),
+        tuple(
+            (size * cosine, size * sine, size, size * locked)
+            for cosine, sine, locked in ((1, 0, 1), (0, 1, 1), (0, 0, 1), (0, 0, 2))
+        ),
         build,
         f"The play between the teeth varies, order {order:g} of the input.",
         order,

@@ -32,7 +32,8 @@ EXACT_SHARE = 0.9999
 """Share that does as well: of a line ten thousand times the noise, the angle's own noise and the
 integrator's steps show."""
 SECOND_SHARE = 0.8
-"""Least share of the excess left by the first effect that a second one removes."""
+"""Least share of the excess left by a first effect of no exact form that a second one removes;
+beside an exact one it is `SHARE`."""
 SECOND_LEAST = 0.02
 """Least share of the whole excess that a second one removes beside a law of no exact form."""
 GAIN = 25.0
@@ -44,8 +45,8 @@ one leaves cannot be excluded: what is left is the form, not the noise."""
 BIC_GAIN = 6.0
 """Least gain of BIC of a named effect."""
 VERY_STRONG = 10.0
-"""Distance of BIC within which rivals cannot be told apart (Kass, Raftery, J. Am. Stat. Assoc.
-1995): one parameter more in a rival that fits as well costs 7 already."""
+"""Distance of twice the logarithm of the evidence within which rivals cannot be told apart (Kass,
+Raftery, J. Am. Stat. Assoc. 1995)."""
 FITTED = 5
 """Most candidates fitted in earnest after the screening."""
 OF_ONE_NAME = 2
@@ -189,7 +190,7 @@ def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
     if _named(rival) == _named(chosen):
         return False
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
-    near = abs(rival.bic - chosen.bic) < VERY_STRONG * misfit
+    near = rival.fit.evidence - chosen.fit.evidence < VERY_STRONG * misfit
     left = (rival.fit.chi_square - freedom) / (chosen.fit.chi_square - freedom)
     return near or (misfit > adequate(freedom) and left < ALIKE)
 
@@ -272,5 +273,7 @@ def _second_earned(pair: Rival, singles: Sequence[Rival], base: Fit, freedom: in
     )
     left = first.fit.chi_square - freedom
     removed = first.fit.chi_square - pair.fit.chi_square
+    if first.candidates[0].exact:
+        return left > 0.0 and removed >= SHARE * left
     counts = removed >= SECOND_LEAST * (base.chi_square - freedom)
-    return left > 0.0 and removed >= SECOND_SHARE * left and (first.candidates[0].exact or counts)
+    return left > 0.0 and removed >= SECOND_SHARE * left and counts

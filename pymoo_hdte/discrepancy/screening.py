@@ -92,7 +92,8 @@ def _best_start(
     upper = np.array([parameter.upper for parameter in candidate.parameters])
     if candidate.linear:
         best, reduction = _least_squares(signatures, starts, left)
-        lines = np.hypot(*best[: 2 * (len(best) // 2)].reshape(-1, 2).T)
+        parts = sum(one.name.endswith(("_cosine", "_sine")) for one in candidate.parameters)
+        lines = np.hypot(*best[:parts].reshape(-1, 2).T)
         if lines[1:].any() and lines[1:].max() > lines[0]:
             # A line that is weaker than its harmonic is not what the harmonic belongs to.
             best, reduction = _least_squares(signatures[:2], starts[:2], left)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import expit
@@ -98,14 +98,34 @@ class DeadZone(Aperiodic):
 
 @dataclass(frozen=True)
 class PeriodicClearance(Periodic):
-    """A dead zone of varying half-width: half_width (1 + cos(order angle + phase)) / 2, rad."""
+    """A dead zone of half-width half_width + variation cos(order angle + phase), at least 0; rad.
+
+    Attributes
+    ----------
+    half_width, variation : float
+        rad.
+    locked : float or None
+        Half-width at the angle at which the input was locked for a torsion sweep, rad, where it
+        is known: of a rig, not of a drive.
+    """
 
     half_width: float
+    variation: float
+    locked: float | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         real_number("clearance_variation.half_width", self.half_width, at_least=0.0)
+        real_number("clearance_variation.variation", self.variation, at_least=0.0)
+        if self.locked is not None:
+            real_number("clearance_variation.locked", self.locked, at_least=0.0)
+
+    @property
+    def at_rest(self) -> float:
+        """Half-width where the input was locked, rad."""
+        return self.half_width if self.locked is None else self.locked
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        return _dead_zone(state, 0.5 * self.half_width * (1.0 + self.cosine(state)))
+        width = self.half_width + self.variation * self.cosine(state)
+        return _dead_zone(state, np.maximum(width, 0.0))

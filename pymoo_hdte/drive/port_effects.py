@@ -48,7 +48,7 @@ LAWS: dict[str, tuple[type, tuple[str, ...], dict[str, str]]] = {
     "clearance_variation": (
         PeriodicClearance,
         ("mesh",),
-        {"order": "", "phase": "angle", "half_width": "angle"},
+        {"order": "", "phase": "angle", "half_width": "angle", "variation": "angle"},
     ),
     "hysteresis": (MaxwellSlip, ("mesh",), {"force": "torque", "torsion": "angle"}),
     "coulomb_friction": (CoulombFriction, FRICTION_PORTS, {"level": "torque"}),

@@ -186,7 +186,7 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
 
 
 def _at_mean(law: Law) -> Law:
-    return DeadZone(law.half_width / 2.0) if isinstance(law, PeriodicClearance) else law
+    return DeadZone(law.at_rest) if isinstance(law, PeriodicClearance) else law
 
 
 def _breakaway(law: Law) -> float:
