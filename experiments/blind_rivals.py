@@ -19,9 +19,10 @@ from scipy.stats import chi2
 from experiments.candidate_terms import terms
 from experiments.torque_balances import Regression, regression
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.fit import LOST, Data
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.hidden_forms import LISTED_FORMS
 from pymoo_hdte.discrepancy.misfit_map import as_lines, cell_chi_square, degrees_of_freedom
+from pymoo_hdte.discrepancy.objective import LOST
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.parameters import MECHANICAL, Layout, Parameter
 from pymoo_hdte.discrepancy.workflow import Analysis

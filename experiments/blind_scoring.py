@@ -18,8 +18,9 @@ from experiments.blind_cases import Case
 from experiments.blind_codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
 from experiments.campaign import Run
 from pymoo_hdte.discrepancy import Campaign
+from pymoo_hdte.discrepancy.data import Data, start_parameters
 from pymoo_hdte.discrepancy.features import Features, measure
-from pymoo_hdte.discrepancy.fit import Data, Fit, fit, start_parameters
+from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.locate import locate
 from pymoo_hdte.discrepancy.misfit_map import Flags, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.naming import Verdict

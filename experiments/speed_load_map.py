@@ -89,15 +89,14 @@ def torsional_mode(model: DriveModel) -> TorsionalMode:
 def critical_speeds(model: DriveModel) -> list[tuple[float, float]]:
     """Return order and input speed (r/min) of every resonance of an excited order.
 
-    Excited are the orders of theta_s, and order 2 by a varying stiffness under load.
+    Excited are the orders of theta_s and, under load, those of a varying stiffness.
     """
     mode = torsional_mode(model)
     if not mode.resonates:
         return []
     coefficients = model.coefficients(model.nominal[None])
     orders = set(coefficients.error_orders.tolist())
-    if coefficients.stiffness_depth:
-        orders.add(2.0)
+    orders |= {law.order for law in coefficients.stiffness_variations}
     return [(order, mode.speed(order)) for order in sorted(orders)]
 
 

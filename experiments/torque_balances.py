@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.candidate_terms import Motion, Term
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import stack
-from pymoo_hdte.discrepancy.fit import Data
 from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
 
 Values = NDArray[np.float64]

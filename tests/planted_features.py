@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 from virtual_rig_cases import BELIEVED, PHASES, RIG
 
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import Features
-from pymoo_hdte.discrepancy.fit import Data, fit
+from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.discrepancy.forward import Conditions, coefficients_of
 from pymoo_hdte.discrepancy.library import candidates
 from pymoo_hdte.discrepancy.naming import Rival, Verdict

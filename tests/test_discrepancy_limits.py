@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 from quick_campaigns import quick_campaign
 
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import measure
-from pymoo_hdte.discrepancy.fit import Data
 from pymoo_hdte.discrepancy.limits import limits
 from pymoo_hdte.discrepancy.workflow import Analysis
 

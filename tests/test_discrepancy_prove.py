@@ -7,8 +7,9 @@ import pytest
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.data import Data, start_parameters
 from pymoo_hdte.discrepancy.features import measure
-from pymoo_hdte.discrepancy.fit import Data, Fit, fit, start_parameters
+from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.forward import coefficients_of
 from pymoo_hdte.discrepancy.gap import Gap
 from pymoo_hdte.discrepancy.library import candidates

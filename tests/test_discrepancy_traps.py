@@ -7,7 +7,8 @@ import pytest
 from quick_campaigns import quick_campaign
 
 from pymoo_hdte.discrepancy import naming
-from pymoo_hdte.discrepancy.fit import Data, fit
+from pymoo_hdte.discrepancy.data import Data
+from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.discrepancy.plausibility import LEAST_TOLERANCE
 from pymoo_hdte.discrepancy.workflow import analyse
 

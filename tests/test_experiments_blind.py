@@ -19,8 +19,9 @@ from experiments.blind_scoring import COLUMNS, BlindJob, bias_scores, truly_move
 from experiments.blind_targets import judge_median, judge_rate, median, rate
 from experiments.campaign import Campaign, Run
 from experiments.registry import Context
+from pymoo_hdte.discrepancy.data import Data, start_parameters
 from pymoo_hdte.discrepancy.features import measure
-from pymoo_hdte.discrepancy.fit import Data, fit, start_parameters
+from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.discrepancy.hidden_forms import LISTED_FORMS, UNLISTED_FORMS
 from pymoo_hdte.discrepancy.naming import Rival
 from pymoo_hdte.discrepancy.parameters import Layout

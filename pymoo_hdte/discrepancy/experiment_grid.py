@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import Features
-from pymoo_hdte.discrepancy.fit import Data, Fit, Objective
+from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.forward import Conditions
+from pymoo_hdte.discrepancy.objective import Objective
 from pymoo_hdte.discrepancy.parameters import Layout
 from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.workflow import Analysis

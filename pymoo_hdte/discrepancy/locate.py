@@ -14,8 +14,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import MEANS
-from pymoo_hdte.discrepancy.fit import LOST, Data, Fit, Objective, fit
+from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.misfit_map import (
     FALSE_DISCOVERIES,
     Flags,
@@ -27,6 +28,7 @@ from pymoo_hdte.discrepancy.misfit_map import (
     degrees_of_freedom,
 )
 from pymoo_hdte.discrepancy.misfit_words import sentences
+from pymoo_hdte.discrepancy.objective import LOST, Objective
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.revise import accepted_fit
 from pymoo_hdte.discrepancy.workflow import Analysis

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import MEANS
-from pymoo_hdte.discrepancy.fit import Data
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 
 FALSE_DISCOVERIES = 0.01

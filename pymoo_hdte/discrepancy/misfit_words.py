@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.fit import Data
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.misfit_map import Flags, Location, Values
 from pymoo_hdte.discrepancy.misfit_nature import changes, growth, nature, sizes
 from pymoo_hdte.discrepancy.order_lines import CHANNELS

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pymoo_hdte.discrepancy.candidate import Candidate, Place
-from pymoo_hdte.discrepancy.fit import Data, Fit, count, fit
+from pymoo_hdte.discrepancy.data import Data
+from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.library import out_of_tolerance
+from pymoo_hdte.discrepancy.objective import count
 from pymoo_hdte.discrepancy.screening import Screened, screen
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted")

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import MEANS
-from pymoo_hdte.discrepancy.fit import Data, Fit
+from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.gap import DEVIATIONS, UNITS, Gap
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.records import RunningRecord

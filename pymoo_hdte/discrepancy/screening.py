@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.candidate import Candidate
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import Features
-from pymoo_hdte.discrepancy.fit import Data, Fit
+from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.order_lines import residual_spectrum
 
 _FALSE_LINES = 1e-3

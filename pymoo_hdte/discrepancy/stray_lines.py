@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.fit import Data
+from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.order_lines import CHANNELS, residual_spectrum
 
 _FALSE_LINES = 1e-3

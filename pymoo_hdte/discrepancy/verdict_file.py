@@ -147,9 +147,13 @@ def _effects(verdict: Verdict) -> list[dict[str, Any]]:
 def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> dict[str, Any]:
     """Return values with intervals; cosine and sine part as amplitude and phase.
 
+    For a base parameter out of tolerance, its fitted value.
+
     The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
     """
     found: dict[str, Any] = {}
+    if candidate.frees is not None:
+        rows = np.array([[one.name for one in fitted.parameters].index(candidate.frees)])
     for row in rows:
         name, variance = fitted.parameters[row].name, fitted.covariance[row, row]
         if name.endswith("_cosine"):

@@ -12,8 +12,9 @@ from threadpoolctl import threadpool_limits
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign import Campaign
 from pymoo_hdte.discrepancy.candidate import Candidate
+from pymoo_hdte.discrepancy.data import Data, start_parameters
 from pymoo_hdte.discrepancy.features import Features, measure
-from pymoo_hdte.discrepancy.fit import Data, Fit, fit, start_parameters
+from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.library import candidates
 from pymoo_hdte.discrepancy.naming import EXPLAINED, SHARE, Verdict, judge
 from pymoo_hdte.discrepancy.screening import leading_sweep_effect, unexpected_orders
