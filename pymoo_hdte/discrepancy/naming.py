@@ -191,6 +191,8 @@ def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
         return False
     if _named(rival) == _named(chosen):
         return False
+    if _twins(rival, chosen):
+        return True
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
     near = rival.fit.evidence - chosen.fit.evidence < VERY_STRONG * misfit
     left = (rival.fit.chi_square - freedom) / (chosen.fit.chi_square - freedom)
@@ -210,6 +212,20 @@ def _searched(data: Data, base: Fit, rival: Rival, excess: float) -> Rival:
         fits = [fit(data, rival.candidates, begin) for begin in begins]
         found += [_rival(fitted, excess) for fitted in fits]
     return min(found, key=lambda one: one.bic)
+
+
+def _twins(rival: Rival, chosen: Rival) -> bool:
+    """Tell whether a rival differs from the chosen effects by twins of theirs only.
+
+    Play shows in the sweep, at one input angle; records that pass through zero torque rattle, and
+    to the others play is a shift. Whether it varies in a turn is then not to be seen.
+    """
+    names, values = [], chosen.fit.values[len(chosen.fit.values) - count(chosen.candidates) :]
+    for candidate in chosen.candidates:
+        own, values = np.split(values, [len(candidate.parameters)])
+        names.append({candidate.name, candidate.twin(own.tolist())})
+    theirs = [candidate.name for candidate in rival.candidates]
+    return all(name in allowed for name, allowed in zip(theirs, names, strict=True))
 
 
 def _named(rival: Rival) -> set[tuple[str, str]]:

@@ -39,6 +39,8 @@ UNITS = {
     "error_phase": "rad",
     "coefficient": "N.m/rad3",
     "softening": "1",
+    "sharpness": "1",
+    "spread": "1",
     "torsion": "rad",
     "half_width": "rad",
     "force": "N.m",

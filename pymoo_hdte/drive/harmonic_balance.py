@@ -28,7 +28,7 @@ from pymoo_hdte.drive.torus import (
 
 HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
-_STEPS = 40
+_STEPS = 50
 _WITHOUT_MEMORY = 10
 """Steps before those that heed the memory of hysteresis, which cost ten times as much."""
 _NEARLY_CONSTANT = 0.02
@@ -131,6 +131,8 @@ class _Solver:
         before, part = np.full_like(size, np.inf), np.ones_like(size)
         for step in range(_STEPS):
             torsion, energy = self.torsion[left], self.energy[left]
+            if step == _WITHOUT_MEMORY:
+                before[left], part[left] = np.inf, 1.0
             recall = equations.recall_matrix(torsion) if step >= _WITHOUT_MEMORY else None
             change, energy_change = _newton_step(equations, torsion, energy, size[left], recall)
             longest = np.abs(change).max(axis=1, keepdims=True)

@@ -18,22 +18,25 @@ SPRINGS = 4
 class MaxwellSlip(Aperiodic):
     """Hysteresis of four springs in parallel, each of which slips at a force of its own.
 
-    Their slip torsions are 1, 2, 3 and 4 quarters of ``torsion`` (rad), their slip forces equal and
-    in sum ``force`` (N.m): from rest the torque rises ever more slowly and stays at ``force``
-    beyond ``torsion``; after a reversal it follows the same curve at twice the scale (Masing).
+    Their slip torsions are ``torsion`` (rad) times 1, 2, 3 and 4 quarters to the power ``spread``,
+    their slip forces equal and in sum ``force`` (N.m): from rest the torque rises ever more slowly
+    and stays at ``force`` beyond ``torsion``; after a reversal it follows the same curve at twice
+    the scale (Masing).
     Al-Bender, Lampaert, Swevers, IEEE Trans. Automatic Control 50 (2005).
     """
 
     force: float
     torsion: float
+    spread: float = 1.0
 
     def __post_init__(self) -> None:
         real_number("hysteresis.force", self.force)
         real_number("hysteresis.torsion", self.torsion, above=0.0)
+        real_number("hysteresis.spread", self.spread, above=0.0)
 
     @property
     def _slips(self) -> Values:
-        return self.torsion * np.arange(1, SPRINGS + 1) / SPRINGS
+        return np.asarray(self.torsion * (np.arange(1, SPRINGS + 1) / SPRINGS) ** self.spread)
 
     @property
     def _stiffnesses(self) -> Values:

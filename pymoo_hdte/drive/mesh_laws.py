@@ -28,24 +28,30 @@ class CubicStiffness(Aperiodic):
 
 @dataclass(frozen=True)
 class SoftWindup(Aperiodic):
-    """T = -softening K torsion tanh(d / torsion): K is lower by this share near zero torsion.
+    """T = -softening K torsion g(d / torsion): K is lower by this share near zero torsion.
 
-    The lower stiffness at small torque is in every catalogue of strain wave gears (K1 below K2
-    below K3). ``torsion``, rad, is where the drive has wound up.
+    g(x) = x / (1 + |x|^p)^(1/p) with p the ``sharpness``: from a gradual winding up to the straight
+    pieces of catalogues (K1 below K2 below K3). ``torsion``, rad, is where the drive has wound up.
     """
 
     softening: float
     torsion: float
+    sharpness: float = 2.0
 
     def __post_init__(self) -> None:
         real_number("soft_windup.softening", self.softening, below=1.0)
         real_number("soft_windup.torsion", self.torsion, above=0.0)
+        real_number("soft_windup.sharpness", self.sharpness, at_least=1.0)
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        wound = np.tanh(state.position / self.torsion)
+        wound = state.position / self.torsion
+        # (1 + |x|^p)^(1/p) by logarithms: the power itself overflows far from zero.
+        power = self.sharpness * np.log(np.maximum(np.abs(wound), 1e-30))
+        root = np.logaddexp(0.0, power) / self.sharpness
         lost = self.softening * state.stiffness
-        return Response(-lost * self.torsion * wound, -lost * (1.0 - wound**2))
+        slope = np.exp(-(1.0 + self.sharpness) * root)
+        return Response(-lost * self.torsion * wound * np.exp(-root), -lost * slope)
 
 
 @dataclass(frozen=True)

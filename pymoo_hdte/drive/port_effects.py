@@ -43,14 +43,18 @@ FRICTION_PORTS = ("input", "output")
 
 LAWS: dict[str, tuple[type, tuple[str, ...], dict[str, str]]] = {
     "hardening_stiffness": (CubicStiffness, ("mesh",), {"coefficient": "cubic stiffness"}),
-    "soft_windup": (SoftWindup, ("mesh",), {"softening": "", "torsion": "angle"}),
+    "soft_windup": (
+        SoftWindup,
+        ("mesh",),
+        {"softening": "", "torsion": "angle", "sharpness": ""},
+    ),
     "backlash": (DeadZone, ("mesh",), {"half_width": "angle"}),
     "clearance_variation": (
         PeriodicClearance,
         ("mesh",),
         {"order": "", "phase": "angle", "half_width": "angle", "variation": "angle"},
     ),
-    "hysteresis": (MaxwellSlip, ("mesh",), {"force": "torque", "torsion": "angle"}),
+    "hysteresis": (MaxwellSlip, ("mesh",), {"force": "torque", "torsion": "angle", "spread": ""}),
     "coulomb_friction": (CoulombFriction, FRICTION_PORTS, {"level": "torque"}),
     "stribeck_friction": (
         StribeckFriction,
