@@ -69,7 +69,12 @@ class Outcome:
 
     @property
     def right(self) -> bool:
-        """Whether the first name is hidden, or all that is hidden stands in the class."""
+        """Whether the first name is hidden, or all that is hidden stands in the class.
+
+        A parameter out of tolerance has to be the right one.
+        """
+        if self.case.kind == "parameter":
+            return bool(self.names) and self.chosen[0] == f"parameter:{self.case.names[0]}"
         return bool(self._hidden & set(self.names[:1])) or self._in_class
 
     @property
@@ -88,8 +93,9 @@ class Outcome:
 
     @property
     def wrong_confident(self) -> bool:
-        """Whether the first name is not hidden, and no other is offered."""
-        return self.status in CONFIDENT and self.names[0] not in self._hidden
+        """Whether any name is not hidden, and no other is offered."""
+        wrong = not self.right or not set(self.names) <= self._hidden
+        return self.status in CONFIDENT and wrong
 
     @property
     def answer(self) -> str:

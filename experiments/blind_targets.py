@@ -120,13 +120,18 @@ def demands(outcomes: Sequence[Outcome]) -> Iterator[Judged]:
     yield judge_rate(
         "first name or class right", listed, [one.right for one in single], required.LEAST_RIGHT
     )
-    yield judge_rate(
-        "wrong name with confidence",
-        listed,
-        [one.wrong_confident for one in single],
-        required.MOST_WRONG_CONFIDENT,
-        at_least=False,
-    )
+    for kind, words in (
+        ("single", listed),
+        ("pair", "two listed effects"),
+        ("unlisted", "one unlisted effect"),
+    ):
+        yield judge_rate(
+            "wrong name with confidence",
+            words,
+            [one.wrong_confident for one in select(outcomes, kind)],
+            required.MOST_WRONG_CONFIDENT,
+            at_least=False,
+        )
     yield judge_rate(
         "alarm",
         "nothing hidden",

@@ -156,14 +156,24 @@ def test_an_order_that_is_no_whole_number_of_output_turns_is_not_the_encoder_s()
 
 
 def test_only_parameters_of_the_drive_can_be_out_of_tolerance():
-    base = [parameter.name for parameter in known_data().base]
-    freed = [candidate.frees for candidate in out_of_tolerance(base)]
+    base = known_data().base
+    names = [parameter.name for parameter in base]
+    freed = [candidate.frees for candidate in out_of_tolerance(base, names)]
     # Load inertia and damping have effects of their own names.
     assert set(freed) == set(MECHANICAL) - {"load_inertia", "damping"}
-    for candidate in out_of_tolerance(base):
+    for candidate in out_of_tolerance(base, names):
         assert candidate.build(()) == ()
         assert candidate.unknowns == 1
         assert not candidate.parameters
+
+
+def test_what_is_believed_to_be_nothing_is_not_out_of_tolerance():
+    base = tuple(
+        replace(one, start=0.0) if one.name == "input_damping" else one for one in known_data().base
+    )
+    freed = {candidate.frees for candidate in out_of_tolerance(base, MECHANICAL)}
+    assert "stiffness" in freed
+    assert "input_damping" not in freed
 
 
 def test_unknowns_count_what_a_fit_gains():

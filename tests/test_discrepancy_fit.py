@@ -73,9 +73,9 @@ def test_nothing_is_tried_beyond_a_bound(swept):
         return soft.build(values)
 
     objective = Objective(swept, (replace(soft, build=watched),))
-    lower, upper = objective.lower[-2:], objective.upper[-2:]
+    lower, upper = objective.lower[-3:], objective.upper[-3:]
     for corner in (lower, upper):
-        objective.jacobian(np.append(objective.start[:-2], corner))
+        objective.jacobian(np.append(objective.start[:-3], corner))
     assert np.all(np.array(tried) >= lower)
     assert np.all(np.array(tried) <= upper)
 
@@ -161,7 +161,7 @@ def test_a_parameter_out_of_tolerance_stops_at_its_bound(factor, side):
     assert base.bound_sides[layout.index("stiffness")] == side
     assert "stiffness" in base.at_bounds
     assert base.bound_sides[layout.index("offset")] == 0.0
-    freed = fit(data, out_of_tolerance(["stiffness"]), base.values)
+    freed = fit(data, out_of_tolerance(data.base, ["stiffness"]), base.values)
     assert freed.effects == ()
     assert "stiffness" not in freed.at_bounds
     place = layout.index("stiffness")

@@ -89,7 +89,7 @@ def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
 @pytest.mark.parametrize(
     ("label", "values"),
     [
-        (SOFT, (0.3, 3e-4)),
+        (SOFT, (0.3, 3e-4, 3.0)),
         (REACTION, (1.0,)),
         (INERTIA, (0.03,)),
     ],

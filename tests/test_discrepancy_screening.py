@@ -22,7 +22,7 @@ PLANTED = {
     "kinematic_error:mesh@3": (0.3 * ARCSEC, 0.2 * ARCSEC, 0.1 * ARCSEC, 0.0),
     "eccentricity:sensor@0.009901": (0.3 * ARCSEC, 0.2 * ARCSEC),
     "hardening_stiffness:mesh": (1e9,),
-    "soft_windup:mesh": (0.1, 3e-4),
+    "soft_windup:mesh": (0.1, 3e-4, 3.0),
     "nonlinear_drag:input": (2e-7,),
     "kinematic_reaction:input": (1.0,),
     "thermal_drift:sensor": (2e-8, 1000.0),
@@ -88,7 +88,9 @@ def test_noise_gives_a_candidate_its_share_by_chance():
 def test_a_freed_parameter_removes_what_was_predicted(factor):
     data, _ = measured((), np.random.default_rng(4), known_data(FEW), stiffness=factor)
     base = fit(data)
-    (stiffness,) = (one for one in out_of_tolerance(base.at_bounds) if one.frees == "stiffness")
+    (stiffness,) = (
+        one for one in out_of_tolerance(base.parameters, base.at_bounds) if one.frees == "stiffness"
+    )
     (found,) = screen(data, base, (stiffness,))
     freed = fit(data, (stiffness,), base.values)
     assert found.reduction == pytest.approx(base.chi_square - freed.chi_square, rel=0.15)
@@ -97,7 +99,9 @@ def test_a_freed_parameter_removes_what_was_predicted(factor):
 def test_a_parameter_that_would_go_inward_removes_nothing():
     data, _ = measured((), np.random.default_rng(4), known_data(FEW), stiffness=1.13)
     base = fit(data)
-    (stiffness,) = (one for one in out_of_tolerance(base.at_bounds) if one.frees == "stiffness")
+    (stiffness,) = (
+        one for one in out_of_tolerance(base.parameters, base.at_bounds) if one.frees == "stiffness"
+    )
     mirrored = replace(base, residuals=-base.residuals)
     (found,) = screen(data, mirrored, (stiffness,))
     assert found.reduction == 0.0
@@ -105,7 +109,11 @@ def test_a_parameter_that_would_go_inward_removes_nothing():
 
 @pytest.mark.parametrize(
     ("name", "values"),
-    [("backlash", (4 * ARCSEC,)), ("soft_windup", (0.3, 3e-4)), ("hysteresis", (1.0, 3e-4))],
+    [
+        ("backlash", (4 * ARCSEC,)),
+        ("soft_windup", (0.3, 3e-4, 3.0)),
+        ("hysteresis", (1.0, 3e-4, 1.5)),
+    ],
 )
 def test_a_sweep_speaks_for_what_it_shows(name, values):
     rng = np.random.default_rng(5)

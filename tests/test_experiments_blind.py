@@ -207,7 +207,10 @@ def test_sets_of_names_survive_their_number():
         ("none", "none", "named", "backlash:mesh", False, False, True, "backlash"),
         ("unlisted", "load_ripple", "unlisted", "backlash:mesh", False, True, False, "unlisted"),
         ("unlisted", "load_ripple", "adequate", "", False, False, False, "adequate"),
-        ("parameter", "stiffness", "parameter", "parameter:base", False, True, False, "parameter"),
+        ("parameter", "stiffness", "parameter", "parameter:stiffness", False, True, False,
+         "parameter"),
+        ("parameter", "stiffness", "parameter", "parameter:input_damping", False, False, True,
+         "parameter"),
         ("pair", "backlash+thermal_drift", "named", "backlash:mesh", False, False, False,
          "backlash"),
         ("pair", "backlash+thermal_drift", "named", "thermal_drift:sensor backlash:mesh", False,
@@ -303,7 +306,7 @@ MADE_UP = [
     ECCENTRIC,
     Case("unlisted", ("load_ripple",), 1.0, 0, ROOT),
     Case("pair", ("backlash", "torque_ripple"), 1.0, 0, ROOT),
-    Case("parameter", ("damping",), 1.0, 0, ROOT),
+    Case("parameter", ("stiffness",), 1.0, 0, ROOT),
     Case("detection", ("eccentricity",), 0.1, 0, ROOT),
 ]
 

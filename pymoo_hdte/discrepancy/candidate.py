@@ -51,9 +51,6 @@ class Candidate:
         not laid at another's door.
     frees : str or None
         Base parameter whose tolerance it lifts.
-    twin : callable
-        From values to the name of an effect that is the same by another name, or of which records
-        like these cannot tell it; None where there is none.
     """
 
     name: str
@@ -66,7 +63,6 @@ class Candidate:
     exact: bool = False
     listed: bool = True
     frees: str | None = None
-    twin: Callable[[Values], str | None] = lambda values: None
 
     @property
     def label(self) -> str:

@@ -68,11 +68,12 @@ class Data:
         spread = rig.repeatability / max(len(lines), 1) ** 0.5
         moved = [start]
         for line in lines:
-            for part in ("amplitude", "phase"):
+            places = [layout.index(f"error_{part}_{line}") for part in ("amplitude", "phase")]
+            amplitude, phase = start[places]
+            for step in (spread, 1j * spread):
                 shifted = start.copy()
-                amplitude = start[layout.index(f"error_amplitude_{line}")]
-                unit = spread if part == "amplitude" else spread / max(amplitude, spread)
-                shifted[layout.index(f"error_{part}_{line}")] += unit
+                phasor = amplitude * np.exp(1j * phase) + step
+                shifted[places] = np.abs(phasor), np.angle(phasor)
                 moved.append(shifted)
         predicted = self.predict(np.array(moved), self.reference_effects)
         change = predicted[1:] - predicted[0]

@@ -9,7 +9,7 @@ from pymoo_hdte.discrepancy.candidate import Candidate, unknown
 from pymoo_hdte.discrepancy.friction_candidates import friction_candidates
 from pymoo_hdte.discrepancy.line_candidates import line_candidates
 from pymoo_hdte.discrepancy.mesh_candidates import mesh_candidates
-from pymoo_hdte.discrepancy.parameters import MECHANICAL
+from pymoo_hdte.discrepancy.parameters import MECHANICAL, Parameter
 from pymoo_hdte.drive import DampingReference, KinematicReaction, LoadInertia, ThermalDrift
 
 _OF_THEIR_OWN = ("load_inertia", "damping")
@@ -37,8 +37,12 @@ def candidates(
     ]
 
 
-def out_of_tolerance(at_bounds: Sequence[str]) -> list[Candidate]:
-    """Return a candidate for each base parameter that a fit left at a bound."""
+def out_of_tolerance(base: Sequence[Parameter], at_bounds: Sequence[str]) -> list[Candidate]:
+    """Return a candidate for each base parameter that a fit left at a bound.
+
+    What is believed to be nothing is missing where it is something, and not out of tolerance.
+    """
+    believed = {parameter.name: parameter.start for parameter in base}
     return [
         Candidate(
             "parameter",
@@ -51,7 +55,7 @@ def out_of_tolerance(at_bounds: Sequence[str]) -> list[Candidate]:
             frees=name,
         )
         for name in at_bounds
-        if name in MECHANICAL and name not in _OF_THEIR_OWN
+        if name in MECHANICAL and name not in _OF_THEIR_OWN and believed[name] > 0.0
     ]
 
 

@@ -32,11 +32,15 @@ def _unproven(analysis: Analysis) -> list[str]:
     if not analysis.campaign.held_out:
         found.append("No record was held out: nothing is proven about conditions not fitted.")
     fitted = {record.name for record in analysis.data.features.records}
-    left_out = [record.name for record in analysis.campaign.train if record.name not in fitted]
+    if analysis.campaign.held_out and (held_out := analysis.held_out()) is None:
+        found.append("All held-out records rattle: nothing is proven about conditions not fitted.")
+    elif analysis.campaign.held_out and held_out is not None:
+        fitted |= {record.name for record in held_out.features.records}
+    left_out = [record.name for record in analysis.campaign.running if record.name not in fitted]
     if left_out:
         found.append(
-            f"Not fitted, because the load does not hold the tooth flanks together: "
-            f"{', '.join(left_out)}."
+            "Neither fitted nor predicted, because the load does not hold the tooth flanks "
+            f"together: {', '.join(left_out)}."
         )
     return found
 

@@ -43,9 +43,12 @@ def line_candidates(
     """
     ratio = believed.ratio
     found = [_encoder("eccentricity", 1.0, ratio, orders)]
+    # A line believed to be nothing is missing where it is something.
+    lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
+    believed_lines = [order for order, amplitude in lines if amplitude > 0.0]
     for order in sorted(seen):
-        if not _holds(believed.error_orders, order):
-            further = [o for o in orders if not _holds(believed.error_orders, o)]
+        if not _holds(believed_lines, order):
+            further = [o for o in orders if not _holds(believed_lines, o)]
             found.append(_kinematic_line(order, further))
             turns = order * ratio
             if turns > 1.5 and abs(turns - round(turns)) < 1e-6:

@@ -22,9 +22,6 @@ from pymoo_hdte.units import ARCSEC
 
 RATED_TORQUE = 40.0
 """N.m; where strengths of mesh laws are scaled."""
-FAR = 0.25
-"""Share of the rated torsion from which a corner is as well one that the drive is stiffer beyond;
-catalogues put the end of the soft wind-up at 0.15 to 0.3 of the rated torque."""
 WIDEST = 40 * ARCSEC
 """Largest half width of a clearance."""
 VARYING_MOST = 15 * ARCSEC
@@ -54,7 +51,6 @@ def mesh_candidates(believed: Believed, orders: Sequence[float]) -> list[Candida
         tuple((0.2, share * windup, 3.0) for share in (0.05, 0.15, 0.4)),
         lambda v: (LawAtPort("soft_windup", "mesh", SoftWindup(*v)),),
         "The drive is softer near zero torque.",
-        twin=lambda v: "hardening_stiffness" if v[1] >= FAR * windup else None,
     )
     backlash = Candidate(
         "backlash",
@@ -63,7 +59,6 @@ def mesh_candidates(believed: Believed, orders: Sequence[float]) -> list[Candida
         ((3 * ARCSEC,), (8 * ARCSEC,)),
         lambda v: (LawAtPort("backlash", "mesh", DeadZone(v[0])),),
         "There is play between the teeth.",
-        twin=lambda v: "clearance_variation",
     )
     slip = unknown("torsion", 0.01 * windup, 2 * windup, 0.2 * windup)
     hysteresis = Candidate(

@@ -29,10 +29,11 @@ _DEVIATIONS = 4.0
 SHARE = 0.9
 """Least share of the excess chi-square that named effects remove."""
 EXACT = 1.3
-"""Chi-square per degree of freedom down to which effects of an exact form must explain."""
+"""Chi-square per degree of freedom that does for effects of an exact form: noise that a resonance
+magnifies is no longer that of the linear covariance."""
 EXACT_SHARE = 0.9999
-"""Share that does as well: of a line ten thousand times the noise, the angle's own noise and the
-integrator's steps show."""
+"""Least share that effects of an exact form remove, if they do not explain down to the noise: of a
+line ten thousand times the noise, the integrator's steps show."""
 SECOND_SHARE = 0.8
 """Least share of the excess left by a first effect of no exact form that a second one removes;
 beside an exact one it is `SHARE`."""
@@ -87,6 +88,11 @@ class Rival:
         return all(candidate.listed for candidate in self.candidates)
 
     @property
+    def exact(self) -> bool:
+        """Whether the forms of all of them leave nothing open."""
+        return all(candidate.exact for candidate in self.candidates)
+
+    @property
     def label(self) -> str:
         """Their labels in one word."""
         return "+".join(candidate.label for candidate in self.candidates)
@@ -126,7 +132,7 @@ def adequate(freedom: int) -> float:
 def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict on a fitted base."""
     freedom = len(base.residuals) - len(base.values)
-    candidates = [*candidates, *out_of_tolerance(base.at_bounds)]
+    candidates = [*candidates, *out_of_tolerance(data.base, base.at_bounds)]
     screened = screen(data, base, candidates)
     excess = base.chi_square - freedom
     if base.chi_square <= adequate(freedom) * freedom and screened[0].reduction < GAIN:
@@ -148,17 +154,18 @@ def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
         return Verdict("unlisted", base, chosen, tuple(others), (), freedom)
     others = [_refined(data, r, excess) if _alike(r, chosen, freedom) else r for r in others]
     equivalent = tuple(rival for rival in others if _alike(rival, chosen, freedom))
-    listed = next((rival for rival in equivalent if rival.listed), None)
-    if not chosen.listed and listed is not None:
-        others = [chosen if rival is listed else rival for rival in others]
-        equivalent = tuple(chosen if rival is listed else rival for rival in equivalent)
-        chosen = listed
+    listed = [r for r in equivalent if r.listed and _explains(r, base, freedom)]
+    if not chosen.listed and listed:
+        others = [chosen if rival is listed[0] else rival for rival in others]
+        equivalent = tuple(chosen if rival is listed[0] else rival for rival in equivalent)
+        chosen = listed[0]
     if not chosen.listed:
         status = "unlisted"
-    elif all(candidate.name == "parameter" for candidate in chosen.candidates):
-        status = "parameter"
+    elif equivalent:
+        status = "class"
     else:
-        status = "class" if equivalent else "named"
+        out = all(candidate.name == "parameter" for candidate in chosen.candidates)
+        status = "parameter" if out else "named"
     return Verdict(status, base, chosen, tuple(others), equivalent, freedom)
 
 
@@ -174,10 +181,9 @@ def _explains(rival: Rival, base: Fit, freedom: int) -> bool:
     residuals = len(base.residuals)
     gain = base.chi_square - rival.fit.chi_square
     penalty = sum(candidate.unknowns for candidate in rival.candidates) * np.log(residuals)
-    if all(candidate.exact for candidate in rival.candidates):
-        enough = rival.fit.chi_square <= EXACT * freedom or rival.share >= EXACT_SHARE
-    else:
-        enough = rival.fit.chi_square <= adequate(freedom) * freedom or rival.share >= SHARE
+    share = EXACT_SHARE if rival.exact else SHARE
+    limit = max(adequate(freedom), EXACT) if rival.exact else adequate(freedom)
+    enough = rival.fit.chi_square <= limit * freedom or rival.share >= share
     return bool(gain - penalty >= BIC_GAIN and enough)
 
 
@@ -191,12 +197,11 @@ def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
         return False
     if _named(rival) == _named(chosen):
         return False
-    if _twins(rival, chosen):
-        return True
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
     near = rival.fit.evidence - chosen.fit.evidence < VERY_STRONG * misfit
-    left = (rival.fit.chi_square - freedom) / (chosen.fit.chi_square - freedom)
-    return near or (misfit > adequate(freedom) and left < ALIKE)
+    if near or misfit <= adequate(freedom) or (rival.exact and chosen.exact):
+        return near
+    return rival.fit.chi_square - freedom < ALIKE * (chosen.fit.chi_square - freedom)
 
 
 def _searched(data: Data, base: Fit, rival: Rival, excess: float) -> Rival:
@@ -212,20 +217,6 @@ def _searched(data: Data, base: Fit, rival: Rival, excess: float) -> Rival:
         fits = [fit(data, rival.candidates, begin) for begin in begins]
         found += [_rival(fitted, excess) for fitted in fits]
     return min(found, key=lambda one: one.bic)
-
-
-def _twins(rival: Rival, chosen: Rival) -> bool:
-    """Tell whether a rival differs from the chosen effects by twins of theirs only.
-
-    Play shows in the sweep, at one input angle; records that pass through zero torque rattle, and
-    to the others play is a shift. Whether it varies in a turn is then not to be seen.
-    """
-    names, values = [], chosen.fit.values[len(chosen.fit.values) - count(chosen.candidates) :]
-    for candidate in chosen.candidates:
-        own, values = np.split(values, [len(candidate.parameters)])
-        names.append({candidate.name, candidate.twin(own.tolist())})
-    theirs = [candidate.name for candidate in rival.candidates]
-    return all(name in allowed for name, allowed in zip(theirs, names, strict=True))
 
 
 def _named(rival: Rival) -> set[tuple[str, str]]:

@@ -97,7 +97,8 @@ def _best_start(
         lines = np.hypot(*best[:parts].reshape(-1, 2).T)
         if lines[1:].any() and lines[1:].max() > lines[0]:
             # A line that is weaker than its harmonic is not what the harmonic belongs to.
-            best, reduction = _least_squares(signatures[:2], starts[:2], left)
+            kept = np.r_[0, 1, parts : len(best)]
+            best, reduction = _least_squares(signatures[kept], starts[kept], left)
     else:
         sizes = np.einsum("ij,ij->i", signatures, signatures)
         along = -signatures @ left

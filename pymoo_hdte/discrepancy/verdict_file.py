@@ -83,7 +83,7 @@ def verdict_document(
     proposal : Proposal
     """
     verdict = analysis.verdict
-    absent = {"reason": "the campaign holds no held-out record, so that nothing can be proved"}
+    absent = {"reason": "no held-out record can be predicted, so that nothing can be proved"}
     return {
         "campaign": analysis.campaign.title,
         "status": verdict.status,
