@@ -168,8 +168,9 @@ def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
     for effect in effects:
         where = "" if effect["order"] is None else f", order {effect['order']:.4g}"
         for name, quantity in effect["parameters"].items():
-            angle = quantity["unit"] == "rad" and name != "phase"
+            angle = quantity["unit"] == "rad" and not name.endswith("phase")
             size, unit = (ARCSEC, "arcsec") if angle else (1.0, quantity["unit"])
+            unit = "" if unit == "1" else unit
             value, low, high = (
                 number / size for number in (quantity["value"], *quantity["interval95"])
             )
