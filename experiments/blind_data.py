@@ -24,6 +24,8 @@ from pymoo_hdte.discrepancy.naming import EXPLAINED
 
 CONFIDENT = ("named", "parameter")
 """Statuses that leave no choice."""
+OPENED = 1.5
+"""Multiple of the noise floor beyond which a gap that was none has been opened."""
 _CASE = ("kind", "truth", "size", "number")
 _WORDS = ("status", "chosen", "equivalents", "truth_in_class", *RIVALS)
 
@@ -118,13 +120,15 @@ class Outcome:
     def bias_ratio(self) -> float | None:
         """Bias of the base after the revision over that before it; 1 where the workflow failed.
 
-        None where the effect moves the base by less than its standard error.
+        None where neither moves the base by more than its standard error.
         """
         if self.status == ERROR:
             return 1.0
-        if self.numbers.get("bias_before", 0.0) <= self.numbers.get("bias_error", 0.0):
+        before, error = (self.numbers.get(f"bias_{one}", 0.0) for one in ("before", "error"))
+        after = self.numbers.get("bias_after", 0.0)
+        if max(before, after) <= error:
             return None
-        return self.numbers["bias_after"] / self.numbers["bias_before"]
+        return after / max(before, error)
 
     def gap(self, name: str) -> Gap | None:
         """Return one of `blind_scoring.GAPS`; None where nothing was proved."""
@@ -134,11 +138,21 @@ class Outcome:
         return Gap(before, after, floor, "")
 
     def shrinkage(self, name: str) -> float | None:
-        """Return how far one of the gaps shrinks; None where there is none, 0 after a failure."""
+        """Return how far one of the gaps shrinks; None where there is none, 0 after a failure.
+
+        A gap that the revision opened shrank by -1.
+        """
         if self.status == ERROR:
             return 0.0
         gap = self.gap(name)
-        return None if gap is None else gap.shrinkage
+        if gap is None or gap.shrinkage is not None:
+            return None if gap is None else gap.shrinkage
+        return None if self.closed(name, OPENED) else -1.0
+
+    def open_before(self, name: str, multiple: float) -> bool:
+        """Return whether one of the gaps was beyond a multiple of the noise floor, or unknown."""
+        gap = self.gap(name)
+        return self.status == ERROR or (gap is not None and gap.before > multiple * gap.noise_floor)
 
     def closed(self, name: str, multiple: float) -> bool:
         """Return whether one of the gaps ends within a multiple of the noise floor."""

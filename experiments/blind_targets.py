@@ -57,7 +57,9 @@ class Judged:
 
     @property
     def verdict(self) -> str:
-        """In words: met by the measured figure itself, by its interval only, or missed."""
+        """In words: met by the measured figure itself, by its interval only, missed, or not run."""
+        if self.measured.n == 0:
+            return "not run"
         beyond = self.measured.value - self.required
         if beyond == 0.0 or (beyond > 0.0) == self.at_least:
             return "met"
@@ -167,7 +169,11 @@ def demands(outcomes: Sequence[Outcome]) -> Iterator[Judged]:
 
 def time_demand(outcomes: Sequence[Outcome]) -> Judged:
     """Judge the time of all parts together."""
-    whole = [sum(one.seconds) for one in outcomes if one.case.kind != "detection"]
+    whole = [
+        sum(one.seconds) if one.seconds else np.inf
+        for one in outcomes
+        if one.case.kind != "detection"
+    ]
     return judge_median("time of a campaign, median, s", "all but detection limits", whole,
                         required.MOST_SECONDS, at_least=False)  # fmt: skip
 
@@ -181,7 +187,8 @@ _GAP_WORDS = {
 def _proof(gap: str, single: Sequence[Outcome]) -> Iterator[Judged]:
     where = f"one listed effect, {_GAP_WORDS[gap]}"
     shrunk = [one.shrinkage(gap) for one in single]
-    closed = [one.closed(gap, required.FLOOR_MULTIPLE) for one in single]
+    multiple = required.FLOOR_MULTIPLE
+    closed = [one.closed(gap, multiple) for one in single if one.open_before(gap, multiple)]
     yield judge_median("shrinkage of the held-out gap, median", where, shrunk,
                        required.LEAST_SHRINKAGE)  # fmt: skip
     yield judge_rate(f"held-out gap within {required.FLOOR_MULTIPLE:g} x the noise floor", where,

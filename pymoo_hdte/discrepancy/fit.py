@@ -81,16 +81,16 @@ class Fit:
     def covariance(self) -> NDArray[np.float64]:
         """Of the values, from the curvature at the optimum and the bounds; shape (n, n).
 
-        The bounds count as the variance of a uniform distribution between them: what no record
-        determines is as uncertain as they are wide.
+        What the model leaves beyond noise counts as noise (Birge, Physical Review 40, 1932), so
+        that a form that is not quite right is not taken for exact. The bounds count as the variance
+        of a uniform distribution between them: what no record determines is as uncertain as they
+        are wide.
         """
+        freedom = max(len(self.residuals) - len(self.values), 1)
+        curvature = self.jacobian.T @ self.jacobian / max(self.chi_square / freedom, 1.0)
         scale = Layout(self.parameters).array("scale")
-        return np.linalg.inv(self.information) * np.outer(scale, scale)
-
-    @property
-    def information(self) -> NDArray[np.float64]:
-        """Inverse of the covariance, by parameters in units of their scale."""
-        return self.jacobian.T @ self.jacobian + np.diag(12.0 / self._widths**2)
+        within = np.diag(12.0 / self._widths**2)
+        return np.linalg.inv(curvature + within) * np.outer(scale, scale)
 
     @property
     def evidence(self) -> float:
@@ -99,9 +99,8 @@ class Fit:
         Chi-square and, for each parameter, how much the data narrowed what its bounds allow
         (MacKay, Neural Computation 4, 1992): what no record determines costs nothing.
         """
-        _, narrowed = np.linalg.slogdet(
-            self.information * np.outer(self._widths, self._widths) / 12.0
-        )
+        information = self.jacobian.T @ self.jacobian * np.outer(self._widths, self._widths) / 12.0
+        _, narrowed = np.linalg.slogdet(information + np.eye(len(information)))
         return self.chi_square + float(narrowed)
 
     @property

@@ -50,6 +50,8 @@ BIC_GAIN = 6.0
 VERY_STRONG = 10.0
 """Distance of twice the logarithm of the evidence within which rivals cannot be told apart (Kass,
 Raftery, J. Am. Stat. Assoc. 1995)."""
+GENEROUS = 5.0
+"""Multiple of these distances within which a rival is fitted to the end before it is judged."""
 FITTED = 5
 """Most candidates fitted in earnest after the screening."""
 OF_ONE_NAME = 2
@@ -152,7 +154,11 @@ def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     chosen = _refined(data, chosen, excess)
     if not _explains(chosen, base, freedom):
         return Verdict("unlisted", base, chosen, tuple(others), (), freedom)
-    others = [_refined(data, r, excess) if _alike(r, chosen, freedom) else r for r in others]
+    near = [_alike(rival, chosen, freedom, GENEROUS) for rival in others]
+    others = [
+        _refined(data, rival, excess) if flag else rival
+        for rival, flag in zip(others, near, strict=True)
+    ]
     equivalent = tuple(rival for rival in others if _alike(rival, chosen, freedom))
     listed = [r for r in equivalent if r.listed and _explains(r, base, freedom)]
     if not chosen.listed and listed:
@@ -187,7 +193,7 @@ def _explains(rival: Rival, base: Fit, freedom: int) -> bool:
     return bool(gain - penalty >= BIC_GAIN and enough)
 
 
-def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
+def _alike(rival: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
     """Tell whether the data cannot separate a rival with other effects from the chosen one.
 
     Where even the chosen form leaves more than noise, that remainder is the scale on which chi-
@@ -198,10 +204,10 @@ def _alike(rival: Rival, chosen: Rival, freedom: int) -> bool:
     if _named(rival) == _named(chosen):
         return False
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
-    near = rival.fit.evidence - chosen.fit.evidence < VERY_STRONG * misfit
+    near = rival.fit.evidence - chosen.fit.evidence < margin * VERY_STRONG * misfit
     if near or misfit <= adequate(freedom) or (rival.exact and chosen.exact):
         return near
-    return rival.fit.chi_square - freedom < ALIKE * (chosen.fit.chi_square - freedom)
+    return rival.fit.chi_square - freedom < margin * ALIKE * (chosen.fit.chi_square - freedom)
 
 
 def _searched(data: Data, base: Fit, rival: Rival, excess: float) -> Rival:

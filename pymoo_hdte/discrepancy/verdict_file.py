@@ -16,12 +16,15 @@ from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.misfit_map import Location
 from pymoo_hdte.discrepancy.naming import Rival, Verdict
 from pymoo_hdte.discrepancy.next_experiment import Proposal
+from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.discrepancy.revise import accepted_fit
 from pymoo_hdte.discrepancy.workflow import Analysis
 
 _DEVIATIONS = 1.959964
 """Half-width of a central 95 % interval of a normal value, in standard deviations."""
 
+_SAYS_LITTLE = 0.8
+"""Width of an interval, as a share of the bounds', from which these and not the records give it."""
 UNITS = {
     "stiffness": "N.m/rad",
     "damping": "N.m.s/rad",
@@ -200,8 +203,17 @@ def base_parameters(fitted: Fit) -> dict[str, Any]:
     for row, parameter in enumerate(fitted.parameters[: len(fitted.parameters) - added]):
         kind = parameter.name.rstrip("0123456789").rstrip("_")
         entry = quantity(fitted.values[row], fitted.covariance[row, row], "base", kind)
+        entry["interval95"] = _within_bounds(parameter, entry["interval95"])
         found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
     return found
+
+
+def _within_bounds(parameter: Parameter, interval: list[float]) -> list[float]:
+    """Return an interval cut at the bounds; all between them where the records say little."""
+    lower, upper = parameter.lower, parameter.upper
+    if interval[1] - interval[0] > _SAYS_LITTLE * (upper - lower):
+        return [lower, upper]
+    return [max(interval[0], lower), min(interval[1], upper)]
 
 
 def _alternatives(verdict: Verdict) -> list[dict[str, Any]]:

@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy.data import Data, start_parameters
 from pymoo_hdte.discrepancy.features import Features, measure
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.library import candidates
-from pymoo_hdte.discrepancy.naming import EXPLAINED, SHARE, Verdict, judge
+from pymoo_hdte.discrepancy.naming import SHARE, Verdict, judge
 from pymoo_hdte.discrepancy.screening import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.torsion_curve import torsion_points
 
@@ -132,7 +132,7 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
     if ratio.max() <= _SAME_NOISE:
         return data, verdict
     again = judge(renewed, fit(renewed), listed)
-    return (renewed, again) if again.status in EXPLAINED else (data, verdict)
+    return (data, verdict) if again.chosen is None else (renewed, again)
 
 
 def _candidates(data: Data, base: Fit) -> list[Candidate]:
