@@ -134,7 +134,7 @@ def _effects(verdict: Verdict) -> list[dict[str, Any]]:
     for candidate in fitted.candidates:
         rows = np.arange(start, start + len(candidate.parameters))
         start += len(candidate.parameters)
-        bounded = [fitted.parameters[row].name for row in rows]
+        bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
         found.append(
             {
                 "name": candidate.name,
@@ -142,7 +142,7 @@ def _effects(verdict: Verdict) -> list[dict[str, Any]]:
                 "order": candidate.order,
                 "sentence": candidate.sentence,
                 "parameters": _parameters(candidate, fitted, rows),
-                "at_bound": [name for name in bounded if name in fitted.at_bounds],
+                "at_bound": bounded,
                 "share": verdict.chosen.share if verdict.chosen else None,
             }
         )
