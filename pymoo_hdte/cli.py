@@ -95,13 +95,15 @@ def _message(error: InvalidInput | OSError) -> str:
 
 
 def _summary(document: dict[str, Any], out: Path) -> str:
+    from pymoo_hdte.discrepancy.effect_words import in_words
+
     names = " + ".join(f"{one['name']} at the {one['port']}" for one in document["effects"])
     lines = [
         f"{document['status']}{': ' + names if names else ''}",
         document["sentence"],
         document["location"]["sentence"],
         *document["limits"],
-        f"Next: {document['next_experiment']['description']}",
+        f"Next: {in_words(document['next_experiment']['description'])}",
         f"Report: {out / 'report.html'}",
     ]
     return "\n".join(lines)
