@@ -18,7 +18,7 @@ from experiments.blind_cases import Case
 from experiments.blind_codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
 from experiments.campaign import Run
 from pymoo_hdte.discrepancy import Campaign
-from pymoo_hdte.discrepancy.data import Data, start_parameters
+from pymoo_hdte.discrepancy.data import training_data
 from pymoo_hdte.discrepancy.features import Features, measure
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.locate import locate
@@ -28,7 +28,6 @@ from pymoo_hdte.discrepancy.next_experiment import next_experiment
 from pymoo_hdte.discrepancy.parameters import MECHANICAL, Layout
 from pymoo_hdte.discrepancy.prove import Proof, prove
 from pymoo_hdte.discrepancy.revise import accepted_fit
-from pymoo_hdte.discrepancy.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy.workflow import Analysis, analyse
 
 PARTS = ("analyse", "locate", "prove", "next_experiment")
@@ -172,10 +171,7 @@ def location_scores(moved: Flags, flagged: Flags) -> Scores:
 
 def twin_fit(twin: Campaign, kept: Features) -> Fit:
     """Fit the base to a campaign without the effect, with the records and orders of ``kept``."""
-    features = _features(twin, kept)
-    sweeps = [record for record in twin.torsion if record.role == "train"]
-    points = tuple(torsion_points(record, twin.rig) for record in sweeps)
-    return fit(Data(twin, features, start_parameters(twin, features), points))
+    return fit(training_data(twin, _features(twin, kept)))
 
 
 def bias_scores(verdict: Verdict, twin: Fit) -> Scores:

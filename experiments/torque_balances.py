@@ -25,6 +25,7 @@ from experiments.candidate_terms import Motion, Term
 from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import stack
 from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
+from pymoo_hdte.drive.order_spectrum import sine_phasor
 
 Values = NDArray[np.float64]
 Phasors = NDArray[np.complex128]
@@ -130,7 +131,7 @@ def _static_error(data: Data, p: dict[str, float]) -> Phasors:
     """Return its phasors (m,)."""
     found = np.zeros(len(data.features.orders), dtype=complex)
     for line, order in enumerate(data.campaign.believed.error_orders):
-        phasor = -1j * p[f"error_amplitude_{line}"] * np.exp(1j * p[f"error_phase_{line}"])
+        phasor = sine_phasor(p[f"error_amplitude_{line}"], p[f"error_phase_{line}"])
         found[np.isclose(data.features.orders, order)] += phasor
     return found
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from law_cases import EFFECTS, memoryless
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
@@ -43,21 +44,7 @@ from pymoo_hdte.drive.torus import (
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.units import ARCSEC
 
-EFFECTS = [
-    LawAtPort("hardening_stiffness", "mesh", CubicStiffness(1.2e9)),
-    LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 2e-4)),
-    LawAtPort("backlash", "mesh", DeadZone(5 * ARCSEC)),
-    LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 3 * ARCSEC, 2 * ARCSEC)),
-    LawAtPort("hysteresis", "mesh", MaxwellSlip(1.0, 2e-4)),
-    LawAtPort("coulomb_friction", "output", CoulombFriction(2.0)),
-    LawAtPort("stribeck_friction", "input", StribeckFriction(0.05, 0.05, 50.0)),
-    LawAtPort("position_dependent_friction", "input", PeriodicFriction(1.0, 0.3, 0.02)),
-    LawAtPort("nonlinear_drag", "input", NonlinearDrag(1e-6)),
-    LawAtPort("torque_ripple", "input", PeriodicTorque(6.0, 1.0, 0.015)),
-    KinematicErrorLine(3.0, 2 * ARCSEC, 0.7),
-    KinematicReaction(),
-]
-MEMORYLESS = [effect for effect in EFFECTS if effect.name != "hysteresis"]
+MEMORYLESS = memoryless(EFFECTS)
 
 
 def with_effects(model, *effects):

@@ -4,44 +4,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from law_cases import EFFECTS as FORWARD
+from law_cases import memoryless
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import MeshStiffnessVariation, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.friction import (
     CoulombFriction,
-    NonlinearDrag,
     PeriodicFriction,
-    PeriodicTorque,
-    StribeckFriction,
 )
-from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.laws import Periodic
-from pymoo_hdte.drive.mesh_laws import CubicStiffness, DeadZone, PeriodicClearance, SoftWindup
-from pymoo_hdte.drive.port_effects import LAWS, KinematicErrorLine, KinematicReaction, LawAtPort
+from pymoo_hdte.drive.port_effects import LAWS, LawAtPort
 from pymoo_hdte.drive.time_domain import StartUp, equations_of_motion
 from pymoo_hdte.units import ARCSEC
 
 # Friction that varies over an output turn shakes the speed of a constant torque in cubes of its
 # level, of which few harmonics are kept: it is as weak as the agreement with the integrator asks.
 EFFECTS = [
-    LawAtPort("hardening_stiffness", "mesh", CubicStiffness(1.2e9)),
-    LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 2e-4)),
-    LawAtPort("backlash", "mesh", DeadZone(5 * ARCSEC)),
-    LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 3 * ARCSEC, 2 * ARCSEC)),
-    LawAtPort("hysteresis", "mesh", MaxwellSlip(1.0, 2e-4)),
-    LawAtPort("coulomb_friction", "output", CoulombFriction(2.0)),
-    LawAtPort("stribeck_friction", "input", StribeckFriction(0.05, 0.05, 50.0)),
-    LawAtPort("position_dependent_friction", "input", PeriodicFriction(1.0, 0.3, 0.02)),
+    *FORWARD,
     LawAtPort("position_dependent_friction", "output", PeriodicFriction(1.0, 0.3, 0.1)),
-    LawAtPort("nonlinear_drag", "input", NonlinearDrag(1e-6)),
-    LawAtPort("torque_ripple", "input", PeriodicTorque(6.0, 1.0, 0.015)),
     MeshStiffnessVariation(0.05, 0.7, 4.0),
-    KinematicErrorLine(3.0, 2 * ARCSEC, 0.7),
-    KinematicReaction(),
 ]
-# Springs that stick and slip make an integrator chatter; the mirror image speaks for them.
-MEMORYLESS = [effect for effect in EFFECTS if effect.name != "hysteresis"]
+# The mirror image speaks for hysteresis.
+MEMORYLESS = memoryless(EFFECTS)
 
 
 def label(effect):

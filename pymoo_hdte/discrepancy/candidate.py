@@ -15,11 +15,10 @@ import numpy as np
 
 from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.drive import Effect
+from pymoo_hdte.drive.effects import Place, place_of
 
 Values = Sequence[float]
 
-Place = tuple[str, str, float | None]
-"""Name, port and order of an effect in a drive model."""
 HARMONIC_NAMES = ("", "second_", "third_")
 """Prefixes of the parameters of a line's harmonics."""
 _HARMONIC_SHARE = 0.2
@@ -73,13 +72,7 @@ class Candidate:
     @property
     def places(self) -> frozenset[Place]:
         """Where its effects stand in a drive model, which takes one of a name at each place."""
-        effects = self.build(self.starts[0])
-        places = {
-            (effect.name, str(getattr(effect, "port", "")), getattr(law, "order", None))
-            for effect in effects
-            for law in [getattr(effect, "law", effect)]
-        }
-        return frozenset(places)
+        return frozenset(place_of(effect) for effect in self.build(self.starts[0]))
 
     @property
     def linear(self) -> bool:

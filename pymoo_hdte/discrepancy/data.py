@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy.campaign import Campaign
 from pymoo_hdte.discrepancy.features import Features
 from pymoo_hdte.discrepancy.forward import Prediction, coefficients_of, predict
 from pymoo_hdte.discrepancy.parameters import Layout, Parameter, base_parameters
-from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
+from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints, torsion_points
 from pymoo_hdte.drive import Balance, Effect, mean_torsion
 
 Vector = NDArray[np.float64]
@@ -127,6 +127,13 @@ class Data:
             solved = solve_triangular(triangle, part, lower=True, check_finite=False)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)
+
+
+def training_data(campaign: Campaign, features: Features) -> Data:
+    """Return features of training records with first guesses and the training sweeps."""
+    sweeps = [record for record in campaign.torsion if record.role == "train"]
+    points = tuple(torsion_points(record, campaign.rig) for record in sweeps)
+    return Data(campaign, features, start_parameters(campaign, features), points)
 
 
 def start_parameters(campaign: Campaign, features: Features) -> tuple[Parameter, ...]:

@@ -29,6 +29,7 @@ from pymoo_hdte.drive.balance import BY_CASE
 from pymoo_hdte.drive.friction import PeriodicTorque
 from pymoo_hdte.drive.harmonic_balance import torus_of
 from pymoo_hdte.drive.mesh_laws import DeadZone, PeriodicClearance
+from pymoo_hdte.drive.order_spectrum import sine_phasor
 from pymoo_hdte.drive.torus import Torus
 
 CLEARANCES = (DeadZone, PeriodicClearance)
@@ -179,7 +180,7 @@ def coefficients_of(
     """Return the coefficients of all rows, vectors outermost."""
     rows = {name: np.repeat(values[name], records) for name in MECHANICAL}
     lines = [
-        -1j * values[f"error_amplitude_{line}"] * np.exp(1j * values[f"error_phase_{line}"])
+        sine_phasor(values[f"error_amplitude_{line}"], values[f"error_phase_{line}"])
         for line in range(len(believed.error_orders))
     ]
     coefficients = Coefficients(

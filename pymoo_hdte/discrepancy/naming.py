@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.candidate import Candidate, Place
+from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.library import out_of_tolerance
@@ -144,7 +144,7 @@ def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
         singles[0] = _searched(data, base, singles[0], excess)
     rivals = list(singles)
     if _second_could_count(singles[0], freedom):
-        pairs = _pairs(data, singles[:1], candidates, excess)
+        pairs = _pairs(data, singles[0], candidates, excess)
         rivals = sorted([*singles, *pairs], key=lambda rival: rival.bic)
     chosen = rivals[0]
     if len(chosen.candidates) == 2 and not _second_earned(chosen, singles, base, freedom):
@@ -179,7 +179,7 @@ def _second_could_count(single: Rival, freedom: int) -> bool:
     """Tell whether a second effect beside this one could be earned at all."""
     if single.fit.chi_square <= adequate(freedom) * freedom:
         return False
-    return single.candidates[0].exact or single.share <= 1.0 - SECOND_LEAST
+    return single.exact or single.share <= 1.0 - SECOND_LEAST
 
 
 def _explains(rival: Rival, base: Fit, freedom: int) -> bool:
@@ -253,27 +253,21 @@ def _varied(screened: Sequence[Screened]) -> list[Screened]:
 
 
 def _rival(fitted: Fit, excess: float) -> Rival:
-    parameters = len(fitted.values)
-    unknowns = len(fitted.values) - count(fitted.candidates)
-    unknowns += sum(candidate.unknowns for candidate in fitted.candidates)
+    n_base = len(fitted.values) - count(fitted.candidates)
+    unknowns = n_base + sum(candidate.unknowns for candidate in fitted.candidates)
     bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
-    freedom = len(fitted.residuals) - (parameters - count(fitted.candidates))
-    gain = excess + freedom - fitted.chi_square
+    gain = excess + (len(fitted.residuals) - n_base) - fitted.chi_square
     share = gain / max(excess, gain)
     return Rival(fitted, float(bic), float(share))
 
 
 def _pairs(
-    data: Data, singles: Sequence[Rival], candidates: Sequence[Candidate], excess: float
+    data: Data, single: Rival, candidates: Sequence[Candidate], excess: float
 ) -> list[Rival]:
-    """Return the best pairs that contain one of the best single effects."""
-    found: list[Rival] = []
-    for single in singles:
-        taken = frozenset[Place]().union(*(one.places for one in single.candidates))
-        others = [one for one in candidates if not taken & one.places and one.frees is None]
-        screened = screen(data, single.fit, others)
-        found += _fit_best(data, single.fit, screened[:2], excess)
-    return found
+    """Return the best pairs that contain the best single effect."""
+    (first,) = single.candidates
+    others = [one for one in candidates if not first.places & one.places and one.frees is None]
+    return _fit_best(data, single.fit, screen(data, single.fit, others)[:2], excess)
 
 
 def _second_earned(pair: Rival, singles: Sequence[Rival], base: Fit, freedom: int) -> bool:
@@ -288,7 +282,7 @@ def _second_earned(pair: Rival, singles: Sequence[Rival], base: Fit, freedom: in
     )
     left = first.fit.chi_square - freedom
     removed = first.fit.chi_square - pair.fit.chi_square
-    if first.candidates[0].exact:
+    if first.exact:
         return left > 0.0 and removed >= SHARE * left
     counts = removed >= SECOND_LEAST * (base.chi_square - freedom)
     return left > 0.0 and removed >= SECOND_SHARE * left and counts

@@ -100,7 +100,7 @@ def certainty(analysis: Analysis) -> str:
             "for these records may still be there."
         )
     share = _percent(verdict.chosen.share)
-    if not all(candidate.listed for candidate in verdict.chosen.candidates):
+    if not verdict.chosen.listed:
         return (
             f"No effect of the list is as likely: this explains {share} of the misfit. An error of "
             "the encoder takes no part in the motion of the drive."

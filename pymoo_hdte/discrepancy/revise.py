@@ -29,6 +29,7 @@ from pymoo_hdte.drive import (
     hs_20_100,
 )
 from pymoo_hdte.drive.datasheet import Nominal
+from pymoo_hdte.drive.order_spectrum import sine_phasor
 from pymoo_hdte.units import ARCSEC
 
 SHEET_FILE = "revised_model_sheet.toml"
@@ -106,7 +107,7 @@ def drive_model(campaign: Campaign, fitted: Fit, name: str, description: str) ->
 
 
 def _peak_to_peak(believed: Believed, amplitudes: list[float], phases: list[float]) -> float:
-    phasors = -1j * np.array([amplitudes]) * np.exp(1j * np.array(phases))
+    phasors = sine_phasor([amplitudes], phases)
     spectrum = OrderSpectrum(np.array(believed.error_orders), phasors)
     return float(spectrum.peak_to_peak(believed.ratio)[0])
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.believed import Rig
 from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import Features
@@ -148,7 +149,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
     return name if reduction > _SEEN_AT_REST else None
 
 
-def unexpected_orders(features: Features, ratio: float, rig: object) -> list[float]:
+def unexpected_orders(features: Features, ratio: float, rig: Rig) -> list[float]:
     """Return orders beyond those of the features at which records show more than noise.
 
     The strongest first, summed over channels and records; fixed frequencies, whose order differs
@@ -156,7 +157,7 @@ def unexpected_orders(features: Features, ratio: float, rig: object) -> list[flo
     """
     total: dict[float, float] = {}
     for record in features.records:
-        orders, amplitudes = residual_spectrum(record, rig, ratio, features.orders)  # type: ignore[arg-type]
+        orders, amplitudes = residual_spectrum(record, rig, ratio, features.orders)
         power = amplitudes**2
         threshold = np.log(power.size * len(features.records) / _FALSE_LINES)
         for place in np.flatnonzero(power.max(axis=0) > threshold):

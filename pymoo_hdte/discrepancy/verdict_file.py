@@ -114,7 +114,7 @@ def sentence(verdict: Verdict) -> str:
     if verdict.status == "adequate" or chosen is None:
         return "Nothing is missing: the believed drive explains the records within its tolerances."
     what = " ".join(candidate.sentence for candidate in chosen.candidates)
-    if not all(candidate.listed for candidate in chosen.candidates):
+    if not chosen.listed:
         return f"Something is missing that is none of the known effects. {what}"
     if verdict.status == "unlisted":
         return (

@@ -12,17 +12,16 @@ from threadpoolctl import threadpool_limits
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign import Campaign
 from pymoo_hdte.discrepancy.candidate import Candidate
-from pymoo_hdte.discrepancy.data import Data, start_parameters
+from pymoo_hdte.discrepancy.data import Data, training_data
 from pymoo_hdte.discrepancy.features import Features, measure
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.library import candidates
 from pymoo_hdte.discrepancy.naming import SHARE, Verdict, judge
+from pymoo_hdte.discrepancy.order_lines import HIGHEST_ORDER
 from pymoo_hdte.discrepancy.screening import leading_sweep_effect, unexpected_orders
-from pymoo_hdte.discrepancy.torsion_curve import torsion_points
 
 FEWEST_RECORDS = 3
 """Below this no effect could be told from the base parameters."""
-HIGHEST_ORDER = 14.0
 _SEPARATION = 0.9
 """Least distance of two order lines, in cycles per output turn."""
 _MOST_LINES = 4
@@ -102,9 +101,7 @@ def analyse(campaign: Campaign) -> Analysis:
     if unexpected:
         orders = _apart([*expected, *unexpected], campaign, HIGHEST_ORDER)
         features = measure(campaign, campaign.train, orders)
-    sweeps = [record for record in campaign.torsion if record.role == "train"]
-    points = tuple(torsion_points(record, campaign.rig) for record in sweeps)
-    data = Data(campaign, features, start_parameters(campaign, features), points)
+    data = training_data(campaign, features)
     base = fit(data)
     listed = _candidates(data, base)
     if leading_sweep_effect(data, base, listed) in CLEARANCES:

@@ -45,6 +45,16 @@ class Effect(Protocol):
         ...
 
 
+Place = tuple[str, str, float | None]
+"""Name, port and order of an effect."""
+
+
+def place_of(effect: Effect) -> Place:
+    """Return where an effect stands in a drive model, which takes one at each place."""
+    law = getattr(effect, "law", effect)
+    return effect.name, str(getattr(effect, "port", "")), getattr(law, "order", None)
+
+
 @dataclass(frozen=True)
 class LoadInertia:
     """Inertia rigidly on the output: loading motor, couplings, torque sensor or robot link.

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
 from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100
-from pymoo_hdte.drive.effects import Effect, effect_from_fields
-from pymoo_hdte.drive.order_spectrum import OrderSpectrum
+from pymoo_hdte.drive.effects import Effect, effect_from_fields, place_of
+from pymoo_hdte.drive.order_spectrum import OrderSpectrum, sine_phasor
 from pymoo_hdte.drive.steady_state import steady_state
 from pymoo_hdte.drive.toml_fields import Fields, read_toml
 from pymoo_hdte.units import ARCSEC
@@ -70,7 +70,7 @@ class KinematicError:
 
     def unit_phasors(self, ratio: float) -> NDArray[np.complex128]:
         """Return the phasors, shape (n_orders,), of the error whose value theta_s is 1 rad."""
-        phasors = -1j * np.array(self.amplitudes) * np.exp(1j * np.array(self.phases))
+        phasors = sine_phasor(self.amplitudes, self.phases)
         shape = OrderSpectrum(np.array(self.orders), phasors[None, :])
         peak_to_peak = shape.peak_to_peak(ratio)[0]
         if peak_to_peak <= 1e-9 * sum(self.amplitudes):
@@ -100,11 +100,7 @@ class DriveModel:
     effects: tuple[Effect, ...] = ()
 
     def __post_init__(self) -> None:
-        places = [
-            (effect.name, getattr(effect, "port", ""), getattr(law, "order", None))
-            for effect in self.effects
-            for law in [getattr(effect, "law", effect)]
-        ]
+        places = [place_of(effect) for effect in self.effects]
         if len(set(places)) != len(places):
             names = [effect.name for effect in self.effects]
             raise InvalidInput("effects", names, "each effect once, at each port and order")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 
@@ -19,6 +19,11 @@ POINTS_PER_TURN = 60
 _POINTS_PER_CYCLE = 6
 _NEWTON_STEPS = 3
 _ROWS_AT_ONCE = 32
+
+
+def sine_phasor(amplitude: ArrayLike, phase: ArrayLike) -> NDArray[np.complex128]:
+    """Return the phasor p of amplitude sin(x + phase) = Re p exp(i x)."""
+    return np.asarray(-1j * np.asarray(amplitude) * np.exp(1j * np.asarray(phase)))
 
 
 @dataclass(frozen=True)

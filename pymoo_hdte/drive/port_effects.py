@@ -37,6 +37,7 @@ from pymoo_hdte.drive.friction import (
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.laws import Law
 from pymoo_hdte.drive.mesh_laws import CubicStiffness, DeadZone, PeriodicClearance, SoftWindup
+from pymoo_hdte.drive.order_spectrum import sine_phasor
 from pymoo_hdte.drive.toml_fields import UNITS, Fields
 
 FRICTION_PORTS = ("input", "output")
@@ -147,7 +148,7 @@ class KinematicErrorLine:
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with the order added."""
-        phasor = -1j * self.amplitude * np.exp(1j * self.phase)
+        phasor = sine_phasor(self.amplitude, self.phase)
         column = np.full((len(coefficients.stiffness), 1), phasor)
         return replace(
             coefficients,

@@ -1,0 +1,33 @@
+"""One effect of every law, which the forward and the reverse tests of the drive share."""
+
+from pymoo_hdte.drive.friction import (
+    CoulombFriction,
+    NonlinearDrag,
+    PeriodicFriction,
+    PeriodicTorque,
+    StribeckFriction,
+)
+from pymoo_hdte.drive.hysteresis import MaxwellSlip
+from pymoo_hdte.drive.mesh_laws import CubicStiffness, DeadZone, PeriodicClearance, SoftWindup
+from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
+from pymoo_hdte.units import ARCSEC
+
+EFFECTS = [
+    LawAtPort("hardening_stiffness", "mesh", CubicStiffness(1.2e9)),
+    LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 2e-4)),
+    LawAtPort("backlash", "mesh", DeadZone(5 * ARCSEC)),
+    LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 3 * ARCSEC, 2 * ARCSEC)),
+    LawAtPort("hysteresis", "mesh", MaxwellSlip(1.0, 2e-4)),
+    LawAtPort("coulomb_friction", "output", CoulombFriction(2.0)),
+    LawAtPort("stribeck_friction", "input", StribeckFriction(0.05, 0.05, 50.0)),
+    LawAtPort("position_dependent_friction", "input", PeriodicFriction(1.0, 0.3, 0.02)),
+    LawAtPort("nonlinear_drag", "input", NonlinearDrag(1e-6)),
+    LawAtPort("torque_ripple", "input", PeriodicTorque(6.0, 1.0, 0.015)),
+    KinematicErrorLine(3.0, 2 * ARCSEC, 0.7),
+    KinematicReaction(),
+]
+
+
+def memoryless(effects):
+    """Return the effects without hysteresis, whose springs make an integrator chatter."""
+    return [effect for effect in effects if effect.name != "hysteresis"]
