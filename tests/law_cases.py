@@ -8,12 +8,17 @@ from pymoo_hdte.drive.friction import (
     StribeckFriction,
 )
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
-from pymoo_hdte.drive.mesh_laws import CubicStiffness, DeadZone, PeriodicClearance, SoftWindup
+from pymoo_hdte.drive.mesh_laws import (
+    DeadZone,
+    HardeningStiffness,
+    PeriodicClearance,
+    SoftWindup,
+)
 from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
 from pymoo_hdte.units import ARCSEC
 
 EFFECTS = [
-    LawAtPort("hardening_stiffness", "mesh", CubicStiffness(1.2e9)),
+    LawAtPort("hardening_stiffness", "mesh", HardeningStiffness(1.2e9)),
     LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 2e-4)),
     LawAtPort("backlash", "mesh", DeadZone(5 * ARCSEC)),
     LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 3 * ARCSEC, 2 * ARCSEC)),

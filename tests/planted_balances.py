@@ -16,11 +16,11 @@ from pymoo_hdte.drive import (
     ThermalDrift,
 )
 from pymoo_hdte.drive.friction import CoulombFriction, NonlinearDrag, PeriodicTorque
-from pymoo_hdte.drive.mesh_laws import CubicStiffness
+from pymoo_hdte.drive.mesh_laws import HardeningStiffness
 from pymoo_hdte.units import ARCSEC
 
 EFFECTS = {
-    "hardening_stiffness": LawAtPort("hardening_stiffness", "mesh", CubicStiffness(1e9)),
+    "hardening_stiffness": LawAtPort("hardening_stiffness", "mesh", HardeningStiffness(1e9)),
     "coulomb_friction": LawAtPort("coulomb_friction", "output", CoulombFriction(1.5)),
     "nonlinear_drag": LawAtPort("nonlinear_drag", "input", NonlinearDrag(5e-7)),
     "kinematic_reaction": KinematicReaction(1.0),

@@ -12,8 +12,9 @@ from pymoo_hdte.discrepancy.features import Features
 from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.discrepancy.forward import Conditions, coefficients_of
 from pymoo_hdte.discrepancy.library import candidates
-from pymoo_hdte.discrepancy.naming import Rival, Verdict
+from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.parameters import Layout, base_parameters
+from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.drive import mean_torsion

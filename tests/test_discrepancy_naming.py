@@ -7,11 +7,12 @@ import pytest
 from planted_features import CONDITIONS, known_data, library, measured
 from scipy.stats import chi2
 
-from pymoo_hdte.discrepancy import naming
+from pymoo_hdte.discrepancy import naming, rival
 from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.discrepancy.naming import adequate, judge
+from pymoo_hdte.discrepancy.naming import judge
 from pymoo_hdte.discrepancy.objective import Objective
 from pymoo_hdte.discrepancy.parameters import Layout
+from pymoo_hdte.discrepancy.rival import adequate
 from pymoo_hdte.discrepancy.verdict_file import sentence
 from pymoo_hdte.units import ARCSEC
 
@@ -42,11 +43,11 @@ def planted(effects, seed=4, seen=SEEN, **changes):
     return measured(tuple(built), np.random.default_rng(seed), EMPTY, **changes)[0]
 
 
-def disturbed(data, chi_square):
+def disturbed(data, chi_square, record=3):
     """Add to one record's input torque a line that no drive has, worth so much of chi-square."""
     values, place = data.features.values.copy(), data.features.places(1)[6, 0]
     shift = np.zeros_like(values)
-    shift[3, place] = 1.0
+    shift[record, place] = 1.0
     worth = np.sum(data.whiten(shift) ** 2)
     return replace(
         data, features=replace(data.features, values=values + shift * np.sqrt(chi_square / worth))
@@ -117,11 +118,11 @@ def test_evidence_in_closed_form(ripple):
     penalty = len(chosen.fit.values) * np.log(len(base.residuals))
     assert chosen.bic == pytest.approx(chosen.fit.chi_square + penalty)
     assert chosen.share == 1.0
-    for rival in verdict.alternatives:
-        removed = base.chi_square - rival.fit.chi_square
+    for other in verdict.alternatives:
+        removed = base.chi_square - other.fit.chi_square
         excess = base.chi_square - verdict.degrees_of_freedom
-        assert rival.share == pytest.approx(min(removed / excess, 1.0))
-        assert rival.bic > chosen.bic
+        assert other.share == pytest.approx(min(removed / excess, 1.0))
+        assert other.bic > chosen.bic
 
 
 def test_the_same_data_give_the_same_verdict_to_the_last_bit(ripple):
@@ -189,8 +190,8 @@ def test_a_line_must_explain_down_to_the_noise(monkeypatch):
     data = disturbed(planted({RIPPLE: (5e-4, 0.0)}), 1000.0)
     verdict = verdict_on(data, [RIPPLE, LINE])
     assert verdict.status == "unlisted"
-    assert naming.SHARE < verdict.chosen.share < naming.EXACT_SHARE
-    monkeypatch.setattr(naming, "EXACT", 10.0)
+    assert rival.SHARE < verdict.chosen.share < rival.EXACT_SHARE
+    monkeypatch.setattr(rival, "EXACT", 10.0)
     found = verdict_on(data, [RIPPLE, LINE])
     assert (found.status, labels_of(found)) == ("named", {RIPPLE})
 
@@ -199,14 +200,42 @@ def test_a_curve_need_explain_its_share_only():
     data = disturbed(planted({CUBIC: (2e9,)}), 500.0)
     verdict = verdict_on(data, [CUBIC, RIPPLE])
     freedom = verdict.degrees_of_freedom
-    assert verdict.chosen.fit.chi_square > naming.EXACT * freedom
+    assert verdict.chosen.fit.chi_square > rival.EXACT * freedom
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC})
+
+
+def test_what_explains_one_channel_is_not_the_cause_of_what_another_shows(monkeypatch):
+    data = planted({CUBIC: (2e9,)})
+    for record in (1, 3):
+        data = disturbed(data, 250.0, record)
+    verdict = verdict_on(data, [CUBIC, RIPPLE])
+    assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
+    assert verdict.chosen.share > rival.SHARE
+    left = rival.unexplained(data, verdict.base, verdict.chosen.fit)
+    assert left.tolist() == [False, True, False, False, False]
+    monkeypatch.setattr(rival, "PART_SHARE", 0.0)
+    assert verdict_on(data, [CUBIC, RIPPLE]).status == "named"
+
+
+def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent():
+    data = planted({CUBIC: (2e9,)})
+    variances = np.diagonal(data.covariance, axis1=1, axis2=2)
+    vars(data)["covariance"] = np.eye(variances.shape[1]) * variances[:, None]
+    vars(data).pop("whiteners", None)
+    found = fit(data)
+    excess = rival.excess_of(data, found)
+    start, prior = (
+        np.array([getattr(one, name) for one in found.parameters]) for name in ("start", "prior")
+    )
+    priors = np.sum(((found.values - start) / prior) ** 2)
+    total = excess.of_parts.sum() + excess.freedom.sum()
+    assert total == pytest.approx(found.chi_square - priors)
 
 
 def test_a_second_effect_must_remove_most_of_what_is_left(monkeypatch):
     # The first leaves 200 beyond the noise, of which the second takes 100.
     data = disturbed(planted({RIPPLE: (3e-3, 0.0), LINE: (0.04 * ARCSEC, 0.0)}), 110.0)
-    monkeypatch.setattr(naming, "EXACT", 10.0)
+    monkeypatch.setattr(rival, "EXACT", 10.0)
     assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE}
     monkeypatch.setattr(naming, "SHARE", 0.4)
     assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE, LINE}

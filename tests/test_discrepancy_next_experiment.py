@@ -10,8 +10,9 @@ from planted_features import analysed, known_data, listed, measured
 from pymoo_hdte.discrepancy.experiment_grid import Grid, Model, separation
 from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.discrepancy.locate import locate
-from pymoo_hdte.discrepancy.naming import Rival, Verdict
+from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.next_experiment import nearest_rivals, next_experiment
+from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.discrepancy.verdict_file import verdict_document
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.units import ARCSEC

@@ -13,11 +13,12 @@ from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.forward import coefficients_of
 from pymoo_hdte.discrepancy.gap import Gap
 from pymoo_hdte.discrepancy.library import candidates
-from pymoo_hdte.discrepancy.naming import Rival, Verdict
+from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.parameters import base_parameters
 from pymoo_hdte.discrepancy.prove import prove
 from pymoo_hdte.discrepancy.revise import drive_model, model_toml, revised_model, sheet_toml
 from pymoo_hdte.discrepancy.rig_runs import Condition
+from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.discrepancy.virtual_rig import run_campaign
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.drive import load_datasheet, load_model

@@ -18,8 +18,8 @@ from pymoo_hdte.drive.friction import CoulombFriction, StribeckFriction
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.laws import PortState
 from pymoo_hdte.drive.mesh_laws import (
-    CubicStiffness,
     DeadZone,
+    HardeningStiffness,
     PeriodicClearance,
     SoftWindup,
 )
@@ -30,8 +30,9 @@ RIG = Rig(0.02, 0.5, 0.7 * ARCSEC, 0.003, 0.2, 0.3 * ARCSEC, 0.204 * ARCSEC)
 LOOP = np.interp(np.arange(181.0), [0, 36, 108, 180], [0.0, 40.0, -40.0, 40.0])
 LAWS = [
     (),
-    (("mesh", CubicStiffness(2e9)),),
+    (("mesh", HardeningStiffness(2e9)),),
     (("mesh", SoftWindup(0.3, 2e-4)),),
+    (("mesh", HardeningStiffness(0.0, 0.3, 5e-4, 6.0)),),
     (("mesh", DeadZone(5.0 * ARCSEC)),),
     (("mesh", MaxwellSlip(1.5, 3e-4)),),
     (("output", CoulombFriction(4.0)),),
@@ -82,7 +83,7 @@ def test_without_laws_the_torsion_is_torque_over_stiffness():
 def test_cubic_stiffness_has_the_root_of_cardano(torque, cubic):
     p, half = K / (3.0 * cubic), torque / (2.0 * cubic)
     spread = 2.0 * p**0.5 * np.sinh(np.arcsinh(half / p**1.5) / 3.0)
-    found = quasi_static_torsion(drive(("mesh", CubicStiffness(cubic))), np.array([torque]))
+    found = quasi_static_torsion(drive(("mesh", HardeningStiffness(cubic))), np.array([torque]))
     assert found[0, 0] == pytest.approx(spread, rel=1e-9, abs=1e-16)
 
 
@@ -94,7 +95,7 @@ def test_within_a_clearance_hardly_any_torque_is_a_long_way(torque):
 
 
 def test_softening_that_carries_no_more_torque_has_no_torsion():
-    weak = drive(("mesh", CubicStiffness(-K / (3.0 * 1e-6))))
+    weak = drive(("mesh", HardeningStiffness(-K / (3.0 * 1e-6))))
     strongest = 2.0 / 3.0 * K * 1e-3
     found = quasi_static_torsion(weak, strongest * np.array([0.5, 0.9, 1.001]))[0]
     assert np.isfinite(found).tolist() == [True, True, False]

@@ -31,7 +31,12 @@ from pymoo_hdte.drive.friction import (
 from pymoo_hdte.drive.harmonic_balance import harmonic_balance
 from pymoo_hdte.drive.hysteresis import MaxwellSlip, slip_along
 from pymoo_hdte.drive.laws import PortState, periodic_phase
-from pymoo_hdte.drive.mesh_laws import CubicStiffness, DeadZone, PeriodicClearance, SoftWindup
+from pymoo_hdte.drive.mesh_laws import (
+    DeadZone,
+    HardeningStiffness,
+    PeriodicClearance,
+    SoftWindup,
+)
 from pymoo_hdte.drive.port_effects import LAWS, KinematicErrorLine, KinematicReaction, LawAtPort
 from pymoo_hdte.drive.toml_fields import Fields
 from pymoo_hdte.drive.torus import (
@@ -81,7 +86,7 @@ def test_the_motor_does_the_work_of_the_load_and_of_the_damper():
     """With the reaction of theta_s all other torques derive from one energy."""
     model = with_effects(
         preset("published"),
-        LawAtPort("hardening_stiffness", "mesh", CubicStiffness(1e9)),
+        LawAtPort("hardening_stiffness", "mesh", HardeningStiffness(1e9)),
         DampingReference(3.0),
         KinematicReaction(),
     )
@@ -147,6 +152,10 @@ def test_laws_have_the_signs_that_their_names_say():
     assert torque(DeadZone(1e-4), 5e-5) == pytest.approx(-2.5e4 * 5e-5, rel=1e-3)
     assert torque(PeriodicClearance(1.0, 0.0, 5e-5, 5e-5), 5e-4) == pytest.approx(-2.5e4 * 1e-4)
     assert torque(PeriodicClearance(1.0, np.pi, 5e-5, 5e-5), 5e-4) == pytest.approx(0.0, abs=1e-6)
+    # Nothing is added before a sharp corner, and a straight line with the added stiffness beyond.
+    corner = HardeningStiffness(0.0, 0.2, 1e-4, 20.0)
+    assert torque(corner, 5e-5) == pytest.approx(0.0, abs=1e-6)
+    assert torque(corner, 5e-4) == pytest.approx(0.2 * 2.5e4 * 4e-4)
     # A ripple drives, everything else opposes.
     assert torque(PeriodicTorque(6.0, 0.0, 0.1)) == pytest.approx(-0.1)
     assert torque(PeriodicFriction(2.0, 0.0, 0.1)) == pytest.approx(0.1)
@@ -276,8 +285,9 @@ def test_maxwell_slip_obeys_masing(force, torsion, reach):
 @pytest.mark.parametrize(
     ("law", "positions"),
     [
-        (CubicStiffness(1e9), (1e-4, -2e-3)),
+        (HardeningStiffness(1e9), (1e-4, -2e-3)),
         (SoftWindup(0.3, 2e-4), (1e-5, -2e-4, 1e-3)),
+        (HardeningStiffness(0.0, 0.3, 2e-4, 8.0), (1e-5, -2e-4, 1e-3)),
         (DeadZone(1e-4), (5e-5, 3e-4, -2e-4)),
         (PeriodicClearance(2.0, 0.3, 5e-5, 5e-5), (1e-5, 3e-4)),
     ],
@@ -331,7 +341,7 @@ def test_a_law_stands_only_where_it_can():
     with pytest.raises(InvalidInput, match=r"backlash\.port is 'input', allowed: one of 'mesh'"):
         LawAtPort("backlash", "input", DeadZone(1e-5))
     with pytest.raises(InvalidInput, match="a DeadZone"):
-        LawAtPort("backlash", "mesh", CubicStiffness(1.0))
+        LawAtPort("backlash", "mesh", HardeningStiffness(1.0))
     twice = [LawAtPort("coulomb_friction", port, CoulombFriction(0.1)) for port in ("input",) * 2]
     with pytest.raises(InvalidInput, match="at each port"):
         with_effects(preset("published"), *twice)

@@ -23,8 +23,8 @@ from pymoo_hdte.discrepancy.data import Data, start_parameters
 from pymoo_hdte.discrepancy.features import measure
 from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.discrepancy.hidden_forms import LISTED_FORMS, UNLISTED_FORMS
-from pymoo_hdte.discrepancy.naming import Rival
 from pymoo_hdte.discrepancy.parameters import Layout
+from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.discrepancy.virtual_rig import TrueRig
 from pymoo_hdte.discrepancy.workflow import Analysis
 

@@ -21,6 +21,7 @@ Values = Sequence[float]
 
 HARMONIC_NAMES = ("", "second_", "third_")
 """Prefixes of the parameters of a line's harmonics."""
+_LINEAR = ("_cosine", "_sine", "mean", "narrowest", "locked")
 _HARMONIC_SHARE = 0.2
 """Typical size of a further harmonic, as a share of the first."""
 
@@ -50,6 +51,8 @@ class Candidate:
         not laid at another's door.
     frees : str or None
         Base parameter whose tolerance it lifts.
+    form : str
+        In a word, where the library holds several forms of one effect.
     """
 
     name: str
@@ -62,25 +65,31 @@ class Candidate:
     exact: bool = False
     listed: bool = True
     frees: str | None = None
+    form: str = ""
 
     @property
     def label(self) -> str:
-        """Name, port and order in one word."""
+        """Name, port, form and order in one word."""
         order = "" if self.order is None else f"@{self.order:.4g}"
-        return f"{self.name}:{self.port}{order}"
+        form = f"_{self.form}" if self.form else ""
+        return f"{self.name}:{self.port}{form}{order}"
 
     @property
     def places(self) -> frozenset[Place]:
         """Where its effects stand in a drive model, which takes one of a name at each place."""
         return frozenset(place_of(effect) for effect in self.build(self.starts[0]))
 
+    def goes_with(self, other: Candidate) -> bool:
+        """Tell whether a drive may have both: no two of their effects at one place."""
+        return not self.places & other.places
+
     @property
     def linear(self) -> bool:
-        """Whether a prediction is close to linear in all its unknowns: parts of lines, and a mean.
+        """Whether a prediction is close to linear in all its unknowns: parts of lines, and levels.
 
         Each of `starts` then goes along one of them.
         """
-        return all(one.name.endswith(("_cosine", "_sine", "mean")) for one in self.parameters)
+        return all(one.name.endswith(_LINEAR) for one in self.parameters)
 
     @property
     def unknowns(self) -> int:

@@ -76,13 +76,18 @@ def backlash(believed: Believed, rng: np.random.Generator, size: float) -> Drawn
 
 
 def clearance_variation(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
-    """Draw a rounded dead zone whose width or centre varies once or twice in an input turn."""
+    """Draw a rounded dead zone whose width varies once or twice in an input turn.
+
+    Both flanks move, or one does. A zone that moves as a whole is not drawn: wherever the load
+    holds the flanks together it is backlash and a line of the static error, and nothing else.
+    """
     port, parameters = backlash(believed, rng, size)
-    return port, parameters | {
-        str(rng.choice(["pulse", "shift"])): rng.uniform(0.5, 1.0),
-        "clearance_order": float(rng.integers(1, 3)),
-        "clearance_phase": uniform_phase(rng),
-    }
+    variation = rng.uniform(0.5, 1.0)
+    flanks: dict[str, float | tuple[float, ...]] = {"pulse": variation}
+    if rng.random() < 0.5:
+        flanks = {"pulse": variation / 2.0, "shift": variation / 2.0}
+    order, phase = float(rng.integers(1, 3)), uniform_phase(rng)
+    return port, parameters | flanks | {"clearance_order": order, "clearance_phase": phase}
 
 
 def coulomb_friction(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:

@@ -17,7 +17,12 @@ from pymoo_hdte.discrepancy.candidate import (
 )
 from pymoo_hdte.drive import Effect, LawAtPort, MeshStiffnessVariation
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
-from pymoo_hdte.drive.mesh_laws import CubicStiffness, DeadZone, PeriodicClearance, SoftWindup
+from pymoo_hdte.drive.mesh_laws import (
+    DeadZone,
+    HardeningStiffness,
+    PeriodicClearance,
+    SoftWindup,
+)
 from pymoo_hdte.units import ARCSEC
 
 RATED_TORQUE = 40.0
@@ -37,8 +42,21 @@ def mesh_candidates(believed: Believed, orders: Sequence[float]) -> list[Candida
         "mesh",
         (unknown("coefficient", 0.0, 6.0 * cubic, cubic),),
         ((cubic,),),
-        lambda v: (LawAtPort("hardening_stiffness", "mesh", CubicStiffness(v[0])),),
+        lambda v: (LawAtPort("hardening_stiffness", "mesh", HardeningStiffness(v[0])),),
         "The drive grows stiffer under torque.",
+    )
+    corner = Candidate(
+        "hardening_stiffness",
+        "mesh",
+        (
+            unknown("stiffening", 0.0, 0.9, 0.2),
+            unknown("torsion", 0.05 * windup, windup, 0.4 * windup),
+            unknown("sharpness", 1.0, 20.0, 3.0),
+        ),
+        tuple((0.2, share * windup, 3.0) for share in (0.25, 0.5)),
+        lambda v: (LawAtPort("hardening_stiffness", "mesh", HardeningStiffness(0.0, *v)),),
+        "The drive grows stiffer beyond a torque.",
+        form="corner",
     )
     soft = Candidate(
         "soft_windup",
@@ -71,6 +89,7 @@ def mesh_candidates(believed: Believed, orders: Sequence[float]) -> list[Candida
     )
     return [
         hardening,
+        corner,
         soft,
         backlash,
         hysteresis,
@@ -98,18 +117,20 @@ def _varying(orders: Sequence[float]) -> Candidate:
 def _clearance(order: float) -> Candidate:
     def build(v: Values) -> tuple[Effect, ...]:
         variation, phase = polar(v[0], v[1])
-        law = PeriodicClearance(order, phase, v[2], variation, locked=v[3])
+        law = PeriodicClearance(order, phase, v[2] + variation, variation, locked=v[3])
         return (LawAtPort("clearance_variation", "mesh", law),)
 
     size = 4 * ARCSEC
-    means = (unknown("mean", 0.0, WIDEST, size), unknown("locked_mean", 0.0, 2 * WIDEST, size))
+    # A play that would fall below nothing stays there, and no search finds its way out of that.
+    narrowest = unknown("narrowest", 0.0, WIDEST, size)
+    locked = unknown("locked", 0.0, 2 * WIDEST, size)
     return Candidate(
         "clearance_variation",
         "mesh",
-        (*wave("variation", VARYING_MOST, size), *means),
+        (*wave("variation", VARYING_MOST, size), narrowest, locked),
         tuple(
-            (size * cosine, size * sine, size, size * locked)
-            for cosine, sine, locked in ((1, 0, 1), (0, 1, 1), (0, 0, 1), (0, 0, 2))
+            (size * cosine, size * sine, size, size * at_rest)
+            for cosine, sine, at_rest in ((1, 0, 1), (0, 1, 1), (0, 0, 1), (0, 0, 2))
         ),
         build,
         f"The play between the teeth varies, order {order:g} of the input.",

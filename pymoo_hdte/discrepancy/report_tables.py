@@ -11,10 +11,11 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign import Campaign
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.gap import Gap
-from pymoo_hdte.discrepancy.naming import SHARE, Rival, Verdict, adequate
+from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.discrepancy.prove import Proof
 from pymoo_hdte.discrepancy.revise import accepted_fit
+from pymoo_hdte.discrepancy.rival import SHARE, Rival, adequate
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 

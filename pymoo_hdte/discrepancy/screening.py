@@ -9,13 +9,13 @@ several strengths are tried and the best few candidates are fitted in earnest af
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.believed import Rig
-from pymoo_hdte.discrepancy.candidate import Candidate
+from pymoo_hdte.discrepancy.candidate import HARMONIC_NAMES, Candidate
 from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import Features
 from pymoo_hdte.discrepancy.fit import Fit
@@ -30,11 +30,22 @@ _SEEN_AT_REST = 50.0
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """A candidate, what it could remove of chi-square, and where to start its fit."""
+    """A candidate, what it could remove of chi-square, and where to start its fit.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    reduction : float
+        Of the whole chi-square.
+    start : tuple of float
+    at_rest : float
+        Of that of the torsion sweeps alone.
+    """
 
     candidate: Candidate
     reduction: float
     start: tuple[float, ...]
+    at_rest: float = 0.0
 
 
 def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
@@ -67,7 +78,12 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
             torsion = data.torsion_residuals(base, effects) - before_torsion
             signature = np.concatenate([change, np.nan_to_num(torsion[0]), np.zeros(priors)])
             signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
-        found.append(_best_start(candidate, np.array(signatures), left))
+        every = np.array(signatures)
+        best, at_rest = _best_start(candidate, every, left), 0.0
+        if before_torsion.size:
+            sweeps = slice(before.size, before.size + before_torsion.size)
+            at_rest = _best_start(candidate, every[:, sweeps], left[sweeps]).reduction
+        found.append(replace(best, at_rest=at_rest))
     return sorted(found, key=lambda one: -one.reduction)
 
 
@@ -94,11 +110,11 @@ def _best_start(
     upper = np.array([parameter.upper for parameter in candidate.parameters])
     if candidate.linear:
         best, reduction = _least_squares(signatures, starts, left)
-        parts = sum(one.name.endswith(("_cosine", "_sine")) for one in candidate.parameters)
-        lines = np.hypot(*best[:parts].reshape(-1, 2).T)
-        if lines[1:].any() and lines[1:].max() > lines[0]:
+        harmonic = [one.name.startswith(HARMONIC_NAMES[1:]) for one in candidate.parameters]
+        lines = np.hypot(*best[harmonic].reshape(-1, 2).T)
+        if lines.size and lines.max() > np.hypot(*best[:2]):
             # A line that is weaker than its harmonic is not what the harmonic belongs to.
-            kept = np.r_[0, 1, parts : len(best)]
+            kept = np.flatnonzero(~np.array(harmonic))
             best, reduction = _least_squares(signatures[kept], starts[kept], left)
     else:
         sizes = np.einsum("ij,ij->i", signatures, signatures)

@@ -14,10 +14,11 @@ from pymoo_hdte.discrepancy.candidate import HARMONIC_NAMES, Candidate, polar
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.misfit_map import Location
-from pymoo_hdte.discrepancy.naming import Rival, Verdict
+from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.next_experiment import Proposal
 from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.discrepancy.revise import accepted_fit
+from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.discrepancy.workflow import Analysis
 
 _DEVIATIONS = 1.959964
@@ -42,6 +43,7 @@ UNITS = {
     "error_phase": "rad",
     "coefficient": "N.m/rad3",
     "softening": "1",
+    "stiffening": "1",
     "sharpness": "1",
     "spread": "1",
     "torsion": "rad",
@@ -50,8 +52,8 @@ UNITS = {
     "depth": "1",
     "level": "N.m",
     "mean": "N.m",
-    "clearance_variation.mean": "rad",
-    "locked_mean": "rad",
+    "narrowest": "rad",
+    "locked": "rad",
     "variation": "rad",
     "excess": "N.m",
     "fading": "rad/s",

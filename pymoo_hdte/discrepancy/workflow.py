@@ -16,8 +16,9 @@ from pymoo_hdte.discrepancy.data import Data, training_data
 from pymoo_hdte.discrepancy.features import Features, measure
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.library import candidates
-from pymoo_hdte.discrepancy.naming import SHARE, Verdict, judge
+from pymoo_hdte.discrepancy.naming import Verdict, judge
 from pymoo_hdte.discrepancy.order_lines import HIGHEST_ORDER
+from pymoo_hdte.discrepancy.rival import SHARE
 from pymoo_hdte.discrepancy.screening import leading_sweep_effect, unexpected_orders
 
 FEWEST_RECORDS = 3

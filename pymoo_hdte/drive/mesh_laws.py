@@ -12,18 +12,37 @@ from pymoo_hdte.drive.laws import Aperiodic, Periodic, PortState, Response, Valu
 
 
 @dataclass(frozen=True)
-class CubicStiffness(Aperiodic):
-    """T = coefficient d^3; N.m/rad3."""
+class HardeningStiffness(Aperiodic):
+    """T = coefficient d^3 + stiffening K (d - torsion g(d / torsion)): stiffer under load.
 
-    coefficient: float
+    Gradually, by the cubic (N.m/rad3), or beyond a corner: K is higher by the share ``stiffening``
+    beyond the ``torsion``, rad. g is that of `SoftWindup`; a corner differs from that law by a
+    multiple of K d, so that only the tolerance of K tells a drive that is stiff under load from one
+    that is soft near zero.
+    """
+
+    coefficient: float = 0.0
+    stiffening: float = 0.0
+    torsion: float = 1.0
+    sharpness: float = 2.0
 
     def __post_init__(self) -> None:
         real_number("hardening_stiffness.coefficient", self.coefficient)
+        real_number("hardening_stiffness.stiffening", self.stiffening, above=-1.0)
+        real_number("hardening_stiffness.torsion", self.torsion, above=0.0)
+        real_number("hardening_stiffness.sharpness", self.sharpness, at_least=1.0)
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
         square = state.position**2
-        return Response(self.coefficient * square * state.position, 3.0 * self.coefficient * square)
+        torque = self.coefficient * square * state.position
+        slope = 3.0 * self.coefficient * square
+        if self.stiffening != 0.0:
+            added = self.stiffening * state.stiffness
+            wound, share = _wound(state.position, self.torsion, self.sharpness)
+            torque = torque + added * (state.position - wound)
+            slope = slope + added * (1.0 - share)
+        return Response(torque, slope)
 
 
 @dataclass(frozen=True)
@@ -45,13 +64,17 @@ class SoftWindup(Aperiodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        wound = state.position / self.torsion
-        # (1 + |x|^p)^(1/p) by logarithms: the power itself overflows far from zero.
-        power = self.sharpness * np.log(np.maximum(np.abs(wound), 1e-30))
-        root = np.logaddexp(0.0, power) / self.sharpness
         lost = self.softening * state.stiffness
-        slope = np.exp(-(1.0 + self.sharpness) * root)
-        return Response(-lost * self.torsion * wound * np.exp(-root), -lost * slope)
+        wound, slope = _wound(state.position, self.torsion, self.sharpness)
+        return Response(-lost * wound, -lost * slope)
+
+
+def _wound(position: Values, torsion: float, sharpness: float) -> tuple[Values, Values]:
+    """Return torsion x g(position / torsion), which ends at the torsion, and its slope."""
+    share = position / torsion
+    # (1 + |x|^p)^(1/p) by logarithms: the power itself overflows far from zero.
+    root = np.logaddexp(0.0, sharpness * np.log(np.maximum(np.abs(share), 1e-30))) / sharpness
+    return position * np.exp(-root), np.exp(-(1.0 + sharpness) * root)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 =============================  ===============  ====================================================
 name                           port             law
 =============================  ===============  ====================================================
-``hardening_stiffness``        mesh             `CubicStiffness`
+``hardening_stiffness``        mesh             `HardeningStiffness`
 ``soft_windup``                mesh             `SoftWindup`
 ``backlash``                   mesh             `DeadZone`
 ``clearance_variation``        mesh             `PeriodicClearance`
@@ -36,14 +36,23 @@ from pymoo_hdte.drive.friction import (
 )
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.laws import Law
-from pymoo_hdte.drive.mesh_laws import CubicStiffness, DeadZone, PeriodicClearance, SoftWindup
+from pymoo_hdte.drive.mesh_laws import (
+    DeadZone,
+    HardeningStiffness,
+    PeriodicClearance,
+    SoftWindup,
+)
 from pymoo_hdte.drive.order_spectrum import sine_phasor
 from pymoo_hdte.drive.toml_fields import UNITS, Fields
 
 FRICTION_PORTS = ("input", "output")
 
 LAWS: dict[str, tuple[type, tuple[str, ...], dict[str, str]]] = {
-    "hardening_stiffness": (CubicStiffness, ("mesh",), {"coefficient": "cubic stiffness"}),
+    "hardening_stiffness": (
+        HardeningStiffness,
+        ("mesh",),
+        {"coefficient": "cubic stiffness", "stiffening": "", "torsion": "angle", "sharpness": ""},
+    ),
     "soft_windup": (
         SoftWindup,
         ("mesh",),

@@ -1,0 +1,193 @@
+"""Sets of effects fitted jointly with the base: how much of the misfit each explains, and where.
+
+The misfit is weighed in each part of the data by itself: the channels of the running records, and
+the torsion sweeps. A sweep at rest may stand out a thousand times further than the transmission
+error, and an effect that explains only the one must not pass for the cause of the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.candidate import Candidate
+from pymoo_hdte.discrepancy.data import Data
+from pymoo_hdte.discrepancy.fit import Fit
+from pymoo_hdte.discrepancy.misfit_map import cell_chi_square, degrees_of_freedom
+from pymoo_hdte.discrepancy.objective import count
+
+DEVIATIONS = 4.0
+"""Standard deviations of chi-square up to which a model is adequate."""
+SHARE = 0.9
+"""Least share of the excess chi-square that named effects remove."""
+PART_SHARE = 0.5
+"""Least share of the excess of each part of the data that they remove."""
+EXACT = 1.3
+"""Chi-square per degree of freedom that does for effects of an exact form: noise that a resonance
+magnifies is no longer that of the linear covariance."""
+EXACT_SHARE = 0.9999
+"""Least share that effects of an exact form remove, if they do not explain down to the noise: of a
+line ten thousand times the noise, the integrator's steps show."""
+ALIKE = 2.0
+"""Where no form fits to the noise, a rival that leaves less than this multiple of what the chosen
+one leaves cannot be excluded: what is left is the form, not the noise."""
+BIC_GAIN = 6.0
+"""Least gain of BIC of a named effect."""
+VERY_STRONG = 10.0
+"""Distance of twice the logarithm of the evidence within which rivals cannot be told apart (Kass,
+Raftery, J. Am. Stat. Assoc. 1995)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A set of effects fitted jointly with the base, with its evidence.
+
+    Attributes
+    ----------
+    fit : Fit
+    bic : float
+        Chi-square + parameters x ln(residuals).
+    share : float
+        Of the base's excess chi-square that it removes; 1 leaves nothing but noise.
+    """
+
+    fit: Fit
+    bic: float
+    share: float
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """The effects."""
+        return self.fit.candidates
+
+    @property
+    def listed(self) -> bool:
+        """Whether a verdict may name all of them."""
+        return all(candidate.listed for candidate in self.candidates)
+
+    @property
+    def exact(self) -> bool:
+        """Whether the forms of all of them leave nothing open."""
+        return all(candidate.exact for candidate in self.candidates)
+
+    @property
+    def label(self) -> str:
+        """Their labels in one word."""
+        return "+".join(candidate.label for candidate in self.candidates)
+
+    @cached_property
+    def names(self) -> frozenset[tuple[str, str]]:
+        """Name and port of each."""
+        return frozenset((candidate.name, candidate.port) for candidate in self.candidates)
+
+
+def rival(fitted: Fit, of_base: float) -> Rival:
+    """Return a fit with its evidence, the base's excess chi-square being given."""
+    n_base = len(fitted.values) - count(fitted.candidates)
+    unknowns = n_base + sum(candidate.unknowns for candidate in fitted.candidates)
+    bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
+    gain = of_base + (len(fitted.residuals) - n_base) - fitted.chi_square
+    share = gain / max(of_base, gain)
+    return Rival(fitted, float(bic), float(share))
+
+
+def adequate(freedom: int) -> float:
+    """Return chi-square per degree of freedom up to which a model is adequate; 1.15 for 1400."""
+    return float(1.0 + DEVIATIONS * np.sqrt(2.0 / freedom))
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """Chi-square of a fit beyond its degrees of freedom, in each part of the data.
+
+    Parts are the four channels of the running records, cell by cell as on the map of the misfit,
+    and the torsion sweeps, which count as one more record.
+
+    Attributes
+    ----------
+    chi_square : ndarray, shape (r + 1, 5)
+        Excess by record and part.
+    freedom : ndarray, shape (r + 1, 5)
+        Degrees of freedom.
+    """
+
+    chi_square: NDArray[np.float64]
+    freedom: NDArray[np.float64]
+
+    @property
+    def of_parts(self) -> NDArray[np.float64]:
+        """Of each part, shape (5,)."""
+        return np.asarray(self.chi_square.sum(axis=0))
+
+    @property
+    def significant(self) -> NDArray[np.bool_]:
+        """Whether it is more than noise, of each part, shape (5,)."""
+        return np.asarray(self.of_parts > DEVIATIONS * np.sqrt(2.0 * self.freedom.sum(axis=0)))
+
+    def without(self, record: NDArray[np.int_]) -> Excess:
+        """Return it with one record left out of each part; ``record`` has shape (5,)."""
+        chi_square, freedom = self.chi_square.copy(), self.freedom.copy()
+        parts = np.arange(len(record))
+        chi_square[record, parts] = freedom[record, parts] = 0.0
+        return Excess(chi_square, freedom)
+
+
+def excess_of(data: Data, fitted: Fit) -> Excess:
+    """Return the excess chi-square of a fit by record and part of the data."""
+    n_records, n_features = data.features.values.shape
+    n_running = n_records * n_features
+    n_sweeps = sum(len(points.angle) - 1 for points in data.torsion)
+    whitened = fitted.residuals[:n_running].reshape(n_records, n_features)
+    cells = cell_chi_square(data, np.einsum("rij,rj->ri", data.whiteners, whitened))
+    known = np.isfinite(cells)
+    chi_square, freedom = np.zeros((2, n_records + 1, cells.shape[1] + 1))
+    freedom[:-1, :-1] = np.where(known, degrees_of_freedom(data), 0.0).sum(axis=2)
+    chi_square[:-1, :-1] = np.where(known, cells, 0.0).sum(axis=2)
+    sweeps = fitted.residuals[n_running : n_running + n_sweeps]
+    chi_square[-1, -1], freedom[-1, -1] = sweeps @ sweeps, n_sweeps
+    return Excess(chi_square - freedom, freedom)
+
+
+def unexplained(data: Data, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
+    """Tell which parts of the data, of those that contradict the base, contradict a fit as well.
+
+    Shape (5,), as `Excess` has them. Of the running records the worst is left out: one condition
+    may lie at a resonance, where no form is exact.
+    """
+    before, after = excess_of(data, base), excess_of(data, fitted)
+    worst = np.argmax(after.chi_square, axis=0)
+    worst[-1] = 0
+    before, after = before.without(worst), after.without(worst)
+    wrong = before.significant & after.significant
+    return np.asarray(wrong & (after.of_parts > (1.0 - PART_SHARE) * before.of_parts))
+
+
+def explains(data: Data, one: Rival, base: Fit, freedom: int) -> bool:
+    """Tell whether a set of effects removes what is wrong with the base, and wherever it is."""
+    gain = base.chi_square - one.fit.chi_square
+    unknowns = sum(candidate.unknowns for candidate in one.candidates)
+    share = EXACT_SHARE if one.exact else SHARE
+    limit = max(adequate(freedom), EXACT) if one.exact else adequate(freedom)
+    if gain - unknowns * np.log(len(base.residuals)) < BIC_GAIN:
+        return False
+    if one.fit.chi_square <= limit * freedom:
+        return True
+    return one.share >= share and not unexplained(data, base, one.fit).any()
+
+
+def alike(one: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
+    """Tell whether the data cannot separate a rival with other effects from the chosen one.
+
+    Where even the chosen form leaves more than noise, that remainder is the scale on which chi-
+    squares differ: hidden and listed forms of one effect differ in kind.
+    """
+    if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
+        return False
+    misfit = max(chosen.fit.chi_square / freedom, 1.0)
+    near = one.fit.evidence - chosen.fit.evidence < margin * VERY_STRONG * misfit
+    if near or misfit <= adequate(freedom) or (one.exact and chosen.exact):
+        return near
+    return one.fit.chi_square - freedom < margin * ALIKE * (chosen.fit.chi_square - freedom)
