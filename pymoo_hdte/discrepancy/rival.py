@@ -7,6 +7,7 @@ error, and an effect that explains only the one must not pass for the cause of t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,9 +16,10 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.data import Data
-from pymoo_hdte.discrepancy.fit import Fit
+from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.misfit_map import cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.objective import count
+from pymoo_hdte.discrepancy.screening import Screened
 
 DEVIATIONS = 4.0
 """Standard deviations of chi-square up to which a model is adequate."""
@@ -25,6 +27,9 @@ SHARE = 0.9
 """Least share of the excess chi-square that named effects remove."""
 PART_SHARE = 0.5
 """Least share of the excess of each part of the data that they remove."""
+PLAIN = 9.0
+"""Chi-square per degree of freedom from which a part of the data plainly contradicts a model: three
+times the noise."""
 EXACT = 1.3
 """Chi-square per degree of freedom that does for effects of an exact form: noise that a resonance
 magnifies is no longer that of the linear covariance."""
@@ -39,6 +44,10 @@ BIC_GAIN = 6.0
 VERY_STRONG = 10.0
 """Distance of twice the logarithm of the evidence within which rivals cannot be told apart (Kass,
 Raftery, J. Am. Stat. Assoc. 1995)."""
+
+
+EVALUATIONS = {1: 25, 2: 10}
+"""Steps of a fit of one effect, and of a second one beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +161,7 @@ def excess_of(data: Data, fitted: Fit) -> Excess:
 
 
 def unexplained(data: Data, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
-    """Tell which parts of the data, of those that contradict the base, contradict a fit as well.
+    """Tell which parts of the data, of those that contradict the base, a fit plainly misses too.
 
     Shape (5,), as `Excess` has them. Of the running records the worst is left out: one condition
     may lie at a resonance, where no form is exact.
@@ -161,8 +170,9 @@ def unexplained(data: Data, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     worst = np.argmax(after.chi_square, axis=0)
     worst[-1] = 0
     before, after = before.without(worst), after.without(worst)
-    wrong = before.significant & after.significant
-    return np.asarray(wrong & (after.of_parts > (1.0 - PART_SHARE) * before.of_parts))
+    plain = after.of_parts > (PLAIN - 1.0) * after.freedom.sum(axis=0)
+    left = after.of_parts > (1.0 - PART_SHARE) * before.of_parts
+    return np.asarray(before.significant & plain & left)
 
 
 def explains(data: Data, one: Rival, base: Fit, freedom: int) -> bool:
@@ -191,3 +201,25 @@ def alike(one: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
     if near or misfit <= adequate(freedom) or (one.exact and chosen.exact):
         return near
     return one.fit.chi_square - freedom < margin * ALIKE * (chosen.fit.chi_square - freedom)
+
+
+def refined(data: Data, one: Rival, excess: float) -> Rival:
+    """Fit a rival to the end, with slopes of its own."""
+    return rival(fit(data, one.candidates, one.fit.values), excess)
+
+
+def fit_all(data: Data, base: Fit, chosen: Sequence[Screened], excess: float) -> list[Rival]:
+    """Fit candidates, each jointly with what stands; by rising BIC."""
+    found = []
+    for one in chosen:
+        start = np.concatenate([base.values, one.start])
+        effects = (*base.candidates, one.candidate)
+        fitted = fit(data, effects, start, EVALUATIONS[len(effects)], base.slopes)
+        found.append(rival(fitted, excess))
+    return sorted(found, key=lambda one: one.bic)
+
+
+def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
+    """Return the candidates without those behind ``most`` better ones of their name."""
+    names = [one.candidate.name for one in screened]
+    return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < most]

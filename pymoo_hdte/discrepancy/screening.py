@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.believed import Rig
 from pymoo_hdte.discrepancy.candidate import HARMONIC_NAMES, Candidate
 from pymoo_hdte.discrepancy.data import Data
-from pymoo_hdte.discrepancy.features import Features
+from pymoo_hdte.discrepancy.features import MEANS, Features
 from pymoo_hdte.discrepancy.fit import Fit
-from pymoo_hdte.discrepancy.order_lines import residual_spectrum
+from pymoo_hdte.discrepancy.order_lines import CHANNELS, residual_spectrum
 
 _FALSE_LINES = 1e-3
 """Chance that noise alone shows any line in a whole campaign."""
@@ -38,14 +38,14 @@ class Screened:
     reduction : float
         Of the whole chi-square.
     start : tuple of float
-    at_rest : float
-        Of that of the torsion sweeps alone.
+    by_part : tuple of float, length 5
+        Of that of each channel alone, and of the torsion sweeps.
     """
 
     candidate: Candidate
     reduction: float
     start: tuple[float, ...]
-    at_rest: float = 0.0
+    by_part: tuple[float, ...] = (0.0,) * 5
 
 
 def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
@@ -66,6 +66,7 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
     before = data.features.of_prediction(stands)
     before_torsion = data.torsion_residuals(base, fitted.effects)
     priors = len(fitted.residuals) - before.size - before_torsion.size
+    parts = _rows_of_parts(data.features, before_torsion.size)
     found = []
     for candidate in candidates:
         if candidate.frees is not None:
@@ -79,12 +80,22 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
             signature = np.concatenate([change, np.nan_to_num(torsion[0]), np.zeros(priors)])
             signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
         every = np.array(signatures)
-        best, at_rest = _best_start(candidate, every, left), 0.0
-        if before_torsion.size:
-            sweeps = slice(before.size, before.size + before_torsion.size)
-            at_rest = _best_start(candidate, every[:, sweeps], left[sweeps]).reduction
-        found.append(replace(best, at_rest=at_rest))
+        by_part = tuple(
+            _best_start(candidate, every[:, rows], left[rows]).reduction for rows in parts
+        )
+        found.append(replace(_best_start(candidate, every, left), by_part=by_part))
     return sorted(found, key=lambda one: -one.reduction)
+
+
+def _rows_of_parts(features: Features, n_sweeps: int) -> list[NDArray[np.int_]]:
+    """Return where the residuals of each channel stand, and those of the sweeps."""
+    n_records, n_features = features.values.shape
+    first = n_features * np.arange(n_records)[:, None]
+    found = []
+    for channel in range(len(CHANNELS)):
+        mean = [MEANS.index(channel)] if channel in MEANS else []
+        found.append((first + np.append(mean, features.places(channel)).astype(int)).ravel())
+    return [*found, n_records * n_features + np.arange(n_sweeps)]
 
 
 def _freed(
