@@ -22,6 +22,7 @@ ORDERS = [1.0 / 101.0, SCALE, 1.0, 2.0, 2.02, 3.0, 4.0, 5.0, 6.0]
 EMPTY = known_data(CONDITIONS[::2], ORDERS)
 RIPPLE, LINE = "torque_ripple:input@5", "kinematic_error:mesh@3"
 SOFT, CUBIC = "soft_windup:mesh", "hardening_stiffness:mesh"
+DRAG = "nonlinear_drag:input"
 REACTION, INERTIA = "kinematic_reaction:input", "load_inertia:output"
 SEEN = [3.0, 5.0]
 FEW = [RIPPLE, LINE, SOFT, REACTION, INERTIA, "nonlinear_drag:input"]
@@ -239,6 +240,20 @@ def test_a_second_effect_must_remove_most_of_what_is_left(monkeypatch):
     assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE}
     monkeypatch.setattr(second_effect, "SHARE", 0.4)
     assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE, LINE}
+
+
+def test_a_second_effect_is_looked_for_where_the_first_explains_least(monkeypatch):
+    """The curve takes 96 % of the excess, and nothing of that of the input torque."""
+    data = planted({CUBIC: (6e9,), DRAG: (2e-7,)})
+    verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE])
+    assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC, DRAG})
+    alone = next(one for one in verdict.alternatives if one.label == CUBIC)
+    assert alone.share > rival.SHARE
+    left = rival.unexplained(data, verdict.base, alone.fit)
+    assert left.tolist() == [False, True, False, False, False]
+    monkeypatch.setattr(second_effect, "HOPE", np.inf)
+    verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE])
+    assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
 
 
 def test_a_second_effect_beside_a_curve_must_count_beside_the_whole(monkeypatch):
