@@ -106,9 +106,13 @@ def test_sparse_regression_names_a_planted_effect(name):
     assert sparse_regression(planted((EFFECTS[name],))) == name
 
 
-def test_sparse_regression_does_not_call_adequate_what_only_a_wrong_damping_explains():
-    """At two speeds a drag is a damping, but one far beyond its tolerance."""
-    assert sparse_regression(planted((EFFECTS["nonlinear_drag"],))) == "unlisted"
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_sparse_regression_does_not_call_adequate_what_only_a_wrong_damping_explains(seed):
+    """At two speeds a drag is a damping, but one far beyond its tolerance: no term holds it.
+
+    What is said instead depends on where the base fit left what no record determines.
+    """
+    assert sparse_regression(planted((EFFECTS["nonlinear_drag"],), seed)) != "adequate"
 
 
 def test_sparse_regression_says_so_when_no_term_explains_a_misfit():
