@@ -48,6 +48,8 @@ Raftery, J. Am. Stat. Assoc. 1995)."""
 
 EVALUATIONS = {1: 25, 2: 10}
 """Steps of a fit of one effect, and of a second one beside it."""
+REFINEMENT = 12
+"""Steps of a fit that begins where one of these ended, with slopes of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +207,7 @@ def alike(one: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
 
 def refined(data: Data, one: Rival, excess: float) -> Rival:
     """Fit a rival to the end, with slopes of its own."""
-    return rival(fit(data, one.candidates, one.fit.values), excess)
+    return rival(fit(data, one.candidates, one.fit.values, REFINEMENT), excess)
 
 
 def fit_all(data: Data, base: Fit, chosen: Sequence[Screened], excess: float) -> list[Rival]:

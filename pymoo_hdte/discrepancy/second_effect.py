@@ -38,7 +38,7 @@ SECOND_LEAST = 0.05
 of a first law of no exact form: less may be that form."""
 SECONDS = 2
 """Names of second effects fitted beside the first, and as many for one part of the data."""
-HOPE = 0.3
+HOPE = 0.5
 """Least share of what is left that a second effect must remove to first order to be fitted."""
 
 
@@ -51,6 +51,9 @@ def with_second(
     best = singles[0]
     if not _second_could_count(data, best, base, freedom):
         return best, singles
+    # Slopes with the first effect in place, which those of pairs are close to.
+    best = refined(data, best, excess)
+    singles = [best, *singles[1:]]
     pairs = _pairs(data, base, best, candidates, excess)
     for place, pair in enumerate(pairs):
         if pair.bic >= best.bic:
@@ -122,19 +125,27 @@ def _pairs(
     """Return the best pairs that contain the best single effect.
 
     Seconds are taken from what would remove most of all that is left, and most of what is left of
-    the part of the data that the first explains worst: either may drown in the other.
+    the parts of the data that the first explains ill: either may drown in the other.
     """
     (first,) = single.candidates
     others = [one for one in candidates if one.frees is None and first.goes_with(one)]
+    before, after = (excess_of(data, one).of_parts for one in (base, single.fit))
+    ill = [] if single.exact else _ill_explained(data, base, single.fit)
+    if not single.exact:
+        shares = [after.sum() / before.sum(), *after[ill] / before[ill]]
+        others = [one for one in others if max(shares) >= _least(first, one)]
     screened = screen(data, single.fit, others)
     left = single.fit.chi_square - (base.chi_square - excess)
     chosen = _hopeful(screened, [one.reduction for one in screened], left)
-    worst = None if single.exact else _worst_part(data, base, single.fit)
-    if worst is not None:
-        left = float(excess_of(data, single.fit).of_parts[worst])
-        of_part = _hopeful(screened, [one.by_part[worst] for one in screened], left)
+    for part in ill:
+        of_part = _hopeful(screened, [one.by_part[part] for one in screened], float(after[part]))
         chosen += [one for one in of_part if one not in chosen]
     return fit_all(data, single.fit, chosen, excess)
+
+
+def _least(first: Candidate, second: Candidate) -> float:
+    """Return the least share of the base's excess that a second effect removes."""
+    return SECOND_LEAST if first.port == second.port else 1.0 - EXACT_SHARE
 
 
 def _hopeful(
@@ -146,14 +157,16 @@ def _hopeful(
     return varied(enough, 1)[:SECONDS]
 
 
-def _worst_part(data: Data, base: Fit, fitted: Fit) -> int | None:
-    """Return the part of the data, of those that contradict both, that a fit explains worst."""
+def _ill_explained(data: Data, base: Fit, fitted: Fit) -> list[int]:
+    """Return the parts of the data that contradict both a base and a fit, the worst first.
+
+    The worst, and what else the fit explains no better than by half.
+    """
     before, after = excess_of(data, base), excess_of(data, fitted)
-    wrong = before.significant & after.significant
-    if not wrong.any():
-        return None
-    shares = np.where(wrong, after.of_parts, -np.inf) / np.where(wrong, before.of_parts, 1.0)
-    return int(np.argmax(shares))
+    wrong = np.flatnonzero(before.significant & after.significant)
+    left = after.of_parts[wrong] / before.of_parts[wrong]
+    ranked = wrong[np.argsort(-left)].tolist()
+    return ranked[: max(1, int(np.sum(left > 1.0 - PART_SHARE)))]
 
 
 def _second_earned(
@@ -172,13 +185,12 @@ def _second_earned(
     if first.exact:
         left = first.fit.chi_square - freedom
         return left > 0.0 and first.fit.chi_square - pair.fit.chi_square >= SHARE * left
-    worst = _worst_part(data, base, first.fit)
-    if worst is None:
+    parts = _ill_explained(data, base, first.fit)
+    if not parts:
         return False
     before, alone, both = (excess_of(data, one) for one in (base, first.fit, pair.fit))
-    one_port = len({candidate.port for candidate in pair.candidates}) == 1
-    least = SECOND_LEAST if one_port else 1.0 - EXACT_SHARE
-    for part in (slice(None), worst):
+    least = _least(*pair.candidates)
+    for part in (slice(None), parts[0]):
         whole, left, rest = (np.sum(one.of_parts[part]) for one in (before, alone, both))
         if left - rest >= max(SECOND_SHARE * left, least * whole):
             return True
