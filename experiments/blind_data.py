@@ -89,6 +89,13 @@ class Outcome:
         return self.both if self.case.kind == "pair" else self.right
 
     @property
+    def right_word(self) -> bool:
+        """Whether the preferred answer alone, without its class, is what it must be."""
+        if self.case.kind in ("none", "unlisted"):
+            return self.right_answer
+        return bool(self._hidden & set(self.names[:1]))
+
+    @property
     def both(self) -> bool:
         """Whether all that is hidden is named, or stands in the class."""
         return self._hidden <= set(self.names) or self._in_class

@@ -1,4 +1,4 @@
-"""Simpler tools than the workflow on the same campaigns: a rule, a sparse regression, and chance.
+"""Simpler tools than the workflow on the same campaigns: a rule and a sparse regression.
 
 Each answers with the name of one effect, "adequate" or "unlisted". Both tools begin where the
 workflow does, with its order lines, their covariance and the base model fitted to them.
@@ -20,15 +20,12 @@ from experiments.candidate_terms import terms
 from experiments.torque_balances import Regression, regression
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.data import Data
-from pymoo_hdte.discrepancy.hidden_forms import LISTED_FORMS
 from pymoo_hdte.discrepancy.misfit_map import as_lines, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.objective import LOST
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.parameters import MECHANICAL, Layout, Parameter
 from pymoo_hdte.discrepancy.workflow import Analysis
 
-ANSWERS = (*LISTED_FORMS, "adequate", "unlisted")
-"""What each tool may say."""
 FALSE_ALARMS = 0.01
 """Chance that noise alone moves the largest of all cells, or the best of all terms, so far."""
 LEAST_SHARE = 0.5
@@ -38,11 +35,6 @@ EFFECTS_IN_BASE = ("damping", "load_inertia")
 _THRESHOLDS = 30
 
 Values = NDArray[np.float64]
-
-
-def chance(rng: np.random.Generator) -> str:
-    """Return one of `ANSWERS`, each as likely as any other."""
-    return str(rng.choice(ANSWERS))
 
 
 def largest_residual_rule(analysis: Analysis) -> str:

@@ -177,7 +177,10 @@ def tools_table(outcomes: Sequence[Outcome]) -> Table:
     for kind in COMPARED:
         chosen = select(outcomes, kind)
         expected = {"none": "adequate", "unlisted": "unlisted"}.get(kind)
-        rates: dict[str, Estimate] = {"this workflow": rate([one.right_answer for one in chosen])}
+        rates: dict[str, Estimate] = {
+            "this workflow, name or class": rate([one.right_answer for one in chosen]),
+            "this workflow, first name alone": rate([one.right_word for one in chosen]),
+        }
         for tool in RIVALS:
             answers = [one.answers.get(tool, "error") == (expected or one.case.truth)
                        for one in chosen]  # fmt: skip

@@ -1,6 +1,5 @@
 """Simpler tools: regressions of known support, planted misfits, planted effects."""
 
-from collections import Counter
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 from planted_balances import EFFECTS, swept
 from planted_features import analysed, known_data, measured
-from scipy.stats import chisquare
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.parameters import Layout
@@ -17,8 +15,6 @@ from pymoo_hdte.units import ARCSEC
 pytest.importorskip("pysindy", reason="pysindy comes with the dev extra only")
 
 from experiments.blind_rivals import (
-    ANSWERS,
-    chance,
     explained,
     held_out_misfit,
     largest_residual_rule,
@@ -217,11 +213,3 @@ def test_the_rule_looks_at_the_shape_of_the_sweep(name, bend):
     analysis = at_truth(lambda data: 0.0)
     analysis.data = swept(analysis.data, torsion)
     assert largest_residual_rule(analysis) == name
-
-
-def test_chance_favours_no_answer():
-    rng = np.random.default_rng(7)
-    drawn = Counter(chance(rng) for _ in range(1900))
-    assert set(drawn) == set(ANSWERS)
-    assert len(ANSWERS) == 19
-    assert chisquare(list(drawn.values())).pvalue > 1e-3

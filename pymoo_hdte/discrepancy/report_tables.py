@@ -16,20 +16,10 @@ from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.discrepancy.prove import Proof
 from pymoo_hdte.discrepancy.revise import accepted_fit
 from pymoo_hdte.discrepancy.rival import SHARE, Rival, adequate
+from pymoo_hdte.discrepancy.verdict_file import UNITS
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
-UNITS = {
-    "stiffness": "N m/rad",
-    "damping": "N m s/rad",
-    "input_inertia": "kg m²",
-    "input_damping": "N m s/rad",
-    "output_damping": "N m s/rad",
-    "load_inertia": "kg m²",
-    "offset": "arcsec",
-    "input_torque_zero": "N m",
-    "output_torque_zero": "N m",
-}
 METRICS = {
     "mae": "mean absolute error",
     "rmse": "root mean square error",
@@ -170,8 +160,7 @@ def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
         where = "" if effect["order"] is None else f", order {effect['order']:.4g}"
         for name, quantity in effect["parameters"].items():
             angle = quantity["unit"] == "rad" and not name.endswith("phase")
-            size, unit = (ARCSEC, "arcsec") if angle else (1.0, quantity["unit"])
-            unit = "" if unit == "1" else unit
+            size, unit = (ARCSEC, "arcsec") if angle else (1.0, _shown(quantity["unit"]))
             value, low, high = (
                 number / size for number in (quantity["value"], *quantity["interval95"])
             )
@@ -253,13 +242,13 @@ def _parameter_row(
     half_width: float,
     at_bounds: tuple[str, ...],
 ) -> ParameterRow:
-    name, unit, size = parameter.name, UNITS.get(parameter.name, ""), 1.0
+    name, unit, size = parameter.name, _shown(UNITS.get(parameter.name, "")), 1.0
     if name.startswith(("error_amplitude_", "error_phase_")):
         kind, line = name.rsplit("_", 1)
         unit, size = ("arcsec", ARCSEC) if kind == "error_amplitude" else ("rad", 1.0)
         name = f"{kind} of order {campaign.believed.error_orders[int(line)]:g}"
     elif name == "offset":
-        size = ARCSEC
+        unit, size = "arcsec", ARCSEC
     # Phases and the constant of the encoders are found, not believed.
     free = parameter.name == "offset" or parameter.name.startswith("error_phase_")
     return ParameterRow(
@@ -272,6 +261,13 @@ def _parameter_row(
         None if free else parameter.upper / size,
         parameter.name in at_bounds,
     )
+
+
+def _shown(unit: str) -> str:
+    """Return a unit such as N.m.s2/rad2 as a reader knows it."""
+    if unit == "1":
+        return ""
+    return unit.replace(".", " ").replace("2", "²").replace("3", "³")
 
 
 def _role(verdict: Verdict, rival: Rival) -> str:
