@@ -140,6 +140,16 @@ def test_the_coupling_torque_is_the_load_and_what_the_load_inertia_takes():
     assert balance.coupling_torque == pytest.approx(expected, abs=1e-4 * size)
 
 
+def test_a_drive_without_static_error_turns_evenly_under_its_load():
+    model = preset("published")
+    coefficients = model.coefficients(model.nominal[None])
+    empty = replace(coefficients, error_orders=np.empty(0), error_phasors=np.empty((1, 0)))
+    balance = harmonic_balance(empty, motor=SpeedLoop(10.0, 0.0))
+    wound = coefficients.mean_mesh_torque / coefficients.stiffness[0]
+    assert balance.torsion[0, 0].real == pytest.approx(wound)
+    assert np.abs(balance.torsion[0, 1:]).max() < 1e-12 * wound
+
+
 def test_laws_have_the_signs_that_their_names_say():
     stiffness = np.array([2.5e4])
 

@@ -46,8 +46,9 @@ def multiples_of(fundamentals: Sequence[float], order: float) -> NDArray[np.int_
 
 def largest_multiples(fundamentals: Sequence[float], orders: Sequence[float]) -> list[int]:
     """Return the largest multiple of each fundamental in any of the ``orders``."""
-    found = np.abs([multiples_of(fundamentals, order) for order in orders])
-    return [int(most) for most in found.max(axis=0)]
+    found = np.array([multiples_of(fundamentals, order) for order in orders], dtype=int)
+    most = np.abs(found.reshape(-1, len(fundamentals))).max(axis=0, initial=0)
+    return [int(multiple) for multiple in most]
 
 
 @lru_cache(maxsize=8)
