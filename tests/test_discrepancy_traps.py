@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from quick_campaigns import quick_campaign
 
-from pymoo_hdte.discrepancy import naming
+from pymoo_hdte.discrepancy import naming, rival, second_effect
 from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.discrepancy.plausibility import LEAST_TOLERANCE
@@ -25,13 +25,19 @@ def unsearched(monkeypatch):
     def as_screened(data, candidates, start, _=0, slopes=None):
         return fit(data, candidates, start, 1, slopes)
 
-    monkeypatch.setattr(naming, "fit", as_screened)
+    for module in (naming, rival, second_effect):
+        monkeypatch.setattr(module, "fit", as_screened)
     monkeypatch.setattr(naming, "FITTED", 1)
 
 
 def test_a_clean_drive_is_adequate(clean):
     """Fails when either safeguard is taken out of the code."""
     assert analyse(clean).verdict.status == "adequate"
+
+
+def test_a_clean_campaign_without_a_sweep_is_adequate(clean):
+    without = replace(clean, torsion=())
+    assert analyse(without).verdict.status == "adequate"
 
 
 def test_a_frozen_base_makes_effects_of_its_own_errors(clean, unsearched):
