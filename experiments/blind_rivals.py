@@ -158,7 +158,7 @@ def sparse_regression(analysis: Analysis) -> str:
     InvalidInput
         Without held-out records.
     """
-    held_out = analysis.held_out()
+    held_out = analysis.held_out
     if held_out is None:
         raise InvalidInput("held_out records", 0, "at least one, to choose the threshold by")
     data, values = analysis.data, _base_values(analysis)

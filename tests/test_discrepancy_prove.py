@@ -182,7 +182,7 @@ def test_parts_add_up_to_the_gap(ripple):
 
 def test_gap_is_the_root_mean_square_over_a_period(ripple):
     proof = prove(ripple)
-    data, fitted = ripple.held_out(), ripple.verdict.chosen.fit
+    data, fitted = ripple.held_out, ripple.verdict.chosen.fit
     predicted = data.predict(fitted.values[None, : len(data.base)], fitted.effects)[0]
     # All orders close over 50 input turns.
     angle = 2.0 * np.pi * 50.0 * np.arange(4000) / 4000.0
@@ -206,7 +206,7 @@ def test_overlay_shows_the_record_that_was_measured(ripple):
 
 
 def test_floor_is_what_a_perfect_model_leaves(clean, rng):
-    held_out = clean.held_out()
+    held_out = clean.held_out
     base = clean.verdict.base
     perfect = held_out.predict(base.values[None, : len(held_out.base)], ())[0]
     squares = []
@@ -226,7 +226,7 @@ class _With:
 
     def __init__(self, analysis, data):
         self.verdict = analysis.verdict
-        self.held_out = lambda: data
+        self.held_out = data
 
 
 def test_without_held_out_records_there_is_no_proof(clean):

@@ -30,7 +30,7 @@ def planted(effects=(), seed=1):
     train, _ = measured(effects, rng, stiffness=1.04)
     held_out, _ = measured(effects, rng, stiffness=1.04)
     verdict = analysed(train).verdict
-    return SimpleNamespace(data=train, verdict=verdict, held_out=lambda: held_out)
+    return SimpleNamespace(data=train, verdict=verdict, held_out=held_out)
 
 
 def test_thresholded_least_squares_finds_the_known_support():
@@ -124,7 +124,7 @@ def test_sparse_regression_says_so_when_no_term_explains_a_misfit():
 
 def test_without_held_out_records_there_is_no_threshold():
     analysis = planted()
-    analysis.held_out = lambda: None
+    analysis.held_out = None
     with pytest.raises(InvalidInput, match="held_out records"):
         sparse_regression(analysis)
 

@@ -32,7 +32,7 @@ def _unproven(analysis: Analysis) -> list[str]:
     if not analysis.campaign.held_out:
         found.append("No record was held out: nothing is proven about conditions not fitted.")
     fitted = {record.name for record in analysis.data.features.records}
-    if analysis.campaign.held_out and (held_out := analysis.held_out()) is None:
+    if analysis.campaign.held_out and (held_out := analysis.held_out) is None:
         found.append("All held-out records rattle: nothing is proven about conditions not fitted.")
     elif analysis.campaign.held_out and held_out is not None:
         fitted |= {record.name for record in held_out.features.records}

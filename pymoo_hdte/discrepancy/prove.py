@@ -130,7 +130,7 @@ def prove(analysis: Analysis) -> Proof | None:
     The loads are those measured. Where the verdict names nothing, nothing was added, so that
     before and after are the same.
     """
-    data = analysis.held_out()
+    data = analysis.held_out
     if data is None:
         return None
     fits = (analysis.verdict.base, accepted_fit(analysis.verdict))

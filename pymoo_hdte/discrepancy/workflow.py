@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,8 +56,9 @@ class Analysis:
     verdict: Verdict
     unexpected: tuple[float, ...]
 
+    @cached_property
     def held_out(self) -> Data | None:
-        """Return the features of the held-out records, or None where there are none.
+        """Features of the held-out records, or None where there are none.
 
         Where records that rattle were left out of the fit, they are here too.
         """
