@@ -69,10 +69,10 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """Name, port, form and order in one word."""
+        """Name, form, port and order in one word."""
         order = "" if self.order is None else f"@{self.order:.4g}"
-        form = f"_{self.form}" if self.form else ""
-        return f"{self.name}:{self.port}{form}{order}"
+        form = f"/{self.form}" if self.form else ""
+        return f"{self.name}{form}:{self.port}{order}"
 
     @property
     def places(self) -> frozenset[Place]:

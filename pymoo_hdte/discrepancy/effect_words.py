@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*):([a-z]+(?:_[a-z]+)*)(?:@([\d.e+-]*\d))?")
+_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z]+))?:([a-z]+(?:_[a-z]+)*)(?:@([\d.e+-]*\d))?")
 
 
 def in_words(text: str) -> str:
@@ -13,6 +13,6 @@ def in_words(text: str) -> str:
 
 
 def _words(label: re.Match[str]) -> str:
-    name, port, order = label.groups()
-    where = port.replace("_", " ") + ("" if order is None else f", order {order}")
-    return f"{name.replace('_', ' ')} ({where})"
+    name, form, port, order = label.groups()
+    details = [port.replace("_", " "), form, None if order is None else f"order {order}"]
+    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"

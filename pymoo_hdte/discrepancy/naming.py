@@ -2,8 +2,9 @@
 
 The base is fitted within its tolerances first. If it is not adequate, candidates are screened, the
 best few are fitted jointly with the base, and the one with the least BIC is named, provided that it
-removes most of the excess, in each part of the data that contradicts the base. What the data cannot
-tell from it is named beside it. A second effect must remove most of what the first leaves.
+removes most of the excess, in no part of the data less than half of it. What the data cannot tell
+from it is named beside it. A second effect must remove most of what the first leaves, in all or in
+the part that the first explains worst.
 """
 
 from __future__ import annotations
@@ -59,9 +60,9 @@ class Verdict:
         Without any effect.
     chosen : Rival or None
     alternatives : tuple of Rival
-        Other sets that were fitted, by rising BIC.
+        Other sets that were fitted.
     equivalent : tuple of Rival
-        Those of them that the data cannot tell from the chosen one.
+        Those of them that explain the data too and that these cannot tell from the chosen one.
     degrees_of_freedom : int
     """
 

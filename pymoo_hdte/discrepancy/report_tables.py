@@ -15,7 +15,14 @@ from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.discrepancy.prove import Proof
 from pymoo_hdte.discrepancy.revise import accepted_fit
-from pymoo_hdte.discrepancy.rival import SHARE, Rival, adequate
+from pymoo_hdte.discrepancy.rival import (
+    EXACT_SHARE,
+    PARTS,
+    SHARE,
+    Rival,
+    adequate,
+    unexplained,
+)
 from pymoo_hdte.discrepancy.verdict_file import UNITS
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -99,10 +106,19 @@ def certainty(analysis: Analysis) -> str:
     if verdict.status == "unlisted":
         return (
             "That something is missing is certain; what it is, is not. The nearest known effect "
-            f"explains {share} of the misfit; a name takes {_percent(SHARE)}, or what is left to "
-            "be noise."
+            f"explains {share} of the misfit, {_too_little(analysis, verdict.chosen)}."
         )
     return " ".join(_evidence(verdict, verdict.chosen, share))
+
+
+def _too_little(analysis: Analysis, nearest: Rival) -> str:
+    """Return why an effect is not named though it is the nearest."""
+    left = unexplained(analysis.data, analysis.verdict.base, nearest.fit)
+    if left.any():
+        parts = [part.replace("_", " ") for part, missed in zip(PARTS, left, strict=True) if missed]
+        return f"but not what shows in {' and '.join(f'the {part}' for part in parts)}"
+    share = EXACT_SHARE if nearest.exact else SHARE
+    return f"where a name takes {100.0 * share:g} %, or what is left to be noise"
 
 
 def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
@@ -122,9 +138,8 @@ def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
         shares = ", ".join(_percent(rival.share) for rival in verdict.equivalent)
         words.append(f"What these data cannot tell from it explains {shares}.")
     elif rivals:
-        words.append(
-            f"The next best, {in_words(rivals[0].label)}, explains {_percent(rivals[0].share)}."
-        )
+        best = min(rivals, key=lambda rival: rival.bic)
+        words.append(f"The next best, {in_words(best.label)}, explains {_percent(best.share)}.")
     if chosen.fit.at_bounds:
         names = ", ".join(name.replace("_", " ") for name in chosen.fit.at_bounds)
         words.append(f"At the edge of what was allowed, so judge with care: {names}.")

@@ -19,8 +19,11 @@ from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.misfit_map import cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.objective import count
+from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.screening import Screened
 
+PARTS = (*CHANNELS, "torsion_sweep")
+"""Of the data, in the order of an `Excess`."""
 DEVIATIONS = 4.0
 """Standard deviations of chi-square up to which a model is adequate."""
 SHARE = 0.9
@@ -101,7 +104,7 @@ def rival(fitted: Fit, of_base: float) -> Rival:
     unknowns = n_base + sum(candidate.unknowns for candidate in fitted.candidates)
     bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
     gain = of_base + (len(fitted.residuals) - n_base) - fitted.chi_square
-    share = gain / max(of_base, gain)
+    share = gain / max(of_base, gain) if gain > 0.0 else 0.0
     return Rival(fitted, float(bic), float(share))
 
 
@@ -206,7 +209,7 @@ def alike(one: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
 
 
 def refined(data: Data, one: Rival, excess: float) -> Rival:
-    """Fit a rival to the end, with slopes of its own."""
+    """Fit a rival further from where it ended, with slopes of its own."""
     return rival(fit(data, one.candidates, one.fit.values, REFINEMENT), excess)
 
 

@@ -20,7 +20,7 @@ name                           port             law
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from typing import ClassVar
 
 import numpy as np
@@ -115,10 +115,12 @@ class LawAtPort:
 
     def to_dict(self) -> dict[str, object]:
         """Return the effect as a TOML-like table."""
-        quantities = LAWS[self.name][2]
-        values = asdict(self.law)  # type: ignore[call-overload]
+        kind, _, quantities = LAWS[self.name]
+        values, defaults = asdict(self.law), _defaults(kind)  # type: ignore[call-overload]
         return {"name": self.name, "port": self.port} | {
-            field: with_unit(values[field], quantity) for field, quantity in quantities.items()
+            field: with_unit(values[field], quantity)
+            for field, quantity in quantities.items()
+            if field not in defaults or values[field] != defaults[field]
         }
 
 
@@ -134,8 +136,14 @@ def law_from_fields(name: str, table: Fields) -> LawAtPort:
     values = {
         field: table.quantity(field, quantity) if quantity else table.number(field)
         for field, quantity in quantities.items()
+        if field not in _defaults(kind) or table.has(field)
     }
     return LawAtPort(name, port, kind(**values))
+
+
+def _defaults(kind: type) -> dict[str, float]:
+    """Return the fields of a law that a file may leave out, with their values."""
+    return {one.name: one.default for one in fields(kind) if one.default is not MISSING}
 
 
 @dataclass(frozen=True)
