@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_features import CONDITIONS, known_data, library, measured
+from planted_features import CONDITIONS, known_data, library, measured, with_sweep
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy import naming, rival, second_effect
@@ -22,7 +22,7 @@ ORDERS = [1.0 / 101.0, SCALE, 1.0, 2.0, 2.02, 3.0, 4.0, 5.0, 6.0]
 EMPTY = known_data(CONDITIONS[::2], ORDERS)
 RIPPLE, LINE = "torque_ripple:input@5", "kinematic_error:mesh@3"
 SOFT, CUBIC = "soft_windup:mesh", "hardening_stiffness:mesh"
-DRAG = "nonlinear_drag:input"
+DRAG, OUTPUT_FRICTION = "nonlinear_drag:input", "coulomb_friction:output"
 REACTION, INERTIA = "kinematic_reaction:input", "load_inertia:output"
 SEEN = [3.0, 5.0]
 FEW = [RIPPLE, LINE, SOFT, REACTION, INERTIA, "nonlinear_drag:input"]
@@ -254,6 +254,25 @@ def test_a_second_effect_is_looked_for_where_the_first_explains_least(monkeypatc
     monkeypatch.setattr(second_effect, "HOPE", np.inf)
     verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
+
+
+def test_a_second_effect_is_looked_for_in_the_sweep_alone(monkeypatch):
+    """The first leaves so much of a running record that the whole hides what the sweep shows."""
+    effects = {DRAG: (5e-7,), OUTPUT_FRICTION: (0.05,)}
+    built = [
+        effect
+        for candidate, values in zip(of_labels(effects), effects.values(), strict=True)
+        for effect in candidate.build(values)
+    ]
+    data = with_sweep(disturbed(planted(effects), 6000.0), built)
+    verdict = verdict_on(data, [DRAG, OUTPUT_FRICTION, RIPPLE])
+    # At two speeds a drag is a damping.
+    assert labels_of(verdict) == {"parameter:input_damping", OUTPUT_FRICTION}
+    excess = rival.excess_of(data, verdict.base)
+    assert excess.freedom[-1].tolist() == [0.0] * 4 + [len(data.torsion[0].angle) - 1]
+    monkeypatch.setattr(second_effect, "_ill_explained", lambda *_: [])
+    verdict = verdict_on(data, [DRAG, OUTPUT_FRICTION, RIPPLE])
+    assert labels_of(verdict) == {"parameter:input_damping"}
 
 
 def test_a_second_effect_beside_a_curve_must_count_beside_the_whole(monkeypatch):
