@@ -258,21 +258,18 @@ def test_a_second_effect_is_looked_for_where_the_first_explains_least(monkeypatc
 
 def test_a_second_effect_is_looked_for_in_the_sweep_alone(monkeypatch):
     """The first leaves so much of a running record that the whole hides what the sweep shows."""
-    effects = {DRAG: (5e-7,), OUTPUT_FRICTION: (0.05,)}
-    built = [
-        effect
-        for candidate, values in zip(of_labels(effects), effects.values(), strict=True)
-        for effect in candidate.build(values)
-    ]
-    data = with_sweep(disturbed(planted(effects), 6000.0), built)
-    verdict = verdict_on(data, [DRAG, OUTPUT_FRICTION, RIPPLE])
-    # At two speeds a drag is a damping.
-    assert labels_of(verdict) == {"parameter:input_damping", OUTPUT_FRICTION}
+    conditions = [(rpm, load) for rpm in (10.0, 1000.0, 2000.0) for load in (0.0, 20.0, 40.0)]
+    drag, friction = of_labels([DRAG, OUTPUT_FRICTION])
+    built = (*drag.build((5e-7,)), *friction.build((0.05,)))
+    empty = known_data(conditions, EMPTY.features.orders)
+    running = measured(built, np.random.default_rng(4), empty)[0]
+    data = with_sweep(disturbed(running, 4000.0), built)
+    verdict = judge(data, fit(data), [drag, friction])
+    assert labels_of(verdict) == {DRAG, OUTPUT_FRICTION}
     excess = rival.excess_of(data, verdict.base)
     assert excess.freedom[-1].tolist() == [0.0] * 4 + [len(data.torsion[0].angle) - 1]
     monkeypatch.setattr(second_effect, "_ill_explained", lambda *_: [])
-    verdict = verdict_on(data, [DRAG, OUTPUT_FRICTION, RIPPLE])
-    assert labels_of(verdict) == {"parameter:input_damping"}
+    assert labels_of(judge(data, fit(data), [drag, friction])) == {DRAG}
 
 
 def test_a_second_effect_beside_a_curve_must_count_beside_the_whole(monkeypatch):
