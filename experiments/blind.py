@@ -19,6 +19,7 @@ from experiments.blind_data import (
 )
 from experiments.blind_figures import confusion_matrix, detection_limits
 from experiments.blind_scoring import BlindJob
+from experiments.blind_shortfalls import shortfalls_table
 from experiments.blind_tables import (
     effects_table,
     limits_table,
@@ -73,6 +74,7 @@ def run(context: Context) -> Result:
             *times_tables(outcomes),
             status_table(outcomes),
             effects_table(outcomes),
+            shortfalls_table(outcomes),
             tools_table(outcomes),
             limits_table(outcomes),
             misses_table(outcomes),

@@ -241,7 +241,9 @@ def _judged_table(
         Column("high", "", 3, "measured"),
         Column("verdict"),
     )
-    findings = tuple(Finding(one.met, _sentence(one), check=True) for one in judged)
+    findings = tuple(
+        Finding(one.met, _sentence(one), check=True) for one in judged if one.measured.n
+    )
     return Table(name, title, columns, rows, note=note, findings=findings, wall_times=wall_times)
 
 
