@@ -11,20 +11,23 @@ from experiments.result import Cell, Column, Table, significant
 from pymoo_hdte.discrepancy.hidden_forms import LISTED_FORMS
 
 REASONS = {
-    "soft_windup": "Three straight pieces are hidden, the law is one curve; K takes up the rest.",
-    "hysteresis": "The hidden elements yield at torsions of their own, the law's at a spread of "
-    "them.",
-    "clearance_variation": "No load turns its sign, so that what varies is a line of the static "
-    "error as well: within that line's tolerance the base takes it, and no record tells.",
-    "coulomb_friction": "A few mN.m at the input are no more than the unknown zero of the torque "
-    "sensor.",
-    "stribeck_friction": "The hidden friction falls exponentially, the law's as a Gaussian; the "
-    "input damping takes up the rest.",
-    "nonlinear_drag": "The hidden powers of the speed are 1.7 and 3, the law's is 2; the input "
-    "damping takes up the rest.",
-    "mesh_stiffness_variation": "The hidden cosine is clipped: it has harmonics beyond the law's.",
+    "soft windup": "three straight pieces are hidden, the law is one curve, and K takes the rest",
+    "hysteresis": "the hidden elements yield each at its torsion, the law's at a smooth spread of "
+    "torsions",
+    "backlash": "under load it is a constant of the transmission error, so that no running record "
+    "shows a gap that could shrink; the sweep shows it",
+    "clearance variation": "no load turns its sign, so that what varies is a line of the static "
+    "error as well: within that line's tolerance the base takes it, and no record can tell",
+    "coulomb friction": "the least drawn at the input, below 10 mN.m, are within three times what "
+    "the zero of the torque sensor is known to",
+    "stribeck friction": "the hidden friction falls exponentially, the law's as a Gaussian, and "
+    "the input damping takes up the rest",
+    "nonlinear drag": "the hidden powers of the speed are 1.7 and 3, the law's is 2, and the input "
+    "damping takes up the rest",
+    "mesh stiffness variation": "where the hidden cosine is clipped it has harmonics beyond the "
+    "law's",
 }
-"""What is known of the cause, for each effect that falls short anywhere."""
+"""What is known of the cause, for effects that fall short anywhere."""
 
 
 def shortfalls_table(outcomes: Sequence[Outcome]) -> Table:
@@ -35,9 +38,8 @@ def shortfalls_table(outcomes: Sequence[Outcome]) -> Table:
         for what, found, limit, at_least in _figures(chosen):
             if found.n and found.value != limit and (found.value < limit) == at_least:
                 asked = ("at least " if at_least else "at most ") + significant(limit, 3)
-                reason = REASONS.get(name, "Not known.")
                 rows.append((name.replace("_", " "), what, asked, found.n, found.value, found.low,
-                             found.high, reason))  # fmt: skip
+                             found.high))  # fmt: skip
     columns = (
         Column("hidden"),
         Column("demand"),
@@ -46,11 +48,12 @@ def shortfalls_table(outcomes: Sequence[Outcome]) -> Table:
         Column("value", "", 3, "measured"),
         Column("low", "", 3, "measured"),
         Column("high", "", 3, "measured"),
-        Column("why"),
     )
+    short = dict.fromkeys(str(row[0]) for row in rows)
+    causes = [f"{name}: {REASONS.get(name, 'not known')}" for name in short]
     note = (
         "What must be reached over all effects together, held against each alone, whether or not "
-        "its twenty cases could tell."
+        f"its twenty cases could tell. Why, as far as it is known. {'; '.join(causes)}."
     )
     return Table("shortfalls", "Where a single effect falls short", columns, tuple(rows), note=note)
 
