@@ -367,6 +367,6 @@ def test_the_committed_outcomes_are_those_of_the_committed_cases():
     if not blind.COMMITTED.is_file():
         pytest.skip("the scoring run has not been committed")
     found = read_outcomes(blind.COMMITTED, blind.COMMITTED_SECONDS)
-    kinds = {one.case.kind for one in found}
-    assert kinds >= {"none", "single", "unlisted", "pair", "parameter"}
-    assert [one.case for one in found] == [case for case in cases() if case.kind in kinds]
+    # Detection limits come last, and may be missing.
+    assert [one.case for one in found] == cases()[: len(found)]
+    assert {one.case.kind for one in found} >= {"none", "single", "unlisted", "pair"}
