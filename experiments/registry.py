@@ -67,7 +67,6 @@ EXPERIMENTS = (
     Experiment(
         "blind",
         "Blind campaigns: what the discrepancy workflow finds of what is hidden",
-        quick=False,
     ),
     Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
     Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
