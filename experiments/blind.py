@@ -7,6 +7,7 @@ same file, and that of the seconds, in the results folder.
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 from experiments.blind_cases import SCORING_SEED, Case, cases
@@ -68,7 +69,7 @@ def run(context: Context) -> Result:
     return Result(
         title="Blind campaigns: what the discrepancy workflow finds",
         command="python -m experiments blind --full",
-        paragraphs=(SETTING, CHANGED),
+        paragraphs=(SETTING, CHANGED, *_unfinished(outcomes)),
         tables=(
             must_reach_table(outcomes),
             *times_tables(outcomes),
@@ -96,6 +97,15 @@ def run(context: Context) -> Result:
         ),
         headline="must_reach",
     )
+
+
+def _unfinished(outcomes: list[Outcome]) -> tuple[str, ...]:
+    """Return what has not been run yet, in words."""
+    missing = Counter(case.kind for case in cases()[len(outcomes) :])
+    if not missing:
+        return ()
+    kinds = ", ".join(f"{count} of kind {kind}" for kind, count in missing.items())
+    return (f"This run was interrupted: {kinds} have not been run.",)
 
 
 def score_cases(chosen: list[Case], campaign: Campaign, title: str) -> list[Outcome]:
