@@ -27,6 +27,16 @@ KINDS = {
     "pair": "two listed effects",
     "parameter": "a parameter out of tolerance",
 }
+JUDGED_COLUMNS = (
+    Column("demand"),
+    Column("cases that hide"),
+    Column("n"),
+    Column("required"),
+    Column("value", "", 3, "measured"),
+    Column("low", "", 3, "measured"),
+    Column("high", "", 3, "measured"),
+    Column("verdict"),
+)
 _ANSWERS = len(LISTED_FORMS) + 2
 """All names, "adequate" and "unlisted": what chance chooses from."""
 
@@ -225,26 +235,20 @@ def misses_table(outcomes: Sequence[Outcome]) -> Table:
 def _judged_table(
     name: str, title: str, judged: Sequence[Judged], note: str, wall_times: bool = False
 ) -> Table:
-    rows = tuple(
-        (one.what, one.cases, one.measured.n, ("at least " if one.at_least else "at most ")
-         + significant(one.required, 3), one.measured.value, one.measured.low, one.measured.high,
-         one.verdict)
-        for one in judged
-    )  # fmt: skip
-    columns = (
-        Column("demand"),
-        Column("cases that hide"),
-        Column("n"),
-        Column("required"),
-        Column("value", "", 3, "measured"),
-        Column("low", "", 3, "measured"),
-        Column("high", "", 3, "measured"),
-        Column("verdict"),
-    )
+    rows = tuple(judged_row(one) for one in judged)
     findings = tuple(
         Finding(one.met, _sentence(one), check=True) for one in judged if one.measured.n
     )
-    return Table(name, title, columns, rows, note=note, findings=findings, wall_times=wall_times)
+    return Table(name, title, JUDGED_COLUMNS, rows, note=note, findings=findings,
+                 wall_times=wall_times)  # fmt: skip
+
+
+def judged_row(one: Judged) -> tuple[Cell, ...]:
+    """Return a demand and what was measured as cells of `JUDGED_COLUMNS`."""
+    asked = ("at least " if one.at_least else "at most ") + significant(one.required, 3)
+    measured = one.measured
+    return (one.what, one.cases, measured.n, asked, measured.value, measured.low, measured.high,
+            one.verdict)  # fmt: skip
 
 
 def _sentence(one: Judged) -> str:

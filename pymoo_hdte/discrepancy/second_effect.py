@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.rival import (
     EXACT_SHARE,
     PART_SHARE,
     SHARE,
+    Excess,
     Rival,
     adequate,
     alike,
@@ -49,7 +50,7 @@ def with_second(
     freedom = len(base.residuals) - len(base.values)
     excess = base.chi_square - freedom
     best = singles[0]
-    if not _second_could_count(data, best, base, freedom):
+    if not _second_could_count(data, best, freedom):
         return best, singles
     # Slopes with the first effect in place, which those of pairs are close to.
     best = refined(data, best, excess)
@@ -74,7 +75,7 @@ def with_second(
     return (does[0] if does else singles[0]), rivals
 
 
-def _second_could_count(data: Data, single: Rival, base: Fit, freedom: int) -> bool:
+def _second_could_count(data: Data, single: Rival, freedom: int) -> bool:
     """Tell whether a second effect beside this one could be earned at all."""
     if single.fit.chi_square <= adequate(freedom) * freedom:
         return False
@@ -129,16 +130,17 @@ def _pairs(
     """
     (first,) = single.candidates
     others = [one for one in candidates if one.frees is None and first.goes_with(one)]
-    before, after = (excess_of(data, one).of_parts for one in (base, single.fit))
-    ill = [] if single.exact else _ill_explained(data, base, single.fit)
+    before, after = (excess_of(data, one) for one in (base, single.fit))
+    ill = [] if single.exact else _ill_explained(before, after)
+    whole, rest = before.of_parts, after.of_parts
     if not single.exact:
-        shares = [after.sum() / before.sum(), *after[ill] / before[ill]]
+        shares = [rest.sum() / whole.sum(), *rest[ill] / whole[ill]]
         others = [one for one in others if max(shares) >= _least(first, one)]
     screened = screen(data, single.fit, others)
     left = single.fit.chi_square - (base.chi_square - excess)
     chosen = _hopeful(screened, [one.reduction for one in screened], left)
     for part in ill:
-        of_part = _hopeful(screened, [one.by_part[part] for one in screened], float(after[part]))
+        of_part = _hopeful(screened, [one.by_part[part] for one in screened], float(rest[part]))
         chosen += [one for one in of_part if one not in chosen]
     return fit_all(data, single.fit, chosen, excess)
 
@@ -157,12 +159,11 @@ def _hopeful(
     return varied(enough, 1)[:SECONDS]
 
 
-def _ill_explained(data: Data, base: Fit, fitted: Fit) -> list[int]:
+def _ill_explained(before: Excess, after: Excess) -> list[int]:
     """Return the parts of the data that contradict both a base and a fit, the worst first.
 
     The worst, and what else the fit explains no better than by half.
     """
-    before, after = excess_of(data, base), excess_of(data, fitted)
     wrong = np.flatnonzero(before.significant & after.significant)
     left = after.of_parts[wrong] / before.of_parts[wrong]
     ranked = wrong[np.argsort(-left)].tolist()
@@ -185,10 +186,10 @@ def _second_earned(
     if first.exact:
         left = first.fit.chi_square - freedom
         return left > 0.0 and first.fit.chi_square - pair.fit.chi_square >= SHARE * left
-    parts = _ill_explained(data, base, first.fit)
+    before, alone, both = (excess_of(data, one) for one in (base, first.fit, pair.fit))
+    parts = _ill_explained(before, alone)
     if not parts:
         return False
-    before, alone, both = (excess_of(data, one) for one in (base, first.fit, pair.fit))
     least = _least(*pair.candidates)
     for part in (slice(None), parts[0]):
         whole, left, rest = (np.sum(one.of_parts[part]) for one in (before, alone, both))
