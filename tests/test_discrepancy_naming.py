@@ -224,7 +224,7 @@ def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent(
     vars(data)["covariance"] = np.eye(variances.shape[1]) * variances[:, None]
     vars(data).pop("whiteners", None)
     found = fit(data)
-    excess = rival.excess_of(data, found)
+    excess = data.excess(found)
     start, prior = (
         np.array([getattr(one, name) for one in found.parameters]) for name in ("start", "prior")
     )
@@ -266,7 +266,7 @@ def test_a_second_effect_is_looked_for_in_the_sweep_alone(monkeypatch):
     data = with_sweep(disturbed(running, 4000.0), built)
     verdict = judge(data, fit(data), [drag, friction])
     assert labels_of(verdict) == {DRAG, OUTPUT_FRICTION}
-    excess = rival.excess_of(data, verdict.base)
+    excess = data.excess(verdict.base)
     assert excess.freedom[-1].tolist() == [0.0] * 4 + [len(data.torsion[0].angle) - 1]
     monkeypatch.setattr(second_effect, "_ill_explained", lambda *_: [])
     assert labels_of(judge(data, fit(data), [drag, friction])) == {DRAG}

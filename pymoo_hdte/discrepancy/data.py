@@ -10,19 +10,35 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from pymoo_hdte.discrepancy.campaign import Campaign
-from pymoo_hdte.discrepancy.features import Features
+from pymoo_hdte.discrepancy.candidate import Candidate
+from pymoo_hdte.discrepancy.evidence import Response
+from pymoo_hdte.discrepancy.excess import Excess
+from pymoo_hdte.discrepancy.features import MEANS, Features
 from pymoo_hdte.discrepancy.forward import Prediction, coefficients_of, predict
+from pymoo_hdte.discrepancy.library import out_of_tolerance
+from pymoo_hdte.discrepancy.misfit_map import cell_chi_square, degrees_of_freedom
+from pymoo_hdte.discrepancy.objective import Objective
+from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.parameters import Layout, Parameter, base_parameters
 from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints, torsion_points
 from pymoo_hdte.drive import Balance, Effect, mean_torsion
 
+if TYPE_CHECKING:
+    from pymoo_hdte.discrepancy.fit import Fit
+
 Vector = NDArray[np.float64]
+
+PARTS = (*CHANNELS, "torsion_sweep")
+"""Of the data, as an `Excess` has them: channels of the running records, and the sweeps."""
+NUMERICAL = 1e-4
+"""Share of an excess that may be of the integrator's steps: see `rival.EXACT_SHARE`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +143,71 @@ class Data:
             solved = solve_triangular(triangle, part, lower=True, check_finite=False)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)
+
+    @property
+    def remainder(self) -> float:
+        """Share of the base's excess up to which what is left is numerical."""
+        return NUMERICAL
+
+    def objective(
+        self, candidates: Sequence[Candidate], slopes: NDArray[np.float64] | None = None
+    ) -> Objective:
+        """Return whitened residuals of the drive with candidates."""
+        return Objective(self, candidates, slopes)
+
+    def response(self, fitted: Fit) -> Response:
+        """Return how the whitened residuals of a fit respond to further effects."""
+        base = fitted.values[None, : len(self.base)]
+        stands = self.prediction(base, fitted.effects)
+        before = self.features.of_prediction(stands)
+        before_torsion = self.torsion_residuals(base, fitted.effects)
+        priors = np.zeros(len(fitted.residuals) - before.size - before_torsion.size)
+
+        def change(added: Sequence[Effect]) -> Vector:
+            effects = (*fitted.effects, *added)
+            running = self.whiten(self.predict(base, effects, stands.balance) - before)[0]
+            torsion = self.torsion_residuals(base, effects) - before_torsion
+            return np.concatenate([running, np.nan_to_num(torsion[0]), priors])
+
+        return change
+
+    def rows_of_parts(self) -> list[NDArray[np.int_]]:
+        """Return where the residuals of each channel stand, and those of the sweeps."""
+        n_records, n_features = self.features.values.shape
+        first = n_features * np.arange(n_records)[:, None]
+        found = []
+        for channel in range(len(CHANNELS)):
+            mean = [MEANS.index(channel)] if channel in MEANS else []
+            places = np.append(mean, self.features.places(channel)).astype(int)
+            found.append((first + places).ravel())
+        return [*found, n_records * n_features + np.arange(self._sweep_residuals)]
+
+    @property
+    def _sweep_residuals(self) -> int:
+        return sum(len(points.angle) - 1 for points in self.torsion)
+
+    def excess(self, fitted: Fit) -> Excess:
+        """Return the excess chi-square of a fit by record and part of the data.
+
+        Parts are the four channels of the running records, cell by cell as on the map of the
+        misfit, and the torsion sweeps, which count as one more record: shape (r + 1, 5).
+        """
+        n_records, n_features = self.features.values.shape
+        n_running = n_records * n_features
+        n_sweeps = self._sweep_residuals
+        whitened = fitted.residuals[:n_running].reshape(n_records, n_features)
+        cells = cell_chi_square(self, np.einsum("rij,rj->ri", self.whiteners, whitened))
+        known = np.isfinite(cells)
+        chi_square, freedom = np.zeros((2, n_records + 1, cells.shape[1] + 1))
+        freedom[:-1, :-1] = np.where(known, degrees_of_freedom(self), 0.0).sum(axis=2)
+        chi_square[:-1, :-1] = np.where(known, cells, 0.0).sum(axis=2)
+        sweeps = fitted.residuals[n_running : n_running + n_sweeps]
+        chi_square[-1, -1], freedom[-1, -1] = sweeps @ sweeps, n_sweeps
+        return Excess(chi_square - freedom, freedom)
+
+    def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
+        """Return a candidate for each base parameter that a fit left at a bound."""
+        return out_of_tolerance(self.base, at_bounds)
 
 
 def training_data(campaign: Campaign, features: Features) -> Data:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pymoo_hdte.discrepancy.candidate import Candidate
-from pymoo_hdte.discrepancy.data import Data, Vector
-from pymoo_hdte.discrepancy.objective import Objective, built, count
+from pymoo_hdte.discrepancy.evidence import Evidence, Vector
+from pymoo_hdte.discrepancy.objective import built, count
 from pymoo_hdte.discrepancy.parameters import Layout, Parameter
 from pymoo_hdte.drive import Effect
 
@@ -33,8 +33,8 @@ class Fit:
         Whitened: of running records, of sweeps, of priors.
     jacobian : ndarray, shape (n_residuals, n_parameters)
         Of the residuals, by parameters in units of their scale.
-    slopes : ndarray, shape (n_base, r, f)
-        Of the features, not whitened, by base parameters in units of their scale.
+    slopes : ndarray, first axis n_base
+        By base parameters in units of their scale; of the features, not whitened, for a drive.
     """
 
     candidates: tuple[Candidate, ...]
@@ -110,7 +110,7 @@ class Fit:
 
 
 def fit(
-    data: Data,
+    data: Evidence,
     candidates: Sequence[Candidate] = (),
     start: Vector | None = None,
     evaluations: int = _EVALUATIONS,
@@ -121,7 +121,7 @@ def fit(
     With ``slopes`` (see `Objective`) a fit takes a fifth of the time; without, they are renewed in
     every step.
     """
-    objective = Objective(data, candidates, slopes)
+    objective = data.objective(candidates, slopes)
     scale = objective.scale
     inner = 1e-6 * (objective.upper - objective.lower)
     begin = objective.start if start is None else start

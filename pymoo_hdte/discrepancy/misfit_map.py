@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import MEANS
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
+
+if TYPE_CHECKING:
+    from pymoo_hdte.discrepancy.data import Data
 
 FALSE_DISCOVERIES = 0.01
 """Share of flagged cells that may be clean, after Benjamini and Hochberg (J. R. Stat. Soc. B 1995);

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pymoo_hdte.discrepancy.candidate import Candidate
-from pymoo_hdte.discrepancy.data import Data
+from pymoo_hdte.discrepancy.evidence import Evidence
 from pymoo_hdte.discrepancy.fit import Fit, fit
-from pymoo_hdte.discrepancy.library import out_of_tolerance
 from pymoo_hdte.discrepancy.rival import (
     Rival,
     adequate,
@@ -74,10 +73,10 @@ class Verdict:
     degrees_of_freedom: int
 
 
-def judge(data: Data, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
+def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict on a fitted base."""
     freedom = len(base.residuals) - len(base.values)
-    candidates = [*candidates, *out_of_tolerance(data.base, base.at_bounds)]
+    candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     screened = screen(data, base, candidates)
     excess = base.chi_square - freedom
     if base.chi_square <= adequate(freedom) * freedom and screened[0].reduction < GAIN:
@@ -118,7 +117,7 @@ def _status(chosen: Rival, equivalent: Sequence[Rival]) -> str:
     return "parameter" if out else "named"
 
 
-def _searched(data: Data, base: Fit, single: Rival, excess: float) -> Rival:
+def _searched(data: Evidence, base: Fit, single: Rival, excess: float) -> Rival:
     """Return the best of fits from all starts of a single effect, with slopes of their own.
 
     An inertia that is half as large again moves a resonance past lines: the way there is not
@@ -133,7 +132,9 @@ def _searched(data: Data, base: Fit, single: Rival, excess: float) -> Rival:
     return min(found, key=lambda one: one.bic)
 
 
-def _fit_best(data: Data, base: Fit, screened: Sequence[Screened], excess: float) -> list[Rival]:
+def _fit_best(
+    data: Evidence, base: Fit, screened: Sequence[Screened], excess: float
+) -> list[Rival]:
     """Fit the most promising candidates jointly with what stands; by rising BIC."""
     least = PROMISING * screened[0].reduction
     promising = [one for one in screened if one.reduction >= least]

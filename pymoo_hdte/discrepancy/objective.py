@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.candidate import Candidate
-from pymoo_hdte.discrepancy.data import Data, Vector
 from pymoo_hdte.discrepancy.parameters import Layout, Parameter
 from pymoo_hdte.drive import Balance, Effect
+
+if TYPE_CHECKING:
+    from pymoo_hdte.discrepancy.data import Data
+
+Vector = NDArray[np.float64]
 
 _STEP = 1e-3
 """Step of difference quotients, in units of a parameter's scale."""
@@ -21,7 +26,37 @@ LOST = 1e3
 """Residual of a point at which the model cannot carry the torque."""
 
 
-class Objective:
+class Unknowns:
+    """What a fit with a set of candidates may change: base parameters first, then theirs.
+
+    Parameters
+    ----------
+    base : sequence of Parameter
+    candidates : sequence of Candidate
+    """
+
+    def __init__(self, base: Sequence[Parameter], candidates: Sequence[Candidate]) -> None:
+        self.candidates = tuple(candidates)
+        added = [parameter for candidate in candidates for parameter in candidate.parameters]
+        freed = {candidate.frees for candidate in candidates}
+        kept = [_without_tolerance(one) if one.name in freed else one for one in base]
+        self.parameters = (*kept, *added)
+        layout = Layout(self.parameters)
+        self.scale, self.start = layout.array("scale"), layout.array("start")
+        self.lower, self.upper = layout.array("lower"), layout.array("upper")
+        self.prior = layout.array("prior")
+        self.bounded = np.isfinite(self.prior)
+
+    def steps(self, values: Vector) -> Vector:
+        """Return steps of quotients; an effect's strength cannot fall below zero."""
+        return np.where(values + _STEP * self.scale > self.upper, -_STEP, _STEP)
+
+    def priors(self, values: Vector) -> Vector:
+        """Return the residuals of parameters that have a prior."""
+        return ((values - self.start) / self.prior)[self.bounded]
+
+
+class Objective(Unknowns):
     """Whitened residuals and their Jacobian for a set of candidates.
 
     Parameters
@@ -40,18 +75,9 @@ class Objective:
         candidates: Sequence[Candidate],
         slopes: NDArray[np.float64] | None = None,
     ) -> None:
+        super().__init__(data.base, candidates)
         self.data = data
-        self.candidates = tuple(candidates)
         self.slopes = slopes
-        added = [parameter for candidate in candidates for parameter in candidate.parameters]
-        freed = {candidate.frees for candidate in candidates}
-        base = [_without_tolerance(one) if one.name in freed else one for one in data.base]
-        self.parameters = (*base, *added)
-        layout = Layout(self.parameters)
-        self.scale, self.start = layout.array("scale"), layout.array("start")
-        self.lower, self.upper = layout.array("lower"), layout.array("upper")
-        self.prior = layout.array("prior")
-        self.bounded = np.isfinite(self.prior)
         self.nearby: Balance | None = None
 
     def residuals(self, values: Vector) -> Vector:
@@ -63,8 +89,8 @@ class Objective:
         """Return predicted minus measured features (r, f), and residuals of sweeps and priors."""
         base, effects = self._parts(values)
         difference = self._features(base, effects)[0] - self.data.features.values
-        priors = ((values - self.start) / self.prior)[self.bounded]
-        return difference, np.concatenate([self._torsion(base, effects)[0], priors])
+        torsion = self._torsion(base, effects)[0]
+        return difference, np.concatenate([torsion, self.priors(values)])
 
     def jacobian(self, values: Vector) -> NDArray[np.float64]:
         """Return the derivatives of the residuals by parameters in units of their scale."""
@@ -76,7 +102,7 @@ class Objective:
 
         Of the features, not whitened, (n, r, f); of sweeps and priors, whitened, (n, n_others).
         """
-        n_base, steps = len(self.data.base), self._steps(values)
+        n_base, steps = len(self.data.base), self.steps(values)
         slopes = self.slopes_at(values) if self.slopes is None else self.slopes
         moved = values + np.diag(steps * self.scale)
         base, effects = self._parts(values)
@@ -90,10 +116,6 @@ class Objective:
         priors = np.diag(self.scale / self.prior)[:, self.bounded]
         return np.array(features), np.concatenate([np.array(sweeps), priors], axis=1)
 
-    def _steps(self, values: Vector) -> Vector:
-        """Return steps of quotients; an effect's strength cannot fall below zero."""
-        return np.where(values + _STEP * self.scale > self.upper, -_STEP, _STEP)
-
     def _torsion(
         self, vectors: NDArray[np.float64], effects: tuple[Effect, ...]
     ) -> NDArray[np.float64]:
@@ -103,7 +125,7 @@ class Objective:
         """Return derivatives of the features by base parameters in units of their scale."""
         base, effects = self._parts(values)
         n_base = base.shape[1]
-        steps = self._steps(values)[:n_base]
+        steps = self.steps(values)[:n_base]
         features = self._features(
             np.vstack([base, base + np.diag(steps * self.scale[:n_base])]), effects
         )

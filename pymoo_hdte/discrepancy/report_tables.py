@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.discrepancy.campaign import Campaign
+from pymoo_hdte.discrepancy.data import PARTS
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.gap import Gap
 from pymoo_hdte.discrepancy.naming import Verdict
@@ -17,7 +18,6 @@ from pymoo_hdte.discrepancy.prove import Proof
 from pymoo_hdte.discrepancy.revise import accepted_fit
 from pymoo_hdte.discrepancy.rival import (
     EXACT_SHARE,
-    PARTS,
     SHARE,
     Rival,
     adequate,

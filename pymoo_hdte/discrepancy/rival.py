@@ -1,8 +1,7 @@
 """Sets of effects fitted jointly with the base: how much of the misfit each explains, and where.
 
-The misfit is weighed in each part of the data by itself: the channels of the running records, and
-the torsion sweeps. A sweep at rest may stand out a thousand times further than the transmission
-error, and an effect that explains only the one must not pass for the cause of the other.
+An effect that explains one part of the data only must not pass for the cause of the others: see
+`excess`.
 """
 
 from __future__ import annotations
@@ -15,17 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.candidate import Candidate
-from pymoo_hdte.discrepancy.data import Data
+from pymoo_hdte.discrepancy.evidence import Evidence
+from pymoo_hdte.discrepancy.excess import DEVIATIONS
 from pymoo_hdte.discrepancy.fit import Fit, fit
-from pymoo_hdte.discrepancy.misfit_map import cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.objective import count
-from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.screening import Screened
 
-PARTS = (*CHANNELS, "torsion_sweep")
-"""Of the data, in the order of an `Excess`."""
-DEVIATIONS = 4.0
-"""Standard deviations of chi-square up to which a model is adequate."""
 SHARE = 0.9
 """Least share of the excess chi-square that named effects remove."""
 PART_SHARE = 0.5
@@ -113,74 +107,21 @@ def adequate(freedom: int) -> float:
     return float(1.0 + DEVIATIONS * np.sqrt(2.0 / freedom))
 
 
-@dataclass(frozen=True, eq=False)
-class Excess:
-    """Chi-square of a fit beyond its degrees of freedom, in each part of the data.
-
-    Parts are the four channels of the running records, cell by cell as on the map of the misfit,
-    and the torsion sweeps, which count as one more record.
-
-    Attributes
-    ----------
-    chi_square : ndarray, shape (r + 1, 5)
-        Excess by record and part.
-    freedom : ndarray, shape (r + 1, 5)
-        Degrees of freedom.
-    """
-
-    chi_square: NDArray[np.float64]
-    freedom: NDArray[np.float64]
-
-    @property
-    def of_parts(self) -> NDArray[np.float64]:
-        """Of each part, shape (5,)."""
-        return np.asarray(self.chi_square.sum(axis=0))
-
-    @property
-    def significant(self) -> NDArray[np.bool_]:
-        """Whether it is more than noise, of each part, shape (5,)."""
-        return np.asarray(self.of_parts > DEVIATIONS * np.sqrt(2.0 * self.freedom.sum(axis=0)))
-
-    def without(self, record: NDArray[np.int_]) -> Excess:
-        """Return it with one record left out of each part; ``record`` has shape (5,)."""
-        chi_square, freedom = self.chi_square.copy(), self.freedom.copy()
-        parts = np.arange(len(record))
-        chi_square[record, parts] = freedom[record, parts] = 0.0
-        return Excess(chi_square, freedom)
-
-
-def excess_of(data: Data, fitted: Fit) -> Excess:
-    """Return the excess chi-square of a fit by record and part of the data."""
-    n_records, n_features = data.features.values.shape
-    n_running = n_records * n_features
-    n_sweeps = sum(len(points.angle) - 1 for points in data.torsion)
-    whitened = fitted.residuals[:n_running].reshape(n_records, n_features)
-    cells = cell_chi_square(data, np.einsum("rij,rj->ri", data.whiteners, whitened))
-    known = np.isfinite(cells)
-    chi_square, freedom = np.zeros((2, n_records + 1, cells.shape[1] + 1))
-    freedom[:-1, :-1] = np.where(known, degrees_of_freedom(data), 0.0).sum(axis=2)
-    chi_square[:-1, :-1] = np.where(known, cells, 0.0).sum(axis=2)
-    sweeps = fitted.residuals[n_running : n_running + n_sweeps]
-    chi_square[-1, -1], freedom[-1, -1] = sweeps @ sweeps, n_sweeps
-    return Excess(chi_square - freedom, freedom)
-
-
-def unexplained(data: Data, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
+def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     """Tell which parts of the data, of those that contradict the base, a fit plainly misses too.
 
-    Shape (5,), as `Excess` has them. Of the running records the worst is left out: one condition
+    Shape (parts,), as `Excess` has them. Of several records the worst is left out: one condition
     may lie at a resonance, where no form is exact.
     """
-    before, after = excess_of(data, base), excess_of(data, fitted)
-    worst = np.argmax(after.chi_square, axis=0)
-    worst[-1] = 0
+    before, after = data.excess(base), data.excess(fitted)
+    worst = after.worst
     before, after = before.without(worst), after.without(worst)
     plain = after.of_parts > (PLAIN - 1.0) * after.freedom.sum(axis=0)
     left = after.of_parts > (1.0 - PART_SHARE) * before.of_parts
     return np.asarray(before.significant & plain & left)
 
 
-def explains(data: Data, one: Rival, base: Fit, freedom: int) -> bool:
+def explains(data: Evidence, one: Rival, base: Fit, freedom: int) -> bool:
     """Tell whether a set of effects removes what is wrong with the base, and wherever it is."""
     gain = base.chi_square - one.fit.chi_square
     unknowns = sum(candidate.unknowns for candidate in one.candidates)
@@ -208,12 +149,12 @@ def alike(one: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
     return one.fit.chi_square - freedom < margin * ALIKE * (chosen.fit.chi_square - freedom)
 
 
-def refined(data: Data, one: Rival, excess: float) -> Rival:
+def refined(data: Evidence, one: Rival, excess: float) -> Rival:
     """Fit a rival further from where it ended, with slopes of its own."""
     return rival(fit(data, one.candidates, one.fit.values, REFINEMENT), excess)
 
 
-def fit_all(data: Data, base: Fit, chosen: Sequence[Screened], excess: float) -> list[Rival]:
+def fit_all(data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float) -> list[Rival]:
     """Fit candidates, each jointly with what stands; by rising BIC."""
     found = []
     for one in chosen:

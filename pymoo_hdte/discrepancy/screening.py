@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.believed import Rig
 from pymoo_hdte.discrepancy.candidate import HARMONIC_NAMES, Candidate
 from pymoo_hdte.discrepancy.data import Data
-from pymoo_hdte.discrepancy.features import MEANS, Features
+from pymoo_hdte.discrepancy.evidence import Evidence
+from pymoo_hdte.discrepancy.features import Features
 from pymoo_hdte.discrepancy.fit import Fit
-from pymoo_hdte.discrepancy.order_lines import CHANNELS, residual_spectrum
+from pymoo_hdte.discrepancy.order_lines import residual_spectrum
 
 _FALSE_LINES = 1e-3
 """Chance that noise alone shows any line in a whole campaign."""
@@ -38,22 +39,22 @@ class Screened:
     reduction : float
         Of the whole chi-square.
     start : tuple of float
-    by_part : tuple of float, length 5
-        Of that of each channel alone, and of the torsion sweeps.
+    by_part : tuple of float
+        Of that of each part of the data alone; empty for a parameter out of tolerance.
     """
 
     candidate: Candidate
     reduction: float
     start: tuple[float, ...]
-    by_part: tuple[float, ...] = (0.0,) * 5
+    by_part: tuple[float, ...] = ()
 
 
-def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
+def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
     """Return all candidates, the most promising first.
 
     Parameters
     ----------
-    data : Data
+    data : Evidence
     fitted : Fit
         What stands so far, perhaps with effects; its misfit is to be explained.
     candidates : sequence of Candidate
@@ -61,12 +62,7 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
     # A parameter at its bound cannot give way any further.
     orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
     left = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
-    base = fitted.values[None, : len(data.base)]
-    stands = data.prediction(base, fitted.effects)
-    before = data.features.of_prediction(stands)
-    before_torsion = data.torsion_residuals(base, fitted.effects)
-    priors = len(fitted.residuals) - before.size - before_torsion.size
-    parts = _rows_of_parts(data.features, before_torsion.size)
+    response, parts = data.response(fitted), data.rows_of_parts()
     found = []
     for candidate in candidates:
         if candidate.frees is not None:
@@ -74,10 +70,7 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
             continue
         signatures = []
         for start in candidate.starts:
-            effects = (*fitted.effects, *candidate.build(start))
-            change = data.whiten(data.predict(base, effects, stands.balance) - before)[0]
-            torsion = data.torsion_residuals(base, effects) - before_torsion
-            signature = np.concatenate([change, np.nan_to_num(torsion[0]), np.zeros(priors)])
+            signature = response(candidate.build(start))
             signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
         every = np.array(signatures)
         by_part = tuple(
@@ -85,17 +78,6 @@ def screen(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> list[Scr
         )
         found.append(replace(_best_start(candidate, every, left), by_part=by_part))
     return sorted(found, key=lambda one: -one.reduction)
-
-
-def _rows_of_parts(features: Features, n_sweeps: int) -> list[NDArray[np.int_]]:
-    """Return where the residuals of each channel stand, and those of the sweeps."""
-    n_records, n_features = features.values.shape
-    first = n_features * np.arange(n_records)[:, None]
-    found = []
-    for channel in range(len(CHANNELS)):
-        mean = [MEANS.index(channel)] if channel in MEANS else []
-        found.append((first + np.append(mean, features.places(channel)).astype(int)).ravel())
-    return [*found, n_records * n_features + np.arange(n_sweeps)]
 
 
 def _freed(

@@ -11,18 +11,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.discrepancy.candidate import Candidate
-from pymoo_hdte.discrepancy.data import Data
+from pymoo_hdte.discrepancy.evidence import Evidence
+from pymoo_hdte.discrepancy.excess import Excess
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.rival import (
     EVALUATIONS,
-    EXACT_SHARE,
     PART_SHARE,
     SHARE,
-    Excess,
     Rival,
     adequate,
     alike,
-    excess_of,
     explains,
     fit_all,
     refined,
@@ -44,7 +42,7 @@ HOPE = 0.5
 
 
 def with_second(
-    data: Data, base: Fit, singles: list[Rival], candidates: Sequence[Candidate]
+    data: Evidence, base: Fit, singles: list[Rival], candidates: Sequence[Candidate]
 ) -> tuple[Rival, list[Rival]]:
     """Return the set to be named, and all that were fitted: a second effect has to be earned."""
     freedom = len(base.residuals) - len(base.values)
@@ -75,11 +73,11 @@ def with_second(
     return (does[0] if does else singles[0]), rivals
 
 
-def _second_could_count(data: Data, single: Rival, freedom: int) -> bool:
+def _second_could_count(data: Evidence, single: Rival, freedom: int) -> bool:
     """Tell whether a second effect beside this one could be earned at all."""
     if single.fit.chi_square <= adequate(freedom) * freedom:
         return False
-    return single.exact or bool(excess_of(data, single.fit).significant.any())
+    return single.exact or bool(data.excess(single.fit).significant.any())
 
 
 def _promising(pair: Rival, single: Rival, freedom: int) -> bool:
@@ -89,7 +87,7 @@ def _promising(pair: Rival, single: Rival, freedom: int) -> bool:
 
 
 def _with_second_alone(
-    data: Data, base: Fit, pair: Rival, singles: list[Rival], excess: float
+    data: Evidence, base: Fit, pair: Rival, singles: list[Rival], excess: float
 ) -> list[Rival]:
     """Return single effects with the second of a pair among them: it may do alone.
 
@@ -104,7 +102,7 @@ def _with_second_alone(
 
 
 def _exchanged(
-    data: Data, pair: Rival, singles: Sequence[Rival], freedom: int, excess: float
+    data: Evidence, pair: Rival, singles: Sequence[Rival], freedom: int, excess: float
 ) -> list[Rival]:
     """Return the pair with its first effect exchanged for those that do as well alone."""
     first, second = pair.candidates
@@ -121,7 +119,7 @@ def _exchanged(
 
 
 def _pairs(
-    data: Data, base: Fit, single: Rival, candidates: Sequence[Candidate], excess: float
+    data: Evidence, base: Fit, single: Rival, candidates: Sequence[Candidate], excess: float
 ) -> list[Rival]:
     """Return the best pairs that contain the best single effect.
 
@@ -130,12 +128,12 @@ def _pairs(
     """
     (first,) = single.candidates
     others = [one for one in candidates if one.frees is None and first.goes_with(one)]
-    before, after = (excess_of(data, one) for one in (base, single.fit))
+    before, after = (data.excess(one) for one in (base, single.fit))
     ill = [] if single.exact else _ill_explained(before, after)
     whole, rest = before.of_parts, after.of_parts
     if not single.exact:
         shares = [rest.sum() / whole.sum(), *rest[ill] / whole[ill]]
-        others = [one for one in others if max(shares) >= _least(first, one)]
+        others = [one for one in others if max(shares) >= _least(data, first, one)]
     screened = screen(data, single.fit, others)
     left = single.fit.chi_square - (base.chi_square - excess)
     chosen = _hopeful(screened, [one.reduction for one in screened], left)
@@ -145,9 +143,9 @@ def _pairs(
     return fit_all(data, single.fit, chosen, excess)
 
 
-def _least(first: Candidate, second: Candidate) -> float:
+def _least(data: Evidence, first: Candidate, second: Candidate) -> float:
     """Return the least share of the base's excess that a second effect removes."""
-    return SECOND_LEAST if first.port == second.port else 1.0 - EXACT_SHARE
+    return SECOND_LEAST if first.port == second.port else data.remainder
 
 
 def _hopeful(
@@ -171,7 +169,7 @@ def _ill_explained(before: Excess, after: Excess) -> list[int]:
 
 
 def _second_earned(
-    data: Data, pair: Rival, singles: Sequence[Rival], base: Fit, freedom: int
+    data: Evidence, pair: Rival, singles: Sequence[Rival], base: Fit, freedom: int
 ) -> bool:
     """Tell whether the second effect removes most of what the better of the two leaves alone.
 
@@ -186,11 +184,11 @@ def _second_earned(
     if first.exact:
         left = first.fit.chi_square - freedom
         return left > 0.0 and first.fit.chi_square - pair.fit.chi_square >= SHARE * left
-    before, alone, both = (excess_of(data, one) for one in (base, first.fit, pair.fit))
+    before, alone, both = (data.excess(one) for one in (base, first.fit, pair.fit))
     parts = _ill_explained(before, alone)
     if not parts:
         return False
-    least = _least(*pair.candidates)
+    least = _least(data, *pair.candidates)
     for part in (slice(None), parts[0]):
         whole, left, rest = (np.sum(one.of_parts[part]) for one in (before, alone, both))
         if left - rest >= max(SECOND_SHARE * left, least * whole):

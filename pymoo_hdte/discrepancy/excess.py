@@ -1,0 +1,55 @@
+"""Chi-square of a fit beyond its degrees of freedom, by record and part of the data.
+
+The misfit is weighed in each part of the data by itself: a sweep at rest may stand out a thousand
+times further than the transmission error, and an effect that explains only the one must not pass
+for the cause of the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+DEVIATIONS = 4.0
+"""Standard deviations of chi-square up to which a model is adequate."""
+
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """Chi-square beyond the degrees of freedom, in each part of the data.
+
+    Attributes
+    ----------
+    chi_square : ndarray, shape (rows, parts)
+        Excess by record and part. What is no record counts as a row of its own.
+    freedom : ndarray, shape (rows, parts)
+        Degrees of freedom.
+    """
+
+    chi_square: NDArray[np.float64]
+    freedom: NDArray[np.float64]
+
+    @property
+    def of_parts(self) -> NDArray[np.float64]:
+        """Of each part, shape (parts,)."""
+        return np.asarray(self.chi_square.sum(axis=0))
+
+    @property
+    def significant(self) -> NDArray[np.bool_]:
+        """Whether it is more than noise, of each part, shape (parts,)."""
+        return np.asarray(self.of_parts > DEVIATIONS * np.sqrt(2.0 * self.freedom.sum(axis=0)))
+
+    @property
+    def worst(self) -> NDArray[np.int_]:
+        """Row of each part with most of it, shape (parts,); -1 where a part has but one row."""
+        several = np.count_nonzero(self.freedom, axis=0) > 1
+        return np.where(several, np.argmax(self.chi_square, axis=0), -1)
+
+    def without(self, rows: NDArray[np.int_]) -> Excess:
+        """Return it with one row left out of each part; -1 leaves a part as it is."""
+        chi_square, freedom = self.chi_square.copy(), self.freedom.copy()
+        parts = np.flatnonzero(rows >= 0)
+        chi_square[rows[parts], parts] = freedom[rows[parts], parts] = 0.0
+        return Excess(chi_square, freedom)
