@@ -1,0 +1,209 @@
+"""From records of a mechanism to a verdict: what is missing, and how much nobody explains.
+
+The rules are those of `discrepancy.naming`. Because no model of a real machine meets the noise of
+its sensors, they are held against the rest: what the two best effects leave. A verdict therefore
+names what stands out of everything that is known to be able to explain it, and says what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.candidate import Candidate
+from pymoo_hdte.discrepancy.fit import Fit, fit
+from pymoo_hdte.discrepancy.naming import FITTED, OF_ONE_NAME, Verdict, judge
+from pymoo_hdte.discrepancy.rival import Rival, adequate, fit_all, rival, varied
+from pymoo_hdte.discrepancy.screening import screen
+from pymoo_hdte.measured.candidates import mechanism_candidates
+from pymoo_hdte.measured.data import MeasuredData, measured_data
+from pymoo_hdte.measured.orders import position_orders
+from pymoo_hdte.mechanism import Mechanism, Record
+
+MAIN_SHARE = 0.5
+"""Least share of the power of a misfit beyond the sensors' noise that a named effect removes."""
+REST = 2.0
+"""Ratio of powers up to which a misfit may be of the sensors, whose noise is an estimate."""
+PARSIMONY = 1.1
+"""Ratio of powers of what two models leave up to which the one with fewer unknowns is named."""
+_ROUNDS = 2
+_SECONDS = 3
+"""Second effects tried beside each of as many first ones to find what nobody explains."""
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What the workflow finds in measured records.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    records : tuple of Record
+    data : MeasuredData
+        Training records; their noise is the rest that nobody explains.
+    verdict : Verdict
+    sensor_noise, base_misfit, remainder : ndarray, shape (n_balances,)
+        Root mean squares, N or N.m: of the sensors' noise, of what the base leaves, and of what
+        the model with the accepted effects leaves.
+    """
+
+    mechanism: Mechanism
+    records: tuple[Record, ...]
+    data: MeasuredData
+    verdict: Verdict
+    sensor_noise: NDArray[np.float64]
+    base_misfit: NDArray[np.float64]
+    remainder: NDArray[np.float64]
+
+
+def investigate(
+    mechanism: Mechanism, records: Sequence[Record], cutoff: float | None = None
+) -> Finding:
+    """Return the verdict on records of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Without the effects that are to be found.
+    records : sequence of Record
+        At least one of them of role ``train``.
+    cutoff : float, optional
+        Hz; see `measured_data`.
+
+    Raises
+    ------
+    InvalidInput
+        If no record is to be fitted, or a record lacks a channel, is too short or dead.
+    """
+    train = [record for record in records if record.role == "train"]
+    if not train:
+        raise InvalidInput("number of train records", 0, "at least 1")
+    sensors = measured_data(mechanism, train, cutoff)
+    base = fit(sensors)
+    candidates = _candidates(sensors, base)
+    data = _with_rest(sensors, base, candidates)
+    verdict = _judged(sensors, data, candidates)
+    accepted = verdict.chosen if verdict.status in ("named", "class", "parameter") else None
+    left = verdict.base if accepted is None else accepted.fit
+    return Finding(
+        mechanism,
+        tuple(records),
+        data,
+        verdict,
+        _root_mean_square(sensors, np.ones_like(base.residuals)),
+        _root_mean_square(data, verdict.base.residuals),
+        _root_mean_square(data, left.residuals),
+    )
+
+
+def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
+    force = float(max(_root_mean_square(data, base.residuals)))
+    orders = position_orders(data, base)
+    return mechanism_candidates(data, force, orders)
+
+
+def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:
+    """Return the data with what the two best effects leave as the noise.
+
+    Which these are depends on the noise; after a few rounds it no longer does.
+    """
+    freedom = len(base.residuals) - len(base.values)
+    if base.chi_square <= adequate(freedom) * freedom:
+        return sensors
+    data = sensors.with_rest(base.residuals)
+    for _ in range(_ROUNDS):
+        best = _best_two(data, candidates)
+        data = sensors.with_rest(_in_units_of(sensors, data, best.fit.residuals))
+    return data
+
+
+def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Rival:
+    """Return the best model with up to two effects, by BIC."""
+    base = fit(data)
+    excess = base.chi_square - (len(base.residuals) - len(base.values))
+    promising = varied(screen(data, base, candidates), OF_ONE_NAME)[:FITTED]
+    singles = fit_all(data, base, promising, excess)
+    found = [rival(base, excess), *singles]
+    for single in singles[:_SECONDS]:
+        (first,) = single.candidates
+        others = [one for one in candidates if first.goes_with(one)]
+        seconds = varied(screen(data, single.fit, others), 1)[:_SECONDS]
+        found += fit_all(data, single.fit, seconds, excess)
+    return min(found, key=lambda one: one.bic)
+
+
+def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
+    """Return the verdict in units of the rest, if it stands before what the sensors would show."""
+    base = fit(data)
+    verdict = _simplest(data, judge(data, base, candidates))
+    before, noise = (
+        np.sum(_root_mean_square(one, residuals) ** 2)
+        for one, residuals in ((data, base.residuals), (sensors, np.ones_like(base.residuals)))
+    )
+    if verdict.chosen is None:
+        if before <= REST * noise:
+            return verdict
+        return _as_unlisted(verdict, None)
+    after = np.sum(_root_mean_square(data, verdict.chosen.fit.residuals) ** 2)
+    if before - after < MAIN_SHARE * (before - noise):
+        return _as_unlisted(verdict, verdict.chosen)
+    return verdict
+
+
+def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with the model of fewest unknowns that leaves hardly more than the best.
+
+    With many samples the evidence prefers a richer law for a hair's breadth of a rest that is no
+    noise.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in ("named", "class"):
+        return verdict
+    most = PARSIMONY * float(np.sum(data.power(chosen.fit.residuals)))
+    near = [
+        one
+        for one in (chosen, *verdict.alternatives)
+        if len(one.candidates) == len(chosen.candidates)
+        and _unknowns(one) < _unknowns(chosen)
+        and np.sum(data.power(one.fit.residuals)) <= most
+    ]
+    if not near:
+        return verdict
+    simplest = min(near, key=lambda one: (_unknowns(one), one.bic))
+    others = tuple(one for one in (chosen, *verdict.alternatives) if one is not simplest)
+    equivalent = tuple(one for one in verdict.equivalent if one is not simplest)
+    status = "class" if equivalent else "named"
+    return Verdict(status, verdict.base, simplest, others, equivalent, verdict.degrees_of_freedom)
+
+
+def _unknowns(one: Rival) -> int:
+    return sum(candidate.unknowns for candidate in one.candidates)
+
+
+def _as_unlisted(verdict: Verdict, nearest: Rival | None) -> Verdict:
+    return Verdict(
+        "unlisted", verdict.base, nearest, verdict.alternatives, (), verdict.degrees_of_freedom
+    )
+
+
+def _in_units_of(
+    wanted: MeasuredData, given: MeasuredData, residuals: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return whitened residuals as whitened by the deviation of other data."""
+    ratio = [
+        (one / other)[balance.kept]
+        for one, other, balance in zip(
+            given.deviation, wanted.deviation, wanted.balances, strict=True
+        )
+    ]
+    return residuals * np.concatenate(ratio)
+
+
+def _root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the root mean square of each balance, N or N.m, for whitened residuals (n,)."""
+    samples = sum(len(balance.time) for balance in data.balances)
+    return np.sqrt(data.power(residuals) / samples)

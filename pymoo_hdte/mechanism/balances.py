@@ -1,0 +1,253 @@
+"""Inverse dynamics: what is left of the force balances when a record's motion is put into them.
+
+For every coordinate the forces of inputs, inertia, springs, dampers and laws, and for every force
+sensor its reading less what acts at its port, as coefficients of an orthonormal cosine transform up
+to the cutoff: stationary noise makes them independent, so that its colour is a weight of each.
+Linear in the quantities of the mechanism (Gautier, Robotics and Autonomous Systems 1997).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive.laws import PortState, periodic_phase
+from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
+from pymoo_hdte.mechanism.motion import (
+    highest_share,
+    margin_of,
+    motion_of,
+    noise_of,
+    smooth,
+    stride_of,
+)
+from pymoo_hdte.mechanism.records import Record
+
+Values = NDArray[np.float64]
+
+_FEWEST_BINS = 8
+_KEPT = 64
+
+
+def balance_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the names of the balances: of coordinates, and of force sensors."""
+    read = [port.name for port in mechanism.ports if port.read]
+    return (*mechanism.coordinates, *read)
+
+
+def quantity_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the quantities on which balances depend: of the mechanism, and zeros of sensors."""
+    zeros = [f"zero of {port.name}" for port in mechanism.ports if port.read]
+    return (*mechanism.quantities, *zeros)
+
+
+@dataclass(frozen=True, eq=False)
+class PortMotion:
+    """Position and speed at a port, shape (n,), at the working rate; SI."""
+
+    position: Values
+    speed: Values
+
+
+class Balance:
+    """Force balances of one record.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    record : Record
+    cutoff : float
+        Hz, up to which the motion is known. Force sensors are held against the motion up to ten
+        samples in a period.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (n_bins,)
+        Of the coefficients, Hz.
+    kept : bool ndarray, shape (n_balances, n_bins)
+        Coefficients of frequencies up to which a balance is known.
+    terms : ndarray, shape (n_balances, n_quantities, n_bins)
+        Coefficients of what each of `quantity_names` adds to each of `balance_names` per unit.
+    constant : ndarray, shape (n_balances, n_bins)
+        Of the readings of force sensors.
+    noise : ndarray, shape (n_balances, n_bins)
+        Standard deviation that the sensors' noise gives them, for the believed quantities.
+    ports : dict of str to PortMotion
+
+    Raises
+    ------
+    InvalidInput
+        If a coordinate, an input or a force sensor has no channel, or the record is too short.
+    """
+
+    def __init__(self, mechanism: Mechanism, record: Record, cutoff: float) -> None:
+        self.mechanism, self.record = mechanism, record
+        self._known: dict[LawAt, Values] = {}
+        margin = margin_of(cutoff, record.step)
+        read = any(port.read for port in mechanism.ports)
+        highest = highest_share(record.step) if read else cutoff
+        stride = stride_of(highest, record.step)
+        self._rows = slice(margin, len(record.time) - margin, stride)
+        n = len(record.time[self._rows])
+        frequency = np.arange(n) / (2.0 * n * record.step * stride)
+        self._bins = int(np.count_nonzero(frequency <= highest))
+        if np.count_nonzero(frequency <= cutoff) < _FEWEST_BINS:
+            shortest = (_FEWEST_BINS + 4.0 * 2.0) / (2.0 * cutoff)
+            raise InvalidInput(
+                f"duration of record {record.name}",
+                float(record.time[-1] - record.time[0]),
+                f"at least {shortest:.3g} s, to say anything below {cutoff:.3g} Hz",
+            )
+        self.frequency = frequency[: self._bins]
+        n_read = len(balance_names(mechanism)) - len(mechanism.coordinates)
+        limits = [cutoff] * len(mechanism.coordinates) + [highest] * n_read
+        self.kept = self.frequency <= np.array(limits)[:, None]
+        motions = {
+            name: motion_of(self._channel(name), record.step, cutoff)
+            for name in mechanism.coordinates
+        }
+        self._acceleration = {
+            name: motion.acceleration[self._rows] for name, motion in motions.items()
+        }
+        self.ports = {
+            port.name: self._port_motion(
+                port,
+                {name: motion.position[self._rows] for name, motion in motions.items()},
+                {name: motion.speed[self._rows] for name, motion in motions.items()},
+            )
+            for port in mechanism.ports
+        }
+        self._inputs = {
+            one.name: smooth(self._channel(one.name), record.step, highest)[self._rows]
+            for one in mechanism.inputs
+        }
+        self.terms = self._terms()
+        names = balance_names(mechanism)
+        self.constant = np.zeros((len(names), self._bins))
+        for port in mechanism.ports:
+            if port.read:
+                reading = smooth(self._channel(port.name), record.step, highest)[self._rows]
+                self.constant[names.index(port.name)] = self._transform(reading)
+        self.noise = self._noise(stride)
+
+    def forces(self, effects: Sequence[LawAt]) -> Values:
+        """Return the coefficients of what laws take from the balances, (n_balances, n_bins)."""
+        names = balance_names(self.mechanism)
+        found = np.zeros((len(names), self._bins))
+        for effect in effects:
+            force = self._law_coefficients(effect)
+            for name, share in self._rows_of(self.mechanism.port(effect.port)).items():
+                found[names.index(name)] += share * force
+        return found
+
+    def _law_coefficients(self, effect: LawAt) -> Values:
+        """Return the coefficients of the force of one effect, (n_bins,).
+
+        The last ones are kept: of a difference quotient all laws but one stay as they are.
+        """
+        if effect not in self._known:
+            while len(self._known) >= _KEPT:
+                self._known.pop(next(iter(self._known)))
+            self._known[effect] = self._transform(self.law_force(effect))
+        return self._known[effect]
+
+    def law_force(self, effect: LawAt) -> Values:
+        """Return the force of one effect against the motion of its port, shape (n,)."""
+        port, motion = self.mechanism.port(effect.port), self.ports[effect.port]
+        state = PortState(
+            motion.position,
+            motion.speed,
+            periodic_phase(motion.position),
+            np.full(1, port.stiffness.value),
+            path=lambda values: values[None, :],
+            back=lambda values: values[0],
+        )
+        return np.broadcast_to(effect.law.respond(state).torque, motion.position.shape)
+
+    def in_time(self, coefficients: Values) -> Values:
+        """Return the signal, shape (n,), at the working rate, of coefficients (n_bins,)."""
+        n = len(self.record.time[self._rows])
+        return np.asarray(dct(np.pad(coefficients, (0, n - self._bins)), type=3, norm="ortho"))
+
+    @property
+    def time(self) -> Values:
+        """Times of the working rate, s, shape (n,)."""
+        return self.record.time[self._rows]
+
+    def _channel(self, name: str) -> Values:
+        if name not in self.record.channels:
+            raise InvalidInput(
+                f"channels of record {self.record.name}",
+                tuple(self.record.channels),
+                f"{name} among them: inverse dynamics needs every coordinate, input and sensor",
+            )
+        return self.record.channels[name]
+
+    def _port_motion(
+        self, port: Port, position: dict[str, Values], speed: dict[str, Values]
+    ) -> PortMotion:
+        here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
+        rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
+        for line in port.error:
+            angle = line.order * position[line.coordinate] + line.phase
+            here = here + line.amplitude * np.sin(angle)
+            rate = rate + line.amplitude * line.order * np.cos(angle) * speed[line.coordinate]
+        return PortMotion(here, rate)
+
+    def _transform(self, signal: Values) -> Values:
+        return np.asarray(dct(signal, type=2, norm="ortho")[: self._bins])
+
+    def _rows_of(self, port: Port) -> dict[str, float]:
+        """Return with which share what acts at a port stands in which balance."""
+        return {port.name: 1.0} if port.read else dict(port.motion)
+
+    def _terms(self) -> Values:
+        names, quantities = balance_names(self.mechanism), quantity_names(self.mechanism)
+        found = np.zeros((len(names), len(quantities), self._bins))
+
+        def add(quantity: str, shares: dict[str, float], signal: Values) -> None:
+            if quantity in quantities:
+                for name, share in shares.items():
+                    row = found[names.index(name), quantities.index(quantity)]
+                    row += share * self._transform(signal)
+
+        for name, acceleration in self._acceleration.items():
+            add(f"inertia of {name}", {name: -1.0}, acceleration)
+        for port in self.mechanism.ports:
+            motion = self.ports[port.name]
+            shares = {name: -share for name, share in self._rows_of(port).items()}
+            add(f"stiffness of {port.name}", shares, motion.position)
+            add(f"damping of {port.name}", shares, motion.speed)
+            add(f"zero of {port.name}", shares, np.ones_like(motion.position))
+        for one in self.mechanism.inputs:
+            add(f"gain of {one.name}", dict(one.acts), self._inputs[one.name])
+        return found
+
+    def _noise(self, stride: int) -> Values:
+        """Return the sensors' noise as the believed mechanism carries it into the balances."""
+        mechanism, names = self.mechanism, balance_names(self.mechanism)
+        omega = 2.0 * np.pi * self.frequency
+        response = np.zeros((len(names), len(mechanism.coordinates), self._bins), dtype=complex)
+        for place, inertia in enumerate(mechanism.inertias.values()):
+            response[place, place] -= inertia.value * omega**2
+        power = np.zeros((len(names), self._bins))
+        for port in mechanism.ports:
+            dynamic = port.stiffness.value + 1j * omega * port.damping.value
+            for row, share in self._rows_of(port).items():
+                for name, part in port.motion.items():
+                    place = mechanism.coordinates.index(name)
+                    response[names.index(row), place] += share * part * dynamic
+            if port.read:
+                power[names.index(port.name)] += noise_of(self._channel(port.name)) ** 2
+        for one in mechanism.inputs:
+            spread = one.gain.value * noise_of(self._channel(one.name))
+            for name, share in one.acts.items():
+                power[names.index(name)] += (share * spread) ** 2
+        for place, name in enumerate(mechanism.coordinates):
+            power += np.abs(response[:, place]) ** 2 * noise_of(self._channel(name)) ** 2
+        return np.sqrt(power / stride)

@@ -1,0 +1,255 @@
+"""A lumped mechanism: inertias, and ports with springs, dampers and laws between them.
+
+M q'' = sum over inputs of B gain u - sum over ports of A (stiffness d + damping d' + laws(d, d')),
+where the motion at a port is d = A^T q, plus what its kinematic error adds. The laws are those of
+`pymoo_hdte.drive`; units are SI throughout, N and m or N.m and rad as the coordinate has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.drive.laws import Law
+
+
+@dataclass(frozen=True)
+class Believed:
+    """A value that is believed within a relative tolerance, which a fit must not leave.
+
+    Attributes
+    ----------
+    value : float
+        SI; at least 0.
+    tolerance : float
+        Relative, 0 for a value that is known; 1 allows everything from nothing to twice the value.
+    """
+
+    value: float
+    tolerance: float = 0.0
+
+    def __post_init__(self) -> None:
+        real_number("believed.value", self.value, at_least=0.0)
+        real_number("believed.tolerance", self.tolerance, at_least=0.0, at_most=1.0)
+
+
+NOTHING = Believed(0.0)
+
+
+@dataclass(frozen=True)
+class ErrorLine:
+    """What a port moves beside its motion: amplitude sin(order q + phase) of a coordinate q."""
+
+    coordinate: str
+    order: float
+    amplitude: float
+    phase: float
+
+    def __post_init__(self) -> None:
+        for name in ("order", "amplitude", "phase"):
+            real_number(f"error.{name}", getattr(self, name))
+
+
+@dataclass(frozen=True)
+class Port:
+    """A place where parts move against each other.
+
+    Attributes
+    ----------
+    name : str
+    motion : mapping of str to float
+        Share of each coordinate in the motion d of the port.
+    stiffness, damping : Believed
+        Of the linear spring and damper that stand there.
+    read : bool
+        True for a force sensor: what acts at the port is measured, as the channel of this name,
+        and does not act on the coordinates.
+    error : tuple of ErrorLine
+        Kinematic error, added to d. It does not act back on the coordinate that makes it, as in
+        Eq. (9) of the paper.
+    """
+
+    name: str
+    motion: Mapping[str, float]
+    stiffness: Believed = NOTHING
+    damping: Believed = NOTHING
+    read: bool = False
+    error: tuple[ErrorLine, ...] = ()
+
+
+@dataclass(frozen=True)
+class Input:
+    """A measured signal that drives the mechanism.
+
+    Attributes
+    ----------
+    name : str
+        Its channel.
+    acts : mapping of str to float
+        Share with which it acts on each coordinate.
+    gain : Believed
+        Force, or torque, per unit of the signal.
+    """
+
+    name: str
+    acts: Mapping[str, float]
+    gain: Believed = field(default=Believed(1.0))
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A control law: input = position_gain (reference - coordinate) - speed_gain coordinate'.
+
+    Attributes
+    ----------
+    input, reference : str
+        The input that it commands, and the channel of the reference.
+    coordinate : str
+    position_gain, speed_gain : float
+    limit : float
+        Of the size of the command; infinite without saturation.
+    """
+
+    input: str
+    reference: str
+    coordinate: str
+    position_gain: float
+    speed_gain: float
+    limit: float = float("inf")
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Coordinates, ports and inputs.
+
+    Attributes
+    ----------
+    inertias : mapping of str to Believed
+        Mass or inertia by coordinate. A coordinate is measured where a record has a channel of
+        its name.
+    ports : sequence of Port
+    inputs : sequence of Input
+    loops : sequence of Loop
+        Closed loops of records that have their references; an input without one is taken from its
+        channel.
+
+    Raises
+    ------
+    InvalidInput
+        For a name that is used twice or stands for nothing, an inertia that is not positive, or a
+        port or input that touches no coordinate.
+    """
+
+    inertias: Mapping[str, Believed]
+    ports: Sequence[Port] = ()
+    inputs: Sequence[Input] = ()
+    loops: Sequence[Loop] = ()
+
+    def __post_init__(self) -> None:
+        for name, value in (
+            ("inertias", MappingProxyType(dict(self.inertias))),
+            ("ports", tuple(self.ports)),
+            ("inputs", tuple(self.inputs)),
+            ("loops", tuple(self.loops)),
+        ):
+            object.__setattr__(self, name, value)
+        if not self.inertias:
+            raise InvalidInput("mechanism.inertias", {}, "at least one coordinate")
+        for name, inertia in self.inertias.items():
+            real_number(f"inertia of {name}", inertia.value, above=0.0)
+        named = [*self.inertias, *self.port_names, *(one.name for one in self.inputs)]
+        for name in named:
+            if not isinstance(name, str) or not name or named.count(name) > 1:
+                allowed = "a name of its own for each coordinate, port and input"
+                raise InvalidInput("mechanism name", name, allowed)
+        for port in self.ports:
+            self._check_shares(f"motion of {port.name}", port.motion)
+            for line in port.error:
+                one_of(f"error of {port.name}", line.coordinate, self.coordinates)
+        for one in self.inputs:
+            self._check_shares(f"acts of {one.name}", one.acts)
+        for loop in self.loops:
+            one_of("loop.input", loop.input, [one.name for one in self.inputs])
+            one_of("loop.coordinate", loop.coordinate, self.coordinates)
+            real_number("loop.position_gain", loop.position_gain)
+            real_number("loop.speed_gain", loop.speed_gain)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates."""
+        return tuple(self.inertias)
+
+    @property
+    def port_names(self) -> tuple[str, ...]:
+        """Names of the ports."""
+        return tuple(port.name for port in self.ports)
+
+    def port(self, name: str) -> Port:
+        """Return a port; raises `InvalidInput` for one that is not there."""
+        return self.ports[self.port_names.index(one_of("port", name, self.port_names))]
+
+    @property
+    def quantities(self) -> dict[str, Believed]:
+        """What is believed, by the name under which a fit knows it, values of nothing left out."""
+        found = {f"inertia of {name}": one for name, one in self.inertias.items()}
+        for port in self.ports:
+            found[f"stiffness of {port.name}"] = port.stiffness
+            found[f"damping of {port.name}"] = port.damping
+        for one in self.inputs:
+            found[f"gain of {one.name}"] = one.gain
+        return {name: one for name, one in found.items() if one.value > 0.0}
+
+    def with_values(self, values: Mapping[str, float]) -> Mechanism:
+        """Return the mechanism with other values of `quantities`, as known ones.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            By name, as in `quantities`; what is not there stays as it is.
+        """
+
+        def known(name: str, before: Believed) -> Believed:
+            return Believed(float(values[name])) if name in values else before
+
+        inertias = {name: known(f"inertia of {name}", one) for name, one in self.inertias.items()}
+        ports = [
+            Port(
+                port.name,
+                port.motion,
+                known(f"stiffness of {port.name}", port.stiffness),
+                known(f"damping of {port.name}", port.damping),
+                port.read,
+                port.error,
+            )
+            for port in self.ports
+        ]
+        inputs = [
+            Input(one.name, one.acts, known(f"gain of {one.name}", one.gain)) for one in self.inputs
+        ]
+        return Mechanism(inertias, ports, inputs, self.loops)
+
+    def _check_shares(self, name: str, shares: Mapping[str, float]) -> None:
+        for coordinate, share in shares.items():
+            one_of(name, coordinate, self.coordinates)
+            real_number(f"{name}.{coordinate}", share)
+        if not any(shares.values()):
+            raise InvalidInput(name, dict(shares), "a share other than 0 of some coordinate")
+
+
+@dataclass(frozen=True)
+class LawAt:
+    """An effect: a law at a port of a mechanism.
+
+    Attributes
+    ----------
+    name : str
+        Of the effect, as verdicts have it.
+    port : str
+    law : Law
+    """
+
+    name: str
+    port: str
+    law: Law

@@ -1,0 +1,109 @@
+"""Motion from measured positions: smoothed without delay, and differentiated, up to a frequency.
+
+Beyond the frequency at which a position no longer stands out of its sensor's noise its derivatives
+are noise, and force balances are held against records below it only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import butter, savgol_filter, sosfiltfilt, welch
+
+from pymoo_hdte.checks import InvalidInput
+
+Values = NDArray[np.float64]
+
+_STANDS_OUT = 4.0
+"""Ratio of powers by which a position stands out of its noise."""
+_HIGHEST_SHARE = 0.1
+"""Largest cutoff as a share of the sampling rate: ten samples in a period."""
+_SEGMENT = 1024
+_ORDER = 8
+_PASS = 2.0
+"""Corner of the smoothing over the cutoff, up to which it passes all but 2e-5."""
+_SETTLES = 2.0
+"""Periods of the cutoff that are left out at either end, where smoothing knows but one side."""
+_STENCIL = 7
+"""Samples of a derivative: exact for polynomials of degree six."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Smoothed position with its derivatives, shape (n,) each; SI."""
+
+    position: Values
+    speed: Values
+    acceleration: Values
+
+
+def noise_of(signal: Values) -> float:
+    """Return the standard deviation of the white noise of a smooth signal, of shape (n,).
+
+    From third differences, in which white noise has 1 + 9 + 9 + 1 times its variance.
+    """
+    return float(np.sqrt(np.mean(np.diff(signal, 3) ** 2) / 20.0))
+
+
+def highest_frequency(position: Values, step: float) -> float:
+    """Return the frequency in Hz up to which a position stands out of its noise.
+
+    Raises
+    ------
+    InvalidInput
+        If it does so nowhere.
+    """
+    # Second differences, because the spectrum of a position falls too steeply for a window.
+    difference = np.diff(position, 2)
+    frequency, power = welch(
+        difference, 1.0 / step, nperseg=min(_SEGMENT, len(difference)), detrend="constant"
+    )
+    noise = 2.0 * step * noise_of(position) ** 2 * (2.0 * np.sin(np.pi * frequency * step)) ** 4
+    stands_out = power[1:] > _STANDS_OUT * noise[1:]
+    if not stands_out[0]:
+        ratio = float(power[1] / max(noise[1], 1e-300))
+        raise InvalidInput(
+            "power of a position over that of its noise",
+            ratio,
+            f"more than {_STANDS_OUT:g} at the lowest frequency, or nothing is known of its motion",
+        )
+    quiet = np.flatnonzero(~stands_out)
+    last = quiet[0] if quiet.size else len(stands_out)
+    return float(min(frequency[last], highest_share(step)))
+
+
+def highest_share(step: float) -> float:
+    """Return the highest frequency, Hz, that a sampling step resolves with ten samples."""
+    return _HIGHEST_SHARE / step
+
+
+def stride_of(cutoff: float, step: float) -> int:
+    """Return how many samples make a step of ten to a period of the cutoff."""
+    return max(1, int(_HIGHEST_SHARE / (step * cutoff)))
+
+
+def margin_of(cutoff: float, step: float) -> int:
+    """Return the number of samples to be left out at either end."""
+    return int(np.ceil(_SETTLES / (step * cutoff)))
+
+
+def smooth(signal: Values, step: float, cutoff: float) -> Values:
+    """Return a signal of shape (n,) without what lies well beyond the cutoff, and without delay."""
+    corner = _PASS * cutoff
+    if corner * step >= 0.45:
+        return signal
+    # From the mean, so that a large constant does not ring at the ends.
+    middle = float(np.mean(signal))
+    filtered = sosfiltfilt(butter(_ORDER, corner, fs=1.0 / step, output="sos"), signal - middle)
+    return np.asarray(filtered + middle)
+
+
+def motion_of(position: Values, step: float, cutoff: float) -> Motion:
+    """Return the motion of a measured position, shape (n,), up to the cutoff in Hz."""
+    smoothed = smooth(position, step, cutoff)
+    speed, acceleration = (
+        savgol_filter(smoothed, _STENCIL, _STENCIL - 1, deriv=order, delta=step) for order in (1, 2)
+    )
+    return Motion(smoothed, speed, acceleration)
