@@ -68,6 +68,8 @@ EXPERIMENTS = (
         "blind",
         "Blind campaigns: what the discrepancy workflow finds of what is hidden",
     ),
+    Experiment("emps", "EMPS: friction of a positioning system, measured by others"),
+    Experiment("kinova", "Kinova Gen3: friction and ripple of a robot joint, measured by others"),
     Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
     Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
 )

@@ -20,8 +20,9 @@ INTERRUPTED = 130
 _EXAMPLE = """example:
   pymoo-hdte discrepancy campaigns/rig-01 --out reports/rig-01
 
-The campaign is a folder with campaign.toml and its records. DIR gets verdict.json,
-revised_model.toml and report.html; an earlier report there is replaced, anything else refused.
+The campaign is a folder with campaign.toml and its records, of a harmonic drive, or with rig.toml
+and its records, of any other mechanism. DIR gets verdict.json, revised_model.toml and report.html;
+an earlier report there is replaced, anything else refused.
 Exit codes: 0 a verdict was reached, whatever it is; 2 the input is at fault."""
 
 
@@ -29,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run what the command line asks for; return the exit code."""
     options = _parser().parse_args(arguments)
     try:
-        document = _discrepancy(options.campaign, options.out)
+        document = _discrepancy(options.campaign, options.out, options.data)
     except (InvalidInput, OSError) as error:
         print(f"pymoo-hdte: error: {_message(error)}", file=sys.stderr)
         return MISTAKE
@@ -60,25 +61,53 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder for verdict and report"
     )
+    command.add_argument(
+        "--data", type=Path, metavar="DIR", help="folder of the records that rig.toml names"
+    )
     output = command.add_mutually_exclusive_group()
     output.add_argument("--json", action="store_true", help="print verdict.json to stdout")
     output.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return parser
 
 
-def _discrepancy(folder: Path, out: Path) -> dict[str, Any]:
-    """Analyse a campaign and write its report; return the verdict's document."""
+def _discrepancy(folder: Path, out: Path, data: Path | None) -> dict[str, Any]:
+    """Analyse a campaign or a rig and write its report; return the verdict's document."""
     # The workflow takes a second to import, which --help need not wait for.
+    from pymoo_hdte.discrepancy.report_folder import check_folder
+    from pymoo_hdte.measured.rig_files import RIG_FILE
+
+    check_folder(out)
+    if (folder / RIG_FILE).is_file() or folder.suffix == ".toml":
+        return _of_mechanism(folder, out, data)
+    if data is not None:
+        raise InvalidInput("--data", str(data), f"none without a {RIG_FILE}")
+    return _of_drive(folder, out)
+
+
+def _of_mechanism(folder: Path, out: Path, data: Path | None) -> dict[str, Any]:
+    from threadpoolctl import threadpool_limits
+
+    from pymoo_hdte.measured import investigate
+    from pymoo_hdte.measured.report import write_measured_report
+    from pymoo_hdte.measured.rig_files import read_rig
+
+    rig = read_rig(folder, data)
+    with threadpool_limits(limits=1):
+        finding = investigate(rig.mechanism, rig.records, rig.cutoff, rig.effects)
+        return write_measured_report(rig.title, finding, out)
+
+
+def _of_drive(folder: Path, out: Path) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits
 
     from pymoo_hdte.discrepancy import read_campaign
     from pymoo_hdte.discrepancy.locate import locate
     from pymoo_hdte.discrepancy.next_experiment import next_experiment
     from pymoo_hdte.discrepancy.prove import prove
-    from pymoo_hdte.discrepancy.report import VERDICT_FILE, check_folder, write_report
+    from pymoo_hdte.discrepancy.report import write_report
+    from pymoo_hdte.discrepancy.report_folder import VERDICT_FILE
     from pymoo_hdte.discrepancy.workflow import analyse
 
-    check_folder(out)
     analysis = analyse(read_campaign(folder))
     with threadpool_limits(limits=1):
         written = write_report(

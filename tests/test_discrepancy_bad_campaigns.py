@@ -13,7 +13,7 @@ from quick_campaigns import quick_campaign
 from virtual_rig_cases import effect
 
 from pymoo_hdte import cli
-from pymoo_hdte.discrepancy import report, workflow, write_campaign
+from pymoo_hdte.discrepancy import report, report_folder, workflow, write_campaign
 from pymoo_hdte.drive import load_datasheet, load_model, simulate
 
 ROW = "run_2000rpm_40Nm.csv.gz"
@@ -208,7 +208,7 @@ def analysed(clean):
     return workflow.analyse(clean)
 
 
-@pytest.mark.parametrize("stage", ["_page", "_revision", "_write_folder"])
+@pytest.mark.parametrize("stage", ["_page", "_revision", "write_folder"])
 def test_an_interrupted_run_leaves_nothing(stage, folder, analysed, tmp_path, monkeypatch, capsys):
     def stop(*_):
         raise KeyboardInterrupt
@@ -220,20 +220,20 @@ def test_an_interrupted_run_leaves_nothing(stage, folder, analysed, tmp_path, mo
 
 
 def test_interrupted_in_the_last_step_the_earlier_report_stays(tmp_path, monkeypatch):
-    files = {report.VERDICT_FILE: "{}", report.PAGE_FILE: "earlier"}
-    report._write_folder(tmp_path / "out", files)
-    moved = report.Path.replace
+    files = {report_folder.VERDICT_FILE: "{}", report_folder.PAGE_FILE: "earlier"}
+    report_folder.write_folder(tmp_path / "out", files)
+    moved = report_folder.Path.replace
 
     def stop(path, target):
         if path.name == "report":
             raise KeyboardInterrupt
         return moved(path, target)
 
-    monkeypatch.setattr(report.Path, "replace", stop)
+    monkeypatch.setattr(report_folder.Path, "replace", stop)
     with pytest.raises(KeyboardInterrupt):
-        report._write_folder(tmp_path / "out", files | {report.PAGE_FILE: "later"})
+        report_folder.write_folder(tmp_path / "out", files | {report_folder.PAGE_FILE: "later"})
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
-    assert (tmp_path / "out" / report.PAGE_FILE).read_text() == "earlier"
+    assert (tmp_path / "out" / report_folder.PAGE_FILE).read_text() == "earlier"
 
 
 def test_too_few_conditions_and_nothing_held_out_are_said(clean, tmp_path, capsys):
@@ -270,7 +270,7 @@ def test_twice_the_same_bytes(reported):
         {p.name: p.read_bytes() for p in (reported / n).iterdir()} for n in ("one", "other")
     )
     assert one == other
-    assert one.keys() == set(report.FILES)
+    assert one.keys() == set(report_folder.FILES)
 
 
 def test_the_verdict_holds_what_was_promised(reported):

@@ -16,7 +16,8 @@ from pymoo_hdte.discrepancy.locate import locate
 from pymoo_hdte.discrepancy.next_experiment import Proposal
 from pymoo_hdte.discrepancy.optimum import OptimumShift, optimum_shift
 from pymoo_hdte.discrepancy.prove import prove
-from pymoo_hdte.discrepancy.report import FILES, write_report
+from pymoo_hdte.discrepancy.report import write_report
+from pymoo_hdte.discrepancy.report_folder import FILES, number
 from pymoo_hdte.discrepancy.report_tables import certainty, gap_sentence, parameter_rows
 from pymoo_hdte.discrepancy.revise import accepted_fit, drive_model, revised_model
 from pymoo_hdte.discrepancy.virtual_rig import run_campaign
@@ -152,7 +153,7 @@ def test_parameters_are_told_in_the_reader_s_units(ripple):
     [(0.0, "0"), (-2.5, "−2.5"), (1.97e-4, "1.97·10⁻⁴"), (123456.0, "1.23·10⁵"), (None, "–")],  # noqa: RUF001
 )
 def test_numbers_are_readable(value, shown):
-    assert report._number(value) == shown
+    assert number(value) == shown
 
 
 def revised_with(ripple, *effects):

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.effect_words import in_words
@@ -27,6 +21,13 @@ from pymoo_hdte.discrepancy.report_figures import (
     misfit_overview,
     optimum_fronts,
     overlay,
+)
+from pymoo_hdte.discrepancy.report_folder import (
+    PAGE_FILE,
+    VERDICT_FILE,
+    check_folder,
+    page,
+    write_folder,
 )
 from pymoo_hdte.discrepancy.report_tables import (
     STATUSES,
@@ -50,10 +51,6 @@ from pymoo_hdte.discrepancy.revise import (
 from pymoo_hdte.discrepancy.verdict_file import verdict_document
 from pymoo_hdte.discrepancy.workflow import Analysis
 
-VERDICT_FILE = "verdict.json"
-PAGE_FILE = "report.html"
-FILES = (VERDICT_FILE, PAGE_FILE, MODEL_FILE, SHEET_FILE)
-
 
 def write_report(
     analysis: Analysis,
@@ -62,7 +59,7 @@ def write_report(
     proposal: Proposal,
     out: str | Path,
 ) -> Path:
-    """Write a folder with `FILES`: all of them or, after an error, none; return its path.
+    """Write a folder with all of `report_folder.FILES` or, after an error, none; return its path.
 
     Parameters
     ----------
@@ -91,9 +88,9 @@ def write_report(
     model_files, shift = _revision(analysis)
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
-    page = _page(analysis, location, proof, document, shift)
+    html = _page(analysis, location, proof, document, shift)
     verdict = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    _write_folder(out, {VERDICT_FILE: verdict, PAGE_FILE: page, **model_files})
+    write_folder(out, {VERDICT_FILE: verdict, PAGE_FILE: html, **model_files})
     return out
 
 
@@ -135,14 +132,6 @@ def _page(
     document: dict[str, Any],
     shift: OptimumShift,
 ) -> str:
-    environment = Environment(
-        loader=PackageLoader("pymoo_hdte.discrepancy", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = _number
     pictures = {
         "overview": data_uri(misfit_overview(location)),
         "map": data_uri(misfit_map(location)),
@@ -155,7 +144,9 @@ def _page(
         }
     if shift.choices:
         pictures["optimum"] = data_uri(optimum_fronts(shift))
-    return environment.get_template("report.html.j2").render(
+    return page(
+        "pymoo_hdte.discrepancy",
+        "report.html.j2",
         campaign=analysis.campaign,
         verdict=analysis.verdict,
         document=document,
@@ -174,54 +165,3 @@ def _page(
         shift=shift,
         surrogate_order=SURROGATE_ORDER,
     )
-
-
-def _number(value: float | None, digits: int = 3) -> str:
-    """Return a number for the reader, without an exponent where it can be helped."""
-    if value is None or not np.isfinite(value):
-        return "\N{EN DASH}"
-    size = abs(value)
-    if value == 0.0 or 1e-3 <= size < 1e5:
-        shown = np.format_float_positional(value, digits, fractional=False, trim="-")
-        return shown.replace("-", "\N{MINUS SIGN}")
-    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    return f"{mantissa}·10{power}".replace("-", "\N{MINUS SIGN}")
-
-
-def check_folder(out: Path) -> None:
-    """Refuse a folder that could not take a report, before anybody waits for one.
-
-    Errors as in `write_report`.
-    """
-    allowed = "a folder that is new, empty or an earlier report"
-    if out.is_symlink() or (out.exists() and not out.is_dir()):
-        raise InvalidInput("folder of the report", str(out), allowed)
-    if out.is_dir():
-        present = {path.name for path in out.iterdir()}
-        if present and not {VERDICT_FILE, PAGE_FILE} <= present <= set(FILES):
-            raise InvalidInput("folder of the report", str(out), allowed)
-    parent = next(folder for folder in out.absolute().parents if folder.exists())
-    if not parent.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(parent))
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(parent))
-
-
-def _write_folder(out: Path, files: dict[str, str]) -> None:
-    """Write files to a draft beside ``out`` and put that in its place."""
-    out.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".report-", dir=out.parent) as workshop:
-        draft = Path(workshop) / "report"
-        draft.mkdir()
-        for name, text in files.items():
-            (draft / name).write_text(text, encoding="utf-8", newline="\n")
-        earlier = Path(workshop) / "earlier"
-        try:
-            if out.exists():
-                out.replace(earlier)
-            draft.replace(out)
-        except BaseException:
-            if earlier.exists() and not out.exists():
-                earlier.replace(out)
-            raise

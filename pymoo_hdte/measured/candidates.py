@@ -67,7 +67,8 @@ def mechanism_candidates(
             if read.read and dict(read.motion) == dict(port.motion):
                 found += _periodic(port.name, orders.get(read.name, ()), force)[:1]
         found += _elastic(port.name, force, travel, port.stiffness.value, both)
-    return found
+    known = {(one.name, one.port, getattr(one.law, "order", None)) for one in data.known}
+    return [one for one in found if not one.places & known]
 
 
 def _at(name: str, port: str, law: Any) -> tuple[Any, ...]:
@@ -162,7 +163,7 @@ def _lines(kind: Any, name: str, port: str, orders: Sequence[float]) -> Any:
 def _periodic(port: str, orders: Sequence[float], force: float) -> list[Candidate]:
     if not orders:
         return []
-    most, form = _LARGEST * force, _in_a_word(orders)
+    most, form, words = _LARGEST * force, _listed(orders, "+"), _listed(orders, ", ")
     ripple = _waves("amplitude", orders, most, force)
     friction = _waves("level", orders, most, force)
     mean = unknown("mean", 0.0, most, force)
@@ -174,7 +175,7 @@ def _periodic(port: str, orders: Sequence[float], force: float) -> list[Candidat
             ripple,
             wave_starts(ripple),
             _lines(PeriodicTorque, "torque_ripple", port, orders),
-            f"A force at the {port} that varies with its position, orders {form}, and acts on the "
+            f"A force at the {port} that varies with its position, orders {words}, and acts on the "
             "motion.",
             form=form,
         ),
@@ -184,7 +185,7 @@ def _periodic(port: str, orders: Sequence[float], force: float) -> list[Candidat
             (*friction, mean),
             wave_starts((*friction, mean)),
             lambda v: (*varying(v[:-1]), *_at("coulomb_friction", port, CoulombFriction(v[-1]))),
-            f"Friction that varies with the position of the {port}, orders {form}.",
+            f"Friction that varies with the position of the {port}, orders {words}.",
             form=form,
         ),
     ]
@@ -193,7 +194,7 @@ def _periodic(port: str, orders: Sequence[float], force: float) -> list[Candidat
 def _of_reading(port: str, orders: Sequence[float], force: float) -> list[Candidate]:
     if not orders:
         return []
-    form = _in_a_word(orders)
+    form, words = _listed(orders, "+"), _listed(orders, ", ")
     parts = _waves("amplitude", orders, _LARGEST * force, force)
     return [
         Candidate(
@@ -202,15 +203,15 @@ def _of_reading(port: str, orders: Sequence[float], force: float) -> list[Candid
             parts,
             wave_starts(parts),
             _lines(PeriodicTorque, "kinematic_error", port, orders),
-            f"The reading of {port} varies with the position, orders {form}, by as much at any "
+            f"The reading of {port} varies with the position, orders {words}, by as much at any "
             "speed: it is made by the kinematics, and not by a torque that moves inertias.",
             form=form,
         )
     ]
 
 
-def _in_a_word(orders: Sequence[float]) -> str:
-    return "+".join(f"{order:g}" for order in orders)
+def _listed(orders: Sequence[float], between: str) -> str:
+    return between.join(f"{order:g}" for order in orders)
 
 
 def _elastic(

@@ -42,11 +42,14 @@ class MeasuredData:
         Of the records.
     deviation : tuple of ndarray, shape (n_balances, n_bins)
         Standard deviation that counts as noise, by record.
+    known : tuple of LawAt
+        Effects that the base has.
     """
 
     mechanism: Mechanism
     balances: tuple[Balance, ...]
     deviation: tuple[Values, ...]
+    known: tuple[LawAt, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -88,7 +91,8 @@ class MeasuredData:
         known[places] = 0.0
         constants, slopes = [], []
         for balance, deviation in zip(self.balances, self.deviation, strict=True):
-            constant = balance.constant + np.einsum("bqk,q->bk", balance.terms, known)
+            constant = balance.constant - balance.forces(self.known)
+            constant += np.einsum("bqk,q->bk", balance.terms, known)
             constants.append((constant / deviation)[balance.kept])
             terms = balance.terms[:, places] / deviation[:, None]
             slopes.append(np.moveaxis(terms, 1, 2)[balance.kept])
@@ -179,6 +183,13 @@ class MeasuredData:
         return np.sum([np.sum(one**2, axis=1) for one in self.coefficients(residuals)], axis=0)
 
     @cached_property
+    def frequency(self) -> Vector:
+        """Frequency of each residual, Hz, shape (n,)."""
+        return np.concatenate(
+            [np.broadcast_to(one.frequency, one.kept.shape)[one.kept] for one in self.balances]
+        )
+
+    @cached_property
     def _part(self) -> NDArray[np.int_]:
         return np.concatenate([np.nonzero(one.kept)[0] for one in self.balances])
 
@@ -222,8 +233,27 @@ class BalanceObjective(Unknowns):
         return tuple(effect for part in parts for effect in part)  # type: ignore[misc]
 
 
+def usual_cutoff(mechanism: Mechanism, records: Sequence[Record]) -> float:
+    """Return the frequency, Hz, up to which every coordinate stands out of its noise.
+
+    Raises
+    ------
+    InvalidInput
+        See `highest_frequency`.
+    """
+    return min(
+        highest_frequency(record.channels[name], record.step)
+        for record in records
+        for name in mechanism.coordinates
+        if name in record.channels
+    )
+
+
 def measured_data(
-    mechanism: Mechanism, records: Sequence[Record], cutoff: float | None = None
+    mechanism: Mechanism,
+    records: Sequence[Record],
+    cutoff: float,
+    known: Sequence[LawAt] = (),
 ) -> MeasuredData:
     """Return records of a mechanism with the noise of their sensors.
 
@@ -231,25 +261,21 @@ def measured_data(
     ----------
     mechanism : Mechanism
     records : sequence of Record
-    cutoff : float, optional
-        Hz; by default where the first coordinate ceases to stand out of its noise in some record.
+    cutoff : float
+        Hz, up to which the motion is known.
+    known : sequence of LawAt
+        Effects that the mechanism has.
 
     Raises
     ------
     InvalidInput
-        See `Balance` and `highest_frequency`; if a channel never changes.
+        See `Balance`; if a channel never changes.
     """
     for record in records:
         for name, channel in record.channels.items():
             if np.ptp(channel) == 0.0:
                 allowed = "a signal that changes; this one is dead"
                 raise InvalidInput(f"channel {name} of {record.name}", float(channel[0]), allowed)
-    if cutoff is None:
-        cutoff = min(
-            highest_frequency(record.channels[name], record.step)
-            for record in records
-            for name in mechanism.coordinates
-            if name in record.channels
-        )
     balances = tuple(Balance(mechanism, record, cutoff) for record in records)
-    return MeasuredData(mechanism, balances, tuple(one.noise for one in balances))
+    noise = tuple(one.noise for one in balances)
+    return MeasuredData(mechanism, balances, noise, tuple(known))

@@ -8,7 +8,7 @@ names what stands out of everything that is known to be able to explain it, and 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.fit import Fit, fit
-from pymoo_hdte.discrepancy.naming import FITTED, OF_ONE_NAME, Verdict, judge
+from pymoo_hdte.discrepancy.naming import EXPLAINED, FITTED, OF_ONE_NAME, Verdict, judge
 from pymoo_hdte.discrepancy.rival import Rival, adequate, fit_all, rival, varied
 from pymoo_hdte.discrepancy.screening import screen
 from pymoo_hdte.measured.candidates import mechanism_candidates
-from pymoo_hdte.measured.data import MeasuredData, measured_data
+from pymoo_hdte.measured.data import MeasuredData, measured_data, usual_cutoff
 from pymoo_hdte.measured.orders import position_orders
-from pymoo_hdte.mechanism import Mechanism, Record
+from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 MAIN_SHARE = 0.5
 """Least share of the power of a misfit beyond the sensors' noise that a named effect removes."""
@@ -43,25 +43,47 @@ class Finding:
     ----------
     mechanism : Mechanism
     records : tuple of Record
+    cutoff : float
+        Hz, up to which the motion is known.
     data : MeasuredData
         Training records; their noise is the rest that nobody explains.
     verdict : Verdict
-    sensor_noise, base_misfit, remainder : ndarray, shape (n_balances,)
-        Root mean squares, N or N.m: of the sensors' noise, of what the base leaves, and of what
-        the model with the accepted effects leaves.
     """
 
     mechanism: Mechanism
     records: tuple[Record, ...]
+    cutoff: float
     data: MeasuredData
     verdict: Verdict
-    sensor_noise: NDArray[np.float64]
-    base_misfit: NDArray[np.float64]
-    remainder: NDArray[np.float64]
+
+    @property
+    def accepted(self) -> Fit:
+        """The fit with the effects that the verdict names, or that of the base."""
+        chosen = self.verdict.chosen
+        return chosen.fit if chosen and self.verdict.status in EXPLAINED else self.verdict.base
+
+    @property
+    def sensor_noise(self) -> NDArray[np.float64]:
+        """Root mean square of the sensors' noise in each balance, N or N.m."""
+        noise = replace(self.data, deviation=tuple(one.noise for one in self.data.balances))
+        return root_mean_square(noise, np.ones_like(self.verdict.base.residuals))
+
+    @property
+    def base_misfit(self) -> NDArray[np.float64]:
+        """Root mean square of what the base leaves of each balance, N or N.m."""
+        return root_mean_square(self.data, self.verdict.base.residuals)
+
+    @property
+    def remainder(self) -> NDArray[np.float64]:
+        """Root mean square of what the accepted model leaves of each balance, N or N.m."""
+        return root_mean_square(self.data, self.accepted.residuals)
 
 
 def investigate(
-    mechanism: Mechanism, records: Sequence[Record], cutoff: float | None = None
+    mechanism: Mechanism,
+    records: Sequence[Record],
+    cutoff: float | None = None,
+    known: Sequence[LawAt] = (),
 ) -> Finding:
     """Return the verdict on records of a mechanism.
 
@@ -72,7 +94,9 @@ def investigate(
     records : sequence of Record
         At least one of them of role ``train``.
     cutoff : float, optional
-        Hz; see `measured_data`.
+        Hz, up to which the motion is known; by default where it ceases to stand out of its noise.
+    known : sequence of LawAt
+        Effects that the mechanism is known to have.
 
     Raises
     ------
@@ -82,26 +106,18 @@ def investigate(
     train = [record for record in records if record.role == "train"]
     if not train:
         raise InvalidInput("number of train records", 0, "at least 1")
-    sensors = measured_data(mechanism, train, cutoff)
+    if cutoff is None:
+        cutoff = usual_cutoff(mechanism, train)
+    sensors = measured_data(mechanism, train, cutoff, known)
     base = fit(sensors)
     candidates = _candidates(sensors, base)
     data = _with_rest(sensors, base, candidates)
     verdict = _judged(sensors, data, candidates)
-    accepted = verdict.chosen if verdict.status in ("named", "class", "parameter") else None
-    left = verdict.base if accepted is None else accepted.fit
-    return Finding(
-        mechanism,
-        tuple(records),
-        data,
-        verdict,
-        _root_mean_square(sensors, np.ones_like(base.residuals)),
-        _root_mean_square(data, verdict.base.residuals),
-        _root_mean_square(data, left.residuals),
-    )
+    return Finding(mechanism, tuple(records), cutoff, data, verdict)
 
 
 def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
-    force = float(max(_root_mean_square(data, base.residuals)))
+    force = float(max(root_mean_square(data, base.residuals)))
     orders = position_orders(data, base)
     return mechanism_candidates(data, force, orders)
 
@@ -141,14 +157,14 @@ def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Cand
     base = fit(data)
     verdict = _simplest(data, judge(data, base, candidates))
     before, noise = (
-        np.sum(_root_mean_square(one, residuals) ** 2)
+        np.sum(root_mean_square(one, residuals) ** 2)
         for one, residuals in ((data, base.residuals), (sensors, np.ones_like(base.residuals)))
     )
     if verdict.chosen is None:
         if before <= REST * noise:
             return verdict
         return _as_unlisted(verdict, None)
-    after = np.sum(_root_mean_square(data, verdict.chosen.fit.residuals) ** 2)
+    after = np.sum(root_mean_square(data, verdict.chosen.fit.residuals) ** 2)
     if before - after < MAIN_SHARE * (before - noise):
         return _as_unlisted(verdict, verdict.chosen)
     return verdict
@@ -157,25 +173,27 @@ def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Cand
 def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
     """Return the verdict with the model of fewest unknowns that leaves hardly more than the best.
 
-    With many samples the evidence prefers a richer law for a hair's breadth of a rest that is no
-    noise.
+    With many samples the evidence prefers a richer law, or a second effect, for a hair's breadth of
+    a rest that is no noise.
     """
     chosen = verdict.chosen
     if chosen is None or verdict.status not in ("named", "class"):
         return verdict
-    most = PARSIMONY * float(np.sum(data.power(chosen.fit.residuals)))
+    most = PARSIMONY * data.power(chosen.fit.residuals)
     near = [
         one
-        for one in (chosen, *verdict.alternatives)
-        if len(one.candidates) == len(chosen.candidates)
-        and _unknowns(one) < _unknowns(chosen)
-        and np.sum(data.power(one.fit.residuals)) <= most
+        for one in verdict.alternatives
+        if _unknowns(one) < _unknowns(chosen) and np.all(data.power(one.fit.residuals) <= most)
     ]
     if not near:
         return verdict
     simplest = min(near, key=lambda one: (_unknowns(one), one.bic))
     others = tuple(one for one in (chosen, *verdict.alternatives) if one is not simplest)
-    equivalent = tuple(one for one in verdict.equivalent if one is not simplest)
+    equivalent = tuple(
+        one
+        for one in verdict.equivalent
+        if one is not simplest and len(one.candidates) == len(simplest.candidates)
+    )
     status = "class" if equivalent else "named"
     return Verdict(status, verdict.base, simplest, others, equivalent, verdict.degrees_of_freedom)
 
@@ -203,7 +221,7 @@ def _in_units_of(
     return residuals * np.concatenate(ratio)
 
 
-def _root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+def root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the root mean square of each balance, N or N.m, for whitened residuals (n,)."""
     samples = sum(len(balance.time) for balance in data.balances)
     return np.sqrt(data.power(residuals) / samples)

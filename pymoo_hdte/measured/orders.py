@@ -14,8 +14,9 @@ from pymoo_hdte.measured.data import MeasuredData
 
 Values = NDArray[np.float64]
 
-_FEWEST_PERIODS = 3.0
-"""Periods within a record that make an order of what varies with its position."""
+_FEWEST_PERIODS = 5.0
+"""Periods within a record that make an order of what varies with its position: fewer may be a
+wander."""
 _FALSE_ORDER = 1e-4
 """Chance that noise alone shows any order."""
 _MOST_ORDERS = 6

@@ -19,6 +19,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.laws import PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
 from pymoo_hdte.mechanism.motion import (
+    Motion,
     highest_share,
     margin_of,
     motion_of,
@@ -78,6 +79,10 @@ class Balance:
     noise : ndarray, shape (n_balances, n_bins)
         Standard deviation that the sensors' noise gives them, for the believed quantities.
     ports : dict of str to PortMotion
+        At the working rate.
+    motions : dict of str to Motion
+        Of the coordinates, at the rate of the record.
+    cutoff : float
 
     Raises
     ------
@@ -107,18 +112,19 @@ class Balance:
         n_read = len(balance_names(mechanism)) - len(mechanism.coordinates)
         limits = [cutoff] * len(mechanism.coordinates) + [highest] * n_read
         self.kept = self.frequency <= np.array(limits)[:, None]
-        motions = {
+        self.cutoff = cutoff
+        self.motions = {
             name: motion_of(self._channel(name), record.step, cutoff)
             for name in mechanism.coordinates
         }
         self._acceleration = {
-            name: motion.acceleration[self._rows] for name, motion in motions.items()
+            name: motion.acceleration[self._rows] for name, motion in self.motions.items()
         }
         self.ports = {
             port.name: self._port_motion(
                 port,
-                {name: motion.position[self._rows] for name, motion in motions.items()},
-                {name: motion.speed[self._rows] for name, motion in motions.items()},
+                {name: motion.position[self._rows] for name, motion in self.motions.items()},
+                {name: motion.speed[self._rows] for name, motion in self.motions.items()},
             )
             for port in mechanism.ports
         }
@@ -156,9 +162,10 @@ class Balance:
             self._known[effect] = self._transform(self.law_force(effect))
         return self._known[effect]
 
-    def law_force(self, effect: LawAt) -> Values:
-        """Return the force of one effect against the motion of its port, shape (n,)."""
-        port, motion = self.mechanism.port(effect.port), self.ports[effect.port]
+    def law_force(self, effect: LawAt, motion: PortMotion | Motion | None = None) -> Values:
+        """Return the force of one effect against a motion, by default its port's, shape (n,)."""
+        port = self.mechanism.port(effect.port)
+        motion = self.ports[effect.port] if motion is None else motion
         state = PortState(
             motion.position,
             motion.speed,

@@ -1,0 +1,233 @@
+"""``verdict.json`` of measured records, and the sentences of their report."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.candidate import polar
+from pymoo_hdte.discrepancy.effect_words import in_words
+from pymoo_hdte.discrepancy.fit import Fit
+from pymoo_hdte.discrepancy.rival import Rival
+from pymoo_hdte.discrepancy.verdict_file import sentence
+from pymoo_hdte.measured.candidates import turns_back
+from pymoo_hdte.measured.intervals import covariance
+from pymoo_hdte.measured.investigate import Finding
+from pymoo_hdte.measured.next_test import NextTest
+from pymoo_hdte.measured.prove import MeasuredGap
+
+_DEVIATIONS = 1.96
+_OFFERED = 6.0
+"""Gain of BIC with which a second effect that is not named is mentioned."""
+_MEANINGFUL = 0.05
+"""Least share of what is left that it removes."""
+
+
+def measured_document(
+    title: str, finding: Finding, gaps: Sequence[MeasuredGap], test: NextTest
+) -> dict[str, Any]:
+    """Return the verdict as plain types.
+
+    Parameters
+    ----------
+    title : str
+    finding : Finding
+    gaps : sequence of MeasuredGap
+        Of held-out records; empty where there are none.
+    test : NextTest
+    """
+    verdict = finding.verdict
+    return {
+        "campaign": title,
+        "status": verdict.status,
+        "sentence": sentence(verdict),
+        "effects": effects(finding),
+        "offered": offered(finding),
+        "alternatives": [_evidence(finding, one) for one in sorted(_others(finding), key=_by_bic)],
+        "base": quantities(finding),
+        "location": location(finding),
+        "remainder": remainder(finding),
+        "limits": limits(finding),
+        "held_out": [gap.as_dict() for gap in gaps]
+        or {"reason": "no record was held out, so that nothing can be proved"},
+        "next_experiment": test.as_dict(),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy")},
+        },
+    }
+
+
+def effects(finding: Finding) -> list[dict[str, Any]]:
+    """Return the accepted effects with values and 95 % intervals."""
+    fitted = finding.accepted
+    spread = covariance(finding.data, fitted)
+    start, found = len(finding.data.base), []
+    for candidate in fitted.candidates:
+        rows = range(start, start + len(candidate.parameters))
+        start = rows.stop
+        found.append(
+            {
+                "name": candidate.name,
+                "port": candidate.port,
+                "sentence": candidate.sentence,
+                "parameters": _parameters(fitted, spread, rows),
+                "at_bound": [
+                    fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0
+                ],
+            }
+        )
+    return found
+
+
+def offered(finding: Finding) -> list[dict[str, Any]]:
+    """Return second effects beside the named one that the data speak for, though not loudly.
+
+    They make the fit better than chance does, but remove too little to be named.
+    """
+    chosen = finding.verdict.chosen
+    if chosen is None or finding.accepted is not chosen.fit or len(chosen.candidates) > 1:
+        return []
+    found = []
+    for one in sorted(finding.verdict.alternatives, key=_by_bic):
+        seconds = [c for c in one.candidates if c is not chosen.candidates[0]]
+        removes = 1.0 - one.fit.chi_square / chosen.fit.chi_square
+        if len(seconds) == 1 < len(one.candidates):
+            gain = chosen.bic - one.bic
+            if gain > _OFFERED and removes > _MEANINGFUL:
+                found.append({"name": seconds[0].name, "port": seconds[0].port, "removes": removes})
+    return found
+
+
+def location(finding: Finding) -> dict[str, Any]:
+    """Return in which balance the base is wrong, and by how much."""
+    before, noise = finding.base_misfit, finding.sensor_noise
+    wrong = [
+        name
+        for name, one, floor in zip(finding.data.names, before, noise, strict=True)
+        if one**2 > 2.0 * floor**2
+    ]
+    if finding.verdict.status == "adequate":
+        words = "Nowhere: what the model leaves is not more than its sensors' noise explains."
+    else:
+        parts = [
+            f"the {_balance(finding, name)} (off by {before[k]:.3g}, sensors {noise[k]:.2g})"
+            for k, name in enumerate(finding.data.names)
+            if name in wrong
+        ]
+        words = f"In {' and '.join(parts) or 'no balance by itself'}."
+    return {
+        "sentence": words,
+        "base_misfit": dict(zip(finding.data.names, before.tolist(), strict=True)),
+        "sensor_noise": dict(zip(finding.data.names, noise.tolist(), strict=True)),
+    }
+
+
+def remainder(finding: Finding) -> dict[str, Any]:
+    """Return what the accepted model leaves, and in words how much of the misfit that is."""
+    before, after, noise = finding.base_misfit, finding.remainder, finding.sensor_noise
+    removed = 1.0 - float(np.sum(after**2 - noise**2) / max(np.sum(before**2 - noise**2), 1e-300))
+    size = ", ".join(
+        f"{one:.3g} in the {_balance(finding, name)} ({one / max(floor, 1e-300):.2g} times the "
+        "sensors' noise)"
+        for name, one, floor in zip(finding.data.names, after, noise, strict=True)
+    )
+    if not finding.accepted.candidates:
+        words = f"The model leaves {size}."
+    else:
+        words = (
+            f"It removes {100.0 * removed:.3g} % of the power of the misfit beyond the sensors' "
+            f"noise. What nobody explains is {size}."
+        )
+    return {
+        "sentence": words,
+        "share_removed": removed if finding.accepted.candidates else 0.0,
+        "left": dict(zip(finding.data.names, after.tolist(), strict=True)),
+    }
+
+
+def limits(finding: Finding) -> list[str]:
+    """Return what these records cannot tell, in sentences."""
+    found = [
+        f"The {port.name} moves in one direction only: these records cannot separate Coulomb "
+        "friction from a constant force or a sensor's offset."
+        for port in finding.mechanism.ports
+        if not port.read and not turns_back(finding.data, port.name)
+    ]
+    if not any(record.role == "held_out" for record in finding.records):
+        found.append("No record was held out: the correction is not proved where it was not made.")
+    if any(finding.accepted.bound_sides[: len(finding.data.base)]):
+        names = [n for n in finding.accepted.at_bounds if n in finding.mechanism.quantities]
+        if names:
+            found.append(f"At the bound of its tolerance: {', '.join(names)}.")
+    return found
+
+
+def _balance(finding: Finding, name: str) -> str:
+    return (
+        f"force balance of {name}" if name in finding.mechanism.coordinates else f"reading {name}"
+    )
+
+
+def _others(finding: Finding) -> list[Rival]:
+    return list(finding.verdict.alternatives)
+
+
+def _by_bic(one: Rival) -> float:
+    return one.bic
+
+
+def _evidence(finding: Finding, one: Rival) -> dict[str, Any]:
+    chosen = finding.verdict.chosen
+    return {
+        "effects": [{"name": c.name, "port": c.port} for c in one.candidates],
+        "label": in_words(one.label),
+        "bic_gap": one.bic - chosen.bic if chosen else None,
+        "share": one.share,
+        "equivalent": one in finding.verdict.equivalent,
+        "role": _role(finding, one),
+    }
+
+
+def _role(finding: Finding, one: Rival) -> str:
+    chosen = finding.verdict.chosen
+    if one in finding.verdict.equivalent:
+        return "as good"
+    return "richer, hardly better" if chosen and one.bic < chosen.bic else "rejected"
+
+
+def quantities(finding: Finding) -> dict[str, Any]:
+    """Return the fitted values of the mechanism with 95 % intervals."""
+    spread = covariance(finding.data, finding.accepted)
+    return _parameters(finding.accepted, spread, range(len(finding.data.base)))
+
+
+def _parameters(fitted: Fit, spread: Any, rows: range) -> dict[str, Any]:
+    """Return values with intervals, SI; cosine and sine parts as amplitude and phase."""
+    found: dict[str, Any] = {}
+    for row in rows:
+        name, value = fitted.parameters[row].name, float(fitted.values[row])
+        if name.endswith("_sine"):
+            continue
+        if not name.endswith("_cosine"):
+            found[name] = _with_interval(value, float(spread[row, row]))
+            continue
+        cosine, sine = fitted.values[row : row + 2]
+        amplitude, phase = polar(float(cosine), float(sine))
+        along = np.array([cosine, sine]) / max(amplitude, np.finfo(float).tiny)
+        block = spread[row : row + 2, row : row + 2]
+        name = name.removesuffix("_cosine")
+        found[name] = _with_interval(amplitude, float(along @ block @ along))
+        across = np.array([-along[1], along[0]])
+        of_phase = min(float(across @ block @ across) / max(amplitude, 1e-300) ** 2, np.pi**2 / 3.0)
+        found[f"{name}_phase"] = _with_interval(phase, of_phase)
+    return found
+
+
+def _with_interval(value: float, variance: float) -> dict[str, Any]:
+    half = _DEVIATIONS * float(np.sqrt(max(variance, 0.0)))
+    return {"value": value, "unit": "SI", "interval95": [value - half, value + half]}

@@ -1,0 +1,117 @@
+"""Models of rigs as text: what is written reads back the same, or is not written."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive.mesh_laws import PeriodicClearance
+from pymoo_hdte.drive.port_effects import LAWS
+from pymoo_hdte.measured.rig_files import read_model, rig_toml
+from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Loop, Mechanism, Port
+from pymoo_hdte.mechanism.effects import EFFECTS, law_from_values, values_of
+from pymoo_hdte.mechanism.laws import ConstantForce
+
+RIG = Mechanism(
+    {"q": Believed(2.0)}, [Port("joint", {"q": 1.0}), Port("cell", {"q": 0.5}, read=True)]
+)
+READING = {"order": 3.0, "phase": 0.5, "amplitude": 0.1}
+ERROR = law_from_values("kinematic_error", READING)
+FRICTION = law_from_values("coulomb_friction", {"level": 20.4})
+
+
+def through_file(folder, *parts):
+    (folder / "model.toml").write_text(rig_toml(*parts), encoding="utf-8")
+    return read_model(folder / "model.toml")
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_effect_survives_the_file(name, tmp_path):
+    values = {one: 1.0 / (3.0 + index) for index, one in enumerate(EFFECTS[name][1])}
+    if "sharpness" in values:
+        values["sharpness"] += 1.0
+    effect = LawAt(name, "cell", law_from_values(name, values))
+    assert values_of(effect) == values
+    assert through_file(tmp_path, "x", RIG, [effect]) == ("x", RIG, (effect,))
+
+
+def test_registry_is_that_of_the_drive_and_three_more():
+    extra = {"force_offset", "direction_dependent_friction", "kinematic_error"}
+    assert set(EFFECTS) == set(LAWS) | extra
+    assert "locked" not in EFFECTS["clearance_variation"][1]
+    locked = LawAt("clearance_variation", "cell", PeriodicClearance(2.0, 0.0, 1e-4, 0.0, 5e-5))
+    assert "locked" not in values_of(locked)
+
+
+NAMES = st.text(min_size=1, max_size=6)
+BELIEVED = st.builds(Believed, st.floats(1e-300, 1e300), st.floats(0.0, 1.0))
+FINITE = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(
+    names=st.lists(NAMES, min_size=4, max_size=4, unique=True),
+    title=NAMES.filter(str.strip),
+    values=st.lists(BELIEVED, min_size=4, max_size=4),
+    numbers=st.lists(FINITE, min_size=5, max_size=5),
+    share=FINITE.filter(bool),
+    limit=st.floats(0.0, exclude_min=True),
+    read=st.booleans(),
+)
+def test_any_model_survives_the_file(
+    tmp_path_factory, names, title, values, numbers, share, limit, read
+):
+    first, second, port, signal = names
+    mechanism = Mechanism(
+        {first: values[0], second: values[1]},
+        [
+            Port(
+                port,
+                {second: share, first: numbers[0]},
+                stiffness=values[2],
+                read=read,
+                error=(ErrorLine(second, *numbers[1:4]), ErrorLine(first, *numbers[2:])),
+            )
+        ],
+        [Input(signal, {first: share}, values[3])],
+        [Loop(signal, "reference", second, numbers[0], numbers[1], limit)],
+    )
+    effect = LawAt("force_offset", port, ConstantForce(numbers[4]))
+    found = through_file(tmp_path_factory.getbasetemp(), title, mechanism, (effect, effect))
+    assert found == (title, mechanism, (effect, effect))
+    assert list(found[1].inertias) == [first, second]
+    assert list(found[1].ports[0].motion) == [second, first]
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    [
+        ((" ", RIG, []), "title is ' '"),
+        (("x", RIG, [], 0.0), "cutoff is 0.0, allowed: a finite number above 0"),
+        (("x", RIG, [LawAt("windup", "joint", FRICTION)]), "effect.name is 'windup'"),
+        (("x", RIG, [LawAt("backlash", "joint", FRICTION)]), "allowed: a DeadZone"),
+        (("x", RIG, [LawAt("coulomb_friction", "hip", FRICTION)]), "port is 'hip'"),
+        (("x", RIG, [LawAt("kinematic_error", "joint", ERROR)]), "read = true"),
+    ],
+)
+def test_unreadable_model_is_not_written(parts, message):
+    with pytest.raises(InvalidInput) as caught:
+        rig_toml(*parts)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "message"),
+    [
+        ("windup", {}, "effect.name is 'windup', allowed: one of 'hardening_stiffness'"),
+        ("backlash", {}, "backlash.half_width is None"),
+        ("backlash", {"half_width": -1.0}, "backlash.half_width is -1.0"),
+        ("backlash", {"width": 1.0}, "number of backlash is 'width', allowed: one of 'half_width'"),
+        ("kinematic_error", READING | {"order": 0.0}, "kinematic_error.order is 0.0"),
+        ("kinematic_error", READING | {"amplitude": "1"}, "kinematic_error.amplitude is '1'"),
+        ("clearance_variation", {"locked": 1.0}, "number of clearance_variation is 'locked'"),
+    ],
+)
+def test_impossible_effect_is_refused(name, values, message):
+    with pytest.raises(InvalidInput) as caught:
+        law_from_values(name, values)
+    assert message in str(caught.value)
