@@ -33,8 +33,7 @@ def write(folder, form, columns, separator=None):
         scipy.io.savemat(path, columns, appendmat=False, do_compression=separator == "compressed")
         return path
     separator = separator or {"csv": ",", "plain": " "}[form]
-    table = np.column_stack(list(columns.values())).tolist()
-    rows = [separator.join(map(repr, row)) for row in table]
+    rows = [separator.join(map(repr, row)) for row in np.column_stack([*columns.values()]).tolist()]
     head = [separator.join(columns)] if form == "csv" else []
     path.write_text("\n".join(head + rows) + "\n", encoding="utf-8")
     return path
@@ -231,6 +230,7 @@ BAD_LAYOUTS = [
     ("skip_rows = 3", "sample_rate = 990", r"table\.time .* if sample_rate"),
     ('time = { column = "t", unit = "ms" }', "", r"table\.sample_rate is None"),
     ('"ms"', '"m"', r"time\.unit is 'm', .*'s', 'ms'"),
+    ("skip_rows", "skip", r"table\.skip is 3, .*no such"),
     ("-2", "1e16", r"channels\.q\.scale is 1e\+16"),
     ("= true", "= 1", r"channels\.q\.unwrap is 1"),
     ("unwrap", "wrap", r"channels\.q\.wrap is True, .*no such"),

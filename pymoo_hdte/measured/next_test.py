@@ -85,15 +85,13 @@ def next_test(finding: Finding) -> NextTest:
         )
     rival = _nearest(finding)
     if chosen is None or rival is None:
-        return NextTest(
-            first,
-            3.0,
-            1.0,
-            (),
-            0.0,
-            f"Repeat {first} at three times its size: an effect too small to be seen may grow with "
-            "the motion.",
+        why = (
+            "an effect too small to be seen may grow with the motion"
+            if chosen is None
+            else "no rival is left, and what was found is to be proved beyond where it was found"
         )
+        text = f"Repeat {first} at three times its size: {why}."
+        return NextTest(first, 3.0, 1.0, (), 0.0, text)
     return _best_repetition(finding, chosen, rival)
 
 

@@ -27,7 +27,6 @@ from pymoo_hdte.measured.prove import MeasuredGap, fitted_mechanism, prove_measu
 from pymoo_hdte.measured.rig_files import rig_toml
 from pymoo_hdte.measured.verdict_document import measured_document
 
-
 _SIZES = 5
 """Parameters on the first screen."""
 

@@ -25,6 +25,7 @@ from pymoo_hdte.mechanism.motion import (
     motion_of,
     noise_of,
     smooth,
+    smoothed_noise,
     stride_of,
 )
 from pymoo_hdte.mechanism.records import Record
@@ -236,25 +237,43 @@ class Balance:
         return found
 
     def _noise(self, stride: int) -> Values:
-        """Return the sensors' noise as the believed mechanism carries it into the balances."""
-        mechanism, names = self.mechanism, balance_names(self.mechanism)
+        """Return the sensors' noise as the believed mechanism carries it into the balances.
+
+        Beside each frequency's own noise the transform shows that of speed and position at the ends
+        of the record, because a derivative is no series of cosines: sum x'' cos = [x' cos] - ...
+        """
+        mechanism, names, record = self.mechanism, balance_names(self.mechanism), self.record
         omega = 2.0 * np.pi * self.frequency
-        response = np.zeros((len(names), len(mechanism.coordinates), self._bins), dtype=complex)
-        for place, inertia in enumerate(mechanism.inertias.values()):
-            response[place, place] -= inertia.value * omega**2
+        inertia, damping, stiffness = self._matrices()
         power = np.zeros((len(names), self._bins))
         for port in mechanism.ports:
-            dynamic = port.stiffness.value + 1j * omega * port.damping.value
-            for row, share in self._rows_of(port).items():
-                for name, part in port.motion.items():
-                    place = mechanism.coordinates.index(name)
-                    response[names.index(row), place] += share * part * dynamic
             if port.read:
                 power[names.index(port.name)] += noise_of(self._channel(port.name)) ** 2
         for one in mechanism.inputs:
             spread = one.gain.value * noise_of(self._channel(one.name))
             for name, share in one.acts.items():
                 power[names.index(name)] += (share * spread) ** 2
+        step = record.step * stride
+        ends = 4.0 * stride / (len(self.time) * step**2)
         for place, name in enumerate(mechanism.coordinates):
-            power += np.abs(response[:, place]) ** 2 * noise_of(self._channel(name)) ** 2
+            noise = noise_of(self._channel(name))
+            position, speed = smoothed_noise(noise, record.step, self.cutoff)
+            inertial, viscous = inertia[:, place, None], damping[:, place, None]
+            own = (stiffness[:, place, None] - inertial * omega**2) ** 2 + (viscous * omega) ** 2
+            power += own * noise**2
+            power += ends * ((inertial * speed) ** 2 + (viscous * position) ** 2)
         return np.sqrt(power / stride)
+
+    def _matrices(self) -> tuple[Values, Values, Values]:
+        """Return believed inertia, damping and stiffness, (n_balances, n_coordinates)."""
+        mechanism, names = self.mechanism, balance_names(self.mechanism)
+        inertia, damping, stiffness = np.zeros((3, len(names), len(mechanism.coordinates)))
+        for place, one in enumerate(mechanism.inertias.values()):
+            inertia[place, place] = one.value
+        for port in mechanism.ports:
+            for row, share in self._rows_of(port).items():
+                for name, part in port.motion.items():
+                    place = names.index(row), mechanism.coordinates.index(name)
+                    damping[place] += share * part * port.damping.value
+                    stiffness[place] += share * part * port.stiffness.value
+        return inertia, damping, stiffness

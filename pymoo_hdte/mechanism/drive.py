@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import cmath
+import math
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from pymoo_hdte.checks import InvalidInput, finite_array
@@ -17,24 +17,68 @@ from pymoo_hdte.mechanism.mechanism import Believed, ErrorLine, Input, LawAt, Me
 def drive_mechanism(
     model: DriveModel, parameters: ArrayLike
 ) -> tuple[Mechanism, tuple[LawAt, ...]]:
-    """Return one design of a drive as a mechanism, and the laws at its ports.
+    """Return one design of a drive as a mechanism, and the effects at its ports.
 
-    Coordinates ``input`` and ``output`` are the angles of wave generator and circular spline, rad.
-    Ports are ``input_bearing`` and ``output_bearing``, and ``mesh``, whose motion is the torsion
+    Coordinates are ``input_angle`` and ``output_angle``, rad. Ports are those of `drive.laws`:
+    ``input`` and ``output``, against the housing, and ``mesh``, whose motion is the torsion
     th_in / N - th_out - theta_s(th_in). Inputs are ``motor_torque``, N.m at the input, and
     ``load_torque``, N.m against the output.
 
     Parameters
     ----------
     model : DriveModel
-        Its operating condition is left to the records.
+        Its speed and load are left to records.
     parameters : array, shape (5,)
         `PARAMETERS` in SI units.
 
     Raises
     ------
     InvalidInput
-        For wrong parameters, or an effect that no mechanism can have: what varies with the input
-        angle at the mesh, where periodic laws of a mechanism depend on the torsion, and a reaction
-        of theta_s on the input.
+        For wrong parameters, or an effect that ports of a mechanism cannot have.
     """
+    if not isinstance(model, DriveModel):
+        raise InvalidInput("model", model, "a DriveModel, e.g. preset('published')")
+    values = finite_array("parameters", parameters, (len(PARAMETERS),))
+    coefficients = model.coefficients(values[None])
+    _refuse(coefficients)
+    mesh = {"input_angle": 1.0 / coefficients.ratio, "output_angle": -1.0}
+    # The static error is taken off: -Re(p exp(i x)) = |p| sin(x + arg p - pi / 2).
+    error = tuple(
+        ErrorLine("input_angle", float(order), abs(phasor), cmath.phase(phasor) - math.pi / 2.0)
+        for order, phasor in zip(
+            coefficients.error_orders, coefficients.error_phasors[0].tolist(), strict=True
+        )
+    )
+    stiffness, damping = float(coefficients.stiffness[0]), float(coefficients.damping[0])
+    bearings = float(coefficients.input_damping[0]), float(coefficients.output_damping)
+    mechanism = Mechanism(
+        {
+            "input_angle": Believed(float(coefficients.input_inertia[0])),
+            "output_angle": Believed(float(coefficients.output_inertia)),
+        },
+        (
+            Port("input", {"input_angle": 1.0}, damping=Believed(bearings[0])),
+            Port("output", {"output_angle": 1.0}, damping=Believed(bearings[1])),
+            Port("mesh", mesh, Believed(stiffness), Believed(damping), error=error),
+        ),
+        (
+            Input("motor_torque", {"input_angle": 1.0}),
+            Input("load_torque", {"output_angle": -1.0}),
+        ),
+    )
+    laws = [effect for effect in model.effects if isinstance(effect, LawAtPort)]
+    return mechanism, tuple(LawAt(effect.name, effect.port, effect.law) for effect in laws)
+
+
+def _refuse(coefficients: Coefficients) -> None:
+    """Raise `InvalidInput` for what ports of a mechanism cannot have."""
+    if coefficients.reaction != 0.0:
+        allowed = "0: errors of a port do not act back on the coordinate that makes them"
+        raise InvalidInput("reaction of the static error", coefficients.reaction, allowed)
+    # Periodic laws of a mechanism turn with the motion of their port, which here is the torsion.
+    allowed = "no effect that varies with the input angle"
+    if coefficients.stiffness_depth != 0.0:
+        raise InvalidInput("effects at the mesh", "mesh_stiffness_variation", allowed)
+    for port, law in coefficients.laws:
+        if port == "mesh" and law.orders:
+            raise InvalidInput("effects at the mesh", type(law).__name__, allowed)

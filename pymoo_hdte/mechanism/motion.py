@@ -18,8 +18,11 @@ Values = NDArray[np.float64]
 
 _STANDS_OUT = 4.0
 """Ratio of powers by which a position stands out of its noise."""
+_FEWEST = 4
 _HIGHEST_SHARE = 0.1
 """Largest cutoff as a share of the sampling rate: ten samples in a period."""
+_LAW_SAMPLES = 40
+"""To a period of the cutoff: the jumps of dry friction lie between two of them."""
 _SEGMENT = 1024
 _ORDER = 8
 _PASS = 2.0
@@ -62,12 +65,13 @@ def highest_frequency(position: Values, step: float) -> float:
     )
     noise = 2.0 * step * noise_of(position) ** 2 * (2.0 * np.sin(np.pi * frequency * step)) ** 4
     stands_out = power[1:] > _STANDS_OUT * noise[1:]
-    if not stands_out[0]:
-        ratio = float(power[1] / max(noise[1], 1e-300))
+    # In the lowest ones of white noise, too, there is what the window lets through.
+    if not np.all(stands_out[:_FEWEST]):
+        ratio = float(np.min(power[1:] / np.maximum(noise[1:], 1e-300)))
         raise InvalidInput(
             "power of a position over that of its noise",
             ratio,
-            f"more than {_STANDS_OUT:g} at the lowest frequency, or nothing is known of its motion",
+            f"more than {_STANDS_OUT:g} at low frequencies, or nothing is known of its motion",
         )
     quiet = np.flatnonzero(~stands_out)
     last = quiet[0] if quiet.size else len(stands_out)
@@ -80,8 +84,8 @@ def highest_share(step: float) -> float:
 
 
 def stride_of(cutoff: float, step: float) -> int:
-    """Return how many samples make a step of ten to a period of the cutoff."""
-    return max(1, int(_HIGHEST_SHARE / (step * cutoff)))
+    """Return how many samples make a step of `_LAW_SAMPLES` to a period of the cutoff."""
+    return max(1, int(1.0 / (_LAW_SAMPLES * step * cutoff)))
 
 
 def margin_of(cutoff: float, step: float) -> int:
@@ -98,6 +102,13 @@ def smooth(signal: Values, step: float, cutoff: float) -> Values:
     middle = float(np.mean(signal))
     filtered = sosfiltfilt(butter(_ORDER, corner, fs=1.0 / step, output="sos"), signal - middle)
     return np.asarray(filtered + middle)
+
+
+def smoothed_noise(noise: float, step: float, cutoff: float) -> tuple[float, float]:
+    """Return the standard deviations of position and speed after smoothing, for white noise."""
+    corner = min(_PASS * cutoff, 0.5 / step)
+    share = 2.0 * step * corner
+    return noise * share**0.5, noise * (share / 3.0) ** 0.5 * 2.0 * np.pi * corner
 
 
 def motion_of(position: Values, step: float, cutoff: float) -> Motion:

@@ -27,6 +27,8 @@ Values = NDArray[np.float64]
 Tangent = tuple[float, Values, float]
 """A force, its slopes by positions and speeds, shape (2, coordinates), and its slope by time."""
 
+Tangents = tuple[Values, Values, Values]
+
 _START_SAMPLES = 20
 _FARTHEST = 1e6
 _STEPS_PER_SAMPLE, _STEPS_ANYWAY = 50, 20_000
@@ -163,7 +165,7 @@ class _PortForce:
         here: Any = PortState(d, rate, periodic_phase(d), self.port.stiffness.value)  # type: ignore[arg-type]
         for law in self.laws:
             found = law.respond(here)
-            force += np.asarray(found.torque).item()
+            force += float(np.asarray(found.torque).item())
             stiffness += np.asarray(found.slope).item()
             damping += np.asarray(found.damping).item()
             if law.orders:
@@ -304,13 +306,24 @@ class _Integrator:
             self.steps_left -= 1
             step = min(self.trial, longest)
             step = left if step > 0.999 * left else step
-            move, third = _predict(step, state, push, self.plant, tangent)
-            there = [one.at(state + move, time + step)[0] for one in self.curved]
+            middle, move, phi = _predict(step, state, push, self.plant, tangent)
+            half, whole = np.zeros((2, state.shape[1]))
+            if self.curved:
+                half = self.departed(state, middle, time, 0.5 * step, tangent)
+                later = move + _moved(phi[0] @ (step**2 * half), step)
+                whole = self.departed(state, later, time, step, tangent)
             after, reach, size = _correct(
-                step, state, move, third, self.plant, tangent, np.array(there),
-                self.origin, self.reach, self.rtol,
-            )  # fmt: skip
-            change = max(0.1, 0.9 * max(size, 6e-3) ** (-1.0 / 3.0))
+                step,
+                state + move,
+                half,
+                whole,
+                phi,
+                self.plant[2],
+                self.origin,
+                self.reach,
+                self.rtol,
+            )
+            change = max(0.1, 0.9 * max(size, 1e-3) ** -0.25)
             share = change
             if size <= 1.0:
                 turns = [one.turns(state, after, step, self.rtol) for one in self.memories]
@@ -323,6 +336,14 @@ class _Integrator:
         for one in self.memories:
             one.settle(after)
         return after, step
+
+    def departed(
+        self, state: Values, move: Values, time: float, step: float, tangent: Tangents
+    ) -> Values:
+        """Return by how much accelerations after a move depart from the tangents, (coordinates,)."""
+        forces, slopes, rates = tangent
+        there = np.array([one.at(state + move, time + step)[0] for one in self.curved])
+        return self.plant[1] @ (there - forces - np.tensordot(slopes, move, 2) - step * rates)
 
     def longest(self, state: Values) -> float:
         """Return the step in which nothing swings or turns by more than 1 rad unseen."""
@@ -337,55 +358,59 @@ def _predict(
     state: Values,
     push: tuple[Values, Values],
     plant: tuple[Values, Values, Values],
-    tangent: tuple[Values, Values, Values],
-) -> tuple[Values, Values]:
-    """Return the move by the tangents, and phi_3 as it acts on accelerations beside them.
+    tangent: Tangents,
+) -> tuple[Values, Values, Values]:
+    """Return the moves in half a step and in one by the tangents, and functions phi.
 
-    ``push`` is the acceleration by inputs and its rate.
+    ``push`` is the acceleration by inputs and its rate. Of phi_1 to phi_4, shape (4, 2 coordinates,
+    coordinates), only what acts on accelerations is there.
     """
     (linear, columns, _), (forces, slopes, rates) = plant, tangent
     n = len(columns)
     by_position = linear[0] + columns @ np.ascontiguousarray(slopes[:, 0])
     by_speed = linear[1] + columns @ np.ascontiguousarray(slopes[:, 1])
     acceleration = push[0] + linear[0] @ state[0] + linear[1] @ state[1] + columns @ forces
-    # The exponential of this block matrix holds phi_1, phi_2 and phi_3.
-    block = np.zeros((5 * n, 5 * n))
-    for i in range(4 * n):
-        block[i, i + n] = 1.0
+    # A straight line and what departs from it, with speeds in ways per step.
+    way = step * state[1]
+    bend = step**2 * (by_position @ way) + step**3 * (push[1] + columns @ rates)
+    block = np.eye(6 * n, k=n)
     block[n : 2 * n, :n] = step**2 * by_position
     block[n : 2 * n, n : 2 * n] = step * by_speed
-    phi = np.ascontiguousarray(_exponential(block)[: 2 * n, 2 * n :])
-    # A straight line and what departs from it, with speeds in ways per step.
-    way, sources = step * state[1], np.zeros(3 * n)
-    sources[:n] = step**2 * acceleration
-    sources[n : 2 * n] = step**2 * (by_position @ way) + step**3 * (push[1] + columns @ rates)
-    move = (phi @ sources).reshape(2, n)
-    move[0] += way
+    half, whole = _exponentials(block)
+    phi = np.empty((4, 2 * n, n))
+    for k in range(4):
+        phi[k] = whole[: 2 * n, (k + 2) * n : (k + 3) * n]
+    first = half[: 2 * n, 2 * n : 3 * n].copy() @ (step**2 * acceleration)
+    first += half[: 2 * n, 3 * n : 4 * n].copy() @ bend
+    first[:n] += 0.5 * way
+    last = phi[0] @ (step**2 * acceleration) + phi[1] @ bend
+    last[:n] += way
+    return _moved(first, step), _moved(last, step), phi
+
+
+@njit(cache=True)
+def _moved(change: Values, step: float) -> Values:
+    """Return a change of positions and ways per step as one of positions and speeds."""
+    move = change.copy().reshape(2, len(change) // 2)
     move[1] /= step
-    return move, np.ascontiguousarray(phi[:, 2 * n :])
+    return move
 
 
 @njit(cache=True)
 def _correct(
     step: float,
-    state: Values,
-    move: Values,
-    third: Values,
-    plant: tuple[Values, Values, Values],
-    tangent: tuple[Values, Values, Values],
-    there: Values,
+    predicted: Values,
+    half: Values,
+    whole: Values,
+    phi: Values,
+    watched: Values,
     origin: Values,
     reach: Values,
     rtol: float,
 ) -> tuple[Values, Values, float]:
     """Return the corrected state, how far it has ever been, and the error over the allowed one."""
-    (_, columns, watched), (forces, slopes, rates) = plant, tangent
-    departed = there - forces - rates * step
-    for i in range(len(departed)):
-        departed[i] -= np.sum(slopes[i] * move)
-    error = (third @ (2.0 * step**2 * (columns @ departed))).reshape(move.shape)
-    error[1] /= step
-    after = state + move + error
+    error = _moved(phi[3] @ (step**2 * (12.0 * whole - 48.0 * half)), step)
+    after = predicted + _moved(phi[2] @ (step**2 * (16.0 * half - 2.0 * whole)), step) + error
     farthest = np.maximum(reach, np.abs((after - origin) @ watched))
     missed = np.abs(error @ watched)
     for kind in range(2):
@@ -395,18 +420,18 @@ def _correct(
 
 
 @njit(cache=True)
-def _exponential(matrix: Values) -> Values:
-    """Return the exponential by the series of a share that is halved below 1, and squaring."""
-    norm, halvings = np.max(np.sum(np.abs(matrix), axis=1)), 0
+def _exponentials(matrix: Values) -> tuple[Values, Values]:
+    """Return the exponentials of half a matrix and of the whole one."""
+    norm, halvings = np.max(np.sum(np.abs(matrix), axis=1)), 1
     while norm > 2.0**halvings and halvings < 200:
         halvings += 1
     share, identity = matrix / 2.0**halvings, np.eye(len(matrix))
     result = identity
     for order in range(18, 0, -1):
         result = identity + share @ result / order
-    for _ in range(halvings):
+    for _ in range(halvings - 1):
         result = result @ result
-    return result
+    return result, result @ result
 
 
 def _row(mechanism: Mechanism, shares: Mapping[str, float]) -> Values:

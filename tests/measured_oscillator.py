@@ -1,0 +1,71 @@
+"""An oscillator in multisine tests: hidden effects of forms that differ from the library's."""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from pymoo_hdte.mechanism import Record
+
+MASS, STIFFNESS, DAMPING = 1.0, 4000.0, 4.0
+RATE, DURATION, HIGHEST = 250.0, 20.0, 12.0
+POSITION_NOISE, FORCE_NOISE = 1e-5, 0.02
+
+
+def multisine(seed, size=20.0):
+    """Return times and a force of random phases up to `HIGHEST` Hz, root mean square ``size``."""
+    time = np.arange(0.0, DURATION, 1.0 / RATE)
+    lines = np.arange(1, int(HIGHEST * DURATION)) / DURATION
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(lines))
+    force = np.cos(2.0 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
+    return time, lines, phases, size / force.std()
+
+
+def record_of(hidden, role="train", seed=1, size=20.0):
+    """Return a record of m x'' + c x' + k x + hidden = F.
+
+    ``hidden(x, v, z, t)`` returns a force and the rate of an inner state z.
+    """
+    time, lines, phases, scale = multisine(seed, size)
+
+    def force(t):
+        return scale * np.cos(2.0 * np.pi * lines * t + phases).sum()
+
+    def rates(t, state):
+        x, v, z = state
+        extra, inner = hidden(x, v, z, t)
+        return [v, (force(t) - DAMPING * v - STIFFNESS * x - extra) / MASS, inner]
+
+    found = solve_ivp(
+        rates, (0.0, time[-1]), [0.0] * 3, t_eval=time, method="LSODA", rtol=1e-8, atol=1e-11,
+        max_step=0.01,
+    )  # fmt: skip
+    noise = np.random.default_rng(100 + seed)
+    return Record(
+        f"{role} {seed}",
+        role,
+        time,
+        {
+            "x": found.y[0] + POSITION_NOISE * noise.standard_normal(len(time)),
+            "force": [force(t) for t in time] + FORCE_NOISE * noise.standard_normal(len(time)),
+        },
+    )
+
+
+def nothing(x, v, z, t):
+    """Nothing is hidden."""
+    return 0.0, 0.0
+
+
+def cubic(x, v, z, t):
+    """Duffing's spring."""
+    return 4e6 * x**3, 0.0
+
+
+def bouc_wen(x, v, z, t):
+    """Hysteresis after Bouc and Wen, where the library has springs that slip."""
+    turning = 0.002
+    return 3000.0 * z, v - 0.5 * (abs(v) * z + v * abs(z)) / turning
+
+
+def swinging_stiffness(x, v, z, t):
+    """A stiffness that varies with time by itself, which no law of the library does."""
+    return 1500.0 * x * np.sin(np.pi * t), 0.0

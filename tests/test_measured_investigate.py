@@ -1,0 +1,169 @@
+"""The verdict on any mechanism: a user's oscillator with effects hidden, or none."""
+
+from dataclasses import replace
+
+import measured_oscillator as rig
+import numpy as np
+import pytest
+from measured_oscillator import bouc_wen, cubic, nothing, swinging_stiffness
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive.friction import CoulombFriction
+from pymoo_hdte.measured import investigate
+from pymoo_hdte.measured.data import measured_data
+from pymoo_hdte.measured.next_test import next_test
+from pymoo_hdte.measured.prove import prove_measured
+from pymoo_hdte.measured.verdict_document import effects, limits, quantities, remainder
+from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
+
+OSCILLATOR = Mechanism(
+    inertias={"x": Believed(1.0, 0.1)},
+    ports=[Port("spring", {"x": 1.0}, Believed(4100.0, 0.1), Believed(5.0, 0.5))],
+    inputs=[Input("force", {"x": 1.0})],
+)
+
+
+def with_held_out(hidden):
+    """Return two training records and a held-out one."""
+    return [
+        rig.record_of(hidden),
+        rig.record_of(hidden, seed=2),
+        rig.record_of(hidden, "held_out", seed=3),
+    ]
+
+
+def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
+    records = with_held_out(cubic)
+    # What a user writes: no more than fifteen lines.
+    oscillator = Mechanism(
+        inertias={"x": Believed(1.0, 0.1)},
+        ports=[Port("spring", {"x": 1.0}, Believed(4100.0, 0.1), Believed(5.0, 0.5))],
+        inputs=[Input("force", {"x": 1.0})],
+    )
+    finding = investigate(oscillator, records)
+    gaps = prove_measured(finding)
+
+    assert finding.verdict.status == "named"
+    (effect,) = effects(finding)
+    assert (effect["name"], effect["port"]) == ("hardening_stiffness", "spring")
+    assert effect["parameters"]["coefficient"]["value"] == pytest.approx(4e6, rel=0.01)
+    simulated, balanced = gaps
+    assert (simulated.kind, balanced.kind) == ("simulation", "balance")
+    assert simulated.shrinkage > 0.95
+    assert balanced.shrinkage > 0.95
+    assert quantities(finding)["stiffness of spring"]["value"] == pytest.approx(4000.0, rel=0.01)
+
+
+def test_hysteresis_of_another_form_is_named():
+    finding = investigate(OSCILLATOR, with_held_out(bouc_wen))
+    assert [one["name"] for one in effects(finding)] == ["hysteresis"]
+    simulated, balanced = prove_measured(finding)
+    assert simulated.shrinkage > 0.95
+    assert balanced.shrinkage > 0.95
+
+
+def test_nothing_hidden_is_adequate_and_proved_to_be():
+    finding = investigate(OSCILLATOR, with_held_out(nothing))
+    assert finding.verdict.status == "adequate"
+    assert effects(finding) == []
+    assert np.all(finding.base_misfit < 1.3 * finding.sensor_noise)
+    simulated, balanced = prove_measured(finding)
+    assert simulated.before == simulated.after
+    assert balanced.after < 1.3 * balanced.noise_floor
+
+
+def test_what_no_law_explains_is_unlisted_and_described():
+    finding = investigate(OSCILLATOR, [rig.record_of(swinging_stiffness)])
+    assert finding.verdict.status == "unlisted"
+    assert effects(finding) == []
+    assert "force balance of x" in remainder(finding)["sentence"]
+    assert any("held out" in sentence for sentence in limits(finding))
+
+
+def test_a_quantity_out_of_tolerance_is_a_parameter():
+    port = replace(OSCILLATOR.ports[0], stiffness=Believed(3000.0, 0.05))
+    finding = investigate(replace(OSCILLATOR, ports=(port,)), [rig.record_of(nothing)])
+    assert finding.verdict.status == "parameter"
+    (candidate,) = finding.accepted.candidates
+    assert candidate.port == "stiffness of spring"
+    values = dict(
+        zip([p.name for p in finding.accepted.parameters], finding.accepted.values, strict=True)
+    )
+    assert values["stiffness of spring"] == pytest.approx(4000.0, rel=0.01)
+
+
+def test_an_effect_that_is_known_is_not_found_again():
+    def dry(x, v, z, t):
+        return 2.0 * np.tanh(v / 1e-3), 0.0
+
+    records = [rig.record_of(dry, seed=4)]
+    assert [one["name"] for one in effects(investigate(OSCILLATOR, records))] == [
+        "coulomb_friction"
+    ]
+    friction = LawAt("coulomb_friction", "spring", CoulombFriction(2.0))
+    finding = investigate(OSCILLATOR, records, known=[friction])
+    assert "coulomb_friction" not in [one["name"] for one in effects(finding)]
+    assert finding.base_misfit < 0.2 * investigate(OSCILLATOR, records).base_misfit
+
+
+def test_the_verdict_does_not_hang_on_units():
+    # In mm, N and g: the same physics.
+    record = rig.record_of(cubic)
+    milli = Record(
+        "mm", "train", record.time, dict(record.channels) | {"x": 1e3 * record.channels["x"]}
+    )
+    scaled = Mechanism(
+        inertias={"x": Believed(1e-3, 0.1)},
+        ports=[Port("spring", {"x": 1.0}, Believed(4.1, 0.1), Believed(5e-3, 0.5))],
+        inputs=[Input("force", {"x": 1.0})],
+    )
+    one, other = investigate(OSCILLATOR, [record]), investigate(scaled, [milli])
+    assert one.verdict.status == other.verdict.status == "named"
+    coefficient = [effects(each)[0]["parameters"]["coefficient"]["value"] for each in (one, other)]
+    assert coefficient[1] == pytest.approx(1e-9 * coefficient[0], rel=1e-3)
+
+
+def test_the_next_test_sets_what_was_found_against_its_rival():
+    finding = investigate(OSCILLATOR, [rig.record_of(bouc_wen)])
+    test = next_test(finding)
+    assert test.separates[0] == "hysteresis:spring"
+    assert test.separation > 1.0
+    assert test.record == "train 1"
+    assert "train 1" in test.description
+    alone = next_test(investigate(OSCILLATOR, [rig.record_of(cubic)]))
+    assert "no rival is left" in alone.description
+
+
+@pytest.mark.parametrize(
+    ("records", "message"),
+    [
+        ([], "number of train records is 0"),
+        ([rig.record_of(nothing, "held_out")], "number of train records is 0"),
+    ],
+)
+def test_without_training_records_nothing_is_fitted(records, message):
+    with pytest.raises(InvalidInput, match=message):
+        investigate(OSCILLATOR, records)
+
+
+def test_a_missing_a_dead_and_a_short_channel_are_named():
+    record = rig.record_of(nothing)
+    for channels, message in (
+        ({"x": record.channels["x"]}, "force among them"),
+        (dict(record.channels) | {"force": np.full(len(record.time), 2.0)}, "dead"),
+    ):
+        with pytest.raises(InvalidInput, match=message):
+            investigate(OSCILLATOR, [Record("bad", "train", record.time, channels)])
+    short = {name: channel[:20] for name, channel in record.channels.items()}
+    with pytest.raises(InvalidInput, match=r"duration of record short .* at least"):
+        measured_data(OSCILLATOR, [Record("short", "train", record.time[:20], short)], 12.0)
+
+
+def test_a_position_of_noise_only_is_refused():
+    record = rig.record_of(nothing)
+    noise = np.random.default_rng(1).standard_normal(len(record.time))
+    with pytest.raises(InvalidInput, match="power of a position over that of its noise"):
+        investigate(
+            OSCILLATOR,
+            [Record("noise", "train", record.time, dict(record.channels) | {"x": noise})],
+        )

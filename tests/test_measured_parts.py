@@ -1,0 +1,139 @@
+"""Orders, intervals, rests and limits of measured records, each where the truth is known."""
+
+import numpy as np
+import pytest
+
+from pymoo_hdte.discrepancy.fit import fit
+from pymoo_hdte.measured import investigate
+from pymoo_hdte.measured.data import measured_data
+from pymoo_hdte.measured.intervals import covariance
+from pymoo_hdte.measured.next_test import next_test
+from pymoo_hdte.measured.orders import position_orders
+from pymoo_hdte.measured.verdict_document import effects, limits
+from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port, Record
+from pymoo_hdte.mechanism.motion import motion_of
+
+STEP, DURATION, CUTOFF = 2e-3, 12.0, 25.0
+TIME = np.arange(0.0, DURATION, STEP)
+INERTIA, VISCOUS = 0.05, 0.4
+
+JOINT = Mechanism(
+    {"q": Believed(0.06, 0.5)},
+    [Port("bearing", {"q": 1.0}, damping=Believed(0.5, 0.5))],
+    [Input("torque", {"q": 1.0})],
+)
+
+
+def turning(name, speed, friction, noise=1e-3, swing=0.2, seed=0):
+    """Return a record of a joint that turns, its speed swinging; ``friction(q, v)`` is hidden."""
+    generator = np.random.default_rng([seed, int(1e6 * abs(speed))])
+    omega = 2.0 * np.pi * np.array([0.7, 1.9, 4.3])
+    angle = np.outer(TIME, omega) + generator.uniform(0.0, 6.0, 3)
+    q = speed * TIME + swing * np.sin(angle) @ (speed / omega)
+    q += 1e-7 * generator.standard_normal(len(q))
+    motion = motion_of(q, STEP, CUTOFF)
+    torque = INERTIA * motion.acceleration + VISCOUS * motion.speed + friction(q, motion.speed)
+    torque = torque + noise * generator.standard_normal(len(q))
+    return Record(name, "train", TIME, {"q": q, "torque": torque})
+
+
+def dry(q, v):
+    return 0.8 * np.tanh(v / 1e-4)
+
+
+def test_the_orders_of_a_ripple_are_found_and_none_in_noise():
+    def rippled(q, v):
+        return 0.05 * np.cos(17.0 * q) + 0.03 * np.cos(34.0 * q + 1.0)
+
+    for friction, strongest in ((rippled, (17.0, 34.0)), (lambda q, v: 0.0 * q, ())):
+        records = [turning(f"{speed}", speed, friction) for speed in (0.8, 1.5, 2.5)]
+        data = measured_data(JOINT, records, CUTOFF)
+        found = position_orders(data, fit(data))["bearing"]
+        assert found[:2] == strongest
+
+
+def test_a_ripple_is_one_effect_with_its_orders():
+    def rippled(q, v):
+        return 0.05 * np.cos(17.0 * q + 0.5) + 0.03 * np.cos(34.0 * q + 1.0)
+
+    finding = investigate(JOINT, [turning(f"{v}", v, rippled) for v in (-0.8, 1.5, 2.5)])
+    assert finding.verdict.status == "named"
+    (effect,) = effects(finding)
+    assert effect["name"] == "torque_ripple"
+    # A driving torque: it acts with the motion, where what is hidden here resists it.
+    values = effect["parameters"]
+    assert values["order_17_amplitude"]["value"] == pytest.approx(0.05, rel=0.05)
+    assert values["order_34_amplitude"]["value"] == pytest.approx(0.03, rel=0.05)
+    phase = values["order_17_amplitude_phase"]["value"]
+    assert np.cos(phase - 0.5) == pytest.approx(-1.0, abs=0.01)
+
+
+def test_one_direction_is_said_and_the_reverse_run_proposed():
+    one_way = investigate(JOINT, [turning(f"{v}", v, dry) for v in (0.5, 1.5, 2.5)])
+    assert [one["name"] for one in effects(one_way)] == ["coulomb_friction"]
+    assert any("cannot separate Coulomb friction" in sentence for sentence in limits(one_way))
+    assert next_test(one_way).rate < 0.0
+    assert "reverse" in next_test(one_way).description
+
+    both = investigate(JOINT, [turning(f"{v}", v, dry) for v in (0.5, -1.5, 2.5)])
+    assert [one["name"] for one in effects(both)] == ["coulomb_friction"]
+    assert not any("cannot separate" in sentence for sentence in limits(both))
+    assert next_test(both).rate > 0.0
+
+
+def test_friction_and_an_offset_are_told_apart_by_two_directions():
+    def offset(q, v):
+        return 0.8 + 0.0 * q
+
+    finding = investigate(JOINT, [turning(f"{v}", v, offset) for v in (0.5, -1.5, 2.5)])
+    (effect,) = effects(finding)
+    assert effect["name"] == "force_offset"
+    assert effect["parameters"]["force"]["value"] == pytest.approx(0.8, rel=0.01)
+
+
+def test_a_rest_that_nobody_explains_does_not_hide_the_main_effect():
+    generator = np.random.default_rng(3)
+    # A slow wander, a hundred times the sensors' noise and a sixth of the friction.
+    wander = np.convolve(generator.standard_normal(len(TIME) + 400), np.hanning(401), "valid")
+    wander *= 0.13 / wander.std()
+
+    finding = investigate(
+        JOINT, [turning(f"{v}", v, lambda q, v: dry(q, v) + wander) for v in (0.5, -1.5, 2.5)]
+    )
+    assert effects(finding)[0]["name"] == "coulomb_friction"
+    assert len(effects(finding)) == 1
+    assert finding.remainder > 10.0 * finding.sensor_noise
+    assert finding.remainder < 0.35 * finding.base_misfit
+
+
+def test_intervals_cover_when_the_rest_is_coloured():
+    """95 % intervals of 120 fits; those of a white rest would cover far less."""
+    truth = np.array([INERTIA, VISCOUS])
+    generator = np.random.default_rng(11)
+    covered = {"coloured": 0, "white": 0}
+    record = turning("one", 1.5, lambda q, v: 0.0 * q, noise=0.0, swing=0.9)
+    trials = 120
+    for _ in range(trials):
+        drawn = generator.standard_normal(len(TIME) + 200)
+        rest = 0.01 * np.convolve(drawn, np.hanning(201), "valid")
+        channels = dict(record.channels) | {"torque": record.channels["torque"] + rest}
+        sensors = measured_data(JOINT, [Record("one", "train", TIME, channels)], CUTOFF)
+        data = sensors.with_rest(fit(sensors).residuals)
+        fitted = fit(data)
+        off = np.abs(fitted.values - truth)
+        for kind, spread in (("coloured", covariance(data, fitted)), ("white", fitted.covariance)):
+            covered[kind] += int(off[1] <= 1.96 * np.sqrt(spread[1, 1]))
+    assert 0.88 <= covered["coloured"] / trials <= 0.99
+    assert covered["white"] / trials < 0.8
+
+
+def test_the_rest_is_never_less_than_the_sensors_noise():
+    record = turning("one", 1.5, lambda q, v: 0.0 * q)
+    data = measured_data(JOINT, [record], CUTOFF)
+    rested = data.with_rest(np.zeros(len(data.frequency)))
+    assert np.array_equal(rested.deviation[0], data.deviation[0])
+    louder = data.with_rest(np.full(len(data.frequency), 3.0))
+    assert np.all(louder.deviation[0] > data.deviation[0])
+    # What was left then counts as noise: its power is that of the deviation.
+    power = np.mean((3.0 * data.deviation[0][data.balances[0].kept]) ** 2)
+    assert np.mean(louder.deviation[0][data.balances[0].kept] ** 2) == pytest.approx(power)
