@@ -186,7 +186,7 @@ def coloured_rest(one: Study, generator: np.random.Generator) -> list[NDArray[np
     """
     found = []
     coefficients = one.finding.data.coefficients(one.finding.accepted.residuals)
-    for left, balance in zip(coefficients, one.finding.data.balances, strict=True):
+    for left, balance in zip(coefficients, one.finding.data.spectra, strict=True):
         edges = np.unique(np.geomspace(1, left.shape[1], _BANDS).astype(int))
         sizes = np.zeros(left.shape)
         for low, high in zip([0, *edges[:-1]], edges, strict=True):

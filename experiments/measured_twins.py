@@ -50,7 +50,7 @@ def twins(one: Study, port: str, force: float) -> tuple[Twin, ...]:
     force : float
         Its force at the largest speed, N or N.m.
     """
-    speed = max(float(np.abs(each.ports[port].speed).max()) for each in one.finding.data.balances)
+    speed = max(float(np.abs(each.ports[port].speed).max()) for each in one.finding.data.spectra)
     drag = LawAt("nonlinear_drag", port, NonlinearDrag(force / speed**2))
     return tuple(
         Twin("nonlinear_drag" if effects else "nothing", rest, _found(one, effects, rest))
@@ -87,9 +87,10 @@ def _found(one: Study, effects: Sequence[LawAt], rest: bool) -> Finding:
     generator = np.random.default_rng(SEED)
     mechanism = fitted_mechanism(one.rig.mechanism, one.finding.accepted)
     disturbances = coloured_rest(one, generator)
+    spectra = [each for each in one.finding.data.spectra if isinstance(each, Balance)]
     records = [
         _twin(mechanism, balance, effects, disturbance if rest else 0.0 * disturbance, generator)
-        for balance, disturbance in zip(one.finding.data.balances, disturbances, strict=True)
+        for balance, disturbance in zip(spectra, disturbances, strict=True)
     ]
     return investigate(one.rig.mechanism, records, one.finding.cutoff)
 

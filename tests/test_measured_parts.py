@@ -135,5 +135,5 @@ def test_the_rest_is_never_less_than_the_sensors_noise():
     louder = data.with_rest(np.full(len(data.frequency), 3.0))
     assert np.all(louder.deviation[0] > data.deviation[0])
     # What was left then counts as noise: its power is that of the deviation.
-    power = np.mean((3.0 * data.deviation[0][data.balances[0].kept]) ** 2)
-    assert np.mean(louder.deviation[0][data.balances[0].kept] ** 2) == pytest.approx(power)
+    power = np.mean((3.0 * data.deviation[0][data.spectra[0].kept]) ** 2)
+    assert np.mean(louder.deviation[0][data.spectra[0].kept] ** 2) == pytest.approx(power)

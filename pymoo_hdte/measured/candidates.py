@@ -25,7 +25,7 @@ from pymoo_hdte.drive.friction import (
 )
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.mesh_laws import DeadZone, HardeningStiffness, SoftWindup
-from pymoo_hdte.measured.data import MeasuredData
+from pymoo_hdte.measured.whitened import WhitenedData
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.mechanism.laws import ConstantForce, DirectionalFriction
 
@@ -38,13 +38,13 @@ _LARGEST = 5.0
 
 
 def mechanism_candidates(
-    data: MeasuredData, force: float, orders: Mapping[str, Sequence[float]]
+    data: WhitenedData, force: float, orders: Mapping[str, Sequence[float]]
 ) -> list[Candidate]:
     """Return all candidates.
 
     Parameters
     ----------
-    data : MeasuredData
+    data : WhitenedData
     force : float
         Typical size of what is missing, N or N.m.
     orders : mapping of str to sequence of float
@@ -52,7 +52,7 @@ def mechanism_candidates(
     """
     found: list[Candidate] = []
     for port in data.mechanism.ports:
-        here = [one.ports[port.name] for one in data.balances]
+        here = [one.ports[port.name] for one in data.spectra]
         travel = max(float(np.abs(one.position).max()) for one in here)
         speed = max(float(np.abs(one.speed).max()) for one in here)
         seen = orders.get(port.name, ())
@@ -75,9 +75,9 @@ def _at(name: str, port: str, law: Any) -> tuple[Any, ...]:
     return (LawAt(name, port, law),)
 
 
-def turns_back(data: MeasuredData, port: str) -> bool:
+def turns_back(data: WhitenedData, port: str) -> bool:
     """Tell whether a port moves in both directions, in one record or another."""
-    speeds = np.concatenate([one.ports[port].speed for one in data.balances])
+    speeds = np.concatenate([one.ports[port].speed for one in data.spectra])
     # Noise of a slow record may change its sign now and then.
     return bool(min(np.mean(speeds > 0.0), np.mean(speeds < 0.0)) > _BACKWARDS)
 

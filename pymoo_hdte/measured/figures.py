@@ -30,7 +30,7 @@ def misfit_over_motion(finding: Finding) -> Figure:
     named = bool(finding.accepted.candidates)
     for row, name in enumerate(names):
         port = _port_of(finding, name)
-        for record, balance in enumerate(finding.data.balances):
+        for record, balance in enumerate(finding.data.spectra):
             motion = balance.ports[port]
             stride = slice(None, None, max(1, len(balance.time) * len(before) // _POINTS))
             shown = [(before[record][row], BEFORE, ".", "before")]
@@ -64,10 +64,10 @@ def misfit_over_frequency(finding: Finding) -> Figure:
         deviation = np.concatenate(
             [
                 one[part][balance.kept[part]]
-                for one, balance in zip(finding.data.deviation, finding.data.balances, strict=True)
+                for one, balance in zip(finding.data.deviation, finding.data.spectra, strict=True)
             ]
         )
-        noise = np.concatenate([one.noise[part][one.kept[part]] for one in finding.data.balances])
+        noise = np.concatenate([one.noise[part][one.kept[part]] for one in finding.data.spectra])
         lines = [("before", finding.verdict.base.residuals, BEFORE, "--")]
         if finding.accepted.candidates:
             lines.append(("after", finding.accepted.residuals, AFTER, "-"))

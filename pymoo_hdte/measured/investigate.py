@@ -20,8 +20,10 @@ from pymoo_hdte.discrepancy.naming import EXPLAINED, FITTED, OF_ONE_NAME, Verdic
 from pymoo_hdte.discrepancy.rival import Rival, adequate, fit_all, rival, varied
 from pymoo_hdte.discrepancy.screening import screen
 from pymoo_hdte.measured.candidates import mechanism_candidates
-from pymoo_hdte.measured.data import MeasuredData, measured_data, usual_cutoff
+from pymoo_hdte.measured.data import measured_data, usual_cutoff
 from pymoo_hdte.measured.orders import position_orders
+from pymoo_hdte.measured.simulated import simulated_data
+from pymoo_hdte.measured.whitened import WhitenedData
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 MAIN_SHARE = 0.5
@@ -43,17 +45,17 @@ class Finding:
     ----------
     mechanism : Mechanism
     records : tuple of Record
-    cutoff : float
-        Hz, up to which the motion is known.
-    data : MeasuredData
+    cutoff : float or None
+        Hz, up to which the motion is known; None where it is not measured.
+    data : WhitenedData
         Training records; their noise is the rest that nobody explains.
     verdict : Verdict
     """
 
     mechanism: Mechanism
     records: tuple[Record, ...]
-    cutoff: float
-    data: MeasuredData
+    cutoff: float | None
+    data: WhitenedData
     verdict: Verdict
 
     @property
@@ -65,7 +67,7 @@ class Finding:
     @property
     def sensor_noise(self) -> NDArray[np.float64]:
         """Root mean square of the sensors' noise in each balance, N or N.m."""
-        noise = replace(self.data, deviation=tuple(one.noise for one in self.data.balances))
+        noise = replace(self.data, deviation=tuple(one.noise for one in self.data.spectra))
         return root_mean_square(noise, np.ones_like(self.verdict.base.residuals))
 
     @property
@@ -87,6 +89,8 @@ def investigate(
 ) -> Finding:
     """Return the verdict on records of a mechanism.
 
+    By inverse dynamics where every coordinate is measured, otherwise by simulation.
+
     Parameters
     ----------
     mechanism : Mechanism
@@ -106,9 +110,12 @@ def investigate(
     train = [record for record in records if record.role == "train"]
     if not train:
         raise InvalidInput("number of train records", 0, "at least 1")
-    if cutoff is None:
-        cutoff = usual_cutoff(mechanism, train)
-    sensors = measured_data(mechanism, train, cutoff, known)
+    _check_alive(records)
+    if all(name in one.channels for name in mechanism.coordinates for one in train):
+        cutoff = usual_cutoff(mechanism, train) if cutoff is None else cutoff
+        sensors: WhitenedData = measured_data(mechanism, train, cutoff, known)
+    else:
+        sensors = simulated_data(mechanism, train, known)
     base = fit(sensors)
     candidates = _candidates(sensors, base)
     data = _with_rest(sensors, base, candidates)
@@ -116,13 +123,21 @@ def investigate(
     return Finding(mechanism, tuple(records), cutoff, data, verdict)
 
 
-def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
+def _check_alive(records: Sequence[Record]) -> None:
+    for record in records:
+        for name, channel in record.channels.items():
+            if np.ptp(channel) == 0.0:
+                allowed = "a signal that changes; this one is dead"
+                raise InvalidInput(f"channel {name} of {record.name}", float(channel[0]), allowed)
+
+
+def _candidates(data: WhitenedData, base: Fit) -> list[Candidate]:
     force = float(max(root_mean_square(data, base.residuals)))
     orders = position_orders(data, base)
     return mechanism_candidates(data, force, orders)
 
 
-def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:
+def _with_rest(sensors: WhitenedData, base: Fit, candidates: Sequence[Candidate]) -> WhitenedData:
     """Return the data with what the two best effects leave as the noise.
 
     Which these are depends on the noise; after a few rounds it no longer does.
@@ -137,7 +152,7 @@ def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]
     return data
 
 
-def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Rival:
+def _best_two(data: WhitenedData, candidates: Sequence[Candidate]) -> Rival:
     """Return the best model with up to two effects, by BIC."""
     base = fit(data)
     excess = base.chi_square - (len(base.residuals) - len(base.values))
@@ -152,7 +167,7 @@ def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Rival:
     return min(found, key=lambda one: one.bic)
 
 
-def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
+def _judged(sensors: WhitenedData, data: WhitenedData, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict in units of the rest, if it stands before what the sensors would show."""
     base = fit(data)
     verdict = _simplest(data, judge(data, base, candidates))
@@ -170,7 +185,7 @@ def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Cand
     return verdict
 
 
-def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
+def _simplest(data: WhitenedData, verdict: Verdict) -> Verdict:
     """Return the verdict with the model of fewest unknowns that leaves hardly more than the best.
 
     With many samples the evidence prefers a richer law, or a second effect, for a hair's breadth of
@@ -209,19 +224,19 @@ def _as_unlisted(verdict: Verdict, nearest: Rival | None) -> Verdict:
 
 
 def _in_units_of(
-    wanted: MeasuredData, given: MeasuredData, residuals: NDArray[np.float64]
+    wanted: WhitenedData, given: WhitenedData, residuals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return whitened residuals as whitened by the deviation of other data."""
     ratio = [
         (one / other)[balance.kept]
         for one, other, balance in zip(
-            given.deviation, wanted.deviation, wanted.balances, strict=True
+            given.deviation, wanted.deviation, wanted.spectra, strict=True
         )
     ]
     return residuals * np.concatenate(ratio)
 
 
-def root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+def root_mean_square(data: WhitenedData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the root mean square of each balance, N or N.m, for whitened residuals (n,)."""
-    samples = sum(len(balance.time) for balance in data.balances)
+    samples = sum(len(balance.time) for balance in data.spectra)
     return np.sqrt(data.power(residuals) / samples)

@@ -71,7 +71,7 @@ def next_test(finding: Finding) -> NextTest:
         for port in finding.mechanism.ports
         if not port.read and not turns_back(finding.data, port.name)
     ]
-    first = finding.data.balances[0].record.name
+    first = finding.data.spectra[0].record.name
     chosen = finding.verdict.chosen
     if one_way:
         return NextTest(
@@ -83,6 +83,10 @@ def next_test(finding: Finding) -> NextTest:
             f"Run the same speeds in the reverse direction: the {one_way[0]} moves one way only, "
             "in which dry friction cannot be told from a constant force.",
         )
+    hidden = [one for one in finding.mechanism.coordinates if one not in finding.data.names]
+    if hidden:
+        text = f"Repeat {first} with a sensor on {hidden[0]}: its forces are then known directly."
+        return NextTest(first, 1.0, 1.0, (), 0.0, text)
     rival = _nearest(finding)
     if chosen is None or rival is None:
         why = (
@@ -109,12 +113,12 @@ def _nearest(finding: Finding) -> Rival | None:
 
 def _best_repetition(finding: Finding, chosen: Rival, rival: Rival) -> NextTest:
     best: tuple[float, int, float, float] = (-1.0, 0, 1.0, 1.0)
-    for place, size, rate in product(range(len(finding.data.balances)), SIZES, RATES):
+    for place, size, rate in product(range(len(finding.data.spectra)), SIZES, RATES):
         best = max(
             best, (_separation(finding, chosen, rival, place, size, rate), place, size, rate)
         )
     separation, place, size, rate = best
-    name = finding.data.balances[place].record.name
+    name = finding.data.spectra[place].record.name
     how = " and ".join(
         text
         for factor, text in (
@@ -139,7 +143,7 @@ def _separation(
     finding: Finding, chosen: Rival, rival: Rival, place: int, size: float, rate: float
 ) -> float:
     """Return how far two explanations lie apart when a record is repeated, beyond the base."""
-    balance = finding.data.balances[place]
+    balance = finding.data.spectra[place]
     power, rest = 0.0, finding.remainder
     for row, name in enumerate(finding.data.names):
         difference = np.zeros(len(balance.time))

@@ -19,6 +19,7 @@ from pymoo_hdte.measured.data import measured_data
 from pymoo_hdte.measured.investigate import Finding, root_mean_square
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.motion import noise_of
+from pymoo_hdte.mechanism.records import FINER
 from pymoo_hdte.mechanism.simulation import simulate
 
 Values = NDArray[np.float64]
@@ -87,7 +88,8 @@ def prove_measured(finding: Finding) -> tuple[MeasuredGap, ...]:
     found: list[MeasuredGap] = []
     for record in held_out:
         found += _simulated(finding, record)
-        found += _balanced(finding, record)
+        if finding.cutoff is not None:
+            found += _balanced(finding, record, finding.cutoff)
     return tuple(found)
 
 
@@ -108,7 +110,7 @@ def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
     ]
     runs = [_positions(mechanism, record, effects) for mechanism, effects in models]
     found = []
-    for name in finding.mechanism.coordinates:
+    for name in (name for name in finding.mechanism.coordinates if name in record.channels):
         measured = record.channels[name]
         before, after = (run[name] for run in runs)
         found.append(
@@ -130,16 +132,17 @@ def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
 
 def _positions(mechanism: Mechanism, record: Record, effects: Sequence[LawAt]) -> dict[str, Values]:
     try:
-        return dict(simulate(mechanism, record, effects).position)
+        fine = simulate(mechanism, record.finer(FINER), effects).position
+        return {name: one[::FINER] for name, one in fine.items()}
     except ArithmeticError:
         lost = np.full(len(record.time), np.nan)
         return {name: lost for name in mechanism.coordinates}
 
 
-def _balanced(finding: Finding, record: Record) -> list[MeasuredGap]:
-    data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
+def _balanced(finding: Finding, record: Record, cutoff: float) -> list[MeasuredGap]:
+    data = measured_data(finding.mechanism, [record], cutoff, finding.data.known)
     n_base = len(data.base)
-    (balance,) = data.balances
+    (balance,) = data.spectra
     left = []
     for one in (finding.verdict.base, finding.accepted):
         whitened = data.residuals(one.values[:n_base], _laws(one.effects))

@@ -115,7 +115,7 @@ def location(finding: Finding) -> dict[str, Any]:
         words = "Nowhere: what the model leaves is not more than its sensors' noise explains."
     else:
         parts = [
-            f"the {_balance(finding, name)} (off by {before[k]:.3g}, sensors {noise[k]:.2g})"
+            f"the {finding.data.what(name)} (off by {before[k]:.3g}, sensors {noise[k]:.2g})"
             for k, name in enumerate(finding.data.names)
             if name in wrong
         ]
@@ -132,7 +132,7 @@ def remainder(finding: Finding) -> dict[str, Any]:
     before, after, noise = finding.base_misfit, finding.remainder, finding.sensor_noise
     removed = 1.0 - float(np.sum(after**2 - noise**2) / max(np.sum(before**2 - noise**2), 1e-300))
     size = ", ".join(
-        f"{one:.3g} in the {_balance(finding, name)} ({one / max(floor, 1e-300):.2g} times the "
+        f"{one:.3g} in the {finding.data.what(name)} ({one / max(floor, 1e-300):.2g} times the "
         "sensors' noise)"
         for name, one, floor in zip(finding.data.names, after, noise, strict=True)
     )
@@ -165,12 +165,6 @@ def limits(finding: Finding) -> list[str]:
         if names:
             found.append(f"At the bound of its tolerance: {', '.join(names)}.")
     return found
-
-
-def _balance(finding: Finding, name: str) -> str:
-    return (
-        f"force balance of {name}" if name in finding.mechanism.coordinates else f"reading {name}"
-    )
 
 
 def _others(finding: Finding) -> list[Rival]:

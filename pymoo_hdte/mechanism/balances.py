@@ -273,7 +273,7 @@ class Balance:
         for port in mechanism.ports:
             for row, share in self._rows_of(port).items():
                 for name, part in port.motion.items():
-                    place = names.index(row), mechanism.coordinates.index(name)
-                    damping[place] += share * part * port.damping.value
-                    stiffness[place] += share * part * port.stiffness.value
+                    at = names.index(row), mechanism.coordinates.index(name)
+                    damping[at] += share * part * port.damping.value
+                    stiffness[at] += share * part * port.stiffness.value
         return inertia, damping, stiffness

@@ -7,11 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of
 
 ROLES = ("train", "held_out")
 FEWEST_SAMPLES = 16
+FINER = 4
+"""Samples for each of a record in a simulation."""
 _JITTER = 0.01
 """Largest deviation of a step from the mean one, relative."""
 
@@ -72,6 +75,20 @@ class Record:
             ("channels", checked),
         ):
             object.__setattr__(self, attribute, value)
+
+    def finer(self, factor: int) -> Record:
+        """Return the record with ``factor`` samples for each, on a smooth curve through them.
+
+        What takes signals for straight between samples is wrong by three per cent where there are
+        ten of them to a period, and by more at a resonance.
+        """
+        n = len(self.time)
+        places, between = np.arange(n), np.arange(factor * (n - 1) + 1) / factor
+        channels = {
+            name: make_interp_spline(places, channel, 3)(between)
+            for name, channel in self.channels.items()
+        }
+        return Record(self.name, self.role, self.time[0] + self.step * between, channels)
 
     @property
     def step(self) -> float:
