@@ -87,10 +87,9 @@ def _found(one: Study, effects: Sequence[LawAt], rest: bool) -> Finding:
     generator = np.random.default_rng(SEED)
     mechanism = fitted_mechanism(one.rig.mechanism, one.finding.accepted)
     disturbances = coloured_rest(one, generator)
-    spectra = [each for each in one.finding.data.spectra if isinstance(each, Balance)]
     records = [
         _twin(mechanism, balance, effects, disturbance if rest else 0.0 * disturbance, generator)
-        for balance, disturbance in zip(spectra, disturbances, strict=True)
+        for balance, disturbance in zip(one.finding.data.spectra, disturbances, strict=True)
     ]
     return investigate(one.rig.mechanism, records, one.finding.cutoff)
 

@@ -29,5 +29,12 @@ def test_both_solvers_of_the_drive_snippet_agree():
     assert integrated != pytest.approx(steady, rel=1e-4)
 
 
+def test_the_friction_of_another_machine_is_named():
+    printed = output_of(SNIPPETS[2])
+    assert printed.startswith("named")
+    level = float(re.search(r"CoulombFriction\(level=([\d.]+)\)", printed).group(1))
+    assert level == pytest.approx(0.3, rel=0.01)
+
+
 def test_every_snippet_is_run_here():
-    assert len(SNIPPETS) == 2
+    assert len(SNIPPETS) == 3

@@ -25,12 +25,16 @@ from pymoo_hdte.drive.friction import (
 )
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.mesh_laws import DeadZone, HardeningStiffness, SoftWindup
-from pymoo_hdte.measured.whitened import WhitenedData
+from pymoo_hdte.measured.data import MeasuredData
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.mechanism.laws import ConstantForce, DirectionalFriction
 
 Parts = tuple[Parameter, ...]
 
+CONTAINED = {
+    "coulomb_friction": ("stribeck_friction", "hysteresis", "position_dependent_friction"),
+}
+"""Laws that are this one where some of their parameters are nothing: as good, they say no more."""
 _BACKWARDS = 0.01
 """Least share of the samples in the rarer direction that makes two directions."""
 _LARGEST = 5.0
@@ -38,13 +42,13 @@ _LARGEST = 5.0
 
 
 def mechanism_candidates(
-    data: WhitenedData, force: float, orders: Mapping[str, Sequence[float]]
+    data: MeasuredData, force: float, orders: Mapping[str, Sequence[float]]
 ) -> list[Candidate]:
     """Return all candidates.
 
     Parameters
     ----------
-    data : WhitenedData
+    data : MeasuredData
     force : float
         Typical size of what is missing, N or N.m.
     orders : mapping of str to sequence of float
@@ -75,7 +79,7 @@ def _at(name: str, port: str, law: Any) -> tuple[Any, ...]:
     return (LawAt(name, port, law),)
 
 
-def turns_back(data: WhitenedData, port: str) -> bool:
+def turns_back(data: MeasuredData, port: str) -> bool:
     """Tell whether a port moves in both directions, in one record or another."""
     speeds = np.concatenate([one.ports[port].speed for one in data.spectra])
     # Noise of a slow record may change its sign now and then.

@@ -1,9 +1,14 @@
-"""Force balances of measured records, which are linear in the quantities of the mechanism."""
+"""Force balances of measured records, whitened, and the rest that counts as their noise.
+
+The noise of the sensors is estimated from the records. No model of a real machine meets it: what
+the best model leaves, the rest, then counts as noise, as Birge's ratio has it (Physical Review 40,
+1932).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,21 +16,39 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.evidence import Response, Vector
+from pymoo_hdte.discrepancy.excess import Excess
 from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.objective import Unknowns, built
-from pymoo_hdte.measured.whitened import WhitenedData
+from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
 from pymoo_hdte.mechanism.motion import highest_frequency
 
 Values = NDArray[np.float64]
 
+REMAINDER = 0.05
+"""Share of the base's excess up to which what is left is nobody's effect."""
+
 
 @dataclass(frozen=True, eq=False)
-class MeasuredData(WhitenedData):
-    """Force balances of records, whitened; every coordinate is measured."""
+class MeasuredData:
+    """Force balances of records as `discrepancy.evidence.Evidence` wants them.
 
+    Attributes
+    ----------
+    mechanism : Mechanism
+    spectra : tuple of Balance
+        Of the records.
+    deviation : tuple of ndarray, shape (n_balances, n_bins)
+        Standard deviation that counts as noise, by record.
+    known : tuple of LawAt
+        Effects that the base has.
+    """
+
+    mechanism: Mechanism
     spectra: tuple[Balance, ...]
+    deviation: tuple[Values, ...]
+    known: tuple[LawAt, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -37,6 +60,30 @@ class MeasuredData(WhitenedData):
         return (
             f"force balance of {part}" if part in self.mechanism.coordinates else f"reading {part}"
         )
+
+    @property
+    def remainder(self) -> float:
+        """Share of the base's excess up to which what is left is nobody's effect."""
+        return REMAINDER
+
+    @cached_property
+    def base(self) -> tuple[Parameter, ...]:
+        """Quantities that are not known exactly, within their tolerances, and sensors' zeros."""
+        found = []
+        for name, one in self.mechanism.quantities.items():
+            if one.tolerance > 0.0:
+                reach = one.tolerance * one.value
+                found.append(
+                    Parameter(name, one.value, one.value - reach, one.value + reach, reach)
+                )
+        for port in self.mechanism.ports:
+            if port.read:
+                largest = max(
+                    float(np.abs(one.record.channels[port.name]).max()) for one in self.spectra
+                )
+                size = max(largest, 1e-12)
+                found.append(Parameter(f"zero of {port.name}", 0.0, -2.0 * size, 2.0 * size, size))
+        return tuple(found)
 
     @cached_property
     def _linear(self) -> tuple[Vector, Values]:
@@ -79,6 +126,82 @@ class MeasuredData(WhitenedData):
     def response(self, fitted: Fit) -> Response:
         """Return how the whitened residuals of a fit respond to further effects."""
         return lambda added: -self.whitened_forces(added)
+
+    def rows_of_parts(self) -> list[NDArray[np.int_]]:
+        """Return where the residuals of each part stand."""
+        return [np.flatnonzero(self._part == part) for part in range(len(self.names))]
+
+    def excess(self, fitted: Fit) -> Excess:
+        """Return the excess chi-square of a fit by record and part, shape (r, n_parts)."""
+        square = fitted.residuals**2
+        shape = (len(self.spectra), len(self.names))
+        chi_square = np.zeros(shape)
+        np.add.at(chi_square, (self._record, self._part), square)
+        freedom = np.array([one.kept.sum(axis=1) for one in self.spectra], dtype=float)
+        return Excess(chi_square - freedom, freedom)
+
+    def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
+        """Return a candidate for each quantity of the mechanism that a fit left at a bound."""
+        return [
+            Candidate(
+                "parameter",
+                name,
+                (),
+                ((),),
+                lambda v: (),
+                f"The {name} lies outside its tolerance.",
+                exact=True,
+                frees=name,
+            )
+            for name in at_bounds
+            if name in self.mechanism.quantities
+        ]
+
+    def with_rest(self, residuals: Vector) -> MeasuredData:
+        """Return the data with what whitened residuals (n,) show beyond the sensors as more noise.
+
+        White, one level for each part of a record: with weights by frequency a model that is
+        wrong at low frequencies would be fitted to the others.
+        """
+        found = []
+        for left, one in zip(self.coefficients(residuals), self.spectra, strict=True):
+            beyond = np.sum(left**2 - one.noise**2 * one.kept, axis=1, keepdims=True)
+            level = np.maximum(beyond, 0.0) / one.kept.sum(axis=1, keepdims=True)
+            found.append(np.sqrt(one.noise**2 + level))
+        return replace(self, deviation=tuple(found))
+
+    def coefficients(self, residuals: Vector) -> list[Values]:
+        """Return whitened residuals (n,) as coefficients (n_parts, n_bins) of each record.
+
+        SI; zero where a part is not known.
+        """
+        found, start = [], 0
+        for balance, deviation in zip(self.spectra, self.deviation, strict=True):
+            whole, end = np.zeros(deviation.shape), start + int(balance.kept.sum())
+            whole[balance.kept] = residuals[start:end]
+            found.append(whole * deviation)
+            start = end
+        return found
+
+    def power(self, residuals: Vector) -> Vector:
+        """Return the sum of squares of whitened residuals (n,) by part, in squares of its unit."""
+        return np.sum([np.sum(one**2, axis=1) for one in self.coefficients(residuals)], axis=0)
+
+    @cached_property
+    def frequency(self) -> Vector:
+        """Frequency of each residual, Hz, shape (n,)."""
+        return np.concatenate(
+            [np.broadcast_to(one.frequency, one.kept.shape)[one.kept] for one in self.spectra]
+        )
+
+    @cached_property
+    def _part(self) -> NDArray[np.int_]:
+        return np.concatenate([np.nonzero(one.kept)[0] for one in self.spectra])
+
+    @cached_property
+    def _record(self) -> NDArray[np.int_]:
+        sizes = [int(one.kept.sum()) for one in self.spectra]
+        return np.repeat(np.arange(len(sizes)), sizes)
 
 
 class BalanceObjective(Unknowns):

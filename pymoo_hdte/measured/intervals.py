@@ -12,19 +12,19 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.parameters import Layout
-from pymoo_hdte.measured.whitened import WhitenedData
+from pymoo_hdte.measured.data import MeasuredData
 
 _FIRST_BAND = 12
 """Coefficients in the lowest band of frequencies; each further one holds half as many more."""
 _GROWTH = 1.5
 
 
-def covariance(data: WhitenedData, fitted: Fit) -> NDArray[np.float64]:
+def covariance(data: MeasuredData, fitted: Fit) -> NDArray[np.float64]:
     """Return the covariance of a fit's values, shape (n, n), SI.
 
     Parameters
     ----------
-    data : WhitenedData
+    data : MeasuredData
         Those that were fitted.
     fitted : Fit
     """
@@ -39,7 +39,7 @@ def covariance(data: WhitenedData, fitted: Fit) -> NDArray[np.float64]:
     return np.asarray(inverse @ spread @ inverse * np.outer(scale, scale))
 
 
-def _powers(data: WhitenedData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+def _powers(data: MeasuredData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the mean square of whitened residuals (n,) in the band of frequencies of each."""
     found = np.empty_like(residuals)
     for rows in data.rows_of_parts():

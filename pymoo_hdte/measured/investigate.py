@@ -19,11 +19,9 @@ from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.naming import EXPLAINED, FITTED, OF_ONE_NAME, Verdict, judge
 from pymoo_hdte.discrepancy.rival import Rival, adequate, fit_all, rival, varied
 from pymoo_hdte.discrepancy.screening import screen
-from pymoo_hdte.measured.candidates import mechanism_candidates
-from pymoo_hdte.measured.data import measured_data, usual_cutoff
+from pymoo_hdte.measured.candidates import CONTAINED, mechanism_candidates
+from pymoo_hdte.measured.data import MeasuredData, measured_data, usual_cutoff
 from pymoo_hdte.measured.orders import position_orders
-from pymoo_hdte.measured.simulated import simulated_data
-from pymoo_hdte.measured.whitened import WhitenedData
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 MAIN_SHARE = 0.5
@@ -45,17 +43,17 @@ class Finding:
     ----------
     mechanism : Mechanism
     records : tuple of Record
-    cutoff : float or None
-        Hz, up to which the motion is known; None where it is not measured.
-    data : WhitenedData
+    cutoff : float
+        Hz, up to which the motion is known.
+    data : MeasuredData
         Training records; their noise is the rest that nobody explains.
     verdict : Verdict
     """
 
     mechanism: Mechanism
     records: tuple[Record, ...]
-    cutoff: float | None
-    data: WhitenedData
+    cutoff: float
+    data: MeasuredData
     verdict: Verdict
 
     @property
@@ -89,7 +87,7 @@ def investigate(
 ) -> Finding:
     """Return the verdict on records of a mechanism.
 
-    By inverse dynamics where every coordinate is measured, otherwise by simulation.
+    By inverse dynamics, for which every coordinate has to be measured.
 
     Parameters
     ----------
@@ -111,11 +109,8 @@ def investigate(
     if not train:
         raise InvalidInput("number of train records", 0, "at least 1")
     _check_alive(records)
-    if all(name in one.channels for name in mechanism.coordinates for one in train):
-        cutoff = usual_cutoff(mechanism, train) if cutoff is None else cutoff
-        sensors: WhitenedData = measured_data(mechanism, train, cutoff, known)
-    else:
-        sensors = simulated_data(mechanism, train, known)
+    cutoff = usual_cutoff(mechanism, train) if cutoff is None else cutoff
+    sensors = measured_data(mechanism, train, cutoff, known)
     base = fit(sensors)
     candidates = _candidates(sensors, base)
     data = _with_rest(sensors, base, candidates)
@@ -131,13 +126,13 @@ def _check_alive(records: Sequence[Record]) -> None:
                 raise InvalidInput(f"channel {name} of {record.name}", float(channel[0]), allowed)
 
 
-def _candidates(data: WhitenedData, base: Fit) -> list[Candidate]:
+def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
     force = float(max(root_mean_square(data, base.residuals)))
     orders = position_orders(data, base)
     return mechanism_candidates(data, force, orders)
 
 
-def _with_rest(sensors: WhitenedData, base: Fit, candidates: Sequence[Candidate]) -> WhitenedData:
+def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:
     """Return the data with what the two best effects leave as the noise.
 
     Which these are depends on the noise; after a few rounds it no longer does.
@@ -152,7 +147,7 @@ def _with_rest(sensors: WhitenedData, base: Fit, candidates: Sequence[Candidate]
     return data
 
 
-def _best_two(data: WhitenedData, candidates: Sequence[Candidate]) -> Rival:
+def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Rival:
     """Return the best model with up to two effects, by BIC."""
     base = fit(data)
     excess = base.chi_square - (len(base.residuals) - len(base.values))
@@ -167,10 +162,10 @@ def _best_two(data: WhitenedData, candidates: Sequence[Candidate]) -> Rival:
     return min(found, key=lambda one: one.bic)
 
 
-def _judged(sensors: WhitenedData, data: WhitenedData, candidates: Sequence[Candidate]) -> Verdict:
+def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict in units of the rest, if it stands before what the sensors would show."""
     base = fit(data)
-    verdict = _simplest(data, judge(data, base, candidates))
+    verdict = _without_contained(_simplest(data, judge(data, base, candidates)))
     before, noise = (
         np.sum(root_mean_square(one, residuals) ** 2)
         for one, residuals in ((data, base.residuals), (sensors, np.ones_like(base.residuals)))
@@ -185,7 +180,7 @@ def _judged(sensors: WhitenedData, data: WhitenedData, candidates: Sequence[Cand
     return verdict
 
 
-def _simplest(data: WhitenedData, verdict: Verdict) -> Verdict:
+def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
     """Return the verdict with the model of fewest unknowns that leaves hardly more than the best.
 
     With many samples the evidence prefers a richer law, or a second effect, for a hair's breadth of
@@ -213,6 +208,27 @@ def _simplest(data: WhitenedData, verdict: Verdict) -> Verdict:
     return Verdict(status, verdict.base, simplest, others, equivalent, verdict.degrees_of_freedom)
 
 
+def _without_contained(verdict: Verdict) -> Verdict:
+    """Return the verdict without rivals that are the chosen law and more, but do no better."""
+    chosen = verdict.chosen
+    if chosen is None or verdict.status != "class":
+        return verdict
+    equivalent = tuple(one for one in verdict.equivalent if not _contains(one, chosen))
+    status = "class" if equivalent else "named"
+    return replace(verdict, status=status, equivalent=equivalent)
+
+
+def _contains(one: Rival, chosen: Rival) -> bool:
+    """Tell whether a set of effects differs from another by laws that contain the other's only."""
+    return all(
+        candidate.port == other.port
+        and (candidate.name == other.name or candidate.name in CONTAINED.get(other.name, ()))
+        for candidate, other in zip(
+            *(sorted(each.candidates, key=lambda c: c.port) for each in (one, chosen)), strict=True
+        )
+    )
+
+
 def _unknowns(one: Rival) -> int:
     return sum(candidate.unknowns for candidate in one.candidates)
 
@@ -224,7 +240,7 @@ def _as_unlisted(verdict: Verdict, nearest: Rival | None) -> Verdict:
 
 
 def _in_units_of(
-    wanted: WhitenedData, given: WhitenedData, residuals: NDArray[np.float64]
+    wanted: MeasuredData, given: MeasuredData, residuals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return whitened residuals as whitened by the deviation of other data."""
     ratio = [
@@ -236,7 +252,7 @@ def _in_units_of(
     return residuals * np.concatenate(ratio)
 
 
-def root_mean_square(data: WhitenedData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+def root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the root mean square of each balance, N or N.m, for whitened residuals (n,)."""
     samples = sum(len(balance.time) for balance in data.spectra)
     return np.sqrt(data.power(residuals) / samples)

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
 from pymoo_hdte.discrepancy.fit import Fit
-from pymoo_hdte.measured.whitened import WhitenedData
+from pymoo_hdte.measured.data import MeasuredData
 
 Values = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _BESIDE = 5.0
 """Distance up to which an order is what another one leaves, whose size changes along the way."""
 
 
-def position_orders(data: WhitenedData, base: Fit) -> dict[str, tuple[float, ...]]:
+def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...]]:
     """Return orders by port, the strongest first.
 
     Whole numbers per unit of the position: of an angle in rad, cycles per turn. What is slower in
@@ -35,15 +35,13 @@ def position_orders(data: WhitenedData, base: Fit) -> dict[str, tuple[float, ...
 
     Parameters
     ----------
-    data : WhitenedData
+    data : MeasuredData
     base : Fit
         Of the model without effects.
     """
     coefficients = data.coefficients(base.residuals)
     found = {}
     for port in data.mechanism.ports:
-        if not {port.name} & set(data.names) and not set(port.motion) <= set(data.names):
-            continue
         rows = [data.names.index(port.name)] if port.read else _touched(data, port.motion)
         signals = []
         for left_by_row, balance in zip(coefficients, data.spectra, strict=True):
@@ -53,7 +51,7 @@ def position_orders(data: WhitenedData, base: Fit) -> dict[str, tuple[float, ...
     return found
 
 
-def _touched(data: WhitenedData, motion: Mapping[str, float]) -> list[int]:
+def _touched(data: MeasuredData, motion: Mapping[str, float]) -> list[int]:
     return [data.names.index(name) for name in motion]
 
 

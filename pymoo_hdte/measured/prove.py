@@ -88,8 +88,7 @@ def prove_measured(finding: Finding) -> tuple[MeasuredGap, ...]:
     found: list[MeasuredGap] = []
     for record in held_out:
         found += _simulated(finding, record)
-        if finding.cutoff is not None:
-            found += _balanced(finding, record, finding.cutoff)
+        found += _balanced(finding, record)
     return tuple(found)
 
 
@@ -110,7 +109,7 @@ def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
     ]
     runs = [_positions(mechanism, record, effects) for mechanism, effects in models]
     found = []
-    for name in (name for name in finding.mechanism.coordinates if name in record.channels):
+    for name in finding.mechanism.coordinates:
         measured = record.channels[name]
         before, after = (run[name] for run in runs)
         found.append(
@@ -139,8 +138,8 @@ def _positions(mechanism: Mechanism, record: Record, effects: Sequence[LawAt]) -
         return {name: lost for name in mechanism.coordinates}
 
 
-def _balanced(finding: Finding, record: Record, cutoff: float) -> list[MeasuredGap]:
-    data = measured_data(finding.mechanism, [record], cutoff, finding.data.known)
+def _balanced(finding: Finding, record: Record) -> list[MeasuredGap]:
+    data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
     n_base = len(data.base)
     (balance,) = data.spectra
     left = []

@@ -24,16 +24,13 @@ from pymoo_hdte.mechanism.mechanism import LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]
-Tangent = tuple[float, Values, float]
-"""A force, its slopes by positions and speeds, shape (2, coordinates), and its slope by time."""
-
-Tangents = tuple[Values, Values, Values]
+Triple = tuple[Values, Values, Values]
 
 _START_SAMPLES = 20
 _FARTHEST = 1e6
-_STEPS_PER_SAMPLE, _STEPS_ANYWAY = 50, 20_000
+_STEPS_ANYWAY, _STEPS_PER_SAMPLE = 20_000, 50
 _SHORTEST = 1e-9
-"""Share of a sample below which a step is taken whatever its error: a law jumps there."""
+"""Share of the way to the next sample below which a step is taken whatever its error."""
 _ROUNDING = 1e-14
 _TURN = 1e-7
 
@@ -121,7 +118,9 @@ def simulate(
         path = integrator.follow(record.time, pushes / inertias, begin, bound)
     forces = {one.port.name: one.along(path) for one in ports if one.port.read}
     inputs |= {name: one.along(path) for name, one in commands.items()}
-    position, speed = (dict(zip(mechanism.coordinates, rows, strict=True)) for rows in path)
+    position, speed = (
+        dict(zip(mechanism.coordinates, rows, strict=True)) for rows in path.transpose(1, 2, 0)
+    )
     return Simulation(record.time, position, speed, inputs, forces)
 
 
@@ -145,27 +144,30 @@ class _PortForce:
         self.stretches = [np.zeros_like(law._slips) for law in self.slips]
         self.since = self.motion(begin)[0]
 
-    def motion(self, state: Values) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
-        """Return d, d', and by line its coordinate with the slopes of d and d' over it."""
-        position, speed = state
-        d, rate, bends = self.row @ position, self.row @ speed, []
+    def motion(self, states: Values) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
+        """Return d, d', and by error line its coordinate and the slopes of d and d' over it.
+
+        Of states of shape (..., 2, coordinates).
+        """
+        d, rate = (states @ self.row).T
+        bends = []
         for place, line in self.lines:
-            angle = line.order * position[place] + line.phase
+            angle, speed = line.order * states[..., 0, place] + line.phase, states[..., 1, place]
             wave = line.amplitude * np.sin(angle)
             slope = line.order * line.amplitude * np.cos(angle)
-            d, rate = d + wave, rate + slope * speed[place]
-            bends.append((place, slope, -(line.order**2) * wave * speed[place]))
+            d, rate = d + wave, rate + slope * speed
+            bends.append((place, slope, -(line.order**2) * wave * speed))
         return d, rate, bends
 
-    def at(self, state: Values, time: float) -> Tangent:
-        """Return the force and its tangent, which for slipping springs is one-sided."""
+    def at(self, state: Values, time: float, slopes: Values) -> tuple[float, float]:
+        """Return the force and its slope by time; write those by the state into ``slopes``."""
         d, rate, bends = self.motion(state)
         stiffness, damping = self.spring
-        force: float = stiffness * d + damping * rate
-        here: Any = PortState(d, rate, periodic_phase(d), self.port.stiffness.value)  # type: ignore[arg-type]
+        force = stiffness * d + damping * rate
+        here = PortState(d, rate, periodic_phase(d), self.spring[0])  # type: ignore[arg-type]
         for law in self.laws:
             found = law.respond(here)
-            force += float(np.asarray(found.torque).item())
+            force += np.asarray(found.torque).item()
             stiffness += np.asarray(found.slope).item()
             damping += np.asarray(found.damping).item()
             if law.orders:
@@ -175,16 +177,16 @@ class _PortForce:
         for law, stretch in zip(self.slips, self.stretches, strict=True):
             moved = stretch + (d - self.since)
             force += law.torque(moved)
-            stiffness += law._stiffnesses @ np.abs(law.rates(math.copysign(1.0, rate), moved))
-        slopes = np.outer((stiffness, damping), self.row)
+            # At the slip the tangent is that of the way in which it moves.
+            sticking = np.abs(law.rates(math.copysign(1.0, rate), moved))
+            stiffness += float(law._stiffnesses @ sticking)
+        slopes[0], slopes[1] = stiffness * self.row, damping * self.row
         for place, slope, bend in bends:
             slopes[:, place] += stiffness * slope + damping * bend, damping * slope
-        return float(force), slopes, 0.0
+        return force, 0.0
 
     def turns(self, before: Values, after: Values, step: float, rtol: float) -> float:
         """Return the share of a step after which slipping springs turn back, 1 for none."""
-        if not self.slips:
-            return 1.0
         first, last = self.motion(before)[1], self.motion(after)[1]
         missed = min(abs(first), abs(last)) * step
         if first * last >= 0.0 or missed <= rtol * min(law.torsion for law in self.slips):
@@ -192,15 +194,14 @@ class _PortForce:
         return float(min(max(first / (first - last), 0.01), 0.99))
 
     def settle(self, state: Values) -> None:
-        """Keep how far springs are stretched, which between turns only the motion decides."""
-        if self.slips:
-            d = self.motion(state)[0]
-            for law, stretch in zip(self.slips, self.stretches, strict=True):
-                stretch[:] = np.clip(stretch + (d - self.since), -law._slips, law._slips)
-            self.since = d
+        """Keep how far springs are stretched, which up to a turn only the way decides."""
+        d = self.motion(state)[0]
+        for law, stretch in zip(self.slips, self.stretches, strict=True):
+            stretch[:] = np.clip(stretch + (d - self.since), -law._slips, law._slips)
+        self.since = d
 
     def along(self, path: Values) -> Values:
-        """Return the force on a path of shape (2, coordinates, n)."""
+        """Return the force on a path of shape (n, 2, coordinates)."""
         d, rate, _ = self.motion(path)
         stiffness, phase = np.asarray(self.spring[0]), periodic_phase(d)
         force = stiffness * d + self.spring[1] * rate
@@ -226,18 +227,20 @@ class _Command:
         driven = next(one for one in mechanism.inputs if one.name == loop.input)
         self.column = driven.gain.value * _row(mechanism, driven.acts)
 
-    def at(self, state: Values, time: float) -> Tangent:
-        """Return the command and its tangent."""
+    def at(self, state: Values, time: float, slopes: Values) -> tuple[float, float]:
+        """Return the command and its slope by time; write those by the state into ``slopes``."""
         place = min(int(np.searchsorted(self.time, time, "right")), len(self.rates)) - 1
         reference = self.reference[place] + self.rates[place] * (time - self.time[place])
         wanted = float(self.gain * reference + np.sum(self.slopes * state))
         if abs(wanted) > self.limit:
-            return math.copysign(self.limit, wanted), np.zeros_like(self.slopes), 0.0
-        return wanted, self.slopes, float(self.gain * self.rates[place])
+            slopes[:] = 0.0
+            return math.copysign(self.limit, wanted), 0.0
+        slopes[:] = self.slopes
+        return wanted, float(self.gain * self.rates[place])
 
     def along(self, path: Values) -> Values:
-        """Return the command on a path of shape (2, coordinates, n)."""
-        wanted = self.gain * self.reference + np.tensordot(self.slopes, path, 2)
+        """Return the command on a path of shape (n, 2, coordinates)."""
+        wanted = self.gain * self.reference + np.sum(self.slopes * path, axis=(1, 2))
         return np.clip(wanted, -self.limit, self.limit)
 
 
@@ -250,22 +253,20 @@ class _Integrator:
         n = len(inertias)
         self.curved = [one for one in forces if not one.linear]
         self.memories = [one for one in self.curved if isinstance(one, _PortForce) and one.slips]
-        slopes = [one.slopes[:, None] * (one.column / inertias)[:, None] for one in forces]
-        linear = sum(
-            (one for one, force in zip(slopes, forces, strict=True) if force.linear),
-            start=np.zeros((2, n, n)),
-        )
+        linear, whole = np.zeros((2, n, n)), np.zeros((2, n, n))
+        for one in forces:
+            slopes = one.slopes[:, None] * (one.column / inertias)[:, None]
+            whole += slopes
+            linear += one.linear * slopes
         columns = np.reshape([one.column / inertias for one in self.curved], (-1, n)).T
-        watched = np.vstack([np.eye(n), rows]).T
-        self.plant = linear, np.ascontiguousarray(columns), np.ascontiguousarray(watched)
-        whole = np.hstack([*sum(slopes, start=np.zeros((2, n, n)))])
-        swings = np.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), whole]))
-        self.swing = float(np.max(np.abs(swings.imag), initial=1e-9))
+        self.plant = linear, np.ascontiguousarray(columns), np.vstack([np.eye(n), rows])
+        companion = np.vstack([np.eye(n, 2 * n, n), np.hstack([whole[0], whole[1]])])
+        self.swing = float(np.max(np.abs(np.linalg.eigvals(companion).imag), initial=1e-9))
         self.turning = [row for one in self.curved for row in one.turning]
         self.rtol, self.trial = rtol, math.inf
 
     def follow(self, time: Values, pushes: Values, begin: Values, bound: float) -> Values:
-        """Return positions and speeds, shape (2, coordinates, n).
+        """Return the states at times (n,), shape (n, 2, coordinates).
 
         ``pushes`` are the accelerations by inputs, shape (n, coordinates), and ``bound`` is how
         far positions may go.
@@ -273,61 +274,44 @@ class _Integrator:
         path = np.empty((len(time), *begin.shape))
         path[0] = state = begin
         self.origin = begin * [[1.0], [0.0]]
-        self.reach = np.abs((begin - self.origin) @ self.plant[2])
-        swung = self.swing * (time[-1] - time[0])
-        self.steps_left = int(_STEPS_ANYWAY + _STEPS_PER_SAMPLE * (len(time) + swung))
+        self.reach = np.abs((begin - self.origin) @ self.plant[2].T)
+        # A scheme whose error goes with the third power of the step takes so many more.
+        finer = max(1.0, 1e-6 / self.rtol) ** (1.0 / 3.0)
+        samples = len(time) + self.swing * (time[-1] - time[0])
+        self.steps_left = int(finer * (_STEPS_ANYWAY + _STEPS_PER_SAMPLE * samples))
         for index, interval in enumerate(np.diff(time).tolist()):
             drift, left = (pushes[index + 1] - pushes[index]) / interval, interval
             while left > 0.0:
                 passed = interval - left
-                moment = float(time[index]) + passed
-                state, step = self.advance(
-                    state, moment, left, (pushes[index] + passed * drift, drift)
-                )
+                moment, push = float(time[index]) + passed, pushes[index] + passed * drift
+                state, step = self.advance(state, moment, left, push, drift)
                 left -= step
-                if not (np.abs(state[0]) < bound).all() or self.steps_left < 0:
+                if not (np.abs(state[0]) < bound).all():
                     raise ArithmeticError(
-                        f"at t = {moment:g} s the motion is {state[0]}, beyond {bound:g}"
-                        if self.steps_left >= 0
-                        else f"by t = {moment:g} s there were too many steps: a law jumps"
+                        f"at t = {moment:g} s the positions {state[0]} have left +-{bound:g}"
                     )
             path[index + 1] = state
-        return path.transpose(1, 2, 0)
+        return path
 
     def advance(
-        self, state: Values, time: float, left: float, push: tuple[Values, Values]
+        self, state: Values, time: float, left: float, push: Values, drift: Values
     ) -> tuple[Values, float]:
         """Return the state after one accepted step, which ends at the next sample or before."""
-        found = [one.at(state, time) for one in self.curved]
-        forces, rates = (np.array([one[part] for one in found]) for part in (0, 2))
-        tangent = forces, np.reshape([one[1] for one in found], (-1, *state.shape)), rates
+        tangent = self.tangent(state, time)
         longest, shortest = min(left, self.longest(state)), _SHORTEST * left
         while True:
             self.steps_left -= 1
+            if self.steps_left < 0:
+                raise ArithmeticError(f"too many steps by t = {time:g} s: a law jumps or is stiff")
             step = min(self.trial, longest)
             step = left if step > 0.999 * left else step
-            middle, move, phi = _predict(step, state, push, self.plant, tangent)
-            half, whole = np.zeros((2, state.shape[1]))
-            if self.curved:
-                half = self.departed(state, middle, time, 0.5 * step, tangent)
-                later = move + _moved(phi[0] @ (step**2 * half), step)
-                whole = self.departed(state, later, time, step, tangent)
-            after, reach, size = _correct(
-                step,
-                state + move,
-                half,
-                whole,
-                phi,
-                self.plant[2],
-                self.origin,
-                self.reach,
-                self.rtol,
-            )
-            change = max(0.1, 0.9 * max(size, 1e-3) ** -0.25)
-            share = change
-            if size <= 1.0:
-                turns = [one.turns(state, after, step, self.rtol) for one in self.memories]
-                share = min(turns, default=1.0)
+            move, exponential = _predict(step, state, push, drift, self.plant, tangent)
+            there = self.tangent(state + move, time + step)[0]
+            error = _correct(step, move, exponential, there, self.plant, tangent)
+            after = state + move + error
+            reach, size = _judge(after, error, self.origin, self.plant[2], self.reach, self.rtol)
+            change = max(0.1, 0.9 * max(size, 6e-3) ** (-1.0 / 3.0))
+            share = self.turn(state, after, step) if size <= 1.0 else change
             if share >= 1.0 or step <= shortest:
                 break
             self.trial = share * step
@@ -337,13 +321,12 @@ class _Integrator:
             one.settle(after)
         return after, step
 
-    def departed(
-        self, state: Values, move: Values, time: float, step: float, tangent: Tangents
-    ) -> Values:
-        """Return by how much accelerations after a move depart from the tangents, (coordinates,)."""
-        forces, slopes, rates = tangent
-        there = np.array([one.at(state + move, time + step)[0] for one in self.curved])
-        return self.plant[1] @ (there - forces - np.tensordot(slopes, move, 2) - step * rates)
+    def tangent(self, state: Values, time: float) -> Triple:
+        """Return what is not linear: forces (r,), slopes by state (r, 2, coordinates), by time."""
+        slopes = np.empty((len(self.curved), *state.shape))
+        found = [one.at(state, time, slopes[place]) for place, one in enumerate(self.curved)]
+        forces, rates = np.reshape(found, (-1, 2)).T.copy()
+        return forces, slopes, rates
 
     def longest(self, state: Values) -> float:
         """Return the step in which nothing swings or turns by more than 1 rad unseen."""
@@ -351,87 +334,119 @@ class _Integrator:
             return math.inf
         return 1.0 / max([self.swing, *(abs(float(row @ state[1])) for row in self.turning)])
 
+    def turn(self, before: Values, after: Values, step: float) -> float:
+        """Return the share of a step after which the first slipping springs turn back."""
+        shares = (one.turns(before, after, step, self.rtol) for one in self.memories)
+        return min(shares, default=1.0)
+
 
 @njit(cache=True)
 def _predict(
-    step: float,
-    state: Values,
-    push: tuple[Values, Values],
-    plant: tuple[Values, Values, Values],
-    tangent: Tangents,
-) -> tuple[Values, Values, Values]:
-    """Return the moves in half a step and in one by the tangents, and functions phi.
+    step: float, state: Values, push: Values, drift: Values, plant: Triple, tangent: Triple
+) -> tuple[Values, Values]:
+    """Return the move by the tangents, and the exponential from which phi_3 is to be had.
 
-    ``push`` is the acceleration by inputs and its rate. Of phi_1 to phi_4, shape (4, 2 coordinates,
-    coordinates), only what acts on accelerations is there.
+    In plain loops, which compile in a tenth of the time of array expressions.
     """
     (linear, columns, _), (forces, slopes, rates) = plant, tangent
-    n = len(columns)
-    by_position = linear[0] + columns @ np.ascontiguousarray(slopes[:, 0])
-    by_speed = linear[1] + columns @ np.ascontiguousarray(slopes[:, 1])
-    acceleration = push[0] + linear[0] @ state[0] + linear[1] @ state[1] + columns @ forces
-    # A straight line and what departs from it, with speeds in ways per step.
-    way = step * state[1]
-    bend = step**2 * (by_position @ way) + step**3 * (push[1] + columns @ rates)
-    block = np.eye(6 * n, k=n)
-    block[n : 2 * n, :n] = step**2 * by_position
-    block[n : 2 * n, n : 2 * n] = step * by_speed
-    half, whole = _exponentials(block)
-    phi = np.empty((4, 2 * n, n))
-    for k in range(4):
-        phi[k] = whole[: 2 * n, (k + 2) * n : (k + 3) * n]
-    first = half[: 2 * n, 2 * n : 3 * n].copy() @ (step**2 * acceleration)
-    first += half[: 2 * n, 3 * n : 4 * n].copy() @ bend
-    first[:n] += 0.5 * way
-    last = phi[0] @ (step**2 * acceleration) + phi[1] @ bend
-    last[:n] += way
-    return _moved(first, step), _moved(last, step), phi
-
-
-@njit(cache=True)
-def _moved(change: Values, step: float) -> Values:
-    """Return a change of positions and ways per step as one of positions and speeds."""
-    move = change.copy().reshape(2, len(change) // 2)
-    move[1] /= step
-    return move
+    n, r = columns.shape
+    # The exponential of this block matrix holds phi_1, phi_2 and phi_3 beside that of the first;
+    # speeds are in ways per step.
+    block, sources = np.zeros((5 * n, 5 * n)), np.zeros((5 * n, 1))
+    for i in range(4 * n):
+        block[i, i + n] = 1.0
+    for i in range(n):
+        acceleration, jerk = push[i], drift[i]
+        for k in range(r):
+            acceleration += columns[i, k] * forces[k]
+            jerk += columns[i, k] * rates[k]
+        for j in range(n):
+            by_position, by_speed = linear[0, i, j], linear[1, i, j]
+            acceleration += by_position * state[0, j] + by_speed * state[1, j]
+            for k in range(r):
+                by_position += columns[i, k] * slopes[k, 0, j]
+                by_speed += columns[i, k] * slopes[k, 1, j]
+            jerk += by_position * state[1, j]
+            block[n + i, j], block[n + i, n + j] = step**2 * by_position, step * by_speed
+        sources[2 * n + i, 0], sources[3 * n + i, 0] = step**2 * acceleration, step**3 * jerk
+    exponential = _exponential(block)
+    change, move = _product(exponential, sources), np.empty((2, n))
+    for i in range(n):
+        move[0, i], move[1, i] = step * state[1, i] + change[i, 0], change[n + i, 0] / step
+    return move, exponential
 
 
 @njit(cache=True)
 def _correct(
-    step: float,
-    predicted: Values,
-    half: Values,
-    whole: Values,
-    phi: Values,
-    watched: Values,
-    origin: Values,
-    reach: Values,
-    rtol: float,
-) -> tuple[Values, Values, float]:
-    """Return the corrected state, how far it has ever been, and the error over the allowed one."""
-    error = _moved(phi[3] @ (step**2 * (12.0 * whole - 48.0 * half)), step)
-    after = predicted + _moved(phi[2] @ (step**2 * (16.0 * half - 2.0 * whole)), step) + error
-    farthest = np.maximum(reach, np.abs((after - origin) @ watched))
-    missed = np.abs(error @ watched)
-    for kind in range(2):
-        rounding = _ROUNDING * (np.max(farthest[kind]) + np.max(np.abs(after[kind]))) + 1e-300
-        missed[kind] /= rtol * farthest[kind] + rounding
-    return after, farthest, np.max(missed)
+    step: float, move: Values, exponential: Values, there: Values, plant: Triple, tangent: Triple
+) -> Values:
+    """Return what the move by the tangents misses, of which it is the error too."""
+    (_, columns, _), (forces, slopes, rates) = plant, tangent
+    n, r = columns.shape
+    sources, error = np.zeros((5 * n, 1)), np.empty((2, n))
+    for k in range(r):
+        departed = there[k] - forces[k] - step * rates[k]
+        for j in range(n):
+            departed -= slopes[k, 0, j] * move[0, j] + slopes[k, 1, j] * move[1, j]
+        for i in range(n):
+            sources[4 * n + i, 0] += 2.0 * step**2 * columns[i, k] * departed
+    change = _product(exponential, sources)
+    for i in range(n):
+        error[0, i], error[1, i] = change[i, 0], change[n + i, 0] / step
+    return error
 
 
 @njit(cache=True)
-def _exponentials(matrix: Values) -> tuple[Values, Values]:
-    """Return the exponentials of half a matrix and of the whole one."""
-    norm, halvings = np.max(np.sum(np.abs(matrix), axis=1)), 1
+def _exponential(matrix: Values) -> Values:
+    """Return the exponential by the series of a share that is halved below 1, and squaring."""
+    norm, halvings, n = 0.0, 0, len(matrix)
+    for i in range(n):
+        norm = max(norm, np.sum(np.abs(matrix[i])))
     while norm > 2.0**halvings and halvings < 200:
         halvings += 1
-    share, identity = matrix / 2.0**halvings, np.eye(len(matrix))
-    result = identity
+    result = np.eye(n)
     for order in range(18, 0, -1):
-        result = identity + share @ result / order
-    for _ in range(halvings - 1):
-        result = result @ result
-    return result, result @ result
+        result = _product(matrix, result)
+        for i in range(n):
+            for j in range(n):
+                result[i, j] *= 0.5**halvings / order
+            result[i, i] += 1.0
+    for _ in range(halvings):
+        result = _product(result, result)
+    return result
+
+
+@njit(cache=True)
+def _product(first: Values, second: Values) -> Values:
+    """Return the product of matrices that are small, with many zeros."""
+    result = np.zeros((len(first), second.shape[1]))
+    for i in range(len(first)):
+        for k in range(len(second)):
+            if first[i, k] != 0.0:
+                for j in range(second.shape[1]):
+                    result[i, j] += first[i, k] * second[k, j]
+    return result
+
+
+@njit(cache=True)
+def _judge(
+    after: Values, error: Values, origin: Values, watched: Values, reach: Values, rtol: float
+) -> tuple[Values, float]:
+    """Return how far and fast all has ever been, (2, rows), and the error over the allowed one."""
+    farthest, missed, size = reach.copy(), np.zeros(reach.shape), 0.0
+    for kind in range(2):
+        largest = np.max(np.abs(after[kind]))
+        for row in range(len(watched)):
+            moved = 0.0
+            for place in range(watched.shape[1]):
+                moved += watched[row, place] * (after[kind, place] - origin[kind, place])
+                missed[kind, row] += watched[row, place] * error[kind, place]
+            farthest[kind, row] = max(farthest[kind, row], abs(moved))
+            largest = max(largest, farthest[kind, row])
+        for row in range(len(watched)):
+            allowed = rtol * farthest[kind, row] + _ROUNDING * largest + 1e-300
+            size = max(size, abs(missed[kind, row]) / allowed)
+    return farthest, size if np.isfinite(error).all() else np.inf
 
 
 def _row(mechanism: Mechanism, shares: Mapping[str, float]) -> Values:
@@ -447,6 +462,8 @@ def _channel(record: Record, name: str) -> Values:
 
 def _closed_loops(mechanism: Mechanism, record: Record, closed: bool | None) -> list[Loop]:
     """Return the loops that command their inputs, each input at most one."""
+    if not (closed is None or isinstance(closed, bool)):
+        raise InvalidInput("closed_loop", closed, "None, True or False")
     if closed is None:
         loops = [loop for loop in mechanism.loops if loop.reference in record.channels]
     else:
