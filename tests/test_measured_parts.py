@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.measured import investigate
 from pymoo_hdte.measured.data import measured_data
@@ -137,3 +138,17 @@ def test_the_rest_is_never_less_than_the_sensors_noise():
     # What was left then counts as noise: its power is that of the deviation.
     power = np.mean((3.0 * data.deviation[0][data.spectra[0].kept]) ** 2)
     assert np.mean(louder.deviation[0][data.spectra[0].kept] ** 2) == pytest.approx(power)
+
+
+def test_noise_that_is_known_is_used_and_checked():
+    record = turning("one", 1.5, lambda q, v: 0.0 * q)
+    louder = Record("one", "train", TIME, record.channels, {"torque": 1.0})
+    plain, stated = (measured_data(JOINT, [one], CUTOFF) for one in (record, louder))
+    assert np.all(stated.deviation[0] > 50.0 * plain.deviation[0])
+    assert louder.finer(2).noise == {"torque": 1.0}
+    for noise, message in (
+        ({"torque": 0.0}, "noise of channel torque"),
+        ({"force": 1.0}, "one of 'q', 'torque'"),
+    ):
+        with pytest.raises(InvalidInput, match=message):
+            Record("one", "train", TIME, record.channels, noise)

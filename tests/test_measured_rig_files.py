@@ -247,3 +247,15 @@ def test_mutated_files_give_a_rig_or_a_clear_error(folder):
         (folder / "model.toml").write_text(rig_toml(*model), encoding="utf-8")
         assert read_model(folder / "model.toml") == model
     assert 30 < read < 570
+
+
+def test_noise_that_is_known_goes_to_the_records_that_have_the_channel(folder):
+    text = (folder / RIG_FILE).read_text()
+    top = 'title = "A rig"\ncutoff = 40.0\n'
+    (folder / RIG_FILE).write_text(top + "[noise]\nq = 1e-6\n" + text.removeprefix(top))
+    first, other = read_rig(folder).records
+    assert first.noise == {"q": 1e-6}
+    assert other.noise == {}
+    (folder / RIG_FILE).write_text(top + "[noise]\nq = -1.0\n" + text.removeprefix(top))
+    with pytest.raises(InvalidInput, match=r"noise\.q"):
+        read_rig(folder)

@@ -84,7 +84,7 @@ def test_a_motion_is_known_up_to_where_it_ends():
     position, *_ = course(np.arange(0.5, 15.0, 0.25))
     noise = 1e-6 * np.random.default_rng(1).standard_normal(len(TIME))
     # It ends at 14.75 Hz; the window of the spectrum blurs that.
-    assert 14.0 < highest_frequency(position + noise, STEP) < 30.0
+    assert 14.0 < highest_frequency(position + noise, STEP, noise_of(position + noise)) < 30.0
 
 
 def test_smoothing_has_no_delay_and_keeps_what_is_below_the_cutoff():

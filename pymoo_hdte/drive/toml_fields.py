@@ -102,6 +102,10 @@ class Fields:
             real_number(f"{self._name(field)}.value", raw["value"], **limits) * units[raw["unit"]]
         )
 
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the fields that are left."""
+        return tuple(self._left)
+
     def has(self, field: str) -> bool:
         """Tell whether an optional field is there."""
         return field in self._left

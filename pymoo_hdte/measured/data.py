@@ -247,7 +247,7 @@ def usual_cutoff(mechanism: Mechanism, records: Sequence[Record]) -> float:
         See `highest_frequency`.
     """
     return min(
-        highest_frequency(record.channels[name], record.step)
+        highest_frequency(record.channels[name], record.step, record.noise_of(name))
         for record in records
         for name in mechanism.coordinates
         if name in record.channels

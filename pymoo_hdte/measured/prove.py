@@ -18,7 +18,6 @@ from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.measured.data import measured_data
 from pymoo_hdte.measured.investigate import Finding, root_mean_square
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-from pymoo_hdte.mechanism.motion import noise_of
 from pymoo_hdte.mechanism.records import FINER
 from pymoo_hdte.mechanism.simulation import simulate
 
@@ -119,7 +118,7 @@ def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
                 "simulation",
                 _size(measured - before),
                 _size(measured - after),
-                noise_of(measured),
+                record.noise_of(name),
                 record.time,
                 measured,
                 before,

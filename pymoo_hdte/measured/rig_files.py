@@ -31,6 +31,9 @@ Numbers of the mechanism are in SI; the columns of the records have units of the
     port = "joint"
     level = 20.4
 
+    [noise]                                        # optional: standard deviations, SI
+    q = 1e-6
+
     [table]                                        # as `layout_from_fields` has it
     ...
     [[records]]
@@ -44,7 +47,7 @@ Numbers of the mechanism are in SI; the columns of the records have units of the
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
@@ -111,17 +114,23 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> Rig:
     with toml_with_lines(path) as top:
         (title, mechanism, effects), cutoff = model_from_fields(top, path.name)
         shared = layout_from_fields(top.table("table")) if top.has("table") else None
+        noise = _noise(top)
         entries = top.tables("records")
         top.finish()
         records: dict[str, Record] = {}
         for index, entry in enumerate(entries):
-            record = _record(entry, f"{path.name}.records[{index}]", files, shared, records)
+            record = _record(entry, f"{path.name}.records[{index}]", files, shared, records, noise)
             records[record.name] = record
     return Rig(title, mechanism, effects, tuple(records.values()), cutoff, str(path))
 
 
 def _record(
-    entry: Fields, place: str, folder: Path, shared: TableLayout | None, taken: Collection[str]
+    entry: Fields,
+    place: str,
+    folder: Path,
+    shared: TableLayout | None,
+    taken: Collection[str],
+    noise: Mapping[str, float],
 ) -> Record:
     file = entry.text("file")
     # As Windows has paths, because it takes both separators and knows drives.
@@ -141,9 +150,17 @@ def _record(
         _check_sha256(path, expected, place)
     table = read_table(path, layout)
     try:
-        return Record(name, role, table.time, table.channels)
+        of_channels = {one: noise[one] for one in noise if one in table.channels}
+        return Record(name, role, table.time, table.channels, of_channels)
     except InvalidInput as error:
         raise InvalidInput(f"{path.name}: {error.field}", error.value, error.allowed) from None
+
+
+def _noise(top: Fields) -> dict[str, float]:
+    if not top.has("noise"):
+        return {}
+    table = top.table("noise")
+    return {name: table.number(name, above=0.0) for name in table.names()}
 
 
 def _check_sha256(path: Path, expected: str, place: str) -> None:

@@ -86,7 +86,7 @@ def layout_from_fields(table: Fields) -> TableLayout:
     form = table.choice("format", ("matlab", "csv", "plain"))
     channels = table.table("channels")
     # Fields does not tell its names, because its other users know theirs beforehand.
-    names = list(channels._left)
+    names = list(channels.names())
     if not names:
         raise InvalidInput(table._name("channels"), {}, "at least one channel")
     mapped = {name: _channel(channels.table(name), form, UNITS) for name in names}

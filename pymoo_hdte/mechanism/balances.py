@@ -23,7 +23,6 @@ from pymoo_hdte.mechanism.motion import (
     highest_share,
     margin_of,
     motion_of,
-    noise_of,
     smooth,
     smoothed_noise,
     stride_of,
@@ -248,15 +247,15 @@ class Balance:
         power = np.zeros((len(names), self._bins))
         for port in mechanism.ports:
             if port.read:
-                power[names.index(port.name)] += noise_of(self._channel(port.name)) ** 2
+                power[names.index(port.name)] += self.record.noise_of(port.name) ** 2
         for one in mechanism.inputs:
-            spread = one.gain.value * noise_of(self._channel(one.name))
+            spread = one.gain.value * self.record.noise_of(one.name)
             for name, share in one.acts.items():
                 power[names.index(name)] += (share * spread) ** 2
         step = record.step * stride
         ends = 4.0 * stride / (len(self.time) * step**2)
         for place, name in enumerate(mechanism.coordinates):
-            noise = noise_of(self._channel(name))
+            noise = self.record.noise_of(name)
             position, speed = smoothed_noise(noise, record.step, self.cutoff)
             inertial, viscous = inertia[:, place, None], damping[:, place, None]
             own = (stiffness[:, place, None] - inertial * omega**2) ** 2 + (viscous * omega) ** 2

@@ -50,8 +50,16 @@ def noise_of(signal: Values) -> float:
     return float(np.sqrt(np.mean(np.diff(signal, 3) ** 2) / 20.0))
 
 
-def highest_frequency(position: Values, step: float) -> float:
+def highest_frequency(position: Values, step: float, deviation: float) -> float:
     """Return the frequency in Hz up to which a position stands out of its noise.
+
+    Parameters
+    ----------
+    position : ndarray, shape (n,)
+    step : float
+        s.
+    deviation : float
+        Standard deviation of its white noise.
 
     Raises
     ------
@@ -63,7 +71,7 @@ def highest_frequency(position: Values, step: float) -> float:
     frequency, power = welch(
         difference, 1.0 / step, nperseg=min(_SEGMENT, len(difference)), detrend="constant"
     )
-    noise = 2.0 * step * noise_of(position) ** 2 * (2.0 * np.sin(np.pi * frequency * step)) ** 4
+    noise = 2.0 * step * deviation**2 * (2.0 * np.sin(np.pi * frequency * step)) ** 4
     stands_out = power[1:] > _STANDS_OUT * noise[1:]
     # In the lowest ones of white noise, too, there is what the window lets through.
     if not np.all(stands_out[:_FEWEST]):

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
-from pymoo_hdte.checks import InvalidInput, finite_array, one_of
+from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
+from pymoo_hdte.mechanism.motion import noise_of
 
 ROLES = ("train", "held_out")
 FEWEST_SAMPLES = 16
@@ -32,21 +33,30 @@ class Record:
         s, uniform within 1 % of a step; at least `FEWEST_SAMPLES` of them.
     channels : dict of str to ndarray, shape (n,)
         Coordinates, inputs, references and force sensors by name, SI.
+    noise : dict of str to float
+        Standard deviation of the white noise of channels, where it is known; of the others it is
+        estimated, see `noise_of`.
 
     Raises
     ------
     InvalidInput
-        For times that are not uniform, or a channel of another length or with a value that is not
-        finite.
+        For times that are not uniform, a channel of another length or with a value that is not
+        finite, or a noise that is not positive or of no channel.
     """
 
     name: str
     role: str
     time: NDArray[np.float64]
     channels: Mapping[str, NDArray[np.float64]]
+    noise: Mapping[str, float]
 
     def __init__(
-        self, name: str, role: str, time: ArrayLike, channels: Mapping[str, ArrayLike]
+        self,
+        name: str,
+        role: str,
+        time: ArrayLike,
+        channels: Mapping[str, ArrayLike],
+        noise: Mapping[str, float] | None = None,
     ) -> None:
         one_of(f"role of record {name}", role, ROLES)
         moments = finite_array(f"time of record {name}", time, (None,))
@@ -68,13 +78,22 @@ class Record:
             channel: finite_array(f"channel {channel} of record {name}", values, (n,))
             for channel, values in channels.items()
         }
+        known = dict(noise or {})
+        for channel, deviation in known.items():
+            one_of(f"noise of record {name}", channel, tuple(checked))
+            real_number(f"noise of channel {channel} of record {name}", deviation, above=0.0)
         for attribute, value in (
+            ("noise", known),
             ("name", name),
             ("role", role),
             ("time", moments),
             ("channels", checked),
         ):
             object.__setattr__(self, attribute, value)
+
+    def noise_of(self, channel: str) -> float:
+        """Return the standard deviation of the noise of a channel: known, or estimated; SI."""
+        return self.noise.get(channel) or noise_of(self.channels[channel])
 
     def finer(self, factor: int) -> Record:
         """Return the record with ``factor`` samples for each, on a smooth curve through them.
@@ -88,7 +107,9 @@ class Record:
             name: make_interp_spline(places, channel, 3)(between)
             for name, channel in self.channels.items()
         }
-        return Record(self.name, self.role, self.time[0] + self.step * between, channels)
+        return Record(
+            self.name, self.role, self.time[0] + self.step * between, channels, self.noise
+        )
 
     @property
     def step(self) -> float:
