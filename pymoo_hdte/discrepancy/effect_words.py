@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import re
 
-_LABEL = re.compile(
-    r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:([A-Za-z]\w*)(?:@([\d.e+-]*\d))?"
-)
+_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:([A-Za-z]\w*)(?:@([\d.e+-]*\d))?")
 
 
 def in_words(text: str) -> str:
