@@ -1,0 +1,154 @@
+"""What acts in a mechanism while it is simulated: the forces of ports, and what loops command."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive.hysteresis import MaxwellSlip
+from pymoo_hdte.drive.laws import Law, PortState, periodic_phase
+from pymoo_hdte.mechanism.mechanism import Loop, Mechanism, Port
+from pymoo_hdte.mechanism.records import Record
+
+Values = NDArray[np.float64]
+
+_TURN = 1e-7
+
+
+class PortForce:
+    """What acts at a port. States are positions and speeds, shape (2, coordinates)."""
+
+    def __init__(
+        self, port: Port, laws: Sequence[Law], mechanism: Mechanism, begin: Values
+    ) -> None:
+        self.port = port
+        self.row = coordinate_row(mechanism, port.motion)
+        self.column = -self.row
+        self.spring = (port.stiffness.value, port.damping.value)
+        self.slopes = np.outer(self.spring, self.row)
+        self.linear = not (laws or port.error)
+        self.lines = [(mechanism.coordinates.index(one.coordinate), one) for one in port.error]
+        self.turning = [line.order * np.eye(len(self.row))[place] for place, line in self.lines]
+        self.turning += [order * self.row for law in laws for order in law.orders]
+        self.laws = [law for law in laws if not isinstance(law, MaxwellSlip)]
+        self.slips = [law for law in laws if isinstance(law, MaxwellSlip)]
+        self.stretches = [np.zeros_like(law._slips) for law in self.slips]
+        self.since = self.motion(begin)[0]
+
+    def motion(self, states: Values) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
+        """Return d, d', and by error line its coordinate and the slopes of d and d' over it.
+
+        Of states of shape (..., 2, coordinates).
+        """
+        d, rate = (states @ self.row).T
+        bends = []
+        for place, line in self.lines:
+            angle, speed = line.order * states[..., 0, place] + line.phase, states[..., 1, place]
+            wave = line.amplitude * np.sin(angle)
+            slope = line.order * line.amplitude * np.cos(angle)
+            d, rate = d + wave, rate + slope * speed
+            bends.append((place, slope, -(line.order**2) * wave * speed))
+        return d, rate, bends
+
+    def at(self, state: Values, time: float, slopes: Values) -> tuple[float, float]:
+        """Return the force and its slope by time; write those by the state into ``slopes``."""
+        d, rate, bends = self.motion(state)
+        stiffness, damping = self.spring
+        force = stiffness * d + damping * rate
+        here = PortState(d, rate, periodic_phase(d), self.spring[0])  # type: ignore[arg-type]
+        for law in self.laws:
+            found = law.respond(here)
+            force += np.asarray(found.torque).item()
+            stiffness += np.asarray(found.slope).item()
+            damping += np.asarray(found.damping).item()
+            if law.orders:
+                # A law's slope holds the phase, which turns with the position here.
+                turned = law.respond(replace(here, phase=periodic_phase(d + _TURN)))
+                stiffness += np.asarray(turned.torque - found.torque).item() / _TURN
+        for law, stretch in zip(self.slips, self.stretches, strict=True):
+            moved = stretch + (d - self.since)
+            force += law.torque(moved)
+            # At the slip the tangent is that of the way in which it moves.
+            sticking = np.abs(law.rates(math.copysign(1.0, rate), moved))
+            stiffness += float(law._stiffnesses @ sticking)
+        slopes[0], slopes[1] = stiffness * self.row, damping * self.row
+        for place, slope, bend in bends:
+            slopes[:, place] += stiffness * slope + damping * bend, damping * slope
+        return force, 0.0
+
+    def turns(self, before: Values, after: Values, step: float, rtol: float) -> float:
+        """Return the share of a step after which slipping springs turn back, 1 for none."""
+        first, last = self.motion(before)[1], self.motion(after)[1]
+        missed = min(abs(first), abs(last)) * step
+        if first * last >= 0.0 or missed <= rtol * min(law.torsion for law in self.slips):
+            return 1.0
+        return float(min(max(first / (first - last), 0.01), 0.99))
+
+    def settle(self, state: Values) -> None:
+        """Keep how far springs are stretched, which up to a turn only the way decides."""
+        d = self.motion(state)[0]
+        for law, stretch in zip(self.slips, self.stretches, strict=True):
+            stretch[:] = np.clip(stretch + (d - self.since), -law._slips, law._slips)
+        self.since = d
+
+    def along(self, path: Values) -> Values:
+        """Return the force on a path of shape (n, 2, coordinates)."""
+        d, rate, _ = self.motion(path)
+        stiffness, phase = np.asarray(self.spring[0]), periodic_phase(d)
+        force = stiffness * d + self.spring[1] * rate
+        for law in self.laws:
+            force += law.respond(PortState(d, rate, phase, stiffness)).torque
+        for law in self.slips:
+            force += law.respond(PortState(d - d[0], rate, phase, stiffness)).torque[0]
+        return np.asarray(force)
+
+
+class Command:
+    """What a loop commands."""
+
+    linear = False
+    turning: tuple[Values, ...] = ()
+
+    def __init__(self, loop: Loop, mechanism: Mechanism, record: Record) -> None:
+        self.limit, self.gain, self.time = loop.limit, loop.position_gain, record.time
+        self.reference = channel_of(record, loop.reference)
+        self.rates = np.diff(self.reference) / np.diff(self.time)
+        gains = (-loop.position_gain, -loop.speed_gain)
+        self.slopes = np.outer(gains, coordinate_row(mechanism, {loop.coordinate: 1.0}))
+        driven = next(one for one in mechanism.inputs if one.name == loop.input)
+        self.column = driven.gain.value * coordinate_row(mechanism, driven.acts)
+
+    def at(self, state: Values, time: float, slopes: Values) -> tuple[float, float]:
+        """Return the command and its slope by time; write those by the state into ``slopes``."""
+        place = min(int(np.searchsorted(self.time, time, "right")), len(self.rates)) - 1
+        reference = self.reference[place] + self.rates[place] * (time - self.time[place])
+        wanted = float(self.gain * reference + np.sum(self.slopes * state))
+        if abs(wanted) > self.limit:
+            slopes[:] = 0.0
+            return math.copysign(self.limit, wanted), 0.0
+        slopes[:] = self.slopes
+        return wanted, float(self.gain * self.rates[place])
+
+    def along(self, path: Values) -> Values:
+        """Return the command on a path of shape (n, 2, coordinates)."""
+        wanted = self.gain * self.reference + np.sum(self.slopes * path, axis=(1, 2))
+        return np.clip(wanted, -self.limit, self.limit)
+
+
+def coordinate_row(mechanism: Mechanism, shares: Mapping[str, float]) -> Values:
+    """Return shares of coordinates as a row of all, shape (coordinates,)."""
+    return np.array([float(shares.get(name, 0.0)) for name in mechanism.coordinates])
+
+
+def channel_of(record: Record, name: str) -> Values:
+    """Return a channel, shape (n,); raises `InvalidInput` where the record has none."""
+    if name not in record.channels:
+        allowed = f"with {name!r}, which the mechanism needs"
+        raise InvalidInput(f"channels of record {record.name}", sorted(record.channels), allowed)
+    return record.channels[name]
