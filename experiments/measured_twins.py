@@ -18,7 +18,7 @@ from pymoo_hdte.drive.friction import NonlinearDrag
 from pymoo_hdte.measured import Finding, investigate
 from pymoo_hdte.measured.prove import fitted_mechanism
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-from pymoo_hdte.mechanism.balances import Balance
+from pymoo_hdte.mechanism.balances import Balance, law_force
 from pymoo_hdte.mechanism.motion import noise_of
 
 SEED = 5
@@ -117,7 +117,8 @@ def _twin(
                 port.stiffness.value * motion.position + port.damping.value * motion.speed
             )
     for effect in effects:
-        force = force + exact.law_force(effect, motion)
+        stiffness = mechanism.port(effect.port).stiffness.value
+        force = force + law_force(effect, motion, stiffness)
     channels = {
         coordinate: motion.position,
         drive.name: force / (drive.gain.value * drive.acts[coordinate]),

@@ -96,18 +96,24 @@ class MeasuredData:
         known[places] = 0.0
         constants, slopes = [], []
         for balance, deviation in zip(self.spectra, self.deviation, strict=True):
-            constant = balance.constant - balance.forces(self.known)
+            constant = balance.constant.copy()
             constant += np.einsum("bqk,q->bk", balance.terms, known)
             constants.append((constant / deviation)[balance.kept])
             terms = balance.terms[:, places] / deviation[:, None]
             slopes.append(np.moveaxis(terms, 1, 2)[balance.kept])
         return np.concatenate(constants), np.concatenate(slopes)
 
-    def whitened_forces(self, effects: Sequence[LawAt]) -> Vector:
-        """Return what effects take from the whitened residuals, shape (n,)."""
+    def whitened_forces(self, base: Vector, effects: Sequence[LawAt]) -> Vector:
+        """Return what effects take from whitened residuals, (n,), at base parameters (n_base,)."""
+        prefix = "stiffness of "
+        stiffness = {
+            one.name.removeprefix(prefix): float(value)
+            for one, value in zip(self.base, base, strict=True)
+            if one.name.startswith(prefix)
+        }
         return np.concatenate(
             [
-                (balance.forces(effects) / deviation)[balance.kept]
+                (balance.forces(effects, stiffness) / deviation)[balance.kept]
                 for balance, deviation in zip(self.spectra, self.deviation, strict=True)
             ]
         )
@@ -115,7 +121,7 @@ class MeasuredData:
     def residuals(self, base: Vector, effects: Sequence[LawAt]) -> Vector:
         """Return whitened residuals, shape (n,), at base parameters (n_base,) with effects."""
         constant, slopes = self._linear
-        return constant + slopes @ base - self.whitened_forces(effects)
+        return constant + slopes @ base - self.whitened_forces(base, (*self.known, *effects))
 
     def objective(
         self, candidates: Sequence[Candidate], slopes: Values | None = None
@@ -125,7 +131,8 @@ class MeasuredData:
 
     def response(self, fitted: Fit) -> Response:
         """Return how the whitened residuals of a fit respond to further effects."""
-        return lambda added: -self.whitened_forces(added)
+        base = fitted.values[: len(self.base)]
+        return lambda added: -self.whitened_forces(base, added)
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return where the residuals of each part stand."""
@@ -219,15 +226,21 @@ class BalanceObjective(Unknowns):
     def jacobian(self, values: Vector) -> Values:
         """Return derivatives (n, n_parameters) by parameters in units of their scale."""
         n_base, steps = len(self.data.base), self.steps(values)
-        _, slopes = self.data._linear
-        columns = [slopes * self.scale[:n_base]]
-        stands = self.data.whitened_forces(self._effects(values[n_base:]))
-        for place in range(n_base, len(values)):
-            moved = values.copy()
-            moved[place] += steps[place] * self.scale[place]
-            change = self.data.whitened_forces(self._effects(moved[n_base:])) - stands
-            columns.append(-change[:, None] / steps[place])
-        return np.hstack(columns)
+        found = np.zeros((len(self.data.frequency), len(values)))
+        found[:, :n_base] = self.data._linear[1] * self.scale[:n_base]
+        stands = self._forces(values)
+        for place, parameter in enumerate(self.parameters):
+            # A law may hang on the stiffness of its port; masses and dampers are no law's.
+            if place >= n_base or parameter.name.startswith("stiffness of "):
+                moved = values.copy()
+                moved[place] += steps[place] * self.scale[place]
+                found[:, place] -= (self._forces(moved) - stands) / steps[place]
+        return found
+
+    def _forces(self, values: Vector) -> Vector:
+        n_base = len(self.data.base)
+        effects = (*self.data.known, *self._effects(values[n_base:]))
+        return self.data.whitened_forces(values[:n_base], effects)
 
     def slopes_at(self, values: Vector) -> Values:
         """Return derivatives by base parameters, which do not depend on the values."""

@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.rival import Rival
-from pymoo_hdte.drive.laws import PortState, periodic_phase
 from pymoo_hdte.measured.candidates import turns_back
 from pymoo_hdte.measured.investigate import Finding
-from pymoo_hdte.mechanism import LawAt
+from pymoo_hdte.mechanism.balances import PortMotion, law_force
 
 Values = NDArray[np.float64]
 
@@ -153,22 +152,10 @@ def _separation(
                 for sign, one in ((1.0, chosen), (-1.0, rival)):
                     for effect in one.fit.effects:
                         if effect.port == port.name:  # type: ignore[attr-defined]
-                            force = _force(effect, port.stiffness.value, position, speed)
+                            scaled = PortMotion(position, speed)
+                            force = law_force(effect, scaled, port.stiffness.value)  # type: ignore[arg-type]
                             difference += sign * share * force
         base = np.column_stack(imitated)
         left = difference - base @ np.linalg.lstsq(base, difference, rcond=None)[0]
         power += float(np.mean(left**2)) / max(float(rest[row]) ** 2, 1e-300)
     return float(np.sqrt(power))
-
-
-def _force(effect: Any, stiffness: float, position: Values, speed: Values) -> Values:
-    assert isinstance(effect, LawAt)
-    state = PortState(
-        position,
-        speed,
-        periodic_phase(position),
-        np.full(1, stiffness),
-        path=lambda values: values[None, :],
-        back=lambda values: values[0],
-    )
-    return np.broadcast_to(effect.law.respond(state).torque, position.shape)

@@ -8,18 +8,20 @@ Linear in the quantities of the mechanism (Gautier, Robotics and Autonomous Syst
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct
+from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.laws import PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
 from pymoo_hdte.mechanism.motion import (
     Motion,
+    finer_than,
     highest_share,
     margin_of,
     motion_of,
@@ -53,6 +55,33 @@ class PortMotion:
 
     position: Values
     speed: Values
+
+
+def port_motion(port: Port, position: dict[str, Values], speed: dict[str, Values]) -> PortMotion:
+    """Return the motion at a port, with its kinematic error, of coordinates of shape (n,)."""
+    here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
+    rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
+    for line in port.error:
+        angle = line.order * position[line.coordinate] + line.phase
+        here = here + line.amplitude * np.sin(angle)
+        rate = rate + line.amplitude * line.order * np.cos(angle) * speed[line.coordinate]
+    return PortMotion(here, rate)
+
+
+def law_force(effect: LawAt, motion: PortMotion | Motion, stiffness: float) -> Values:
+    """Return the force of an effect against a motion in time, shape (n,).
+
+    ``stiffness`` is that of its port, N/m or N.m/rad.
+    """
+    state = PortState(
+        motion.position,
+        motion.speed,
+        periodic_phase(motion.position),
+        np.full(1, stiffness),
+        path=lambda values: values[None, :],
+        back=lambda values: values[0],
+    )
+    return np.broadcast_to(effect.law.respond(state).torque, motion.position.shape)
 
 
 class Balance:
@@ -92,7 +121,7 @@ class Balance:
 
     def __init__(self, mechanism: Mechanism, record: Record, cutoff: float) -> None:
         self.mechanism, self.record = mechanism, record
-        self._known: dict[LawAt, Values] = {}
+        self._known: dict[tuple[LawAt, float], Values] = {}
         margin = margin_of(cutoff, record.step)
         read = any(port.read for port in mechanism.ports)
         highest = highest_share(record.step) if read else cutoff
@@ -120,14 +149,12 @@ class Balance:
         self._acceleration = {
             name: motion.acceleration[self._rows] for name, motion in self.motions.items()
         }
-        self.ports = {
-            port.name: self._port_motion(
-                port,
-                {name: motion.position[self._rows] for name, motion in self.motions.items()},
-                {name: motion.speed[self._rows] for name, motion in self.motions.items()},
-            )
-            for port in mechanism.ports
-        }
+        self.ports = self._port_motions(
+            {name: one.position[self._rows] for name, one in self.motions.items()},
+            {name: one.speed[self._rows] for name, one in self.motions.items()},
+        )
+        self._finer = finer_than(cutoff, record.step * stride)
+        self._fine = self.ports if self._finer == 1 else self._port_motions(*self._between(stride))
         self._inputs = {
             one.name: smooth(self._channel(one.name), record.step, highest)[self._rows]
             for one in mechanism.inputs
@@ -141,40 +168,40 @@ class Balance:
                 self.constant[names.index(port.name)] = self._transform(reading)
         self.noise = self._noise(stride)
 
-    def forces(self, effects: Sequence[LawAt]) -> Values:
-        """Return the coefficients of what laws take from the balances, (n_balances, n_bins)."""
+    def forces(
+        self, effects: Sequence[LawAt], stiffness: Mapping[str, float] | None = None
+    ) -> Values:
+        """Return the coefficients of what laws take from the balances, (n_balances, n_bins).
+
+        Parameters
+        ----------
+        effects : sequence of LawAt
+        stiffness : mapping of str to float, optional
+            Of ports, N/m or N.m/rad, which play and curved springs take from; otherwise believed.
+        """
         names = balance_names(self.mechanism)
         found = np.zeros((len(names), self._bins))
         for effect in effects:
-            force = self._law_coefficients(effect)
-            for name, share in self._rows_of(self.mechanism.port(effect.port)).items():
+            port = self.mechanism.port(effect.port)
+            here = (stiffness or {}).get(port.name, port.stiffness.value)
+            force = self._law_coefficients(effect, here)
+            for name, share in self._rows_of(port).items():
                 found[names.index(name)] += share * force
         return found
 
-    def _law_coefficients(self, effect: LawAt) -> Values:
+    def _law_coefficients(self, effect: LawAt, stiffness: float) -> Values:
         """Return the coefficients of the force of one effect, (n_bins,).
 
         The last ones are kept: of a difference quotient all laws but one stay as they are.
         """
-        if effect not in self._known:
+        key = effect, stiffness
+        if key not in self._known:
             while len(self._known) >= _KEPT:
                 self._known.pop(next(iter(self._known)))
-            self._known[effect] = self._transform(self.law_force(effect))
-        return self._known[effect]
-
-    def law_force(self, effect: LawAt, motion: PortMotion | Motion | None = None) -> Values:
-        """Return the force of one effect against a motion, by default its port's, shape (n,)."""
-        port = self.mechanism.port(effect.port)
-        motion = self.ports[effect.port] if motion is None else motion
-        state = PortState(
-            motion.position,
-            motion.speed,
-            periodic_phase(motion.position),
-            np.full(1, port.stiffness.value),
-            path=lambda values: values[None, :],
-            back=lambda values: values[0],
-        )
-        return np.broadcast_to(effect.law.respond(state).torque, motion.position.shape)
+            force = law_force(effect, self._fine[effect.port], stiffness)
+            # The finer samples lie around the others, so that their cosines are the same.
+            self._known[key] = self._transform(force) / np.sqrt(self._finer)
+        return self._known[key]
 
     def in_time(self, coefficients: Values) -> Values:
         """Return the signal, shape (n,), at the working rate, of coefficients (n_bins,)."""
@@ -195,16 +222,23 @@ class Balance:
             )
         return self.record.channels[name]
 
-    def _port_motion(
-        self, port: Port, position: dict[str, Values], speed: dict[str, Values]
-    ) -> PortMotion:
-        here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
-        rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
-        for line in port.error:
-            angle = line.order * position[line.coordinate] + line.phase
-            here = here + line.amplitude * np.sin(angle)
-            rate = rate + line.amplitude * line.order * np.cos(angle) * speed[line.coordinate]
-        return PortMotion(here, rate)
+    def _port_motions(
+        self, position: dict[str, Values], speed: dict[str, Values]
+    ) -> dict[str, PortMotion]:
+        return {port.name: port_motion(port, position, speed) for port in self.mechanism.ports}
+
+    def _between(self, stride: int) -> tuple[dict[str, Values], dict[str, Values]]:
+        """Return positions and speeds at ``_finer`` moments around each of the working rate."""
+        places = np.arange(len(self.record.time))[self._rows]
+        offsets = ((np.arange(self._finer) + 0.5) / self._finer - 0.5) * stride
+        moments = (places[:, None] + offsets).ravel()
+        every = np.arange(len(self.record.time))
+
+        def at_moments(values: Values) -> Values:
+            return np.asarray(make_interp_spline(every, values, 3)(moments))
+
+        position = {name: at_moments(one.position) for name, one in self.motions.items()}
+        return position, {name: at_moments(one.speed) for name, one in self.motions.items()}
 
     def _transform(self, signal: Values) -> Values:
         return np.asarray(dct(signal, type=2, norm="ortho")[: self._bins])

@@ -96,6 +96,11 @@ def stride_of(cutoff: float, step: float) -> int:
     return max(1, int(1.0 / (_LAW_SAMPLES * step * cutoff)))
 
 
+def finer_than(cutoff: float, step: float) -> int:
+    """Return how many samples for each make `_LAW_SAMPLES` to a period of the cutoff."""
+    return max(1, int(np.ceil(_LAW_SAMPLES * cutoff * step - 1e-9)))
+
+
 def margin_of(cutoff: float, step: float) -> int:
     """Return the number of samples to be left out at either end."""
     return int(np.ceil(_SETTLES / (step * cutoff)))
