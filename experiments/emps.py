@@ -13,7 +13,7 @@ from experiments.measured_rigs import (
     values_table,
     verdict_paragraphs,
 )
-from experiments.measured_twins import Twin, twins, twins_table
+from experiments.measured_twins import Twin, twins, twins_agree, twins_table
 from experiments.registry import Context
 from experiments.result import Finding, Result, Table
 
@@ -65,7 +65,7 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
         and ours[name]["interval95"][0] <= published <= ours[name]["interval95"][1]
         for name, (published, share) in PUBLISHED.items()
     )
-    first, *seconds = one.names
+    first, *seconds = one.names or ("nothing",)
     findings = (
         Finding(first == "coulomb_friction", f"The first name is {first}.", check=True),
         Finding(
@@ -86,7 +86,7 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
             check=True,
         ),
         Finding(
-            [twin.names for twin in found] == [(), ("nonlinear_drag",), ("nonlinear_drag",)],
+            twins_agree(found),
             f"Twins: {', '.join(' + '.join(twin.names) or 'nothing' for twin in found)}.",
             check=True,
         ),

@@ -12,7 +12,7 @@ from experiments.measured_rigs import (
     values_table,
     verdict_paragraphs,
 )
-from experiments.measured_twins import Twin, twins, twins_table
+from experiments.measured_twins import Twin, twins, twins_agree, twins_table
 from experiments.registry import Context
 from experiments.result import Finding, Result, Table
 from pymoo_hdte.drive.effects import place_of
@@ -86,7 +86,7 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
             check=True,
         ),
         Finding(
-            [twin.names for twin in found] == [(), ("nonlinear_drag",), ("nonlinear_drag",)],
+            twins_agree(found),
             f"Twins: {', '.join(' + '.join(twin.names) or 'nothing' for twin in found)}.",
             check=True,
         ),

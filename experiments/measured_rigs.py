@@ -50,7 +50,7 @@ def study(name: str, folder: str) -> Study | None:
     if not (MEASURED / folder).is_dir():
         return None
     rig = read_rig(RIGS / f"{name}.toml", MEASURED / folder)
-    finding = investigate(rig.mechanism, rig.records, rig.cutoff)
+    finding = investigate(rig.mechanism, rig.records, rig.cutoff, rig.effects)
     return Study(rig, finding, prove_measured(finding))
 
 

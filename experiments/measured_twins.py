@@ -58,6 +58,13 @@ def twins(one: Study, port: str, force: float) -> tuple[Twin, ...]:
     )
 
 
+def twins_agree(found: Sequence[Twin]) -> bool:
+    """Tell whether the first twin is adequate and what is hidden in the others is named."""
+    first, *others = found
+    named = [twin.names == (twin.hidden,) for twin in others]
+    return first.finding.verdict.status == "adequate" and all(named)
+
+
 def twins_table(found: Sequence[Twin]) -> Table:
     """Return what is hidden in each twin and what is found."""
     return Table(

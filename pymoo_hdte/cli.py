@@ -126,7 +126,7 @@ def _message(error: InvalidInput | OSError) -> str:
 def _summary(document: dict[str, Any], out: Path) -> str:
     from pymoo_hdte.discrepancy.effect_words import in_words
 
-    names = " + ".join(f"{one['name']} at the {one['port']}" for one in document["effects"])
+    names = " + ".join(_name(one) for one in document["effects"])
     lines = [
         f"{document['status']}{': ' + names if names else ''}",
         document["sentence"],
@@ -136,6 +136,12 @@ def _summary(document: dict[str, Any], out: Path) -> str:
         f"Report: {out / 'report.html'}",
     ]
     return "\n".join(lines)
+
+
+def _name(effect: dict[str, Any]) -> str:
+    if effect["name"] == "parameter":
+        return str(effect["port"]).replace("_", " ")
+    return f"{effect['name']} at the {effect['port']}"
 
 
 if __name__ == "__main__":

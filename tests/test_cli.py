@@ -19,7 +19,7 @@ DOCUMENT = {
 
 @pytest.fixture
 def ready(monkeypatch):
-    monkeypatch.setattr(cli, "_discrepancy", lambda campaign, out: DOCUMENT)
+    monkeypatch.setattr(cli, "_discrepancy", lambda campaign, out, data: DOCUMENT)
 
 
 def run(*options):
@@ -67,7 +67,7 @@ def test_a_missing_campaign_is_one_line_and_writes_nothing(tmp_path, capsys):
     ],
 )
 def test_a_mistake_is_named_without_a_traceback(error, words, monkeypatch, capsys):
-    def fail(campaign, out):
+    def fail(campaign, out, data):
         raise error
 
     monkeypatch.setattr(cli, "_discrepancy", fail)
@@ -78,7 +78,7 @@ def test_a_mistake_is_named_without_a_traceback(error, words, monkeypatch, capsy
 
 
 def test_an_interrupt_has_the_code_of_the_shell(monkeypatch, capsys):
-    def stop(campaign, out):
+    def stop(campaign, out, data):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli, "_discrepancy", stop)

@@ -125,14 +125,16 @@ def test_the_verdict_does_not_hang_on_units():
 
 
 def test_the_next_test_sets_what_was_found_against_its_rival():
-    finding = investigate(OSCILLATOR, [rig.record_of(bouc_wen)])
-    test = next_test(finding)
-    assert test.separates[0] == "hysteresis:spring"
-    assert test.separation > 1.0
-    assert test.record == "train 1"
-    assert "train 1" in test.description
+    def dry(x, v, z, t):
+        return 2.0 * np.tanh(v / 1e-3), 0.0
+
+    test = next_test(investigate(OSCILLATOR, [rig.record_of(dry, seed=4)]))
+    assert test.separates == ("coulomb_friction:spring", "stribeck_friction:spring")
+    assert "train 4" in test.description or "another motion" in test.description
     alone = next_test(investigate(OSCILLATOR, [rig.record_of(cubic)]))
     assert "no rival is left" in alone.description
+    unknown = next_test(investigate(OSCILLATOR, [rig.record_of(swinging_stiffness)]))
+    assert "proved" not in unknown.description
 
 
 @pytest.mark.parametrize(
@@ -151,7 +153,7 @@ def test_a_missing_a_dead_and_a_short_channel_are_named():
     record = rig.record_of(nothing)
     for channels, message in (
         ({"x": record.channels["x"]}, "force among them"),
-        (dict(record.channels) | {"force": np.full(len(record.time), 2.0)}, "dead"),
+        (dict(record.channels) | {"x": np.full(len(record.time), 2.0)}, "dead"),
     ):
         with pytest.raises(InvalidInput, match=message):
             investigate(OSCILLATOR, [Record("bad", "train", record.time, channels)])
@@ -168,3 +170,58 @@ def test_a_position_of_noise_only_is_refused():
             OSCILLATOR,
             [Record("noise", "train", record.time, dict(record.channels) | {"x": noise})],
         )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"ports": ()}, "at least one: effects are looked for there"),
+        ({"inputs": [Input("force", {"x": 1.0}, Believed(1.0, 0.5))]}, "only ratios are known"),
+    ],
+)
+def test_a_mechanism_that_says_too_little_is_refused(change, message):
+    with pytest.raises(InvalidInput, match=message):
+        investigate(replace(OSCILLATOR, **change), [rig.record_of(nothing)])
+
+
+def test_two_records_of_one_name_and_a_held_out_one_without_a_channel_are_refused_at_once():
+    record = rig.record_of(nothing)
+    with pytest.raises(InvalidInput, match="a name of its own for each record"):
+        investigate(OSCILLATOR, [record, record])
+    held_out = Record("other", "held_out", record.time, {"x": record.channels["x"]})
+    with pytest.raises(InvalidInput, match="channels of record other"):
+        investigate(OSCILLATOR, [record, held_out])
+
+
+def test_a_spring_and_a_damper_that_were_forgotten_are_named():
+    (port,) = OSCILLATOR.ports
+    for lost, name, size in (
+        ("stiffness", "linear_stiffness", rig.STIFFNESS),
+        ("damping", "viscous_friction", rig.DAMPING),
+    ):
+        forgetful = replace(OSCILLATOR, ports=(replace(port, **{lost: Believed(0.0)}),))
+        (effect,) = effects(investigate(forgetful, [rig.record_of(nothing)]))
+        assert effect["name"] == name
+        assert effect["parameters"]["coefficient"]["value"] == pytest.approx(size, rel=0.01)
+
+
+def test_play_takes_the_stiffness_that_is_fitted_and_not_the_believed_one():
+    def play(x, v, z, t):
+        return rig.STIFFNESS * (np.clip(x, -0.002, 0.002) * -1.0), 0.0
+
+    records = [rig.record_of(play), rig.record_of(play, "held_out", seed=3)]
+    finding = investigate(OSCILLATOR, records)
+    (effect,) = effects(finding)
+    assert effect["name"] == "backlash"
+    assert effect["parameters"]["half_width"]["value"] == pytest.approx(0.002, rel=0.02)
+    assert quantities(finding)["stiffness of spring"]["value"] == pytest.approx(4000.0, rel=0.005)
+    simulated, balanced = prove_measured(finding)
+    assert simulated.shrinkage > 0.9
+    assert balanced.shrinkage > 0.9
+
+
+def test_a_sign_that_is_swapped_is_no_parameter_out_of_tolerance():
+    record = rig.record_of(nothing)
+    swapped = dict(record.channels) | {"force": -record.channels["force"]}
+    finding = investigate(OSCILLATOR, [Record("swapped", "train", record.time, swapped)])
+    assert finding.verdict.status == "unlisted"

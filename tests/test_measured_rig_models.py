@@ -35,8 +35,9 @@ def test_every_effect_survives_the_file(name, tmp_path):
     assert through_file(tmp_path, "x", RIG, [effect]) == ("x", RIG, (effect,))
 
 
-def test_registry_is_that_of_the_drive_and_three_more():
+def test_registry_is_that_of_the_drive_and_five_more():
     extra = {"force_offset", "direction_dependent_friction", "kinematic_error"}
+    extra |= {"linear_stiffness", "viscous_friction"}
     assert set(EFFECTS) == set(LAWS) | extra
     assert "locked" not in EFFECTS["clearance_variation"][1]
     locked = LawAt("clearance_variation", "cell", PeriodicClearance(2.0, 0.0, 1e-4, 0.0, 5e-5))

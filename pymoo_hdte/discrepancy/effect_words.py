@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:([A-Za-z]\w*)(?:@([\d.e+-]*\d))?")
+_PORT = r"([A-Za-z]\w*(?: of \w+)?)"
+_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
 
 
 def in_words(text: str) -> str:

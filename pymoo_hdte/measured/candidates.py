@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.candidate import (
     Candidate,
     Values,
@@ -26,8 +27,13 @@ from pymoo_hdte.drive.friction import (
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.mesh_laws import DeadZone, HardeningStiffness, SoftWindup
 from pymoo_hdte.measured.data import MeasuredData
-from pymoo_hdte.mechanism import LawAt
-from pymoo_hdte.mechanism.laws import ConstantForce, DirectionalFriction
+from pymoo_hdte.mechanism import LawAt, Port
+from pymoo_hdte.mechanism.laws import (
+    ConstantForce,
+    DirectionalFriction,
+    LinearDamper,
+    LinearSpring,
+)
 
 Parts = tuple[Parameter, ...]
 
@@ -36,33 +42,38 @@ CONTAINED = {
 }
 """Laws that are this one where some of their parameters are nothing: as good, they say no more."""
 _BACKWARDS = 0.01
-"""Least share of the samples in the rarer direction that makes two directions."""
+"""Least share of the way in the rarer direction that makes two directions."""
 _LARGEST = 5.0
 """Largest force of an effect, in units of the largest that the inputs or springs have."""
 
 
 def mechanism_candidates(
-    data: MeasuredData, force: float, orders: Mapping[str, Sequence[float]]
+    data: MeasuredData, forces: Mapping[str, float], orders: Mapping[str, Sequence[float]]
 ) -> list[Candidate]:
     """Return all candidates.
 
     Parameters
     ----------
     data : MeasuredData
-    force : float
-        Typical size of what is missing, N or N.m.
+    forces : mapping of str to float
+        By port, size of a force that may be missing there, N or N.m.
     orders : mapping of str to sequence of float
         By port, orders at which something varies with its position, per unit of it.
     """
     found: list[Candidate] = []
     for port in data.mechanism.ports:
         here = [one.ports[port.name] for one in data.spectra]
-        travel = max(float(np.abs(one.position).max()) for one in here)
+        travel = max(float(np.ptp(one.position)) for one in here) / 2.0
+        if travel == 0.0:
+            allowed = "one that changes in some record"
+            raise InvalidInput(f"motion of port {port.name}", 0.0, allowed)
+        force = forces[port.name]
         speed = max(float(np.abs(one.speed).max()) for one in here)
         seen = orders.get(port.name, ())
         if port.read:
             found += _of_reading(port.name, seen, force)
             continue
+        found += _linear(port, force, travel, speed)
         both = turns_back(data, port.name)
         found += _dry(port.name, force, speed, both)
         found += _periodic(port.name, seen, force)
@@ -75,6 +86,28 @@ def mechanism_candidates(
     return [one for one in found if not one.places & known]
 
 
+def _linear(port: Port, force: float, travel: float, speed: float) -> list[Candidate]:
+    """Return a spring and a damper where none is believed to stand."""
+    found = []
+    for name, law, believed, size, words in (
+        ("linear_stiffness", LinearSpring, port.stiffness, travel, "a spring"),
+        ("viscous_friction", LinearDamper, port.damping, speed, "a friction that grows with speed"),
+    ):
+        if believed.value == 0.0:
+            typical = force / size
+            found.append(
+                Candidate(
+                    name,
+                    port.name,
+                    (unknown("coefficient", 0.0, _LARGEST * typical, typical),),
+                    ((typical,),),
+                    lambda v, name=name, law=law: _at(name, port.name, law(v[0])),  # type: ignore[misc]
+                    f"There is {words} at the {port.name} where none is believed.",
+                )
+            )
+    return found
+
+
 def _at(name: str, port: str, law: Any) -> tuple[Any, ...]:
     return (LawAt(name, port, law),)
 
@@ -82,8 +115,9 @@ def _at(name: str, port: str, law: Any) -> tuple[Any, ...]:
 def turns_back(data: MeasuredData, port: str) -> bool:
     """Tell whether a port moves in both directions, in one record or another."""
     speeds = np.concatenate([one.ports[port].speed for one in data.spectra])
-    # Noise of a slow record may change its sign now and then.
-    return bool(min(np.mean(speeds > 0.0), np.mean(speeds < 0.0)) > _BACKWARDS)
+    forward, backward = np.sum(np.maximum(speeds, 0.0)), np.sum(np.maximum(-speeds, 0.0))
+    # Noise of a record at rest changes its sign now and then.
+    return bool(min(forward, backward) > _BACKWARDS * (forward + backward))
 
 
 def _dry(port: str, force: float, speed: float, both: bool) -> list[Candidate]:
@@ -207,8 +241,8 @@ def _of_reading(port: str, orders: Sequence[float], force: float) -> list[Candid
             parts,
             wave_starts(parts),
             _lines(PeriodicTorque, "kinematic_error", port, orders),
-            f"The reading of {port} varies with the position, orders {words}, by as much at any "
-            "speed: it is made by the kinematics, and not by a torque that moves inertias.",
+            f"The reading of {port} varies with the position, orders {words}, and has one "
+            "amplitude at all speeds run: it is kinematic, and no torque that moves inertias.",
             form=form,
         )
     ]

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.evidence import Response, Vector
 from pymoo_hdte.discrepancy.excess import Excess
@@ -259,12 +260,16 @@ def usual_cutoff(mechanism: Mechanism, records: Sequence[Record]) -> float:
     InvalidInput
         See `highest_frequency`.
     """
-    return min(
-        highest_frequency(record.channels[name], record.step, record.noise_of(name))
-        for record in records
-        for name in mechanism.coordinates
-        if name in record.channels
-    )
+    found = []
+    for record in records:
+        for name in mechanism.coordinates:
+            noise = record.noise_of(name)
+            try:
+                found.append(highest_frequency(record.channels[name], record.step, noise))
+            except InvalidInput as error:
+                field = f"{name} of record {record.name}: {error.field}"
+                raise InvalidInput(field, error.value, error.allowed) from None
+    return min(found)
 
 
 def measured_data(

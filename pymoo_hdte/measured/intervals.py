@@ -35,7 +35,8 @@ def covariance(data: MeasuredData, fitted: Fit) -> NDArray[np.float64]:
     curvature = fitted.jacobian.T @ fitted.jacobian + np.diag(12.0 / widths**2)
     inverse = np.linalg.inv(curvature)
     coloured = fitted.jacobian * _powers(data, fitted.residuals)[:, None]
-    spread = fitted.jacobian.T @ coloured
+    # What no record determines is as uncertain as its bounds are wide.
+    spread = fitted.jacobian.T @ coloured + np.diag(12.0 / widths**2)
     return np.asarray(inverse @ spread @ inverse * np.outer(scale, scale))
 
 

@@ -17,12 +17,13 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.naming import EXPLAINED, FITTED, OF_ONE_NAME, Verdict, judge
-from pymoo_hdte.discrepancy.rival import Rival, adequate, fit_all, rival, varied
+from pymoo_hdte.discrepancy.rival import SHARE, Rival, adequate, fit_all, rival, varied
 from pymoo_hdte.discrepancy.screening import screen
 from pymoo_hdte.measured.candidates import CONTAINED, mechanism_candidates
 from pymoo_hdte.measured.data import MeasuredData, measured_data, usual_cutoff
 from pymoo_hdte.measured.orders import position_orders
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+from pymoo_hdte.mechanism.balances import balance_names
 
 MAIN_SHARE = 0.5
 """Least share of the power of a misfit beyond the sensors' noise that a named effect removes."""
@@ -31,6 +32,7 @@ REST = 2.0
 PARSIMONY = 1.1
 """Ratio of powers of what two models leave up to which the one with fewer unknowns is named."""
 _ROUNDS = 2
+_SCALES = ("inertia", "stiffness", "gain")
 _SECONDS = 3
 """Second effects tried beside each of as many first ones to find what nobody explains."""
 
@@ -63,10 +65,19 @@ class Finding:
         return chosen.fit if chosen and self.verdict.status in EXPLAINED else self.verdict.base
 
     @property
+    def sensors(self) -> MeasuredData:
+        """The data with the noise of their sensors only."""
+        return replace(self.data, deviation=tuple(one.noise for one in self.data.spectra))
+
+    @property
+    def share_removed(self) -> float:
+        """Share of the power of the misfit beyond the sensors' noise that the effects remove."""
+        return share_removed(self.sensors, self.data, self.verdict.base, self.accepted)
+
+    @property
     def sensor_noise(self) -> NDArray[np.float64]:
         """Root mean square of the sensors' noise in each balance, N or N.m."""
-        noise = replace(self.data, deviation=tuple(one.noise for one in self.data.spectra))
-        return root_mean_square(noise, np.ones_like(self.verdict.base.residuals))
+        return root_mean_square(self.sensors, np.ones_like(self.verdict.base.residuals))
 
     @property
     def base_misfit(self) -> NDArray[np.float64]:
@@ -103,12 +114,13 @@ def investigate(
     Raises
     ------
     InvalidInput
-        If no record is to be fitted, or a record lacks a channel, is too short or dead.
+        If no record is to be fitted, a record lacks a channel, is too short or does not move, two
+        have one name, or the mechanism has no port, or no quantity that sets the scale.
     """
     train = [record for record in records if record.role == "train"]
     if not train:
         raise InvalidInput("number of train records", 0, "at least 1")
-    _check_alive(records)
+    _check(mechanism, records)
     cutoff = usual_cutoff(mechanism, train) if cutoff is None else cutoff
     sensors = measured_data(mechanism, train, cutoff, known)
     base = fit(sensors)
@@ -118,18 +130,39 @@ def investigate(
     return Finding(mechanism, tuple(records), cutoff, data, verdict)
 
 
-def _check_alive(records: Sequence[Record]) -> None:
+def _check(mechanism: Mechanism, records: Sequence[Record]) -> None:
+    if not mechanism.ports:
+        raise InvalidInput("mechanism.ports", (), "at least one: effects are looked for there")
+    scales = [name for name, one in mechanism.quantities.items() if one.tolerance == 0.0]
+    if not any(name.startswith(_SCALES) for name in scales):
+        allowed = "none for at least one inertia, stiffness or gain, or only ratios are known"
+        raise InvalidInput("tolerances of the mechanism", "on all", allowed)
+    needed = (*balance_names(mechanism), *(one.name for one in mechanism.inputs))
+    names = [record.name for record in records]
     for record in records:
-        for name, channel in record.channels.items():
+        if names.count(record.name) > 1:
+            raise InvalidInput("record", record.name, "a name of its own for each record")
+        for name in needed:
+            if name not in record.channels:
+                allowed = f"{name} among them: every coordinate, input and force sensor is needed"
+                field = f"channels of record {record.name}"
+                raise InvalidInput(field, tuple(record.channels), allowed)
+        for name in mechanism.coordinates:
+            channel = record.channels[name]
             if np.ptp(channel) == 0.0:
                 allowed = "a signal that changes; this one is dead"
                 raise InvalidInput(f"channel {name} of {record.name}", float(channel[0]), allowed)
 
 
 def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
-    force = float(max(root_mean_square(data, base.residuals)))
-    orders = position_orders(data, base)
-    return mechanism_candidates(data, force, orders)
+    left = dict(zip(data.names, root_mean_square(data, base.residuals), strict=True))
+    forces = {
+        port.name: left[port.name]
+        if port.read
+        else max(left[name] / abs(share) for name, share in port.motion.items() if share)
+        for port in data.mechanism.ports
+    }
+    return mechanism_candidates(data, forces, position_orders(data, base))
 
 
 def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:
@@ -166,18 +199,26 @@ def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Cand
     """Return the verdict in units of the rest, if it stands before what the sensors would show."""
     base = fit(data)
     verdict = _without_contained(_simplest(data, judge(data, base, candidates)))
-    before, noise = (
-        np.sum(root_mean_square(one, residuals) ** 2)
-        for one, residuals in ((data, base.residuals), (sensors, np.ones_like(base.residuals)))
-    )
+    before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
     if verdict.chosen is None:
-        if before <= REST * noise:
-            return verdict
-        return _as_unlisted(verdict, None)
-    after = np.sum(root_mean_square(data, verdict.chosen.fit.residuals) ** 2)
-    if before - after < MAIN_SHARE * (before - noise):
+        return verdict if np.all(before <= REST * noise) else _as_unlisted(verdict, None)
+    removed = share_removed(sensors, data, base, verdict.chosen.fit)
+    freed = [one.frees for one in verdict.chosen.candidates]
+    out = any(one in verdict.chosen.fit.at_bounds for one in freed if one)
+    if removed < (SHARE if verdict.status == "parameter" else MAIN_SHARE) or out:
         return _as_unlisted(verdict, verdict.chosen)
     return verdict
+
+
+def share_removed(sensors: MeasuredData, data: MeasuredData, base: Fit, fitted: Fit) -> float:
+    """Return the share of the power beyond the sensors' noise that a fit removes, 0 to 1.
+
+    Each balance in units of its rest, so that N and N.m may stand side by side.
+    """
+    noise = float(np.sum((_in_units_of(data, sensors, np.ones_like(base.residuals))) ** 2))
+    beyond = base.chi_square - noise
+    gain = base.chi_square - max(fitted.chi_square, noise)
+    return float(np.clip(gain / beyond, 0.0, 1.0)) if beyond > 0.0 else 0.0
 
 
 def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
@@ -193,7 +234,9 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
     near = [
         one
         for one in verdict.alternatives
-        if _unknowns(one) < _unknowns(chosen) and np.all(data.power(one.fit.residuals) <= most)
+        if all(candidate.frees is None for candidate in one.candidates)
+        and _unknowns(one) < _unknowns(chosen)
+        and np.all(data.power(one.fit.residuals) <= most)
     ]
     if not near:
         return verdict

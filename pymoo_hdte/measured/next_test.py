@@ -24,6 +24,8 @@ Values = NDArray[np.float64]
 
 SIZES = (0.3, 1.0, 3.0)
 RATES = (0.3, 1.0, 3.0)
+_NEAR = 4.0
+"""Times what the chosen explanation leaves, up to which another one is a rival."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,12 @@ def next_test(finding: Finding) -> NextTest:
         )
     rival = _nearest(finding)
     if chosen is None or rival is None:
-        why = (
-            "an effect too small to be seen may grow with the motion"
-            if chosen is None
-            else "no rival is left, and what was found is to be proved beyond where it was found"
+        why = {
+            "adequate": "an effect too small to be seen may grow with the motion",
+            "unlisted": "how what is left grows with the motion says what it may be",
+        }.get(
+            finding.verdict.status,
+            "no rival is left, and what was found is to be proved beyond where it was found",
         )
         text = f"Repeat {first} at three times its size: {why}."
         return NextTest(first, 3.0, 1.0, (), 0.0, text)
@@ -103,7 +107,12 @@ def _nearest(finding: Finding) -> Rival | None:
         if chosen is not None and one.names != chosen.names and one.fit.effects
     ]
     equivalent = [one for one in others if one in finding.verdict.equivalent]
-    return min(equivalent or others, key=lambda one: one.bic, default=None)
+    near = [
+        one
+        for one in others
+        if chosen is not None and one.fit.chi_square <= _NEAR * chosen.fit.chi_square
+    ]
+    return min(equivalent or near, key=lambda one: one.bic, default=None)
 
 
 def _best_repetition(finding: Finding, chosen: Rival, rival: Rival) -> NextTest:
@@ -122,6 +131,16 @@ def _best_repetition(finding: Finding, chosen: Rival, rival: Rival) -> NextTest:
         )
         if factor != 1.0
     )
+    if separation < 1.0:
+        return NextTest(
+            name,
+            size,
+            rate,
+            (chosen.label, rival.label),
+            separation,
+            "No repetition of these records at another size or speed separates "
+            f"{in_words(chosen.label)} from {in_words(rival.label)}: it takes another motion.",
+        )
     told = f"{in_words(chosen.label)} and {in_words(rival.label)}"
     return NextTest(
         name,

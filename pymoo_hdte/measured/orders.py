@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,19 +18,19 @@ _FEWEST_PERIODS = 5.0
 """Periods within a record that make an order of what varies with its position: fewer may be a
 wander."""
 _FALSE_ORDER = 1e-4
-"""Chance that noise alone shows any order."""
+"""Chance that noise alone shows an order in its middle; near the ends it is larger."""
 _MOST_ORDERS = 6
 _MOST_TRIED = 2000
 _SURROUNDINGS = 101
 """Orders whose median power is what noise shows at the one in their middle."""
 _BESIDE = 5.0
-"""Distance up to which an order is what another one leaves, whose size changes along the way."""
+"""Steps up to which an order is what another one leaves, whose size changes along the way."""
 
 
 def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...]]:
     """Return orders by port, the strongest first.
 
-    Whole numbers per unit of the position: of an angle in rad, cycles per turn. What is slower in
+    Cycles per turn of an angle in rad, whole numbers; of a length, radians per m. What is slower in
     time than the residual's own trend is left to the friction.
 
     Parameters
@@ -42,17 +42,15 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
     coefficients = data.coefficients(base.residuals)
     found = {}
     for port in data.mechanism.ports:
-        rows = [data.names.index(port.name)] if port.read else _touched(data, port.motion)
+        shares = {port.name: 1.0} if port.read else port.motion
         signals = []
         for left_by_row, balance in zip(coefficients, data.spectra, strict=True):
-            left = left_by_row[rows].sum(axis=0)
+            # As a force at the port would stand in all of them.
+            rows = [data.names.index(name) for name in shares]
+            left = np.array(list(shares.values())) @ left_by_row[rows]
             signals.append((balance.ports[port.name].position, _detrended(balance.in_time(left))))
         found[port.name] = _strongest(signals)
     return found
-
-
-def _touched(data: MeasuredData, motion: Mapping[str, float]) -> list[int]:
-    return [data.names.index(name) for name in motion]
 
 
 def _detrended(signal: Values) -> Values:
@@ -66,29 +64,48 @@ def _strongest(signals: list[tuple[Values, Values]]) -> tuple[float, ...]:
 
     One after the other, what is found being taken out, so that none is found again beside itself.
     """
-    orders = _tried([position for position, _ in signals])
+    orders, step = _tried([position for position, _ in signals])
     kept: list[float] = []
     while len(kept) < _MOST_ORDERS and orders.size:
         ratio = _significance(signals, orders)
         place = int(np.argmax(ratio))
         if ratio[place] <= 1.0:
             break
-        if not any(abs(orders[place] - other) <= _BESIDE for other in kept):
-            kept.append(float(orders[place]))
-        signals = [
-            (position, _without(signal, orders[place] * position)) for position, signal in signals
-        ]
+        order = _refined(signals, float(orders[place]), step)
+        if not any(abs(order - other) <= _BESIDE * step for other in kept):
+            kept.append(order)
+        signals = [(position, _without(signal, order * position)) for position, signal in signals]
     return tuple(kept)
 
 
-def _tried(positions: Sequence[Values]) -> Values:
-    """Return the orders that are looked at: with several periods, and samples to each of them."""
+def _tried(positions: Sequence[Values]) -> tuple[Values, float]:
+    """Return the orders that are looked at, and their step: half of what the travel resolves.
+
+    But at least 1, so that the orders of a shaft are whole numbers.
+    """
     widest = max(float(np.ptp(position)) for position in positions)
-    finest = max(
-        len(position) * np.pi / (4.0 * np.sum(np.abs(np.diff(position)))) for position in positions
+    if widest == 0.0:
+        return np.empty(0), 1.0
+    step = max(1.0, np.pi / widest)
+    lowest = step * np.ceil(max(1.0, 2.0 * np.pi * _FEWEST_PERIODS / widest) / step)
+    highest = min(max(map(_finest, positions)), lowest + _MOST_TRIED * step)
+    return np.arange(lowest, highest, step), step
+
+
+def _finest(position: Values) -> float:
+    """Return the order of which a record has, in the mean, eight samples to a period."""
+    return len(position) * np.pi / (4.0 * max(float(np.sum(np.abs(np.diff(position)))), 1e-300))
+
+
+def _refined(signals: Sequence[tuple[Values, Values]], order: float, step: float) -> float:
+    """Return the order beside one of a coarse grid at which there is most."""
+    if step == 1.0:
+        return order
+    near = order + step * np.linspace(-1.0, 1.0, 41)
+    power = sum(
+        np.abs(np.exp(-1j * np.outer(near, position)) @ signal) ** 2 for position, signal in signals
     )
-    lowest = max(1.0, np.ceil(2.0 * np.pi * _FEWEST_PERIODS / widest))
-    return np.arange(lowest, min(finest, lowest + _MOST_TRIED))
+    return float(near[np.argmax(power)])
 
 
 def _significance(signals: Sequence[tuple[Values, Values]], orders: Values) -> Values:
@@ -96,10 +113,11 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values) -> V
     total, counted = np.zeros((2, len(orders)))
     for position, signal in signals:
         seen = orders * np.ptp(position) >= 2.0 * np.pi * _FEWEST_PERIODS
+        seen &= orders <= _finest(position)
         if not seen.any():
             continue
         power = np.abs(np.exp(-1j * np.outer(orders[seen], position)) @ signal) ** 2
-        around = median_filter(power, min(_SURROUNDINGS, len(power)), mode="nearest")
+        around = median_filter(power, min(_SURROUNDINGS, len(power)), mode="reflect")
         total[seen] += power / np.maximum(around, 1e-300) * np.log(2.0)
         counted += seen
     limit = gamma.isf(_FALSE_ORDER / max(len(orders), 1), np.maximum(counted, 1))

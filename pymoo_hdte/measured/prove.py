@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.fit import Fit
@@ -22,6 +23,10 @@ from pymoo_hdte.mechanism.records import FINER
 from pymoo_hdte.mechanism.simulation import simulate
 
 Values = NDArray[np.float64]
+
+_FEWEST = 5
+_QUARTER = 0.25
+"""Of a period of the cutoff, in which a motion is near a parabola."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +67,7 @@ class MeasuredGap:
         excess = self.before - self.noise_floor
         if not excess > 0.1 * self.noise_floor:
             return None
-        return 1.0 - (self.after - self.noise_floor) / excess
+        return min(1.0 - (self.after - self.noise_floor) / excess, 1.0)
 
     def as_dict(self) -> dict[str, Any]:
         """Return its figures as plain values."""
@@ -106,7 +111,7 @@ def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
         (fitted_mechanism(finding.mechanism, one), (*finding.data.known, *_laws(one.effects)))
         for one in (finding.verdict.base, finding.accepted)
     ]
-    runs = [_positions(mechanism, record, effects) for mechanism, effects in models]
+    runs = [_positions(one, record, effects, finding.cutoff) for one, effects in models]
     found = []
     for name in finding.mechanism.coordinates:
         measured = record.channels[name]
@@ -128,13 +133,24 @@ def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
     return found
 
 
-def _positions(mechanism: Mechanism, record: Record, effects: Sequence[LawAt]) -> dict[str, Values]:
+def _positions(
+    mechanism: Mechanism, record: Record, effects: Sequence[LawAt], cutoff: float
+) -> dict[str, Values]:
     try:
-        fine = simulate(mechanism, record.finer(FINER), effects).position
+        start = {name: _start(record, name, cutoff) for name in mechanism.coordinates}
+        fine = simulate(mechanism, record.finer(FINER), effects, start=start).position
         return {name: one[::FINER] for name, one in fine.items()}
     except ArithmeticError:
         lost = np.full(len(record.time), np.nan)
         return {name: lost for name in mechanism.coordinates}
+
+
+def _start(record: Record, name: str, cutoff: float) -> tuple[float, float]:
+    """Return position and speed at the first sample, of a parabola through the first ones."""
+    count = max(_FEWEST, int(_QUARTER / (cutoff * record.step)))
+    time = record.time[:count] - record.time[0]
+    curve = Polynomial.fit(time, record.channels[name][:count], 2)
+    return float(curve(0.0)), float(curve.deriv()(0.0))
 
 
 def _balanced(finding: Finding, record: Record) -> list[MeasuredGap]:

@@ -112,8 +112,15 @@ def proof_sentence(finding: Finding, gaps: Sequence[MeasuredGap]) -> str:
                 float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in of_it])))
                 for one in ("before", "after")
             )
-            words.append(f"{quantity} by {kind} from {before:.3g} to {after:.3g}")
-    return f"Root mean square errors (SI) fall: {'; '.join(words)}."
+            change = _change(before, after)
+            words.append(f"{quantity} by {kind} {change} from {before:.3g} to {after:.3g}")
+    return f"Root mean square errors (SI), before and after: {'; '.join(words)}."
+
+
+def _change(before: float, after: float) -> str:
+    if not np.isfinite(before + after):
+        return "diverges for one of the models,"
+    return "falls" if after < before else "does not fall,"
 
 
 def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

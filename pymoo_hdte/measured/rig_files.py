@@ -51,7 +51,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.discrepancy.toml_lines import toml_with_lines
 from pymoo_hdte.drive.toml_fields import Fields
 from pymoo_hdte.measured.rig_models import model_from_fields, read_model, rig_toml
@@ -121,6 +121,7 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> Rig:
         for index, entry in enumerate(entries):
             record = _record(entry, f"{path.name}.records[{index}]", files, shared, records, noise)
             records[record.name] = record
+        _check_noise(noise, records, path.name)
     return Rig(title, mechanism, effects, tuple(records.values()), cutoff, str(path))
 
 
@@ -161,6 +162,12 @@ def _noise(top: Fields) -> dict[str, float]:
         return {}
     table = top.table("noise")
     return {name: table.number(name, above=0.0) for name in table.names()}
+
+
+def _check_noise(noise: Mapping[str, float], records: Mapping[str, Record], file: str) -> None:
+    channels = {channel for record in records.values() for channel in record.channels}
+    for name in noise:
+        one_of(f"{file}: name in noise", name, sorted(channels))
 
 
 def _check_sha256(path: Path, expected: str, place: str) -> None:

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.candidate import polar
+from pymoo_hdte.discrepancy.candidate import Candidate, polar
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.fit import Fit
+from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.discrepancy.verdict_file import sentence
 from pymoo_hdte.measured.candidates import turns_back
@@ -44,10 +45,12 @@ def measured_document(
     return {
         "campaign": title,
         "status": verdict.status,
-        "sentence": sentence(verdict),
+        "sentence": _sentence(verdict),
         "effects": effects(finding),
         "offered": offered(finding),
-        "alternatives": [_evidence(finding, one) for one in sorted(_others(finding), key=_by_bic)],
+        "alternatives": [
+            _evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
+        ],
         "base": quantities(finding),
         "location": location(finding),
         "remainder": remainder(finding),
@@ -60,6 +63,16 @@ def measured_document(
             **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy")},
         },
     }
+
+
+def _sentence(verdict: Verdict) -> str:
+    if verdict.status == "adequate":
+        return (
+            "Nothing is missing: the believed mechanism explains the records within its tolerances."
+        )
+    if verdict.chosen is None:
+        return "Something is missing that no known effect explains."
+    return sentence(verdict)
 
 
 def effects(finding: Finding) -> list[dict[str, Any]]:
@@ -75,13 +88,21 @@ def effects(finding: Finding) -> list[dict[str, Any]]:
                 "name": candidate.name,
                 "port": candidate.port,
                 "sentence": candidate.sentence,
-                "parameters": _parameters(fitted, spread, rows),
+                "parameters": _parameters(fitted, spread, _rows(fitted, candidate, rows)),
                 "at_bound": [
                     fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0
                 ],
             }
         )
     return found
+
+
+def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
+    """Return the rows of a candidate's parameters, or of the quantity that it sets free."""
+    if candidate.frees is None:
+        return rows
+    place = [one.name for one in fitted.parameters].index(candidate.frees)
+    return range(place, place + 1)
 
 
 def offered(finding: Finding) -> list[dict[str, Any]]:
@@ -112,7 +133,7 @@ def location(finding: Finding) -> dict[str, Any]:
         if one**2 > 2.0 * floor**2
     ]
     if finding.verdict.status == "adequate":
-        words = "Nowhere: what the model leaves is not more than its sensors' noise explains."
+        words = "Nowhere: what the model leaves is that of its sensors, or near it."
     else:
         parts = [
             f"the {finding.data.what(name)} (off by {before[k]:.3g}, sensors {noise[k]:.2g})"
@@ -129,23 +150,24 @@ def location(finding: Finding) -> dict[str, Any]:
 
 def remainder(finding: Finding) -> dict[str, Any]:
     """Return what the accepted model leaves, and in words how much of the misfit that is."""
-    before, after, noise = finding.base_misfit, finding.remainder, finding.sensor_noise
-    removed = 1.0 - float(np.sum(after**2 - noise**2) / max(np.sum(before**2 - noise**2), 1e-300))
+    after, noise = finding.remainder, finding.sensor_noise
     size = ", ".join(
         f"{one:.3g} in the {finding.data.what(name)} ({one / max(floor, 1e-300):.2g} times the "
         "sensors' noise)"
         for name, one, floor in zip(finding.data.names, after, noise, strict=True)
     )
-    if not finding.accepted.candidates:
-        words = f"The model leaves {size}."
-    else:
+    named = bool(finding.accepted.candidates)
+    removed = finding.share_removed if named else 0.0
+    words = f"The model leaves {size}."
+    if named:
+        left = "What is left is" if np.all(after <= noise) else "What nobody explains is"
         words = (
             f"It removes {100.0 * removed:.3g} % of the power of the misfit beyond the sensors' "
-            f"noise. What nobody explains is {size}."
+            f"noise. {left} {size}."
         )
     return {
         "sentence": words,
-        "share_removed": removed if finding.accepted.candidates else 0.0,
+        "share_removed": removed,
         "left": dict(zip(finding.data.names, after.tolist(), strict=True)),
     }
 
@@ -165,10 +187,6 @@ def limits(finding: Finding) -> list[str]:
         if names:
             found.append(f"At the bound of its tolerance: {', '.join(names)}.")
     return found
-
-
-def _others(finding: Finding) -> list[Rival]:
-    return list(finding.verdict.alternatives)
 
 
 def _by_bic(one: Rival) -> float:

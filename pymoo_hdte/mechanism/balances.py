@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.interpolate import make_interp_spline
 
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.laws import PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
 from pymoo_hdte.mechanism.motion import (
@@ -73,8 +74,10 @@ def law_force(effect: LawAt, motion: PortMotion | Motion, stiffness: float) -> V
 
     ``stiffness`` is that of its port, N/m or N.m/rad.
     """
+    # Springs that slip start unstretched, wherever the position has its zero.
+    rests = isinstance(effect.law, MaxwellSlip)
     state = PortState(
-        motion.position,
+        motion.position - rests * motion.position[0],
         motion.speed,
         periodic_phase(motion.position),
         np.full(1, stiffness),
@@ -116,11 +119,13 @@ class Balance:
     Raises
     ------
     InvalidInput
-        If a coordinate, an input or a force sensor has no channel, or the record is too short.
+        If a coordinate, an input or a force sensor has no channel, the record is too short, or the
+        cutoff beyond ten samples in a period.
     """
 
     def __init__(self, mechanism: Mechanism, record: Record, cutoff: float) -> None:
         self.mechanism, self.record = mechanism, record
+        real_number("cutoff", cutoff, above=0.0, at_most=highest_share(record.step))
         self._known: dict[tuple[LawAt, float], Values] = {}
         margin = margin_of(cutoff, record.step)
         read = any(port.read for port in mechanism.ports)
@@ -131,7 +136,7 @@ class Balance:
         frequency = np.arange(n) / (2.0 * n * record.step * stride)
         self._bins = int(np.count_nonzero(frequency <= highest))
         if np.count_nonzero(frequency <= cutoff) < _FEWEST_BINS:
-            shortest = (_FEWEST_BINS + 4.0 * 2.0) / (2.0 * cutoff)
+            shortest = (_FEWEST_BINS + 4.0 * 4.0) / (2.0 * cutoff)
             raise InvalidInput(
                 f"duration of record {record.name}",
                 float(record.time[-1] - record.time[0]),

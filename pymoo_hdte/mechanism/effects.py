@@ -7,6 +7,8 @@ name                              law                    numbers
 ================================  =====================  ===========================================
 ``force_offset``                  `ConstantForce`        ``force``
 ``direction_dependent_friction``  `DirectionalFriction`  ``level``, ``viscous``
+``linear_stiffness``              `LinearSpring`         ``coefficient``
+``viscous_friction``              `LinearDamper`         ``coefficient``
 ``kinematic_error``               `PeriodicTorque`       ``order``, ``phase``, ``amplitude``; it is
                                                          in the reading of a force sensor
 ================================  =====================  ===========================================
@@ -21,13 +23,20 @@ from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.drive.friction import PeriodicTorque
 from pymoo_hdte.drive.laws import Law
 from pymoo_hdte.drive.port_effects import LAWS
-from pymoo_hdte.mechanism.laws import ConstantForce, DirectionalFriction
+from pymoo_hdte.mechanism.laws import (
+    ConstantForce,
+    DirectionalFriction,
+    LinearDamper,
+    LinearSpring,
+)
 from pymoo_hdte.mechanism.mechanism import LawAt
 
 EFFECTS: dict[str, tuple[type, tuple[str, ...]]] = {
     **{name: (kind, tuple(quantities)) for name, (kind, _, quantities) in LAWS.items()},
     "force_offset": (ConstantForce, ("force",)),
     "direction_dependent_friction": (DirectionalFriction, ("level", "viscous")),
+    "linear_stiffness": (LinearSpring, ("coefficient",)),
+    "viscous_friction": (LinearDamper, ("coefficient",)),
     "kinematic_error": (PeriodicTorque, ("order", "phase", "amplitude")),
 }
 """For each name its law and the fields of it that are numbers."""

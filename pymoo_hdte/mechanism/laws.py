@@ -47,3 +47,31 @@ class DirectionalFriction(Aperiodic):
         slope = 2.0 * sign * (1.0 - moving) / SMOOTHING_SPEED
         force = self.level + self.viscous * size
         return Response(force * moving, damping=force * slope + self.viscous * sign * moving)
+
+
+@dataclass(frozen=True)
+class LinearSpring(Aperiodic):
+    """T = coefficient d: a spring from position zero; N/m or N.m/rad."""
+
+    coefficient: float
+
+    def __post_init__(self) -> None:
+        real_number("linear_stiffness.coefficient", self.coefficient)
+
+    def respond(self, state: PortState) -> Response:
+        """Return force and tangents."""
+        return Response(self.coefficient * state.position, self.coefficient)
+
+
+@dataclass(frozen=True)
+class LinearDamper(Aperiodic):
+    """T = coefficient speed; N.s/m or N.m.s/rad."""
+
+    coefficient: float
+
+    def __post_init__(self) -> None:
+        real_number("viscous_friction.coefficient", self.coefficient)
+
+    def respond(self, state: PortState) -> Response:
+        """Return force and tangents."""
+        return Response(self.coefficient * state.speed, damping=self.coefficient)

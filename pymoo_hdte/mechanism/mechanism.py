@@ -175,6 +175,8 @@ class Mechanism:
             one_of("loop.coordinate", loop.coordinate, self.coordinates)
             real_number("loop.position_gain", loop.position_gain)
             real_number("loop.speed_gain", loop.speed_gain)
+            if not loop.limit > 0.0:
+                raise InvalidInput("loop.limit", loop.limit, "above 0, or infinite")
 
     @property
     def coordinates(self) -> tuple[str, ...]:

@@ -21,13 +21,15 @@ _STANDS_OUT = 4.0
 _FEWEST = 4
 _HIGHEST_SHARE = 0.1
 """Largest cutoff as a share of the sampling rate: ten samples in a period."""
+_MEDIAN_OF_NORMAL = 0.6744897501960817
+_THIRD_DIFFERENCE = 20.0**0.5
 _LAW_SAMPLES = 40
 """To a period of the cutoff: the jumps of dry friction lie between two of them."""
 _SEGMENT = 1024
 _ORDER = 8
 _PASS = 2.0
 """Corner of the smoothing over the cutoff, up to which it passes all but 2e-5."""
-_SETTLES = 2.0
+_SETTLES = 4.0
 """Periods of the cutoff that are left out at either end, where smoothing knows but one side."""
 _STENCIL = 7
 """Samples of a derivative: exact for polynomials of degree six."""
@@ -45,9 +47,12 @@ class Motion:
 def noise_of(signal: Values) -> float:
     """Return the standard deviation of the white noise of a smooth signal, of shape (n,).
 
-    From third differences, in which white noise has 1 + 9 + 9 + 1 times its variance.
+    From third differences, in which white noise has 1 + 9 + 9 + 1 times its variance: their median,
+    because a jump of the signal is no noise, or, of a coarse quantisation, their mean square.
     """
-    return float(np.sqrt(np.mean(np.diff(signal, 3) ** 2) / 20.0))
+    differences = np.abs(np.diff(signal, 3))
+    middle = float(np.median(differences)) / _MEDIAN_OF_NORMAL
+    return (middle or float(np.sqrt(np.mean(differences**2)))) / _THIRD_DIFFERENCE
 
 
 def highest_frequency(position: Values, step: float, deviation: float) -> float:
