@@ -152,3 +152,65 @@ def test_noise_that_is_known_is_used_and_checked():
     ):
         with pytest.raises(InvalidInput, match=message):
             Record("one", "train", TIME, record.channels, noise)
+
+
+def test_a_stop_with_noise_is_no_second_direction():
+    omega = 2.0 * np.pi * 0.5
+    q = 1.5 * (TIME - np.sin(omega * TIME) / omega)
+    q += 1e-5 * np.random.default_rng(2).standard_normal(len(TIME))
+    motion = motion_of(q, STEP, CUTOFF)
+    assert np.any(motion.speed < 0.0)
+    torque = INERTIA * motion.acceleration + VISCOUS * motion.speed + 0.8
+    torque += 1e-3 * np.random.default_rng(3).standard_normal(len(TIME))
+    finding = investigate(JOINT, [Record("stops", "train", TIME, {"q": q, "torque": torque})])
+    assert any("cannot separate" in sentence for sentence in limits(finding))
+    assert "force_offset" not in [
+        c.name for r in finding.verdict.alternatives for c in r.candidates
+    ]
+
+
+def test_a_port_with_a_small_share_of_the_motion_is_searched_in_its_own_forces():
+    geared = Mechanism(
+        JOINT.inertias,
+        [Port("bearing", {"q": 1.0}, damping=Believed(0.5, 0.5)), Port("slide", {"q": 0.05})],
+        JOINT.inputs,
+    )
+    sized = turning("both", 1.5, lambda q, v: dry(q, v))
+    back = turning("back", -1.0, lambda q, v: dry(q, v))
+    finding = investigate(geared, [sized, back])
+    first = effects(finding)[0]
+    assert first["name"] == "coulomb_friction"
+    assert first["at_bound"] == []
+    size = {"bearing": 0.8, "slide": 16.0}[first["port"]]
+    assert first["parameters"]["level"]["value"] == pytest.approx(size, rel=0.02)
+
+
+def test_a_ripple_between_two_bodies_is_found():
+    pair = Mechanism(
+        {"a": Believed(0.05), "b": Believed(0.03)},
+        [
+            Port("between", {"a": 1.0, "b": -1.0}, damping=Believed(0.2, 0.5)),
+            Port("bearing", {"b": 1.0}, damping=Believed(0.3, 0.5)),
+        ],
+        [Input("drive", {"a": 1.0})],
+    )
+    omega = 2.0 * np.pi * np.array([0.7, 1.9, 3.1])
+    generator = np.random.default_rng(5)
+    noise = 1e-7 * generator.standard_normal((2, len(TIME)))
+    b = 1.5 * TIME + np.sin(np.outer(TIME, omega)) @ (0.3 / omega) + noise[0]
+    moved = motion_of(b, STEP, CUTOFF)
+    # What the second body asks for is what passes between them.
+    passes = 0.03 * moved.acceleration + 0.3 * moved.speed
+    d, a = np.zeros(len(TIME)), np.zeros(len(TIME))
+    for k in range(1, len(TIME)):
+        rate = (passes[k - 1] - 0.1 * np.cos(9.0 * d[k - 1])) / 0.2
+        d[k] = d[k - 1] + STEP * rate
+    a = b + d + noise[1]
+    torque = 0.05 * motion_of(a, STEP, CUTOFF).acceleration + passes
+    torque += 1e-4 * generator.standard_normal(len(TIME))
+    record = Record("pair", "train", TIME, {"a": a, "b": b, "drive": torque})
+    finding = investigate(pair, [record])
+    assert effects(finding)[0]["name"] == "torque_ripple"
+    assert effects(finding)[0]["port"] == "between"
+    amplitude = effects(finding)[0]["parameters"]["order_9_amplitude"]["value"]
+    assert amplitude == pytest.approx(0.1, rel=0.05)
