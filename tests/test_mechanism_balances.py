@@ -80,6 +80,15 @@ def test_noise_is_told_from_a_smooth_signal(size, seed):
     assert noise_of(signal + noise) == pytest.approx(size, rel=0.06)
 
 
+def test_a_jump_of_a_force_is_no_noise():
+    noise = 0.01 * np.random.default_rng(4).standard_normal(len(TIME))
+    force = np.sign(np.sin(2.0 * np.pi * 3.0 * TIME)) + noise
+    assert noise_of(force, jumps=True) == pytest.approx(0.01, rel=0.1)
+    assert noise_of(force) > 0.05
+    # Coarse steps have no median.
+    assert noise_of(np.round(force), jumps=True) > 0.0
+
+
 def test_a_motion_is_known_up_to_where_it_ends():
     position, *_ = course(np.arange(0.5, 15.0, 0.25))
     noise = 1e-6 * np.random.default_rng(1).standard_normal(len(TIME))

@@ -198,7 +198,7 @@ def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Rival:
 def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict in units of the rest, if it stands before what the sensors would show."""
     base = fit(data)
-    verdict = _without_contained(_simplest(data, judge(data, base, candidates)))
+    verdict = _with_true_rivals(data, _simplest(data, judge(data, base, candidates)))
     before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
     if verdict.chosen is None:
         return verdict if np.all(before <= REST * noise) else _as_unlisted(verdict, None)
@@ -251,12 +251,20 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
     return Verdict(status, verdict.base, simplest, others, equivalent, verdict.degrees_of_freedom)
 
 
-def _without_contained(verdict: Verdict) -> Verdict:
-    """Return the verdict without rivals that are the chosen law and more, but do no better."""
+def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict without rivals that leave more of some balance, or are the same and more.
+
+    A law that contains the chosen one and does no better is no other explanation.
+    """
     chosen = verdict.chosen
     if chosen is None or verdict.status != "class":
         return verdict
-    equivalent = tuple(one for one in verdict.equivalent if not _contains(one, chosen))
+    most = PARSIMONY * data.power(chosen.fit.residuals)
+    equivalent = tuple(
+        one
+        for one in verdict.equivalent
+        if np.all(data.power(one.fit.residuals) <= most) and not _contains(one, chosen)
+    )
     status = "class" if equivalent else "named"
     return replace(verdict, status=status, equivalent=equivalent)
 

@@ -21,6 +21,8 @@ _FALSE_ORDER = 1e-4
 """Chance that noise alone shows an order in its middle; near the ends it is larger."""
 _MOST_ORDERS = 6
 _MOST_TRIED = 2000
+_WHOLE = 2.0
+"""Resolution up to which orders are taken for whole numbers."""
 _SURROUNDINGS = 101
 """Orders whose median power is what noise shows at the one in their middle."""
 _BESIDE = 5.0
@@ -79,14 +81,14 @@ def _strongest(signals: list[tuple[Values, Values]]) -> tuple[float, ...]:
 
 
 def _tried(positions: Sequence[Values]) -> tuple[Values, float]:
-    """Return the orders that are looked at, and their step: half of what the travel resolves.
+    """Return the orders that are looked at, and their step.
 
-    But at least 1, so that the orders of a shaft are whole numbers.
+    Whole numbers where the travel, as of a shaft, resolves them; otherwise half of what it does.
     """
     widest = max(float(np.ptp(position)) for position in positions)
     if widest == 0.0:
         return np.empty(0), 1.0
-    step = max(1.0, np.pi / widest)
+    step = 1.0 if np.pi / widest < _WHOLE else np.pi / widest
     lowest = step * np.ceil(max(1.0, 2.0 * np.pi * _FEWEST_PERIODS / widest) / step)
     highest = min(max(map(_finest, positions)), lowest + _MOST_TRIED * step)
     return np.arange(lowest, highest, step), step

@@ -286,9 +286,9 @@ class Balance:
         power = np.zeros((len(names), self._bins))
         for port in mechanism.ports:
             if port.read:
-                power[names.index(port.name)] += self.record.noise_of(port.name) ** 2
+                power[names.index(port.name)] += self.record.noise_of(port.name, jumps=True) ** 2
         for one in mechanism.inputs:
-            spread = one.gain.value * self.record.noise_of(one.name)
+            spread = one.gain.value * self.record.noise_of(one.name, jumps=True)
             for name, share in one.acts.items():
                 power[names.index(name)] += (share * spread) ** 2
         step = record.step * stride

@@ -44,14 +44,15 @@ class Motion:
     acceleration: Values
 
 
-def noise_of(signal: Values) -> float:
+def noise_of(signal: Values, jumps: bool = False) -> float:
     """Return the standard deviation of the white noise of a smooth signal, of shape (n,).
 
-    From third differences, in which white noise has 1 + 9 + 9 + 1 times its variance: their median,
-    because a jump of the signal is no noise, or, of a coarse quantisation, their mean square.
+    From third differences, in which white noise has 1 + 9 + 9 + 1 times its variance. Of a signal
+    that jumps, as a force may and a position cannot, from their median, unless that is zero because
+    the signal is coarsely quantised.
     """
     differences = np.abs(np.diff(signal, 3))
-    middle = float(np.median(differences)) / _MEDIAN_OF_NORMAL
+    middle = float(np.median(differences)) / _MEDIAN_OF_NORMAL if jumps else 0.0
     return (middle or float(np.sqrt(np.mean(differences**2)))) / _THIRD_DIFFERENCE
 
 

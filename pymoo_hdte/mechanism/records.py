@@ -91,9 +91,12 @@ class Record:
         ):
             object.__setattr__(self, attribute, value)
 
-    def noise_of(self, channel: str) -> float:
-        """Return the standard deviation of the noise of a channel: known, or estimated; SI."""
-        return self.noise.get(channel) or noise_of(self.channels[channel])
+    def noise_of(self, channel: str, jumps: bool = False) -> float:
+        """Return the standard deviation of the noise of a channel: known, or estimated; SI.
+
+        ``jumps`` tells whether its signal may, as that of a force.
+        """
+        return self.noise.get(channel) or noise_of(self.channels[channel], jumps)
 
     def finer(self, factor: int) -> Record:
         """Return the record with ``factor`` samples for each, on a smooth curve through them.
