@@ -65,7 +65,7 @@ def absent(title: str, folder: str, command: str) -> Result:
 
 def verdict_paragraphs(one: Study) -> tuple[str, ...]:
     """Return the verdict in words: what is missing, what is left, what cannot be said."""
-    named = ", then ".join(c.sentence for c in one.finding.accepted.candidates)
+    named = " Then: ".join(c.sentence for c in one.finding.accepted.candidates)
     second = " ".join(
         f"Beside it {other['name'].replace('_', ' ')} would take {other['removes']:.0%} of what is "
         "left."
