@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from experiments.measured_rigs import (
     Study,
     absent,
@@ -13,7 +15,7 @@ from experiments.measured_rigs import (
     values_table,
     verdict_paragraphs,
 )
-from experiments.measured_twins import Twin, twins, twins_agree, twins_table
+from experiments.measured_twins import Twin, twins, twins_finding, twins_table
 from experiments.registry import Context
 from experiments.result import Finding, Result, Table
 
@@ -85,12 +87,6 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
             f"Second: {', '.join(seconds) or 'none'}.",
             check=True,
         ),
-        Finding(
-            twins_agree(found),
-            f"Twins: {', '.join(' + '.join(twin.names) or 'nothing' for twin in found)}.",
-            check=True,
-        ),
+        twins_finding(found),
     )
-    return Table(
-        table.name, table.title, table.columns, table.rows, note=table.note, findings=findings
-    )
+    return replace(table, findings=findings)

@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from experiments.measured_rigs import Study, coloured_rest
 from experiments.result import Column, Table
+from experiments.result import Finding as Agreement
 from pymoo_hdte.drive.friction import NonlinearDrag
 from pymoo_hdte.measured import Finding, investigate
 from pymoo_hdte.measured.prove import fitted_mechanism
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-from pymoo_hdte.mechanism.balances import Balance, law_force
+from pymoo_hdte.mechanism.balances import Balance
 from pymoo_hdte.mechanism.motion import noise_of
+from pymoo_hdte.mechanism.port_motion import law_force
 
 SEED = 5
 
@@ -58,11 +60,13 @@ def twins(one: Study, port: str, force: float) -> tuple[Twin, ...]:
     )
 
 
-def twins_agree(found: Sequence[Twin]) -> bool:
-    """Tell whether the first twin is adequate and what is hidden in the others is named."""
+def twins_finding(found: Sequence[Twin]) -> Agreement:
+    """Return whether the first twin is adequate and what is hidden in the others is named."""
     first, *others = found
     named = [twin.names == (twin.hidden,) for twin in others]
-    return first.finding.verdict.status == "adequate" and all(named)
+    agrees = first.finding.verdict.status == "adequate" and all(named)
+    words = ", ".join(" + ".join(twin.names) or "nothing" for twin in found)
+    return Agreement(agrees, f"Twins: {words}.", check=True)
 
 
 def twins_table(found: Sequence[Twin]) -> Table:
@@ -125,7 +129,7 @@ def _twin(
             )
     for effect in effects:
         stiffness = mechanism.port(effect.port).stiffness.value
-        force = force + law_force(effect, motion, stiffness)
+        force = force + law_force(effect.law, motion, stiffness)
     channels = {
         coordinate: motion.position,
         drive.name: force / (drive.gain.value * drive.acts[coordinate]),

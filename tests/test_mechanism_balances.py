@@ -9,9 +9,10 @@ from pymoo_hdte.drive.friction import CoulombFriction, PeriodicTorque
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.mesh_laws import HardeningStiffness
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.balances import Balance, balance_names, law_force, quantity_names
+from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
 from pymoo_hdte.mechanism.laws import ConstantForce, DirectionalFriction
 from pymoo_hdte.mechanism.motion import highest_frequency, motion_of, noise_of, smooth
+from pymoo_hdte.mechanism.port_motion import law_force
 
 STEP = 1e-3
 TIME = np.arange(0.0, 8.0, STEP)
@@ -132,7 +133,7 @@ def test_slipping_springs_follow_the_order_of_the_samples():
     record = closed()
     balance = Balance(two_masses(), record, CUTOFF)
     motion = balance.ports["between"]
-    torque = law_force(LawAt("hysteresis", "between", law), motion, 300.0)
+    torque = law_force(law, motion, 300.0)
     work = np.sum(0.5 * (torque[1:] + torque[:-1]) * np.diff(motion.position))
     assert np.abs(torque).max() <= 3.0 + 1e-12
     # Springs that slip take energy out of any motion.

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.drive import Effect
@@ -97,6 +98,20 @@ class Candidate:
         return len(self.parameters) + (self.frees is not None)
 
 
+def out_of_tolerance(name: str, words: str) -> Candidate:
+    """Return the candidate that lifts the tolerance of a base parameter, which is ``words``."""
+    return Candidate(
+        "parameter",
+        name,
+        (),
+        ((),),
+        lambda v: (),
+        f"The {words} lies outside its tolerance.",
+        exact=True,
+        frees=name,
+    )
+
+
 def unknown(name: str, lower: float, upper: float, typical: float) -> Parameter:
     """Return a parameter that starts at its typical size."""
     return Parameter(name, typical, lower, upper, abs(typical))
@@ -141,6 +156,22 @@ def harmonics_among(orders: Sequence[float], order: float, most: int) -> int:
     while count < most and any(abs((count + 1) * order - one) < 1e-6 for one in orders):
         count += 1
     return count
+
+
+def line_with_variance(
+    cosine: float, sine: float, covariance: NDArray[np.float64]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return amplitude and phase of a line, each with its variance.
+
+    ``covariance`` is that of its cosine and sine part, shape (2, 2). A phase is never less certain
+    than one of which nothing is known.
+    """
+    amplitude, phase = polar(cosine, sine)
+    size = max(amplitude, np.finfo(float).tiny)
+    along = np.array([cosine, sine]) / size
+    across = np.array([-sine, cosine]) / size
+    of_phase = min(float(across @ covariance @ across) / size**2, np.pi**2 / 3.0)
+    return (amplitude, float(along @ covariance @ along)), (phase, of_phase)
 
 
 def polar(cosine: float, sine: float) -> tuple[float, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pymoo_hdte.discrepancy import candidate
 from pymoo_hdte.discrepancy.believed import Believed
 from pymoo_hdte.discrepancy.candidate import Candidate, unknown
 from pymoo_hdte.discrepancy.friction_candidates import friction_candidates
@@ -44,16 +45,7 @@ def out_of_tolerance(base: Sequence[Parameter], at_bounds: Sequence[str]) -> lis
     """
     believed = {parameter.name: parameter.start for parameter in base}
     return [
-        Candidate(
-            "parameter",
-            name,
-            (),
-            ((),),
-            lambda v: (),
-            f"The {name.replace('_', ' ')} lies outside its tolerance.",
-            exact=True,
-            frees=name,
-        )
+        candidate.out_of_tolerance(name, name.replace("_", " "))
         for name in at_bounds
         if name in MECHANICAL and name not in _OF_THEIR_OWN and believed[name] > 0.0
     ]

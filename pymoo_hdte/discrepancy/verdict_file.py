@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.candidate import HARMONIC_NAMES, Candidate, polar
+from pymoo_hdte.discrepancy.candidate import HARMONIC_NAMES, Candidate, line_with_variance
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.misfit_map import Location
@@ -173,17 +173,14 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> di
 def _line(name: str, effect: str, fitted: Fit, row: int) -> dict[str, Any]:
     """Return amplitude and phase, with intervals, of the cosine part at a row and the sine next."""
     rows = np.array([row, row + 1])
-    (cosine, sine), covariance = fitted.values[rows], fitted.covariance[np.ix_(rows, rows)]
-    amplitude, phase = polar(cosine, sine)
-    size = max(amplitude, np.finfo(float).tiny)
-    along = np.array([cosine, sine]) / size
-    across = np.array([-sine, cosine]) / size
-    of_phase = min(float(across @ covariance @ across) / size**2, np.pi**2 / 3.0)
+    covariance = fitted.covariance[np.ix_(rows, rows)]
+    cosine, sine = fitted.values[rows]
+    amplitude, phase = line_with_variance(cosine, sine, covariance)
     prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
     quantity_name = name.removeprefix(prefix)
     return {
-        name: quantity(amplitude, float(along @ covariance @ along), effect, quantity_name),
-        f"{prefix}phase": quantity(phase, of_phase, effect, "phase"),
+        name: quantity(*amplitude, effect, quantity_name),
+        f"{prefix}phase": quantity(*phase, effect, "phase"),
     }
 
 

@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.candidate import (
     wave_starts,
 )
 from pymoo_hdte.discrepancy.parameters import Parameter
+from pymoo_hdte.drive.effects import place_of
 from pymoo_hdte.drive.friction import (
     CoulombFriction,
     NonlinearDrag,
@@ -82,7 +83,7 @@ def mechanism_candidates(
             if read.read and dict(read.motion) == dict(port.motion):
                 found += _periodic(port.name, orders.get(read.name, ()), force)[:1]
         found += _elastic(port.name, force, travel, port.stiffness.value, both)
-    known = {(one.name, one.port, getattr(one.law, "order", None)) for one in data.known}
+    known = {place_of(one) for one in data.known}  # type: ignore[arg-type]
     return [one for one in found if not one.places & known]
 
 

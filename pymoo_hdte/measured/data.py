@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.candidate import Candidate
+from pymoo_hdte.discrepancy.candidate import Candidate, out_of_tolerance
 from pymoo_hdte.discrepancy.evidence import Response, Vector
 from pymoo_hdte.discrepancy.excess import Excess
 from pymoo_hdte.discrepancy.fit import Fit
@@ -151,18 +151,7 @@ class MeasuredData:
     def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
         """Return a candidate for each quantity of the mechanism that a fit left at a bound."""
         return [
-            Candidate(
-                "parameter",
-                name,
-                (),
-                ((),),
-                lambda v: (),
-                f"The {name} lies outside its tolerance.",
-                exact=True,
-                frees=name,
-            )
-            for name in at_bounds
-            if name in self.mechanism.quantities
+            out_of_tolerance(name, name) for name in at_bounds if name in self.mechanism.quantities
         ]
 
     def with_rest(self, residuals: Vector) -> MeasuredData:

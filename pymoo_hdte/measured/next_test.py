@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.measured.candidates import turns_back
 from pymoo_hdte.measured.investigate import Finding
-from pymoo_hdte.mechanism.balances import PortMotion, law_force
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 
 Values = NDArray[np.float64]
 
@@ -172,7 +172,7 @@ def _separation(
                     for effect in one.fit.effects:
                         if effect.port == port.name:  # type: ignore[attr-defined]
                             scaled = PortMotion(position, speed)
-                            force = law_force(effect, scaled, port.stiffness.value)  # type: ignore[arg-type]
+                            force = law_force(effect.law, scaled, port.stiffness.value)  # type: ignore[attr-defined]
                             difference += sign * share * force
         base = np.column_stack(imitated)
         left = difference - base @ np.linalg.lstsq(base, difference, rcond=None)[0]

@@ -107,15 +107,13 @@ def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:
 
 
 def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
-    models = [
-        (fitted_mechanism(finding.mechanism, one), (*finding.data.known, *_laws(one.effects)))
-        for one in (finding.verdict.base, finding.accepted)
-    ]
-    runs = [_positions(one, record, effects, finding.cutoff) for one, effects in models]
+    base, accepted = finding.verdict.base, finding.accepted
+    before_all = _positions(finding, record, base)
+    after_all = before_all if accepted is base else _positions(finding, record, accepted)
     found = []
     for name in finding.mechanism.coordinates:
         measured = record.channels[name]
-        before, after = (run[name] for run in runs)
+        before, after = before_all[name], after_all[name]
         found.append(
             MeasuredGap(
                 record.name,
@@ -133,11 +131,12 @@ def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
     return found
 
 
-def _positions(
-    mechanism: Mechanism, record: Record, effects: Sequence[LawAt], cutoff: float
-) -> dict[str, Values]:
+def _positions(finding: Finding, record: Record, fitted: Fit) -> dict[str, Values]:
+    """Return the simulated positions at the samples of a record, nan where a model diverges."""
+    mechanism = fitted_mechanism(finding.mechanism, fitted)
+    effects = (*finding.data.known, *_laws(fitted.effects))
     try:
-        start = {name: _start(record, name, cutoff) for name in mechanism.coordinates}
+        start = {name: _start(record, name, finding.cutoff) for name in mechanism.coordinates}
         fine = simulate(mechanism, record.finer(FINER), effects, start=start).position
         return {name: one[::FINER] for name, one in fine.items()}
     except ArithmeticError:

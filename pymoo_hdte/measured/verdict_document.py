@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.candidate import Candidate, polar
+from pymoo_hdte.discrepancy.candidate import Candidate, line_with_variance
 from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.fit import Fit
 from pymoo_hdte.discrepancy.naming import Verdict
@@ -228,15 +228,12 @@ def _parameters(fitted: Fit, spread: Any, rows: range) -> dict[str, Any]:
         if not name.endswith("_cosine"):
             found[name] = _with_interval(value, float(spread[row, row]))
             continue
-        cosine, sine = fitted.values[row : row + 2]
-        amplitude, phase = polar(float(cosine), float(sine))
-        along = np.array([cosine, sine]) / max(amplitude, np.finfo(float).tiny)
-        block = spread[row : row + 2, row : row + 2]
+        pair = slice(row, row + 2)
+        cosine, sine = fitted.values[pair]
+        amplitude, phase = line_with_variance(cosine, sine, spread[pair, pair])
         name = name.removesuffix("_cosine")
-        found[name] = _with_interval(amplitude, float(along @ block @ along))
-        across = np.array([-along[1], along[0]])
-        of_phase = min(float(across @ block @ across) / max(amplitude, 1e-300) ** 2, np.pi**2 / 3.0)
-        found[f"{name}_phase"] = _with_interval(phase, of_phase)
+        found[name] = _with_interval(*amplitude)
+        found[f"{name}_phase"] = _with_interval(*phase)
     return found
 
 

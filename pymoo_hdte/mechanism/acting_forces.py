@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.laws import Law, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Loop, Mechanism, Port
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]
@@ -100,13 +100,9 @@ class PortForce:
     def along(self, path: Values) -> Values:
         """Return the force on a path of shape (n, 2, coordinates)."""
         d, rate, _ = self.motion(path)
-        stiffness, phase = np.asarray(self.spring[0]), periodic_phase(d)
-        force = stiffness * d + self.spring[1] * rate
-        for law in self.laws:
-            force += law.respond(PortState(d, rate, phase, stiffness)).torque
-        for law in self.slips:
-            force += law.respond(PortState(d - d[0], rate, phase, stiffness)).torque[0]
-        return np.asarray(force)
+        stiffness, damping = self.spring
+        laws = [law_force(law, PortMotion(d, rate), stiffness) for law in (*self.laws, *self.slips)]
+        return np.asarray(stiffness * d + damping * rate + sum(laws))
 
 
 class Command:
@@ -117,7 +113,7 @@ class Command:
 
     def __init__(self, loop: Loop, mechanism: Mechanism, record: Record) -> None:
         self.limit, self.gain, self.time = loop.limit, loop.position_gain, record.time
-        self.reference = channel_of(record, loop.reference)
+        self.reference = record.channel(loop.reference)
         self.rates = np.diff(self.reference) / np.diff(self.time)
         gains = (-loop.position_gain, -loop.speed_gain)
         self.slopes = np.outer(gains, coordinate_row(mechanism, {loop.coordinate: 1.0}))
@@ -144,11 +140,3 @@ class Command:
 def coordinate_row(mechanism: Mechanism, shares: Mapping[str, float]) -> Values:
     """Return shares of coordinates as a row of all, shape (coordinates,)."""
     return np.array([float(shares.get(name, 0.0)) for name in mechanism.coordinates])
-
-
-def channel_of(record: Record, name: str) -> Values:
-    """Return a channel, shape (n,); raises `InvalidInput` where the record has none."""
-    if name not in record.channels:
-        allowed = f"with {name!r}, which the mechanism needs"
-        raise InvalidInput(f"channels of record {record.name}", sorted(record.channels), allowed)
-    return record.channels[name]

@@ -9,7 +9,6 @@ Linear in the quantities of the mechanism (Gautier, Robotics and Autonomous Syst
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,8 @@ from scipy.fft import dct
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.drive.hysteresis import MaxwellSlip
-from pymoo_hdte.drive.laws import PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
 from pymoo_hdte.mechanism.motion import (
-    Motion,
     finer_than,
     highest_share,
     margin_of,
@@ -30,6 +26,7 @@ from pymoo_hdte.mechanism.motion import (
     smoothed_noise,
     stride_of,
 )
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force, port_motion
 from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]
@@ -48,43 +45,6 @@ def quantity_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the quantities on which balances depend: of the mechanism, and zeros of sensors."""
     zeros = [f"zero of {port.name}" for port in mechanism.ports if port.read]
     return (*mechanism.quantities, *zeros)
-
-
-@dataclass(frozen=True, eq=False)
-class PortMotion:
-    """Position and speed at a port, shape (n,), at the working rate; SI."""
-
-    position: Values
-    speed: Values
-
-
-def port_motion(port: Port, position: dict[str, Values], speed: dict[str, Values]) -> PortMotion:
-    """Return the motion at a port, with its kinematic error, of coordinates of shape (n,)."""
-    here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
-    rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
-    for line in port.error:
-        angle = line.order * position[line.coordinate] + line.phase
-        here = here + line.amplitude * np.sin(angle)
-        rate = rate + line.amplitude * line.order * np.cos(angle) * speed[line.coordinate]
-    return PortMotion(here, rate)
-
-
-def law_force(effect: LawAt, motion: PortMotion | Motion, stiffness: float) -> Values:
-    """Return the force of an effect against a motion in time, shape (n,).
-
-    ``stiffness`` is that of its port, N/m or N.m/rad.
-    """
-    # Springs that slip start unstretched, wherever the position has its zero.
-    rests = isinstance(effect.law, MaxwellSlip)
-    state = PortState(
-        motion.position - rests * motion.position[0],
-        motion.speed,
-        periodic_phase(motion.position),
-        np.full(1, stiffness),
-        path=lambda values: values[None, :],
-        back=lambda values: values[0],
-    )
-    return np.broadcast_to(effect.law.respond(state).torque, motion.position.shape)
 
 
 class Balance:
@@ -136,7 +96,7 @@ class Balance:
         frequency = np.arange(n) / (2.0 * n * record.step * stride)
         self._bins = int(np.count_nonzero(frequency <= highest))
         if np.count_nonzero(frequency <= cutoff) < _FEWEST_BINS:
-            shortest = (_FEWEST_BINS + 4.0 * 4.0) / (2.0 * cutoff)
+            shortest = _FEWEST_BINS / (2.0 * cutoff) + 2.0 * margin * record.step
             raise InvalidInput(
                 f"duration of record {record.name}",
                 float(record.time[-1] - record.time[0]),
@@ -148,7 +108,7 @@ class Balance:
         self.kept = self.frequency <= np.array(limits)[:, None]
         self.cutoff = cutoff
         self.motions = {
-            name: motion_of(self._channel(name), record.step, cutoff)
+            name: motion_of(self.record.channel(name), record.step, cutoff)
             for name in mechanism.coordinates
         }
         self._acceleration = {
@@ -161,7 +121,7 @@ class Balance:
         self._finer = finer_than(cutoff, record.step * stride)
         self._fine = self.ports if self._finer == 1 else self._port_motions(*self._between(stride))
         self._inputs = {
-            one.name: smooth(self._channel(one.name), record.step, highest)[self._rows]
+            one.name: smooth(self.record.channel(one.name), record.step, highest)[self._rows]
             for one in mechanism.inputs
         }
         self.terms = self._terms()
@@ -169,7 +129,7 @@ class Balance:
         self.constant = np.zeros((len(names), self._bins))
         for port in mechanism.ports:
             if port.read:
-                reading = smooth(self._channel(port.name), record.step, highest)[self._rows]
+                reading = smooth(self.record.channel(port.name), record.step, highest)[self._rows]
                 self.constant[names.index(port.name)] = self._transform(reading)
         self.noise = self._noise(stride)
 
@@ -203,7 +163,7 @@ class Balance:
         if key not in self._known:
             while len(self._known) >= _KEPT:
                 self._known.pop(next(iter(self._known)))
-            force = law_force(effect, self._fine[effect.port], stiffness)
+            force = law_force(effect.law, self._fine[effect.port], stiffness)
             # The finer samples lie around the others, so that their cosines are the same.
             self._known[key] = self._transform(force) / np.sqrt(self._finer)
         return self._known[key]
@@ -217,15 +177,6 @@ class Balance:
     def time(self) -> Values:
         """Times of the working rate, s, shape (n,)."""
         return self.record.time[self._rows]
-
-    def _channel(self, name: str) -> Values:
-        if name not in self.record.channels:
-            raise InvalidInput(
-                f"channels of record {self.record.name}",
-                tuple(self.record.channels),
-                f"{name} among them: inverse dynamics needs every coordinate, input and sensor",
-            )
-        return self.record.channels[name]
 
     def _port_motions(
         self, position: dict[str, Values], speed: dict[str, Values]

@@ -91,6 +91,13 @@ class Record:
         ):
             object.__setattr__(self, attribute, value)
 
+    def channel(self, name: str) -> NDArray[np.float64]:
+        """Return a channel, shape (n,); raises `InvalidInput` where the record has none."""
+        if name not in self.channels:
+            allowed = f"with {name!r}, which the mechanism needs"
+            raise InvalidInput(f"channels of record {self.name}", sorted(self.channels), allowed)
+        return self.channels[name]
+
     def noise_of(self, channel: str, jumps: bool = False) -> float:
         """Return the standard deviation of the noise of a channel: known, or estimated; SI.
 

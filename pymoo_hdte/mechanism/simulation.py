@@ -17,7 +17,6 @@ from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
 from pymoo_hdte.mechanism.acting_forces import (
     Command,
     PortForce,
-    channel_of,
     coordinate_row,
 )
 from pymoo_hdte.mechanism.exponential_steps import ExponentialIntegrator
@@ -101,7 +100,7 @@ def simulate(
     inputs, pushes = {}, np.zeros((len(record.time), len(inertias)))
     for one in mechanism.inputs:
         if one.name not in commands:
-            inputs[one.name] = channel_of(record, one.name)
+            inputs[one.name] = record.channel(one.name)
             pushes += np.outer(
                 inputs[one.name], one.gain.value * coordinate_row(mechanism, one.acts)
             )
