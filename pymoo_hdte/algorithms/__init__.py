@@ -1,6 +1,7 @@
 """The swarm family, as pymoo algorithms."""
 
 from pymoo_hdte.algorithms.archive import LeaderArchive
+from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.inertia import EntropyWeight, LinearDecrease
 from pymoo_hdte.algorithms.pyramid import Flat, Pyramid
 from pymoo_hdte.algorithms.swarm import ParticleSwarm
@@ -11,6 +12,7 @@ __all__ = [
     "AMPMOPSO",
     "MOPSO",
     "MPMOPSO",
+    "ElitistSwarm",
     "EntropyWeight",
     "Flat",
     "LeaderArchive",

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import inspect
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pymoo.core.algorithm import Algorithm
-from pymoo.core.individual import Individual
-from pymoo.core.initialization import Initialization
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 from pymoo.core.sampling import Sampling
-from pymoo.operators.sampling.rnd import FloatRandomSampling
-from pymoo.util.display.multi import MultiObjectiveOutput
 
 from pymoo_hdte.algorithms.archive import LeaderArchive
+from pymoo_hdte.algorithms.base import Swarm, particles_at
 from pymoo_hdte.algorithms.dominance import constrained_ranks
 from pymoo_hdte.algorithms.horizon import generation_limit
 from pymoo_hdte.algorithms.inertia import InertiaWeight
 from pymoo_hdte.algorithms.personal_best import updated_personal_best
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.pyramid import Hierarchy
-from pymoo_hdte.checks import InvalidInput, whole_number
+from pymoo_hdte.checks import whole_number
 
 
-class ParticleSwarm(Algorithm):
+class ParticleSwarm(Swarm):
     """Multi-objective particle swarm with an external archive, whose strategies are parts.
 
     One generation moves every particle,
@@ -94,41 +89,24 @@ class ParticleSwarm(Algorithm):
         sampling: Sampling | NDArray | Population | None = None,
         **kwargs: Any,
     ) -> None:
-        # pymoo's base class swallows misspelt arguments without a word.
-        unknown = set(kwargs) - set(inspect.signature(Algorithm.__init__).parameters)
-        if unknown:
-            raise TypeError(f"{type(self).__name__} has no argument {', '.join(sorted(unknown))}")
-        super().__init__(**{"output": MultiObjectiveOutput(), **kwargs})
-        self.pop_size = whole_number("pop_size", pop_size, at_least=2)
+        super().__init__(pop_size, sampling, **kwargs)
         self.archive_size = whole_number("archive_size", archive_size, at_least=2)
         if n_max_gen is not None:
             n_max_gen = whole_number("n_max_gen", n_max_gen, at_least=1)
         self.n_max_gen = n_max_gen
         self.inertia = inertia
         self.hierarchy = hierarchy
-        self.initialization = Initialization(
-            FloatRandomSampling() if sampling is None else sampling
-        )
 
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
-        _check_problem(problem)
+        super()._setup(problem, **kwargs)
         self.generations = generation_limit(self.termination, self.pop_size, self.n_max_gen)
         # pymoo adds to `self.archive` by itself and truncates it with an unseeded generator.
         self.leaders = LeaderArchive(self.archive_size, problem.n_var, problem.n_obj)
 
     def _initialize_infill(self) -> Population:
-        particles = self.initialization.do(
-            self.problem, self.pop_size, algorithm=self, random_state=self.random_state
-        )
+        particles = super()._initialize_infill()
         X = particles.get("X")
         lowest, highest = self.problem.bounds()
-        if X.shape != (self.pop_size, self.problem.n_var):
-            wanted = f"{(self.pop_size, self.problem.n_var)}, a position for every particle"
-            raise InvalidInput("shape of sampling", X.shape, wanted)
-        inside = np.all((lowest <= X) & (highest >= X), axis=1)
-        if not inside.all():
-            row = int(inside.argmin())
-            raise InvalidInput(f"sampling[{row}]", X[row], "within the bounds of the problem")
         self.next_velocity = self.random_state.uniform(lowest - X, highest - X)
         particles.set("V", self.next_velocity)
         return particles
@@ -155,7 +133,10 @@ class ParticleSwarm(Algorithm):
         )
         mutation = self.hierarchy.mutation(ranks, progress, highest - lowest, random_state)
         self.next_velocity = V
-        return _particles(np.clip(swarm.X + V + mutation, lowest, highest), V)
+        particles = particles_at(np.clip(swarm.X + V + mutation, lowest, highest))
+        for particle, velocity in zip(particles, V, strict=True):
+            particle.data["V"] = velocity.copy()
+        return particles
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         points = self._evaluated(infills)
@@ -169,37 +150,3 @@ class ParticleSwarm(Algorithm):
     def _set_optimum(self) -> None:
         # pymoo reads the optimum in every generation, even if nothing could be judged so far.
         self.opt = self.leaders.members if len(self.leaders) else self.pop[:1]
-
-    def _evaluated(self, infills: Population | None) -> Points:
-        """Return the points of a swarm that comes back from evaluation, in the order of ``ask``."""
-        n = 0 if infills is None else len(infills)
-        if infills is None or n != self.pop_size:
-            allowed = f"the {self.pop_size} particles of ask(), in their order"
-            raise InvalidInput("number of infills", n, allowed)
-        points = Points.of(infills, self.problem.has_constraints())
-        expected = (self.pop_size, self.problem.n_obj)
-        if points.F.shape != expected:
-            raise InvalidInput("shape of F of infills", points.F.shape, f"{expected}, evaluated")
-        return points
-
-
-def _particles(X: NDArray[np.float64], V: NDArray[np.float64]) -> Population:
-    """Return particles at ``X`` that carry their velocities ``V``, for less than Population.new."""
-    config = Individual.default_config()
-    particles = [Individual(config) for _ in X]
-    for particle, x, v in zip(particles, X, V, strict=True):
-        particle.X = x.copy()
-        particle.data["V"] = v.copy()
-    return Population(particles)
-
-
-def _check_problem(problem: Problem) -> None:
-    if getattr(problem, "vars", None) is not None or problem.vtype not in (None, float):
-        raise InvalidInput("vtype of problem", problem.vtype, "real variables")
-    if problem.n_obj < 2:
-        raise InvalidInput("n_obj of problem", problem.n_obj, "at least 2")
-    bounds = problem.bounds()
-    if any(bound is None or not np.all(np.isfinite(bound)) for bound in bounds):
-        raise InvalidInput("bounds of problem", bounds, "finite lower and upper bounds")
-    if np.any(bounds[0] > bounds[1]):
-        raise InvalidInput("bounds of problem", bounds, "lower bounds up to the upper ones")

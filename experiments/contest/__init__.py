@@ -1,0 +1,1 @@
+"""Runs of multi-objective algorithms, ours and others', on benchmark problems, as jobs."""

@@ -1,0 +1,60 @@
+"""One run of one algorithm on one benchmark problem, as a job of a campaign."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from moocore import is_nondominated
+from numpy.typing import NDArray
+
+from experiments.campaign import Run
+from experiments.contest.peers import CONTESTANTS
+from experiments.contest.problems import problem_of
+from pymoo_hdte.algorithms.spread import most_spread
+
+FINAL_SIZE = 50
+
+
+@dataclass(frozen=True)
+class ContestRun:
+    """One algorithm, one problem, one seed, and the final set at each budget of evaluations."""
+
+    problem: str
+    algorithm: str
+    seed: int
+    budgets: tuple[int, ...]
+
+    @property
+    def key(self) -> str:
+        """All settings in one name."""
+        budgets = "_".join(map(str, self.budgets))
+        return f"{self.problem}_{self.algorithm}_{budgets}_seed{self.seed}"
+
+    def execute(self) -> Run:
+        """Run, and reduce what is offered to `FINAL_SIZE` in the same way for all.
+
+        Columns are the budget and the objectives, rows by budget and rising objectives.
+        """
+        problem = problem_of(self.problem)
+        run = CONTESTANTS[self.algorithm].run
+        started = time.perf_counter()
+        offered = run(problem, self.budgets, self.seed)
+        seconds = time.perf_counter() - started
+        rows = [
+            np.column_stack([np.full(len(front), float(budget)), front])
+            for budget, front in zip(self.budgets, map(final_set, offered), strict=True)
+        ]
+        columns = ("evaluations", *(f"f{1 + i}" for i in range(problem.n_obj)))
+        return Run(columns, np.concatenate(rows), seconds)
+
+
+def final_set(F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return at most `FINAL_SIZE` different, non-dominated rows of ``F`` (n, m), evenly spread."""
+    F = F[np.isfinite(F).all(axis=1)]
+    if not len(F):
+        return F
+    front = F[is_nondominated(F)]
+    front = front[np.lexsort(front.T[::-1])]
+    return front[most_spread(front, FINAL_SIZE)]

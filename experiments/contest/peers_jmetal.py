@@ -1,0 +1,149 @@
+"""SMPSO and OMOPSO of jMetalPy, as its users run them."""
+
+from __future__ import annotations
+
+import logging
+import random
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jmetal.algorithm.multiobjective.omopso import OMOPSO
+from jmetal.algorithm.multiobjective.smpso import SMPSO
+from jmetal.core.observer import Observer
+from jmetal.core.problem import FloatProblem
+from jmetal.core.solution import FloatSolution
+from jmetal.operator.mutation import NonUniformMutation, PolynomialMutation, UniformMutation
+from jmetal.util.archive import CrowdingDistanceArchive
+from jmetal.util.comparator import DominanceComparator, DominanceWithConstraintsComparator
+from jmetal.util.evaluator import Evaluator
+from jmetal.util.observable import DefaultObservable
+from jmetal.util.termination_criterion import StoppingByEvaluations
+from numpy.typing import NDArray
+from pymoo.core.problem import Problem
+
+logging.getLogger("jmetal.core.algorithm").setLevel(logging.WARNING)
+
+SWARM = 100
+EPSILON = 0.0075
+"""Of OMOPSO's archive, in objectives as they are: the value in jMetalPy's examples."""
+
+
+class WrappedProblem(FloatProblem):
+    """A pymoo problem as jMetalPy sees it."""
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__()
+        self.problem = problem
+        self.evaluations = 0
+        self.lower_bound, self.upper_bound = problem.xl.tolist(), problem.xu.tolist()
+        self.directions = [self.MINIMIZE] * problem.n_obj
+
+    def number_of_objectives(self) -> int:
+        """Return the number of objectives."""
+        return self.problem.n_obj
+
+    def number_of_constraints(self) -> int:
+        """Return the number of inequality constraints."""
+        return self.problem.n_ieq_constr
+
+    def name(self) -> str:
+        """Return the name of the problem."""
+        return self.problem.name()
+
+    def evaluate(self, solution: FloatSolution) -> FloatSolution:
+        """Evaluate one solution."""
+        return BatchEvaluator().evaluate([solution], self)[0]
+
+
+class BatchEvaluator(Evaluator):
+    """Evaluates a whole swarm at once, and counts."""
+
+    def evaluate(
+        self, solution_list: list[FloatSolution], problem: WrappedProblem
+    ) -> list[FloatSolution]:
+        """Fill in objectives and constraints, which are violated below 0 in jMetalPy."""
+        X = np.array([solution.variables for solution in solution_list])
+        F, G = problem.problem.evaluate(X, return_values_of=["F", "G"])
+        problem.evaluations += len(X)
+        for solution, f, g in zip(solution_list, F, G, strict=True):
+            solution.objectives = f.tolist()
+            solution.constraints = (-g).tolist()
+        return solution_list
+
+
+class _Snapshots(Observer):
+    """Keeps what the algorithm offers when a budget is spent."""
+
+    def __init__(self, budgets: Sequence[int]) -> None:
+        self.budgets = budgets
+        self.offered: list[NDArray[np.float64]] = []
+
+    def update(self, *args: Any, **kwargs: Any) -> None:
+        if kwargs["EVALUATIONS"] in self.budgets:
+            self.offered.append(_offer(kwargs["SOLUTIONS"]))
+
+
+def run_jmetal(
+    name: str, problem: Problem, budgets: Sequence[int], seed: int
+) -> list[NDArray[np.float64]]:
+    """Run SMPSO or OMOPSO once and return F (n, m) of its feasible set at every budget.
+
+    Budgets are multiples of the swarm; OMOPSO's mutation shrinks until the largest is spent.
+
+    Raises
+    ------
+    RuntimeError
+        If another number of evaluations is spent.
+    """
+    # jMetalPy draws from the generators of the modules; nothing else in this process uses them.
+    random.seed(seed)
+    np.random.seed(seed)  # noqa: NPY002
+    wrapped = WrappedProblem(problem)
+    make = {"SMPSO": _smpso, "OMOPSO": _omopso}[name]
+    algorithm = make(wrapped, budgets[-1])
+    snapshots = _Snapshots(budgets)
+    algorithm.observable = DefaultObservable()
+    algorithm.observable.register(algorithm.termination_criterion)
+    algorithm.observable.register(snapshots)
+    algorithm.run()
+    if wrapped.evaluations != budgets[-1] or len(snapshots.offered) != len(budgets):
+        raise RuntimeError(f"{name} spent {wrapped.evaluations} evaluations, not {budgets[-1]}")
+    return snapshots.offered
+
+
+def _dominance(problem: WrappedProblem) -> DominanceComparator:
+    if problem.number_of_constraints():
+        return DominanceWithConstraintsComparator()
+    return DominanceComparator()
+
+
+def _smpso(problem: WrappedProblem, budget: int) -> SMPSO:
+    return SMPSO(
+        problem=problem,
+        swarm_size=SWARM,
+        mutation=PolynomialMutation(1.0 / problem.number_of_variables(), 20),
+        leaders=CrowdingDistanceArchive(SWARM, _dominance(problem)),
+        dominance_comparator=_dominance(problem),
+        termination_criterion=StoppingByEvaluations(budget),
+        swarm_evaluator=BatchEvaluator(),
+    )
+
+
+def _omopso(problem: WrappedProblem, budget: int) -> OMOPSO:
+    rate = 1.0 / problem.number_of_variables()
+    return OMOPSO(
+        problem=problem,
+        swarm_size=SWARM,
+        epsilon=EPSILON,
+        uniform_mutation=UniformMutation(rate, 0.5),
+        non_uniform_mutation=NonUniformMutation(rate, 0.5, budget // SWARM),
+        leaders=CrowdingDistanceArchive(SWARM, _dominance(problem)),
+        termination_criterion=StoppingByEvaluations(budget),
+        swarm_evaluator=BatchEvaluator(),
+    )
+
+
+def _offer(solutions: list[FloatSolution]) -> NDArray[np.float64]:
+    feasible = [s.objectives for s in solutions if all(value >= 0.0 for value in s.constraints)]
+    return np.array(feasible).reshape(-1, len(solutions[0].objectives))

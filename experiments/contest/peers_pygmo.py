@@ -1,0 +1,52 @@
+"""NSPSO of pygmo, as its users run it: without constraints, which it does not take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pygmo
+from numpy.typing import NDArray
+from pymoo.core.problem import Problem
+
+SWARM = 100
+
+
+class WrappedProblem:
+    """A pymoo problem as pygmo sees it."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def fitness(self, x: NDArray[np.float64]) -> list[float]:
+        """Return the objectives of one point."""
+        return self.problem.evaluate(x[np.newaxis], return_values_of=["F"])[0].tolist()
+
+    def get_bounds(self) -> tuple[list[float], list[float]]:
+        """Return the bounds."""
+        return self.problem.xl.tolist(), self.problem.xu.tolist()
+
+    def get_nobj(self) -> int:
+        """Return the number of objectives."""
+        return self.problem.n_obj
+
+
+def run_pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[NDArray[np.float64]]:
+    """Run NSPSO for each budget and return F (n, m) of its population.
+
+    Raises
+    ------
+    RuntimeError
+        If another number of evaluations is spent.
+    """
+    offered = []
+    for budget in budgets:
+        generations = budget // SWARM - 1
+        algorithm = pygmo.algorithm(pygmo.nspso(gen=generations, seed=seed))
+        swarm = pygmo.population(pygmo.problem(WrappedProblem(problem)), SWARM, seed=seed)
+        evolved = algorithm.evolve(swarm)
+        spent = evolved.problem.get_fevals()
+        if spent != budget:
+            raise RuntimeError(f"NSPSO spent {spent} evaluations, not {budget}")
+        offered.append(evolved.get_f())
+    return offered

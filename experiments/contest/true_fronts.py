@@ -1,0 +1,137 @@
+"""True fronts of the benchmark problems in closed form, or as a curve that a solver follows.
+
+Sources: ZDT and DTLZ (Deb, Thiele, Laumanns, Zitzler 2005) as pymoo has them; WFG (Huband,
+Hingston, Barone, While 2006, shapes of section VIII with all distance parameters at their optimum);
+OSY and TNK (Deb 2001, section 8.3).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from moocore import is_nondominated
+from numpy.typing import NDArray
+from pymoo.core.problem import Problem
+from pymoo.util.ref_dirs import get_reference_directions
+from scipy.optimize import minimize
+
+N_POINTS = 1000
+"""Of a front with two objectives; those with three have some 5,000."""
+
+_PARTITIONS = 99
+
+
+def wfg_front(number: int) -> NDArray[np.float64]:
+    """Return the front of a WFG problem with two objectives, shape (n, 2)."""
+    t = np.linspace(0.0, 1.0, 20 * N_POINTS)
+    quarter = t * np.pi / 2.0
+    if number == 1:
+        mixed = 1.0 - t - np.cos(10.0 * np.pi * t + np.pi / 2.0) / (10.0 * np.pi)
+        shape = np.column_stack([1.0 - np.cos(quarter), mixed])
+    elif number == 2:
+        shape = np.column_stack([1.0 - np.cos(quarter), 1.0 - t * np.cos(5.0 * np.pi * t) ** 2])
+    elif number == 3:
+        shape = np.column_stack([t, 1.0 - t])
+    else:
+        shape = np.column_stack([np.sin(quarter), np.cos(quarter)])
+    return even_curve(shape * np.array([2.0, 4.0]))
+
+
+def dtlz_front(number: int) -> NDArray[np.float64]:
+    """Return the front of DTLZ1, 2 or 7 with three objectives, shape (n, 3)."""
+    if number == 7:
+        one_side = np.linspace(0.0, 1.0, 200)
+        first, second = (grid.ravel() for grid in np.meshgrid(one_side, one_side))
+        bumps = sum(f / 2.0 * (1.0 + np.sin(3.0 * np.pi * f)) for f in (first, second))
+        front = np.column_stack([first, second, 2.0 * (3.0 - bumps)])
+        return front[is_nondominated(front)]
+    directions = get_reference_directions("das-dennis", 3, n_partitions=_PARTITIONS)
+    if number == 1:
+        return 0.5 * directions
+    return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+
+
+def tnk_front() -> NDArray[np.float64]:
+    """Return the front of TNK, part of the curve r^2 = 1 + 0.1 cos(16 phi), shape (n, 2)."""
+    angle = np.linspace(0.0, np.pi / 2.0, 100 * N_POINTS)
+    radius = np.sqrt(1.0 + 0.1 * np.cos(16.0 * angle))
+    curve = radius[:, np.newaxis] * np.column_stack([np.cos(angle), np.sin(angle)])
+    inside = np.sum((curve - 0.5) ** 2, axis=1) <= 0.5
+    return even_curve(curve[inside])
+
+
+def osy_front(problem: Problem) -> NDArray[np.float64]:
+    """Return the front of OSY from the five parts of its Pareto set, shape (n, 2)."""
+    t = np.linspace(0.0, 1.0, 4 * N_POINTS)
+    one, none = np.ones_like(t), np.zeros_like(t)
+    x1 = 4.0556 + 0.9444 * t
+    parts = [
+        [5 * one, one, 1 + 4 * t, none, 5 * one, none],
+        [5 * one, one, 1 + 4 * t, none, one, none],
+        [x1, (x1 - 2) / 3, one, none, one, none],
+        [none, 2 * one, 1 + 2.7321 * t, none, one, none],
+        [t, 2 - t, one, none, one, none],
+    ]
+    designs = np.hstack([np.array(part) for part in parts]).T
+    F, G = problem.evaluate(designs, return_values_of=["F", "G"])
+    return even_curve(F[np.all(G <= 1e-9, axis=1)])
+
+
+def welded_beam_front(problem: Problem) -> NDArray[np.float64]:
+    """Return the front of the welded beam, shape (n, 2): least cost at levels of deflection.
+
+    SLSQP follows the curve from its stiff end with several starts at every level.
+    """
+    stiffest, weakest = 2.1952 / (10.0**3 * 5.0), 2.1952 / (10.0**3 * 0.2)
+    levels = np.geomspace(stiffest, weakest, 300)
+    rng = np.random.default_rng(1)
+    width = problem.xu - problem.xl
+    best, points = problem.xu.copy(), []
+    for level in levels:
+        starts = [best, *(problem.xl + rng.random((4, problem.n_var)) * width)]
+        found = [_least_cost(problem, level, start) for start in starts]
+        values = [(cost, x) for cost, x in found if np.isfinite(cost)]
+        _, best = min(values, key=lambda entry: entry[0])
+        points.append(problem.evaluate(best, return_values_of=["F"]))
+    return even_curve(np.array(points))
+
+
+def _least_cost(
+    problem: Problem, level: float, start: NDArray[np.float64]
+) -> tuple[float, NDArray[np.float64]]:
+    def values(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return problem.evaluate(x, return_values_of=["F", "G"])
+
+    # The smallest variable is 0.1 wide and the forces are thousands: one scale for each.
+    size = np.array([1e4, 1e4, 1.0, 1e4])
+
+    def slack(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        F, G = values(x)
+        return np.append(-G / size, 1.0 - F[1] / level)
+
+    result = minimize(
+        lambda x: values(x)[0][0],
+        start,
+        method="SLSQP",
+        bounds=list(zip(problem.xl, problem.xu, strict=True)),
+        constraints={"type": "ineq", "fun": slack},
+        options={"ftol": 1e-10, "maxiter": 200},
+    )
+    x = np.clip(result.x, problem.xl, problem.xu)
+    feasible = np.min(slack(x)) > -1e-6
+    return (float(result.fun) if feasible else np.inf), x
+
+
+def even_curve(F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return some `N_POINTS` of the non-dominated rows of a dense curve, even in arc length.
+
+    Distances are in objectives normalised by the front, and steps of over 0.02 are gaps.
+    """
+    front = F[is_nondominated(F)]
+    front = front[front[:, 0].argsort()]
+    normal = (front - front.min(axis=0)) / np.ptp(front, axis=0)
+    steps = np.linalg.norm(np.diff(normal, axis=0), axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(np.where(steps > 0.02, 0.0, steps))])
+    wanted = np.linspace(0.0, arc[-1], N_POINTS)
+    ends = np.flatnonzero(steps > 0.02)
+    rows = np.unique(np.concatenate([np.searchsorted(arc, wanted), ends, ends + 1]))
+    return front[rows.clip(max=len(front) - 1)]

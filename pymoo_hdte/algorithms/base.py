@@ -1,0 +1,91 @@
+"""What all swarms share: their size, their first positions, and what they refuse."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.individual import Individual
+from pymoo.core.initialization import Initialization
+from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+from pymoo.core.sampling import Sampling
+from pymoo.operators.sampling.rnd import FloatRandomSampling
+from pymoo.util.display.multi import MultiObjectiveOutput
+
+from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.checks import InvalidInput, whole_number
+
+
+class Swarm(Algorithm):
+    """Base of `ParticleSwarm` and `ElitistSwarm`, which tell its parameters and errors."""
+
+    def __init__(
+        self,
+        pop_size: int,
+        sampling: Sampling | NDArray | Population | None,
+        **kwargs: Any,
+    ) -> None:
+        # pymoo's base class swallows misspelt arguments without a word.
+        unknown = set(kwargs) - set(inspect.signature(Algorithm.__init__).parameters)
+        if unknown:
+            raise TypeError(f"{type(self).__name__} has no argument {', '.join(sorted(unknown))}")
+        super().__init__(**{"output": MultiObjectiveOutput(), **kwargs})
+        self.pop_size = whole_number("pop_size", pop_size, at_least=2)
+        self.initialization = Initialization(
+            FloatRandomSampling() if sampling is None else sampling
+        )
+
+    def _setup(self, problem: Problem, **kwargs: Any) -> None:
+        _check_problem(problem)
+
+    def _initialize_infill(self) -> Population:
+        particles = self.initialization.do(
+            self.problem, self.pop_size, algorithm=self, random_state=self.random_state
+        )
+        X = particles.get("X")
+        lowest, highest = self.problem.bounds()
+        if X.shape != (self.pop_size, self.problem.n_var):
+            wanted = f"{(self.pop_size, self.problem.n_var)}, a position for every particle"
+            raise InvalidInput("shape of sampling", X.shape, wanted)
+        inside = np.all((lowest <= X) & (highest >= X), axis=1)
+        if not inside.all():
+            row = int(inside.argmin())
+            raise InvalidInput(f"sampling[{row}]", X[row], "within the bounds of the problem")
+        return particles
+
+    def _evaluated(self, infills: Population | None) -> Points:
+        """Return the points of a swarm that comes back from evaluation, in the order of ``ask``."""
+        n = 0 if infills is None else len(infills)
+        if infills is None or n != self.pop_size:
+            allowed = f"the {self.pop_size} particles of ask(), in their order"
+            raise InvalidInput("number of infills", n, allowed)
+        points = Points.of(infills, self.problem.has_constraints())
+        expected = (self.pop_size, self.problem.n_obj)
+        if points.F.shape != expected:
+            raise InvalidInput("shape of F of infills", points.F.shape, f"{expected}, evaluated")
+        return points
+
+
+def particles_at(X: NDArray[np.float64]) -> Population:
+    """Return particles at ``X`` (n, d), for less than Population.new."""
+    config = Individual.default_config()
+    particles = [Individual(config) for _ in X]
+    for particle, x in zip(particles, X, strict=True):
+        particle.X = x.copy()
+    return Population(particles)
+
+
+def _check_problem(problem: Problem) -> None:
+    if getattr(problem, "vars", None) is not None or problem.vtype not in (None, float):
+        raise InvalidInput("vtype of problem", problem.vtype, "real variables")
+    if problem.n_obj < 2:
+        raise InvalidInput("n_obj of problem", problem.n_obj, "at least 2")
+    bounds = problem.bounds()
+    if any(bound is None or not np.all(np.isfinite(bound)) for bound in bounds):
+        raise InvalidInput("bounds of problem", bounds, "finite lower and upper bounds")
+    if np.any(bounds[0] > bounds[1]):
+        raise InvalidInput("bounds of problem", bounds, "lower bounds up to the upper ones")

@@ -1,0 +1,114 @@
+"""The swarm to use: elitist, with moves that share the particles by their success."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+from pymoo.core.sampling import Sampling
+
+from pymoo_hdte.algorithms.base import Swarm, particles_at
+from pymoo_hdte.algorithms.crowding import crowding_distance
+from pymoo_hdte.algorithms.dominance import best_front
+from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, SparseMutation
+from pymoo_hdte.algorithms.success_shares import SuccessShares
+from pymoo_hdte.algorithms.survival import survivors
+
+
+class ElitistSwarm(Swarm):
+    """A swarm that keeps the best of all it has visited, for two objectives or more.
+
+    In a generation every particle makes one of the moves, towards a leader from the best front,
+    and a sparse mutation; the best of the old and the new positions are the next swarm, thinned
+    out evenly. A move gets more particles the more of them survive. There is nothing to tune and no
+    schedule: a run may be stopped or continued at any generation.
+
+    It is what the ablation left of ideas for AMP-MOPSO, whose results it does not borrow: inertia,
+    with an entropy weight or without, did not earn its place (`experiments/peers`).
+
+    Parameters
+    ----------
+    pop_size : int
+        Number of particles, at least 2.
+    sampling : Sampling, array of shape (pop_size, n_var) or Population of that size, optional
+        First positions, within the bounds; uniformly random by default.
+    moves : sequence of Move, optional
+        By default `Attraction`, `Exchange` and `Difference`.
+    mutation : SparseMutation, optional
+    **kwargs
+        Any other argument of `pymoo.core.algorithm.Algorithm`.
+
+    Raises
+    ------
+    InvalidInput
+        As `ParticleSwarm`, but for G_max, which is not needed.
+    TypeError
+        For an argument that does not exist.
+
+    Notes
+    -----
+    - a leader is the less crowded of two random members of the best front;
+    - a position cut to the box stays there;
+    - feasible solutions come before infeasible ones, these by total violation (Deb et al. 2002); a
+      solution that is not finite comes last, copies of another one after that;
+    - the result of a run is the best front of the swarm, at most ``pop_size`` solutions.
+    """
+
+    def __init__(
+        self,
+        pop_size: int = 100,
+        *,
+        sampling: Sampling | NDArray | Population | None = None,
+        moves: Sequence[Move] | None = None,
+        mutation: SparseMutation | None = None,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(pop_size, sampling, **kwargs)
+        self.moves = (Attraction(), Exchange(), Difference()) if moves is None else tuple(moves)
+        self.mutation = SparseMutation() if mutation is None else mutation
+
+    def _setup(self, problem: Problem, **kwargs: Any) -> None:
+        super()._setup(problem, **kwargs)
+        self.success = SuccessShares(len(self.moves))
+
+    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
+        self.pop, self.swarm = infills, self._evaluated(infills)
+
+    def _infill(self) -> Population:
+        X, random_state = self.swarm.X, self.random_state
+        lowest, highest = self.problem.bounds()
+        leaders = self._leaders()
+        self.chosen = self.success.draw(self.pop_size, random_state)
+        steps = np.empty_like(X)
+        for number, move in enumerate(self.moves):
+            rows = self.chosen == number
+            steps[rows] = move(X[rows], leaders[rows], X, random_state)
+        steps += self.mutation(steps, highest - lowest, random_state)
+        return particles_at(np.clip(X + steps, lowest, highest))
+
+    def _leaders(self) -> NDArray[np.float64]:
+        """Draw a leader's position for every particle, shape (n, d)."""
+        front = best_front(self.swarm)
+        if not len(front):
+            return self.swarm.X
+        pairs = self.random_state.integers(len(front), size=(self.pop_size, 2))
+        distance = crowding_distance(self.swarm.F[front])[pairs]
+        less_crowded = np.where(distance[:, 0] >= distance[:, 1], pairs[:, 0], pairs[:, 1])
+        return self.swarm.X[front[less_crowded]]
+
+    def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
+        points = self.swarm.followed_by(self._evaluated(infills))
+        kept = survivors(points, self.pop_size)
+        survived = np.zeros(2 * self.pop_size, dtype=bool)
+        survived[kept] = True
+        self.success.learn(self.chosen, survived[self.pop_size :])
+        self.pop, self.swarm = Population.merge(self.pop, infills)[kept], points[kept]
+
+    def _set_optimum(self) -> None:
+        # pymoo reads the optimum in every generation, even if nothing could be judged so far.
+        front = best_front(self.swarm)
+        self.opt = self.pop[front] if len(front) else self.pop[:1]

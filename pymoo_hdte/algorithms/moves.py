@@ -1,0 +1,140 @@
+"""Moves of an elitist swarm: where a particle steps from where it is.
+
+A particle of an elitist swarm stands on the best position it knows, so that its own memory pulls it
+nowhere. What is left of the classical swarm is the pull of a leader, here in three forms that suit
+different landscapes: scaled, exact, and along directions that the swarm itself spans.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Move(Protocol):
+    """A rule for the steps of particles."""
+
+    def __call__(
+        self,
+        X: NDArray[np.float64],
+        leaders: NDArray[np.float64],
+        swarm: NDArray[np.float64],
+        random_state: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return the steps, shape (n, d).
+
+        Parameters
+        ----------
+        X : (n, d) array
+            Positions of the particles that move.
+        leaders : (n, d) array
+            The leader of each.
+        swarm : (N, d) array
+            Positions of all particles.
+        random_state : numpy.random.Generator
+            Source of random numbers.
+        """
+        ...
+
+
+class Attraction:
+    """The social pull of a particle swarm, in half of the variables.
+
+    A step is c r (leader - X) with c = 1.5 and r uniform in [0, 1] for every variable, so that it
+    may pass the leader; a variable takes part with probability 0.5 (a whole move would disturb what
+    is already right).
+    """
+
+    STRENGTH = 1.5
+    TAKES_PART = 0.5
+
+    def __call__(
+        self,
+        X: NDArray[np.float64],
+        leaders: NDArray[np.float64],
+        swarm: NDArray[np.float64],
+        random_state: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return the steps (n, d)."""
+        pull = self.STRENGTH * random_state.random(X.shape) * (leaders - X)
+        return np.where(random_state.random(X.shape) < self.TAKES_PART, pull, 0.0)
+
+
+class Exchange:
+    """Half of the variables take the value of the leader as it is.
+
+    Where good values lie in separate valleys, anything between two of them is bad. It is the
+    exemplar of J. J. Liang, A. K. Qin, P. N. Suganthan, S. Baskar, "Comprehensive learning particle
+    swarm optimizer for global optimization of multimodal functions", IEEE Transactions on
+    Evolutionary Computation 10 (2006) 281-295, followed all the way.
+    """
+
+    TAKES_PART = 0.5
+
+    def __call__(
+        self,
+        X: NDArray[np.float64],
+        leaders: NDArray[np.float64],
+        swarm: NDArray[np.float64],
+        random_state: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return the steps (n, d)."""
+        return np.where(random_state.random(X.shape) < self.TAKES_PART, leaders - X, 0.0)
+
+
+class Difference:
+    """All variables together, along the leader's direction and the difference of two particles.
+
+    A step is c r (leader - X) + 0.5 (X_a - X_b) with c = 1.5, one uniform r a particle and a, b
+    drawn from the swarm. It turns with the coordinate system, as the other moves do not, and so
+    serves problems whose variables belong together (differential evolution, "current to best":
+    K. Price, R. Storn, J. Lampinen, "Differential Evolution", Springer 2005).
+    """
+
+    STRENGTH = 1.5
+    SCALE = 0.5
+
+    def __call__(
+        self,
+        X: NDArray[np.float64],
+        leaders: NDArray[np.float64],
+        swarm: NDArray[np.float64],
+        random_state: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return the steps (n, d)."""
+        first, second = random_state.integers(len(swarm), size=(2, len(X)))
+        pull = self.STRENGTH * random_state.random((len(X), 1)) * (leaders - X)
+        return pull + self.SCALE * (swarm[first] - swarm[second])
+
+
+class SparseMutation:
+    """Normal steps of random length in few variables.
+
+    Each variable is struck with probability 0.5 / d, at least one in a particle that would stay
+    where it is. The standard deviation is span 10^-u with u uniform in [0.3, 2.3] for every
+    particle: from half of the box to half a percent of it, at all times, so that no schedule is
+    needed.
+    """
+
+    RATE = 0.5
+    LARGEST_EXPONENT, SMALLEST_EXPONENT = -0.3, -2.3
+
+    def __call__(
+        self,
+        steps: NDArray[np.float64],
+        span: NDArray[np.float64],
+        random_state: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return what to add to the ``steps`` (n, d) in a box of widths ``span`` (d,)."""
+        n, d = steps.shape
+        struck = random_state.random((n, d)) < self.RATE / d
+        still = np.flatnonzero(~(struck.any(axis=1) | steps.any(axis=1)))
+        struck[still, random_state.integers(d, size=len(still))] = True
+        rows, columns = np.nonzero(struck)
+        exponent = random_state.uniform(self.SMALLEST_EXPONENT, self.LARGEST_EXPONENT, n)
+        mutation = np.zeros((n, d))
+        size = 10.0 ** exponent[rows] * span[columns]
+        mutation[rows, columns] = size * random_state.standard_normal(len(rows))
+        return mutation

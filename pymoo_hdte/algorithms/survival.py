@@ -1,0 +1,41 @@
+"""Elitism: which of the parents and their offspring make up the next swarm."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.algorithms.dominance import constrained_ranks
+from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.spread import most_spread
+
+
+def survivors(points: Points, size: int) -> NDArray[np.int_]:
+    """Return ``size`` rows, ascending: the best fronts, the last of them thinned out evenly.
+
+    Feasible points come before infeasible ones, these by violation. A point whose objectives and
+    violation equal an earlier one's comes after all others, so that no front fills with copies.
+    """
+    ranks = constrained_ranks(points)
+    copies = _copies(points)
+    ranks[copies] += ranks.max()
+    order = np.argsort(ranks, kind="stable")
+    last = ranks[order[size - 1]]
+    safe = np.flatnonzero(ranks < last)
+    front = np.flatnonzero(ranks == last)
+    room = size - len(safe)
+    # Infeasible fronts are ordered by violation, and copies are all alike: no spread to keep.
+    spread = last <= ranks[~copies].max() and points.violation[front[0]] == 0.0
+    chosen = most_spread(points.F[front], room) if spread else np.arange(room)
+    return np.sort(np.concatenate([safe, front[chosen]]))
+
+
+def _copies(points: Points) -> NDArray[np.bool_]:
+    """Return which rows (n,) repeat an earlier one in objectives and violation."""
+    keys = np.column_stack([points.F, points.violation])
+    order = np.lexsort(keys.T)
+    # Stable sorting leaves the earliest of equal rows in front.
+    same = np.all(keys[order[1:]] == keys[order[:-1]], axis=1)
+    copies = np.zeros(len(points), dtype=bool)
+    copies[order[1:][same]] = True
+    return copies
