@@ -37,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InvalidInput as error:
         parser.error(str(error))
     with executor or nullcontext():
-        context = Context(options.seeds, options.out, Campaign(options.out, executor), options.full)
+        campaign = Campaign(options.out, executor)
+        context = Context(options.seeds, options.out, campaign, options.full, options.quick)
         return _run(chosen, context)
 
 
@@ -82,11 +83,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--out", type=Path, default=Path("results"), help="folder of the results (default results)"
     )
-    parser.add_argument(
+    extent = parser.add_mutually_exclusive_group()
+    extent.add_argument(
         "--full",
         action="store_true",
-        help="run the long campaign behind an experiment (calibration) instead of reading its "
-        "committed outcome",
+        help="run the long campaign behind an experiment (calibration, blind, peers, swarm_parts) "
+        "instead of reading its committed outcome",
+    )
+    extent.add_argument(
+        "--quick", action="store_true", help="run a small version of peers or swarm_parts, minutes"
     )
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"

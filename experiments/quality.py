@@ -6,20 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pymoo.indicators.hv import Hypervolume
-from pymoo.indicators.igd import IGD
-from pymoo.indicators.spacing import SpacingIndicator
 
-from pymoo_hdte.checks import InvalidInput, finite_array
+from experiments.indicators import IndicatorsAgainst
+from pymoo_hdte.checks import finite_array
 
 GAP = 0.02
 """Neighbours on the reference front further apart than this belong to two pieces."""
 
 REACH = 0.05
 """A piece with no solution within this distance is lost."""
-
-HYPERVOLUME_CORNER = np.array([1.1, 1.1])
-"""Reference point of the hypervolume in normalised objectives."""
 
 
 class Quality(NamedTuple):
@@ -53,18 +48,11 @@ class TrueFront:
         front = finite_array("true front", F, (None, 2))
         front = front[np.argsort(front[:, 0], kind="stable")]
         self.F = front
-        self.ideal = front.min(axis=0)
-        self.nadir = front.max(axis=0)
-        if not np.all(self.nadir > self.ideal):
-            raise InvalidInput("extent of the true front", self.nadir - self.ideal, "above 0")
-        scale = {"zero_to_one": True, "ideal": self.ideal, "nadir": self.nadir}
-        self._igd = IGD(front, **scale)
-        self._spacing = SpacingIndicator(**scale)
-        self._hypervolume = Hypervolume(ref_point=HYPERVOLUME_CORNER, norm_ref_point=False, **scale)
+        self._indicators = IndicatorsAgainst(front)
 
     def normalise(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map the ideal point to 0 and the nadir point to 1."""
-        return (F - self.ideal) / (self.nadir - self.ideal)
+        return self._indicators.normalise(F)
 
     @property
     def pieces(self) -> list[NDArray[np.float64]]:
@@ -75,22 +63,17 @@ class TrueFront:
     def quality(self, F: ArrayLike) -> Quality:
         """Measure the front ``F``, shape (n, 2).
 
-        pymoo gives an empty front an IGD of 0 and a duplicated one a Spacing of 0, each the best
-        there is. Here an empty front has infinite IGD, duplicates count once, and a front of fewer
-        than two different points has no Spacing (NaN).
+        As `IndicatorsAgainst`; an empty front loses every piece.
 
         Raises
         ------
         InvalidInput
             An objective is not finite.
         """
-        front = np.unique(finite_array("F", F, (None, 2)), axis=0)
-        if len(front) == 0:
-            return Quality(np.inf, np.nan, 0.0, len(self.pieces))
-        spacing = float(self._spacing(front)) if len(front) > 1 else np.nan
-        return Quality(
-            float(self._igd(front)), spacing, float(self._hypervolume(front)), self._lost(front)
-        )
+        front = finite_array("F", F, (None, 2))
+        measured = self._indicators(front)
+        lost = self._lost(front) if len(front) else len(self.pieces)
+        return Quality(measured.igd, measured.spacing, measured.hypervolume, lost)
 
     def _lost(self, F: NDArray[np.float64]) -> int:
         found = self.normalise(F)

@@ -24,12 +24,15 @@ class Context:
         Runs jobs on the workers that the user allowed.
     full
         Whether to run long campaigns instead of reading their committed outcome.
+    quick
+        Whether to run a small version of those that have one.
     """
 
     seeds: int
     out: Path
     campaign: Campaign
     full: bool = False
+    quick: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,8 @@ EXPERIMENTS = (
     ),
     Experiment("emps", "EMPS: friction of a positioning system, measured by others"),
     Experiment("kinova", "Kinova Gen3: friction and ripple of a robot joint, measured by others"),
+    Experiment("peers", "The elitist swarm against the best algorithms of other libraries"),
+    Experiment("swarm_parts", "What each part of the elitist swarm is worth"),
     Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
     Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
 )

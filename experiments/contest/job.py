@@ -10,7 +10,7 @@ from moocore import is_nondominated
 from numpy.typing import NDArray
 
 from experiments.campaign import Run
-from experiments.contest.peers import CONTESTANTS
+from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
 from experiments.contest.problems import problem_of
 from pymoo_hdte.algorithms.spread import most_spread
 
@@ -38,7 +38,7 @@ class ContestRun:
         Columns are the budget and the objectives, rows by budget and rising objectives.
         """
         problem = problem_of(self.problem)
-        run = CONTESTANTS[self.algorithm].run
+        run = (CONTESTANTS | SWARM_VARIANTS)[self.algorithm].run
         started = time.perf_counter()
         offered = run(problem, self.budgets, self.seed)
         seconds = time.perf_counter() - started

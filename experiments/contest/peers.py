@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
 from experiments.contest.peers_pymoo import OWN, PYMOO, run_pymoo
+from experiments.contest.reduced_swarms import REDUCED
 
 Fronts = list[NDArray[np.float64]]
 RunFunction = Callable[[Problem, Sequence[int], int], Fronts]
@@ -84,3 +85,9 @@ CONTESTANTS = {
     "random search": Contestant("numpy", run_random),
 }
 """All contestants by name."""
+
+SWARM_VARIANTS = {
+    name: Contestant("pymoo_hdte", partial(run_pymoo, lambda _, make=make: make()))
+    for name, make in REDUCED.items()
+}
+"""Variants of the elitist swarm, which compete with it alone."""

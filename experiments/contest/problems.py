@@ -17,6 +17,7 @@ from experiments.contest.true_fronts import (
     dtlz_front,
     even_curve,
     osy_front,
+    srn_front,
     tnk_front,
     welded_beam_front,
     wfg_front,
@@ -113,9 +114,9 @@ def _constrained() -> list[Benchmark]:
     fronts: dict[str, Callable[[Problem], NDArray[np.float64]]] = {
         "BNH": _pymoo_front,
         "TNK": lambda _: tnk_front(),
-        "SRN": _pymoo_front,
+        "SRN": srn_front,
         "OSY": osy_front,
-        "welded_beam": welded_beam_front,
+        "welded_beam": lambda _: welded_beam_front(),
     }
     return [
         Benchmark(name, "constrained", False, lambda name=name: get_problem(name.lower()), front)

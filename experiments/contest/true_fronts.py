@@ -7,6 +7,8 @@ OSY and TNK (Deb 2001, section 8.3).
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from moocore import is_nondominated
 from numpy.typing import NDArray
@@ -18,6 +20,10 @@ N_POINTS = 1000
 """Of a front with two objectives; those with three have some 5,000."""
 
 _PARTITIONS = 99
+
+WELDED_BEAM = Path(__file__).parent / "front_welded_beam.csv"
+WELDED_BEAM_LEVELS = np.geomspace(4.39e-4, 0.0158, 400)
+"""Deflections, in inches, from the stiffest beam to the cheapest."""
 
 
 def wfg_front(number: int) -> NDArray[np.float64]:
@@ -76,40 +82,58 @@ def osy_front(problem: Problem) -> NDArray[np.float64]:
     return even_curve(F[np.all(G <= 1e-9, axis=1)])
 
 
-def welded_beam_front(problem: Problem) -> NDArray[np.float64]:
-    """Return the front of the welded beam, shape (n, 2): least cost at levels of deflection.
+def srn_front(problem: Problem) -> NDArray[np.float64]:
+    """Return the front of SRN, shape (n, 2).
 
-    SLSQP follows the curve from its stiff end with several starts at every level.
+    The set has three parts: x_1 = -2.5 between the two constraints, and a stretch along either of
+    them, which pymoo's front leaves out. On the circle it ends where f_2 is least.
     """
-    stiffest, weakest = 2.1952 / (10.0**3 * 5.0), 2.1952 / (10.0**3 * 0.2)
-    levels = np.geomspace(stiffest, weakest, 300)
+    t = np.linspace(0.0, 1.0, 10 * N_POINTS)
+    edge = np.sqrt(15.0**2 - 2.5**2)
+    line = np.column_stack([-2.5 + 5.0 * t, (7.5 + 5.0 * t) / 3.0])
+    middle = np.column_stack([np.full_like(t, -2.5), 2.5 + (edge - 2.5) * t])
+    turn = np.arcsin(2.5 / 15.0) + (np.pi / 4.0) * t
+    circle = 15.0 * np.column_stack([-np.sin(turn), np.cos(turn)])
+    return even_curve(problem.evaluate(np.vstack([line, middle, circle]), return_values_of=["F"]))
+
+
+def welded_beam_front() -> NDArray[np.float64]:
+    """Return the front of the welded beam, shape (n, 2): stored, as `follow_welded_beam` gives it.
+
+    No closed form is known.
+    """
+    return even_curve(np.loadtxt(WELDED_BEAM, delimiter=",", skiprows=1))
+
+
+def follow_welded_beam(problem: Problem, levels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return least cost at falling stiffness, shape (n, 2), for rising deflections ``levels``.
+
+    SLSQP starts from the last solution and from random ones, and what is better stays.
+    """
     rng = np.random.default_rng(1)
     width = problem.xu - problem.xl
-    best, points = problem.xu.copy(), []
+    best, points = (problem.xl + problem.xu) / 2.0, []
     for level in levels:
-        starts = [best, *(problem.xl + rng.random((4, problem.n_var)) * width)]
+        starts = [best, *(problem.xl + rng.random((5, problem.n_var)) * width)]
         found = [_least_cost(problem, level, start) for start in starts]
-        values = [(cost, x) for cost, x in found if np.isfinite(cost)]
-        _, best = min(values, key=lambda entry: entry[0])
+        _, best = min(found, key=lambda entry: entry[0])
         points.append(problem.evaluate(best, return_values_of=["F"]))
-    return even_curve(np.array(points))
+    return np.array(points)
 
 
 def _least_cost(
     problem: Problem, level: float, start: NDArray[np.float64]
 ) -> tuple[float, NDArray[np.float64]]:
-    def values(x: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return problem.evaluate(x, return_values_of=["F", "G"])
-
-    # The smallest variable is 0.1 wide and the forces are thousands: one scale for each.
-    size = np.array([1e4, 1e4, 1.0, 1e4])
+    def cost(x: NDArray[np.float64]) -> float:
+        return problem.evaluate(x, return_values_of=["F"])[0]
 
     def slack(x: NDArray[np.float64]) -> NDArray[np.float64]:
-        F, G = values(x)
-        return np.append(-G / size, 1.0 - F[1] / level)
+        F, G = problem.evaluate(x, return_values_of=["F", "G"])
+        # Three constraints are forces and stresses of thousands, one is a length: one scale each.
+        return np.append(-G / np.array([1e4, 1e4, 1.0, 1e4]), 1.0 - F[1] / level)
 
     result = minimize(
-        lambda x: values(x)[0][0],
+        cost,
         start,
         method="SLSQP",
         bounds=list(zip(problem.xl, problem.xu, strict=True)),
@@ -117,8 +141,7 @@ def _least_cost(
         options={"ftol": 1e-10, "maxiter": 200},
     )
     x = np.clip(result.x, problem.xl, problem.xu)
-    feasible = np.min(slack(x)) > -1e-6
-    return (float(result.fun) if feasible else np.inf), x
+    return (float(result.fun) if np.min(slack(x)) > -1e-6 else np.inf), x
 
 
 def even_curve(F: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,8 +15,9 @@ from pymoo_hdte.algorithms.base import Swarm, particles_at
 from pymoo_hdte.algorithms.crowding import crowding_distance
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, SparseMutation
+from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.algorithms.success_shares import SuccessShares
-from pymoo_hdte.algorithms.survival import survivors
+from pymoo_hdte.algorithms.survival import Truncation, survivors
 
 
 class ElitistSwarm(Swarm):
@@ -39,6 +40,9 @@ class ElitistSwarm(Swarm):
     moves : sequence of Move, optional
         By default `Attraction`, `Exchange` and `Difference`.
     mutation : SparseMutation, optional
+    truncation : callable, optional
+        Takes objectives (n, m) and a size, and returns the rows that stay; by default
+        `most_spread`.
     **kwargs
         Any other argument of `pymoo.core.algorithm.Algorithm`.
 
@@ -65,11 +69,13 @@ class ElitistSwarm(Swarm):
         sampling: Sampling | NDArray | Population | None = None,
         moves: Sequence[Move] | None = None,
         mutation: SparseMutation | None = None,
+        truncation: Truncation = most_spread,
         **kwargs: Any,
     ) -> None:
         super().__init__(pop_size, sampling, **kwargs)
         self.moves = (Attraction(), Exchange(), Difference()) if moves is None else tuple(moves)
         self.mutation = SparseMutation() if mutation is None else mutation
+        self.truncation = truncation
 
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
         super()._setup(problem, **kwargs)
@@ -102,7 +108,7 @@ class ElitistSwarm(Swarm):
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         points = self.swarm.followed_by(self._evaluated(infills))
-        kept = survivors(points, self.pop_size)
+        kept = survivors(points, self.pop_size, self.truncation)
         survived = np.zeros(2 * self.pop_size, dtype=bool)
         survived[kept] = True
         self.success.learn(self.chosen, survived[self.pop_size :])

@@ -22,68 +22,55 @@ def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
     n = len(F)
     if n <= size:
         return np.arange(n)
-    return np.flatnonzero(_kept(squared_distances(F), size))
-
-
-def squared_distances(F: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the squared distances (n, n) of rows scaled by their ranges, inf on the diagonal."""
     span = np.ptp(F, axis=0)
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
-    distance = np.zeros((len(F), len(F)))
-    for column in scaled.T:
-        distance += (column[:, np.newaxis] - column) ** 2
-    np.fill_diagonal(distance, np.inf)
-    return distance
+    return np.flatnonzero(_kept(scaled, size))
 
 
 @njit(cache=True)
-def _kept(distance: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
-    n = len(distance)
+def _kept(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
+    n = len(scaled)
     stays = np.ones(n, dtype=np.bool_)
-    nearest = np.empty(n, dtype=np.int64)
-    second = np.empty(n, dtype=np.int64)
+    # Of every row the two nearest that stay, and their squared distances.
+    neighbours = np.empty((n, 2), dtype=np.int64)
+    gaps = np.empty((n, 2))
     for row in range(n):
-        _find_neighbours(distance, stays, nearest, second, row)
+        _find_neighbours(scaled, stays, neighbours, gaps, row)
     for _ in range(n - size):
         leaving = -1
         for row in range(n):
-            if stays[row] and (leaving < 0 or _closer(distance, nearest, second, row, leaving)):
+            if stays[row] and (leaving < 0 or _closer(gaps[row], gaps[leaving])):
                 leaving = row
         stays[leaving] = False
         for row in range(n):
-            if stays[row] and (nearest[row] == leaving or second[row] == leaving):
-                _find_neighbours(distance, stays, nearest, second, row)
+            if stays[row] and (neighbours[row, 0] == leaving or neighbours[row, 1] == leaving):
+                _find_neighbours(scaled, stays, neighbours, gaps, row)
     return stays
 
 
 @njit(cache=True)
-def _closer(
-    distance: NDArray[np.float64],
-    nearest: NDArray[np.int_],
-    second: NDArray[np.int_],
-    row: int,
-    other: int,
-) -> bool:
-    first_gap = distance[row, nearest[row]] - distance[other, nearest[other]]
-    if first_gap != 0.0:
-        return first_gap < 0.0
-    return distance[row, second[row]] < distance[other, second[other]]
+def _closer(gaps: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
+    return gaps[0] < others[0] or (gaps[0] == others[0] and gaps[1] < others[1])
 
 
 @njit(cache=True)
 def _find_neighbours(
-    distance: NDArray[np.float64],
+    scaled: NDArray[np.float64],
     stays: NDArray[np.bool_],
-    nearest: NDArray[np.int_],
-    second: NDArray[np.int_],
+    neighbours: NDArray[np.int_],
+    gaps: NDArray[np.float64],
     row: int,
 ) -> None:
-    first, then = row, row
-    for other in range(len(distance)):
+    first, second, gap, second_gap = row, row, np.inf, np.inf
+    for other in range(len(scaled)):
         if not stays[other] or other == row:
             continue
-        if distance[row, other] < distance[row, first]:
-            first, then = other, first
-        elif distance[row, other] < distance[row, then]:
-            then = other
-    nearest[row], second[row] = first, then
+        distance = 0.0
+        for objective in range(scaled.shape[1]):
+            distance += (scaled[row, objective] - scaled[other, objective]) ** 2
+        if distance < gap:
+            first, second, gap, second_gap = other, first, distance, gap
+        elif distance < second_gap:
+            second, second_gap = other, distance
+    neighbours[row] = first, second
+    gaps[row] = gap, second_gap

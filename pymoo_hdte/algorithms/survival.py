@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,9 +11,12 @@ from pymoo_hdte.algorithms.dominance import constrained_ranks
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.spread import most_spread
 
+Truncation = Callable[[NDArray[np.float64], int], NDArray[np.int_]]
+"""Takes objectives (n, m) and a size, and returns which rows stay."""
 
-def survivors(points: Points, size: int) -> NDArray[np.int_]:
-    """Return ``size`` rows, ascending: the best fronts, the last of them thinned out evenly.
+
+def survivors(points: Points, size: int, truncation: Truncation = most_spread) -> NDArray[np.int_]:
+    """Return ``size`` rows, ascending: the best fronts, the last of them thinned out.
 
     Feasible points come before infeasible ones, these by violation. A point whose objectives and
     violation equal an earlier one's comes after all others, so that no front fills with copies.
@@ -26,7 +31,7 @@ def survivors(points: Points, size: int) -> NDArray[np.int_]:
     room = size - len(safe)
     # Infeasible fronts are ordered by violation, and copies are all alike: no spread to keep.
     spread = last <= ranks[~copies].max() and points.violation[front[0]] == 0.0
-    chosen = most_spread(points.F[front], room) if spread else np.arange(room)
+    chosen = truncation(points.F[front], room) if spread else np.arange(room)
     return np.sort(np.concatenate([safe, front[chosen]]))
 
 

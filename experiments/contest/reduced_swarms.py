@@ -1,0 +1,102 @@
+"""The elitist swarm less one of its parts, or with one more: what its ablation compares."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+
+from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms.crowding import least_crowded
+from pymoo_hdte.algorithms.dominance import best_front
+from pymoo_hdte.algorithms.inertia import normalised_entropy
+from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, SparseMutation
+from pymoo_hdte.algorithms.success_shares import SuccessShares
+
+GRID_DIVISIONS = 32
+
+
+class EqualShares(SuccessShares):
+    """All moves alike, whatever their success."""
+
+    def learn(self, moves: NDArray[np.int_], survived: NDArray[np.bool_]) -> None:
+        """Learn nothing."""
+
+
+class EqualSwarm(ElitistSwarm):
+    """Without learning which move succeeds."""
+
+    def _setup(self, problem: Problem, **kwargs: Any) -> None:
+        super()._setup(problem, **kwargs)
+        self.success = EqualShares(len(self.moves))
+
+
+class AnyLeaderSwarm(ElitistSwarm):
+    """Leaders drawn from the best front without regard to crowding."""
+
+    def _leaders(self) -> NDArray[np.float64]:
+        front = best_front(self.swarm)
+        if not len(front):
+            return self.swarm.X
+        return self.swarm.X[front[self.random_state.integers(len(front), size=self.pop_size)]]
+
+
+class OneSizeMutation(SparseMutation):
+    """A tenth of the box as the one standard deviation."""
+
+    LARGEST_EXPONENT = SMALLEST_EXPONENT = -1.0
+
+
+class NoMutation(SparseMutation):
+    """Leave every particle to its move."""
+
+    def __call__(
+        self,
+        steps: NDArray[np.float64],
+        span: NDArray[np.float64],
+        random_state: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return zeros (n, d)."""
+        return np.zeros_like(steps)
+
+
+class InertialSwarm(ElitistSwarm):
+    """With the last step of every survivor added to its next, weighted by the archive's entropy.
+
+    The weight is 0.1 + 0.4 (1 - S), S being the normalised entropy of the best front, in the
+    variables that the move touches: the extension that `pymoo_hdte.algorithms.inertia` suggests.
+    """
+
+    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
+        super()._initialize_advance(infills, **kwargs)
+        self.pop.set("step", np.zeros_like(self.swarm.X))
+
+    def _infill(self) -> Population:
+        before, last = self.swarm.X, self.pop.get("step")
+        particles = super()._infill()
+        moved = np.array([particle.X for particle in particles])
+        diversity = normalised_entropy(self.swarm.F[best_front(self.swarm)], GRID_DIVISIONS)
+        weight = 0.1 + 0.4 * (1.0 - diversity)
+        carried = np.where(moved != before, weight * last, 0.0)
+        X = np.clip(moved + carried, *self.problem.bounds())
+        particles.set("X", X)
+        particles.set("step", X - before)
+        return particles
+
+
+REDUCED: dict[str, Callable[[], ElitistSwarm]] = {
+    "without attraction": lambda: ElitistSwarm(moves=(Exchange(), Difference())),
+    "without exchange": lambda: ElitistSwarm(moves=(Attraction(), Difference())),
+    "without difference": lambda: ElitistSwarm(moves=(Attraction(), Exchange())),
+    "equal shares of moves": EqualSwarm,
+    "without mutation": lambda: ElitistSwarm(mutation=NoMutation()),
+    "mutation of one size": lambda: ElitistSwarm(mutation=OneSizeMutation()),
+    "crowding truncation": lambda: ElitistSwarm(truncation=least_crowded),
+    "leaders at random": AnyLeaderSwarm,
+    "with entropy inertia": InertialSwarm,
+}
+"""Variants by what is missing, changed or added; all with 100 particles."""

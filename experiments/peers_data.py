@@ -1,0 +1,187 @@
+"""Scores of the peer comparison: measured from runs, and as the CSV that the repository keeps.
+
+Seconds stand in a file of their own, because they differ from run to run.
+"""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.campaign import Campaign, Run
+from experiments.contest.job import ContestRun
+from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
+from experiments.contest.problems import BENCHMARKS, front_of
+from experiments.indicators import Indicators, IndicatorsAgainst
+from experiments.provenance import environment
+
+_ENTRIES = CONTESTANTS | SWARM_VARIANTS
+_KEY = ("problem", "algorithm", "evaluations", "seed")
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Indicators of every run.
+
+    Attributes
+    ----------
+    problems, algorithms : tuple of str
+    budgets, seeds : tuple of int
+    values : ndarray, shape (4, problems, algorithms, budgets, seeds)
+        In the order of `Indicators`; a run without any feasible solution has infinite distances,
+        and an algorithm that cannot take a problem has NaN throughout.
+    seconds : ndarray, shape (problems, algorithms)
+        Median wall time of a run of the largest budget.
+    """
+
+    problems: tuple[str, ...]
+    algorithms: tuple[str, ...]
+    budgets: tuple[int, ...]
+    seeds: tuple[int, ...]
+    values: NDArray[np.float64]
+    seconds: NDArray[np.float64]
+
+    def of(
+        self, indicator: str, evaluations: int, *, tuning: bool | None = None
+    ) -> NDArray[np.float64]:
+        """Return one indicator at one budget, shape (problems, algorithms, seeds).
+
+        With ``tuning``, only of the problems that may, or may not, be tuned on.
+        """
+        place = Indicators._fields.index(indicator), self.budgets.index(evaluations)
+        return self.values[place[0], :, :, place[1], :][self.rows(tuning)]
+
+    def rows(self, tuning: bool | None) -> NDArray[np.int_]:
+        """Return the rows of the problems that may, or may not, be tuned on; all for None."""
+        kinds = [BENCHMARKS[name].tuning for name in self.problems]
+        return np.array([i for i, kind in enumerate(kinds) if tuning is None or kind == tuning])
+
+
+def contest_scores(
+    campaign: Campaign,
+    problems: Sequence[str],
+    algorithms: Sequence[str],
+    budgets: tuple[int, ...],
+    seeds: Sequence[int],
+) -> Scores:
+    """Run every algorithm on every problem with every seed, and measure the final sets."""
+    entries = [
+        (problem, algorithm, seed)
+        for seed, problem, algorithm in product(seeds, problems, algorithms)
+        if takes_part(algorithm, problem)
+    ]
+    jobs = [
+        ContestRun(*entry, budget)
+        for entry in entries
+        for budget in budgets_of_runs(entry[1], budgets)
+    ]
+    values = np.full(
+        (len(Indicators._fields), len(problems), len(algorithms), len(budgets), len(seeds)), np.nan
+    )
+    seconds = np.full((len(problems), len(algorithms), len(seeds)), np.nan)
+    for job, run in zip(jobs, campaign.run(jobs, "peers"), strict=True):
+        place = problems.index(job.problem), algorithms.index(job.algorithm)
+        for budget in job.budgets:
+            where = (*place, budgets.index(budget), seeds.index(job.seed))
+            values[(slice(None), *where)] = measure(job.problem, run, budget)
+        seconds[(*place, seeds.index(job.seed))] = run.seconds
+    # The last run of an algorithm on a problem is that of the largest budget.
+    return Scores(
+        tuple(problems),
+        tuple(algorithms),
+        budgets,
+        tuple(seeds),
+        np.vectorize(_rounded)(values),
+        np.median(seconds, axis=-1),
+    )
+
+
+def takes_part(algorithm: str, problem: str) -> bool:
+    """Say whether an algorithm takes the problem at all."""
+    unconstrained = BENCHMARKS[problem].family != "constrained"
+    return unconstrained or _ENTRIES[algorithm].takes_constraints
+
+
+def budgets_of_runs(algorithm: str, budgets: tuple[int, ...]) -> list[tuple[int, ...]]:
+    """Return the budgets that share a run: all, unless the algorithm moves by what it has left."""
+    if _ENTRIES[algorithm].knows_budget:
+        return [(budget,) for budget in budgets]
+    return [budgets]
+
+
+@cache
+def _indicators(problem: str) -> IndicatorsAgainst:
+    return IndicatorsAgainst(front_of(problem))
+
+
+def measure(problem: str, run: Run, budget: int) -> Indicators:
+    """Return the indicators of the final set that a run offers at one budget."""
+    return _indicators(problem)(run.values[run.values[:, 0] == budget][:, 1:])
+
+
+def _rounded(value: float) -> float:
+    """Return the number that the CSV keeps, so that both ways to the report give the same."""
+    return float(f"{value:.4g}")
+
+
+def format_scores(scores: Scores) -> str:
+    """Return the CSV text of the scores, with date and versions in a first comment line."""
+    header = {"date": datetime.date.today().isoformat(), **environment()}
+    text = io.StringIO()
+    text.write(f"# {json.dumps(header)}\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*_KEY, *Indicators._fields])
+    axes = (scores.problems, scores.algorithms, scores.budgets, scores.seeds)
+    for place in np.ndindex(*scores.values.shape[1:]):
+        row = scores.values[(slice(None), *place)]
+        if not np.isnan(row).all():
+            key = [axis[i] for axis, i in zip(axes, place, strict=True)]
+            writer.writerow([*key, *(f"{value:.4g}" for value in row)])
+    return text.getvalue()
+
+
+def format_seconds(scores: Scores) -> str:
+    """Return the CSV text of the seconds."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["problem", *scores.algorithms])
+    for problem, row in zip(scores.problems, scores.seconds, strict=True):
+        writer.writerow([problem, *(f"{value:.3g}" for value in row)])
+    return text.getvalue()
+
+
+def read_scores(path: Path, seconds_path: Path) -> Scores:
+    """Read what `format_scores` and `format_seconds` wrote."""
+    with path.open(newline="", encoding="utf-8") as file:
+        file.readline()
+        rows = list(csv.DictReader(file))
+    problems, algorithms = (_in_order(rows, name) for name in _KEY[:2])
+    budgets, seeds = (tuple(sorted({int(row[name]) for row in rows})) for name in _KEY[2:])
+    shape = (len(Indicators._fields), len(problems), len(algorithms), len(budgets), len(seeds))
+    values = np.full(shape, np.nan)
+    for row in rows:
+        place = (
+            problems.index(row["problem"]),
+            algorithms.index(row["algorithm"]),
+            budgets.index(int(row["evaluations"])),
+            seeds.index(int(row["seed"])),
+        )
+        values[(slice(None), *place)] = [float(row[name]) for name in Indicators._fields]
+    with seconds_path.open(newline="", encoding="utf-8") as file:
+        by_problem = {row["problem"]: row for row in csv.DictReader(file)}
+    seconds = np.array([[float(by_problem[p][a]) for a in algorithms] for p in problems])
+    return Scores(problems, algorithms, budgets, seeds, values, seconds)
+
+
+def _in_order(rows: Sequence[dict[str, str]], name: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(row[name] for row in rows))

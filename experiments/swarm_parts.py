@@ -1,0 +1,137 @@
+"""What each part of the elitist swarm is worth: the same runs with a part missing or added.
+
+Without ``--full`` the report is made from ``experiments/data/swarm_parts.csv``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.contest.peers import SWARM_VARIANTS
+from experiments.contest.problems import BENCHMARKS
+from experiments.peers_data import (
+    Scores,
+    contest_scores,
+    format_scores,
+    format_seconds,
+    read_scores,
+)
+from experiments.peers_tables import NAMES, OURS
+from experiments.registry import Context
+from experiments.result import Column, Result, Table
+from experiments.store import TIMES, write_atomically
+
+COMMITTED = Path(__file__).parent / "data" / "swarm_parts.csv"
+COMMITTED_SECONDS = Path(__file__).parent / "data" / "swarm_parts_seconds.csv"
+
+BUDGETS, SEEDS = (10_000,), 21
+QUICK_BUDGETS, QUICK_SEEDS = (2_500,), 5
+RESAMPLES = 1000
+
+SETTING = (
+    "Each variant of the elitist swarm lacks a part, has a simpler one, or has one more; all else "
+    "is the same, as are problems, seeds and measures of the comparison with peers. The cost of a "
+    "change is the geometric mean over the problems of the ratio of median IGDs, the variant's to "
+    "the whole swarm's: above 1, the part is worth having. Intervals come from resampled seeds. "
+    "The parts were chosen on the tuning problems; the held-out ones say whether they hold."
+)
+
+
+def run(context: Context) -> Result:
+    """Run the variants or read their outcome, and compare each with the whole."""
+    scores = _scores(context)
+    return Result(
+        title="What each part of the elitist swarm is worth",
+        command="python -m experiments swarm_parts --full",
+        paragraphs=(SETTING,),
+        tables=(_parts_table(scores), *_problems_tables(scores)),
+        notes=(f"{len(scores.seeds)} seeds, {scores.budgets[-1]:,} evaluations.",),
+    )
+
+
+def _scores(context: Context) -> Scores:
+    if not (context.full or context.quick):
+        if not COMMITTED.is_file():
+            raise RuntimeError(f"no {COMMITTED.name}: run python -m experiments swarm_parts --full")
+        return read_scores(COMMITTED, COMMITTED_SECONDS)
+    budgets, seeds = (BUDGETS, SEEDS) if context.full else (QUICK_BUDGETS, QUICK_SEEDS)
+    algorithms = [OURS, *SWARM_VARIANTS]
+    scores = contest_scores(
+        context.campaign, list(BENCHMARKS), algorithms, budgets, range(1, seeds + 1)
+    )
+    folder = context.out / "swarm_parts"
+    write_atomically(folder / COMMITTED.name, format_scores(scores).encode())
+    times = context.out / TIMES / "swarm_parts"
+    write_atomically(times / COMMITTED_SECONDS.name, format_seconds(scores).encode())
+    return scores
+
+
+def _parts_table(scores: Scores) -> Table:
+    """Give the cost of every change, with its interval, apart for tuning and held-out problems."""
+    rng = np.random.default_rng(1)
+    columns = [Column("variant")]
+    rows: list[list[float | str]] = [[name] for name in scores.algorithms[1:]]
+    for group, tuning in (("tuning problems", True), ("held-out problems", False)):
+        columns += [
+            Column("cost", "", 3, group),
+            Column("95 %", group=group),
+            Column("worse on", group=group),
+            Column("better on", group=group),
+        ]
+        logs = np.log(scores.of("igd", scores.budgets[-1], tuning=tuning))
+        cost, low, high = _costs(logs, rng)
+        medians = np.median(logs, axis=-1)
+        for variant, row in enumerate(rows, start=1):
+            change = medians[:, variant] - medians[:, 0]
+            interval = f"{low[variant]:.3f}..{high[variant]:.3f}"
+            row += [float(cost[variant]), interval, int(sum(change > 0)), int(sum(change < 0))]
+    order = np.argsort([-float(row[1]) for row in rows], kind="stable")
+    return Table(
+        "parts",
+        f"Cost of leaving out, simplifying or adding a part, in {NAMES['igd']}",
+        tuple(columns),
+        tuple(tuple(rows[i]) for i in order),
+        note=f"{len(scores.rows(True))} tuning and {len(scores.rows(False))} held-out problems; "
+        "worse and better count medians.",
+    )
+
+
+def _costs(
+    logs: NDArray[np.float64], rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return the ratio to the first algorithm and its interval, shape (algorithms,) each.
+
+    ``logs`` are logarithms of IGD, shape (problems, algorithms, seeds).
+    """
+
+    def ratio(runs: NDArray[np.float64]) -> NDArray[np.float64]:
+        medians = np.median(runs, axis=-1)
+        return np.exp(np.mean(medians - medians[:, :1], axis=0))
+
+    drawn = np.array(
+        [
+            ratio(np.take_along_axis(logs, rng.integers(logs.shape[-1], size=logs.shape), axis=-1))
+            for _ in range(RESAMPLES)
+        ]
+    )
+    low, high = np.quantile(drawn, (0.025, 0.975), axis=0)
+    return ratio(logs), low, high
+
+
+def _problems_tables(scores: Scores) -> list[Table]:
+    values = np.median(scores.of("igd", scores.budgets[-1]), axis=-1)
+    return [
+        Table(
+            "problems",
+            f"Median {NAMES['igd']} on every problem",
+            (Column("problem"), *map(Column, scores.algorithms)),
+            tuple(
+                (problem, *row.tolist())
+                for problem, row in zip(scores.problems, values, strict=True)
+            ),
+            folded=True,
+        )
+    ]
