@@ -1,7 +1,6 @@
 """The swarm family as pymoo algorithms: moves, runs, reproducibility, constraints, bad input."""
 
 import copy
-import hashlib
 import pickle
 import subprocess
 import sys
@@ -17,6 +16,7 @@ from pymoo.indicators.igd import IGD
 from pymoo.operators.sampling.lhs import LHS
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
+from swarm_problems import Bowl, Cliff, Parabolas, Unreachable, assert_clean_front, digest, run
 
 from pymoo_hdte.algorithms import (
     AMOPSO,
@@ -35,48 +35,6 @@ FAMILY = [MOPSO, AMPMOPSO, AMOPSO, MPMOPSO]
 SMALL = {"pop_size": 20, "archive_size": 10}
 
 
-class Parabolas(Problem):
-    """Squared distances from two points; counts the rows it evaluates."""
-
-    def __init__(self, **kwargs):
-        super().__init__(**{"n_var": 3, "n_obj": 2, "xl": -1.0, "xu": 2.0, **kwargs})
-        self.n_rows = 0
-
-    def _evaluate(self, X, out, *args, **kwargs):
-        self.n_rows += len(X)
-        out["F"] = np.column_stack([(X**2).sum(axis=1), ((X - 1.0) ** 2).sum(axis=1)])
-
-
-class Bowl(Parabolas):
-    """One objective, twice."""
-
-    def _evaluate(self, X, out, *args, **kwargs):
-        out["F"] = np.repeat((X**2).sum(axis=1, keepdims=True), 2, axis=1)
-
-
-class Cliff(Parabolas):
-    """Not a number on part of the box."""
-
-    def __init__(self, edge):
-        super().__init__()
-        self.edge = edge
-
-    def _evaluate(self, X, out, *args, **kwargs):
-        super()._evaluate(X, out)
-        out["F"][X[:, 0] < self.edge] = np.nan
-
-
-class Unreachable(Parabolas):
-    """Never feasible; least infeasible at the lower corner."""
-
-    def __init__(self):
-        super().__init__(n_ieq_constr=1)
-
-    def _evaluate(self, X, out, *args, **kwargs):
-        super()._evaluate(X, out)
-        out["G"] = 1.0 + (X + 1.0).sum(axis=1, keepdims=True)
-
-
 class Still:
     """A hierarchy without any pull that shifts every particle by a constant."""
 
@@ -88,20 +46,6 @@ class Still:
 
     def mutation(self, ranks, progress, span, random_state):
         return np.full((len(ranks), len(span)), self.shift)
-
-
-def run(algorithm, problem="zdt1", n_gen=30, seed=1, **kwargs):
-    problem = get_problem(problem) if isinstance(problem, str) else problem
-    return minimize(problem, algorithm, ("n_gen", n_gen), seed=seed, **kwargs)
-
-
-def digest(result):
-    return hashlib.sha256(result.X.tobytes() + result.F.tobytes()).hexdigest()
-
-
-def assert_clean_front(result):
-    no_worse = (result.F[:, np.newaxis] <= result.F).all(axis=2)
-    np.testing.assert_array_equal(no_worse, np.eye(len(result.F), dtype=bool))
 
 
 # --- one move ---------------------------------------------------------------------------------
