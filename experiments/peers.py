@@ -11,6 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from experiments.contest.job import FINAL_SIZE
 from experiments.contest.peers import CONTESTANTS
@@ -143,7 +144,7 @@ def _pictures(scores: Scores) -> list[Picture]:
     return pictures
 
 
-def _heatmap(scores: Scores, evaluations: int):
+def _heatmap(scores: Scores, evaluations: int) -> Figure:
     ranks = problem_ranks(median_values(scores, "igd", evaluations), smaller_is_better=True)
     order = np.argsort(ranks[scores.rows(False)].mean(axis=0), kind="stable")
     groups = ["tuning" if BENCHMARKS[p].tuning else "held out" for p in scores.problems]

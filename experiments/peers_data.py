@@ -126,7 +126,7 @@ def _indicators(problem: str) -> IndicatorsAgainst:
 
 def measure(problem: str, run: Run, budget: int) -> Indicators:
     """Return the indicators of the final set that a run offers at one budget."""
-    return _indicators(problem)(run.values[run.values[:, 0] == budget][:, 1:])
+    return _indicators(problem)(run.values[run.values[:, 0] == budget][:, 2:])
 
 
 def _rounded(value: float) -> float:

@@ -142,7 +142,7 @@ def ranks_table(scores: Scores) -> Table:
             intervals = rank_intervals(values, rng, smaller_is_better=better)
             for row, rank, (low, high) in zip(cells, ranks, intervals, strict=True):
                 row += [float(rank), f"{low:.1f}..{high:.1f}"]
-    order = np.argsort([row[1] for row in cells], kind="stable")
+    order = sorted(range(len(cells)), key=lambda row: float(cells[row][1] or 0.0))
     tests = [
         f"{NAMES[indicator]} at {evaluations:,}: chi-square "
         f"{significant(test.chi_square, 3)}, p = {significant(test.f_p, 2)}"
@@ -266,7 +266,7 @@ def times_table(scores: Scores) -> Table:
             Column("a tenth below", "s", 2),
             Column("a tenth above", "s", 2),
         ),
-        tuple(sorted(rows, key=lambda row: row[1])),
+        tuple(rows[i] for i in np.argsort(np.nanmedian(scores.seconds, axis=0), kind="stable")),
         note="Other runs went on beside these; python -m experiments benchmark measures the ratio "
         "to NSGA-II in one run.",
         wall_times=True,

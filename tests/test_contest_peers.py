@@ -34,9 +34,10 @@ class Counting(Parabolas):
 
 def test_the_budget_is_spent_and_not_more(contestant):
     before = Counting.rows
-    fronts = contestant.run(Counting(), (700,), seed=1)
-    assert len(fronts) == 1
-    assert fronts[0].shape[1] == 2
+    offers = contestant.run(Counting(), (700,), seed=1)
+    assert len(offers) == 1
+    assert offers[0].F.shape[1] == 2
+    assert offers[0].spent == Counting.rows - before
     # NSGA-III's population is that of its directions; nobody spends more than allowed.
     assert 600 < Counting.rows - before <= 700
 
@@ -46,11 +47,11 @@ def test_a_larger_budget_does_not_change_what_a_smaller_one_gives(contestant):
         pytest.skip("it moves by what it has left: every budget is a run of its own")
     early, _ = contestant.run(problem_of("ZDT1"), BUDGETS, seed=3)
     (alone,) = contestant.run(problem_of("ZDT1"), BUDGETS[:1], seed=3)
-    np.testing.assert_array_equal(early, alone)
+    np.testing.assert_array_equal(early.F, alone.F)
 
 
 def test_the_seed_decides(contestant):
-    one, again, other = (contestant.run(problem_of("ZDT4"), (700,), s)[0] for s in (1, 1, 2))
+    one, again, other = (contestant.run(problem_of("ZDT4"), (700,), s)[0].F for s in (1, 1, 2))
     np.testing.assert_array_equal(one, again)
     assert one.shape != other.shape or not np.array_equal(one, other)
 
@@ -58,7 +59,7 @@ def test_the_seed_decides(contestant):
 def test_what_is_offered_is_feasible_and_reachable(contestant):
     if not contestant.takes_constraints:
         pytest.skip("it does not take constraints")
-    (F,) = contestant.run(get_problem("bnh"), (1000,), seed=1)
+    F = contestant.run(get_problem("bnh"), (1000,), seed=1)[0].F
     assert len(F)
     # Without the constraints both objectives of BNH could be smaller.
     assert np.all(F[:, 1] >= 4.0 - 1e-9)
@@ -70,21 +71,21 @@ def test_those_who_know_their_budget_move_otherwise_with_another(contestant):
         pytest.skip("it does not")
     (short,) = contestant.run(problem_of("ZDT1"), (400,), seed=3)
     shorter_of_long = contestant.run(problem_of("ZDT1"), BUDGETS, seed=3)[0]
-    assert not np.array_equal(short, shorter_of_long)
+    assert not np.array_equal(short.F, shorter_of_long.F)
 
 
 @pytest.mark.parametrize("name", SWARM_VARIANTS)
 def test_every_variant_of_the_swarm_differs_from_the_whole(name):
-    whole = CONTESTANTS["ElitistSwarm"].run(problem_of("ZDT1"), (700,), 1)[0]
-    variant = SWARM_VARIANTS[name].run(problem_of("ZDT1"), (700,), 1)[0]
+    whole = CONTESTANTS["ElitistSwarm"].run(problem_of("ZDT1"), (700,), 1)[0].F
+    variant = SWARM_VARIANTS[name].run(problem_of("ZDT1"), (700,), 1)[0].F
     assert whole.shape != variant.shape or not np.array_equal(whole, variant)
 
 
 def test_a_job_reduces_what_is_offered_and_keeps_the_budgets_apart():
     run = ContestRun("ZDT1", "NSGA-II", 1, (5000, 10_000)).execute()
-    assert run.columns == ("evaluations", "f1", "f2")
+    assert run.columns == ("evaluations", "spent", "f1", "f2")
     for budget in (5000, 10_000):
-        F = run.values[run.values[:, 0] == budget][:, 1:]
+        F = run.values[run.values[:, 0] == budget][:, 2:]
         assert len(F) == FINAL_SIZE
         assert is_nondominated(F).all()
         assert np.all(np.diff(F[:, 0]) > 0)

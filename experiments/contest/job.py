@@ -35,18 +35,19 @@ class ContestRun:
     def execute(self) -> Run:
         """Run, and reduce what is offered to `FINAL_SIZE` in the same way for all.
 
-        Columns are the budget and the objectives, rows by budget and rising objectives.
+        Columns are the budget, the evaluations spent and the objectives, rows by budget and rising
+        objectives.
         """
         problem = problem_of(self.problem)
         run = (CONTESTANTS | SWARM_VARIANTS)[self.algorithm].run
         started = time.perf_counter()
-        offered = run(problem, self.budgets, self.seed)
+        offers = run(problem, self.budgets, self.seed)
         seconds = time.perf_counter() - started
-        rows = [
-            np.column_stack([np.full(len(front), float(budget)), front])
-            for budget, front in zip(self.budgets, map(final_set, offered), strict=True)
-        ]
-        columns = ("evaluations", *(f"f{1 + i}" for i in range(problem.n_obj)))
+        rows = []
+        for budget, offer in zip(self.budgets, offers, strict=True):
+            front = final_set(offer.F)
+            rows.append(np.column_stack([np.tile([budget, offer.spent], (len(front), 1)), front]))
+        columns = ("evaluations", "spent", *(f"f{1 + i}" for i in range(problem.n_obj)))
         return Run(columns, np.concatenate(rows), seconds)
 
 

@@ -8,14 +8,13 @@ from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
-from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
+from experiments.contest.offer import Offer
 from experiments.contest.peers_pymoo import OWN, PYMOO, run_pymoo
 from experiments.contest.reduced_swarms import REDUCED
 
-Fronts = list[NDArray[np.float64]]
-RunFunction = Callable[[Problem, Sequence[int], int], Fronts]
+RunFunction = Callable[[Problem, Sequence[int], int], list[Offer]]
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,7 @@ class Contestant:
     library : str
         Where it comes from.
     run : callable
-        Takes a problem, ascending budgets and a seed; gives the objectives (n, m) of the feasible
-        set that the algorithm offers at each budget.
+        Takes a problem, ascending budgets and a seed; gives what is offered at each budget.
     knows_budget : bool
         Whether it moves otherwise if it may spend more; then every budget is a run of its own.
     takes_constraints : bool
@@ -45,17 +43,17 @@ class Contestant:
         return find_spec(self.library) is not None
 
 
-def run_random(problem: Problem, budgets: Sequence[int], seed: int) -> Fronts:
+def run_random(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
     """Draw designs uniformly and return the feasible objectives after each budget."""
     rng = np.random.default_rng(seed)
     X = problem.xl + rng.random((budgets[-1], problem.n_var)) * (problem.xu - problem.xl)
     F, G = problem.evaluate(X, return_values_of=["F", "G"])
     feasible = np.all(G <= 0.0, axis=1)
-    return [F[:budget][feasible[:budget]] for budget in budgets]
+    return [Offer(F[:budget][feasible[:budget]], budget) for budget in budgets]
 
 
 def _jmetal(name: str) -> RunFunction:
-    def run(problem: Problem, budgets: Sequence[int], seed: int) -> Fronts:
+    def run(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
         # Imported where it is used, because the extra may be absent.
         from experiments.contest.peers_jmetal import run_jmetal
 
@@ -64,7 +62,7 @@ def _jmetal(name: str) -> RunFunction:
     return run
 
 
-def _pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> Fronts:
+def _pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
     from experiments.contest.peers_pygmo import run_pygmo
 
     return run_pygmo(problem, budgets, seed)
@@ -87,7 +85,6 @@ CONTESTANTS = {
 """All contestants by name."""
 
 SWARM_VARIANTS = {
-    name: Contestant("pymoo_hdte", partial(run_pymoo, lambda _, make=make: make()))
-    for name, make in REDUCED.items()
+    name: Contestant("pymoo_hdte", partial(run_pymoo, make)) for name, make in REDUCED.items()
 }
 """Variants of the elitist swarm, which compete with it alone."""

@@ -22,6 +22,8 @@ from jmetal.util.termination_criterion import StoppingByEvaluations
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
+from experiments.contest.offer import Offer
+
 logging.getLogger("jmetal.core.algorithm").setLevel(logging.WARNING)
 
 SWARM = 100
@@ -77,17 +79,16 @@ class _Snapshots(Observer):
 
     def __init__(self, budgets: Sequence[int]) -> None:
         self.budgets = budgets
-        self.offered: list[NDArray[np.float64]] = []
+        self.offered: list[Offer] = []
 
     def update(self, *args: Any, **kwargs: Any) -> None:
         if kwargs["EVALUATIONS"] in self.budgets:
-            self.offered.append(_offer(kwargs["SOLUTIONS"]))
+            F = _feasible(kwargs["SOLUTIONS"])
+            self.offered.append(Offer(F, kwargs["EVALUATIONS"]))
 
 
-def run_jmetal(
-    name: str, problem: Problem, budgets: Sequence[int], seed: int
-) -> list[NDArray[np.float64]]:
-    """Run SMPSO or OMOPSO once and return F (n, m) of its feasible set at every budget.
+def run_jmetal(name: str, problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
+    """Run SMPSO or OMOPSO once and return what it offers at every budget.
 
     Budgets are multiples of the swarm; OMOPSO's mutation shrinks until the largest is spent.
 
@@ -144,6 +145,6 @@ def _omopso(problem: WrappedProblem, budget: int) -> OMOPSO:
     )
 
 
-def _offer(solutions: list[FloatSolution]) -> NDArray[np.float64]:
+def _feasible(solutions: list[FloatSolution]) -> NDArray[np.float64]:
     feasible = [s.objectives for s in solutions if all(value >= 0.0 for value in s.constraints)]
     return np.array(feasible).reshape(-1, len(solutions[0].objectives))

@@ -9,6 +9,8 @@ import pygmo
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
+from experiments.contest.offer import Offer
+
 SWARM = 100
 
 
@@ -31,8 +33,8 @@ class WrappedProblem:
         return self.problem.n_obj
 
 
-def run_pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[NDArray[np.float64]]:
-    """Run NSPSO for each budget and return F (n, m) of its population.
+def run_pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
+    """Run NSPSO for each budget and return what its population offers.
 
     Raises
     ------
@@ -48,5 +50,5 @@ def run_pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[NDArr
         spent = evolved.problem.get_fevals()
         if spent != budget:
             raise RuntimeError(f"NSPSO spent {spent} evaluations, not {budget}")
-        offered.append(evolved.get_f())
+        offered.append(Offer(evolved.get_f(), spent))
     return offered

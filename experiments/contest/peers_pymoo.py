@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -18,6 +19,7 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
+from experiments.contest.offer import Offer
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
 
 POPULATION = 100
@@ -51,24 +53,29 @@ OWN: dict[str, tuple[Callable[[Problem], Algorithm], bool]] = {
 
 def run_pymoo(
     make: Callable[[Problem], Algorithm], problem: Problem, budgets: Sequence[int], seed: int
-) -> list[NDArray[np.float64]]:
-    """Run an algorithm once and return the objectives (n, m) of its feasible set at every budget.
+) -> list[Offer]:
+    """Run an algorithm once and return what it offers at every budget.
 
     Budgets ascend; a budget counts the evaluations that pymoo's evaluator was asked for, in whole
-    generations that do not exceed it.
+    generations that do not exceed it. AGE-MOEA-II of pymoo 0.6.2 may divide by zero where its front
+    is degenerate; such a run ends there, and what it held before counts.
     """
     offered = []
+    broken = False
     with seeded_default_rng(seed):
         algorithm = make(problem)
         algorithm.setup(problem, termination=("n_eval", budgets[-1]), seed=seed)
         for budget in budgets:
-            while algorithm.evaluator.n_eval + algorithm.pop_size <= budget:
-                algorithm.next()
-            offered.append(_offer(algorithm, problem))
+            while not broken and algorithm.evaluator.n_eval + algorithm.pop_size <= budget:
+                try:
+                    algorithm.next()
+                except ZeroDivisionError:
+                    broken = True
+            offered.append(Offer(_feasible(algorithm, problem), algorithm.evaluator.n_eval))
     return offered
 
 
-def _offer(algorithm: Algorithm, problem: Problem) -> NDArray[np.float64]:
+def _feasible(algorithm: Algorithm, problem: Problem) -> NDArray[np.float64]:
     """Return F (n, m) of the feasible part of what the algorithm holds to be best."""
     best = algorithm.opt
     if best is None or len(best) == 0:
@@ -90,7 +97,7 @@ def seeded_default_rng(seed: int) -> Iterator[None]:
     original = np.random.default_rng
     children = np.random.SeedSequence(seed)
 
-    def seeded(given: object = None) -> np.random.Generator:
+    def seeded(given: Any = None) -> np.random.Generator:
         return original(children.spawn(1)[0] if given is None else given)
 
     with patch.object(np.random, "default_rng", seeded):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,40 +73,33 @@ def _own_front(problem: Problem) -> NDArray[np.float64]:
 
 
 def _zdt() -> list[Benchmark]:
-    plain, moved, rotated = [], [], []
+    plain: list[Benchmark] = []
+    moved: list[Benchmark] = []
+    rotated: list[Benchmark] = []
     for number, digit in enumerate(_ZDT):
         name = f"zdt{digit}"
 
-        def make(name: str = name) -> Problem:
-            return get_problem(name)
-
-        def make_moved(name: str = name, number: int = number) -> Problem:
-            return MovedZDT(name, rotated=False, seed=number + 1)
-
-        def make_rotated(name: str = name, number: int = number) -> Problem:
-            return MovedZDT(name, rotated=True, seed=number + 101)
-
-        upper = name.upper()
-        plain.append(Benchmark(upper, "ZDT", True, make, _pymoo_front))
-        moved.append(Benchmark(f"{upper}-moved", "ZDT moved", True, make_moved, _pymoo_front))
-        rotated.append(
-            Benchmark(f"{upper}-rotated", "ZDT rotated", False, make_rotated, _pymoo_front)
+        make_moved = partial(MovedZDT, name, rotated=False, seed=number + 1)
+        make_rotated = partial(MovedZDT, name, rotated=True, seed=number + 101)
+        entries = (
+            (plain, "", True, partial(get_problem, name)),
+            (moved, " moved", True, make_moved),
+            (rotated, " rotated", False, make_rotated),
         )
+        for group, suffix, tuning, make in entries:
+            full = name.upper() + suffix.replace(" ", "-")
+            group.append(Benchmark(full, "ZDT" + suffix, tuning, make, _pymoo_front))
     return plain + moved + rotated
 
 
 def _dtlz(number: int) -> Benchmark:
-    def make() -> Problem:
-        return get_problem(f"dtlz{number}", n_var=_DTLZ_VARIABLES[number], n_obj=3)
-
+    make = partial(get_problem, f"dtlz{number}", n_var=_DTLZ_VARIABLES[number], n_obj=3)
     return Benchmark(f"DTLZ{number}", "DTLZ", number == 2, make, lambda _: dtlz_front(number))
 
 
 def _wfg(number: int) -> Benchmark:
-    def make() -> Problem:
-        n_var = _WFG_POSITIONS + _WFG_DISTANCES
-        return get_problem(f"wfg{number}", n_var=n_var, n_obj=2, k=_WFG_POSITIONS)
-
+    n_var = _WFG_POSITIONS + _WFG_DISTANCES
+    make = partial(get_problem, f"wfg{number}", n_var=n_var, n_obj=2, k=_WFG_POSITIONS)
     return Benchmark(f"WFG{number}", "WFG", False, make, lambda _: wfg_front(number))
 
 
@@ -119,13 +112,15 @@ def _constrained() -> list[Benchmark]:
         "welded_beam": lambda _: welded_beam_front(),
     }
     return [
-        Benchmark(name, "constrained", False, lambda name=name: get_problem(name.lower()), front)
+        Benchmark(name, "constrained", False, partial(get_problem, name.lower()), front)
         for name, front in fronts.items()
     ]
 
 
 def _robust(model: str) -> Benchmark:
-    return Benchmark(f"RobustDTE-{model}", "RobustDTE", False, lambda: RobustDTE(model), _own_front)
+    return Benchmark(
+        f"RobustDTE-{model}", "RobustDTE", False, partial(RobustDTE, model), _own_front
+    )
 
 
 BENCHMARKS = {

@@ -73,10 +73,10 @@ class InertialSwarm(ElitistSwarm):
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         super()._initialize_advance(infills, **kwargs)
-        self.pop.set("step", np.zeros_like(self.swarm.X))
+        self.members.set("step", np.zeros_like(self.swarm.X))
 
     def _infill(self) -> Population:
-        before, last = self.swarm.X, self.pop.get("step")
+        before, last = self.swarm.X, self.members.get("step")
         particles = super()._infill()
         moved = np.array([particle.X for particle in particles])
         diversity = normalised_entropy(self.swarm.F[best_front(self.swarm)], GRID_DIVISIONS)
@@ -88,15 +88,15 @@ class InertialSwarm(ElitistSwarm):
         return particles
 
 
-REDUCED: dict[str, Callable[[], ElitistSwarm]] = {
-    "without attraction": lambda: ElitistSwarm(moves=(Exchange(), Difference())),
-    "without exchange": lambda: ElitistSwarm(moves=(Attraction(), Difference())),
-    "without difference": lambda: ElitistSwarm(moves=(Attraction(), Exchange())),
-    "equal shares of moves": EqualSwarm,
-    "without mutation": lambda: ElitistSwarm(mutation=NoMutation()),
-    "mutation of one size": lambda: ElitistSwarm(mutation=OneSizeMutation()),
-    "crowding truncation": lambda: ElitistSwarm(truncation=least_crowded),
-    "leaders at random": AnyLeaderSwarm,
-    "with entropy inertia": InertialSwarm,
+REDUCED: dict[str, Callable[[Problem], ElitistSwarm]] = {
+    "without attraction": lambda _: ElitistSwarm(moves=(Exchange(), Difference())),
+    "without exchange": lambda _: ElitistSwarm(moves=(Attraction(), Difference())),
+    "without difference": lambda _: ElitistSwarm(moves=(Attraction(), Exchange())),
+    "equal shares of moves": lambda _: EqualSwarm(),
+    "without mutation": lambda _: ElitistSwarm(mutation=NoMutation()),
+    "mutation of one size": lambda _: ElitistSwarm(mutation=OneSizeMutation()),
+    "crowding truncation": lambda _: ElitistSwarm(truncation=least_crowded),
+    "leaders at random": lambda _: AnyLeaderSwarm(),
+    "with entropy inertia": lambda _: InertialSwarm(),
 }
 """Variants by what is missing, changed or added; all with 100 particles."""

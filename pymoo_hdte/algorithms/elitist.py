@@ -80,9 +80,12 @@ class ElitistSwarm(Swarm):
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
         super()._setup(problem, **kwargs)
         self.success = SuccessShares(len(self.moves))
+        # As `pop`, which pymoo lets be None.
+        self.members = Population.empty()
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        self.pop, self.swarm = infills, self._evaluated(infills)
+        self.swarm = self._evaluated(infills)
+        self.pop = self.members = infills
 
     def _infill(self) -> Population:
         X, random_state = self.swarm.X, self.random_state
@@ -112,9 +115,10 @@ class ElitistSwarm(Swarm):
         survived = np.zeros(2 * self.pop_size, dtype=bool)
         survived[kept] = True
         self.success.learn(self.chosen, survived[self.pop_size :])
-        self.pop, self.swarm = Population.merge(self.pop, infills)[kept], points[kept]
+        self.swarm = points[kept]
+        self.pop = self.members = Population.merge(self.members, infills)[kept]
 
     def _set_optimum(self) -> None:
         # pymoo reads the optimum in every generation, even if nothing could be judged so far.
         front = best_front(self.swarm)
-        self.opt = self.pop[front] if len(front) else self.pop[:1]
+        self.opt = self.members[front] if len(front) else self.members[:1]

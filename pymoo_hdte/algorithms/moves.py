@@ -133,8 +133,8 @@ class SparseMutation:
         still = np.flatnonzero(~(struck.any(axis=1) | steps.any(axis=1)))
         struck[still, random_state.integers(d, size=len(still))] = True
         rows, columns = np.nonzero(struck)
-        exponent = random_state.uniform(self.SMALLEST_EXPONENT, self.LARGEST_EXPONENT, n)
+        exponents = random_state.uniform(self.SMALLEST_EXPONENT, self.LARGEST_EXPONENT, size=(n,))
         mutation = np.zeros((n, d))
-        size = 10.0 ** exponent[rows] * span[columns]
+        size = 10.0 ** exponents[rows] * span[columns]
         mutation[rows, columns] = size * random_state.standard_normal(len(rows))
         return mutation
