@@ -29,7 +29,7 @@ from experiments.peers_tables import (
     median_values,
     medians_tables,
     must_reach_table,
-    ranks_table,
+    ranks_tables,
     rivals_table,
     smaller_is_better,
     times_table,
@@ -78,7 +78,7 @@ def run(context: Context) -> Result:
         paragraphs=(SETTING, HELD_OUT, PEERS_NOTE),
         tables=(
             must_reach_table(scores),
-            ranks_table(scores),
+            *ranks_tables(scores),
             rivals_table(scores),
             tuning_table(scores),
             *medians_tables(scores),
