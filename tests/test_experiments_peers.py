@@ -1,0 +1,165 @@
+"""The peer comparison and the ablation: scores on disk, demands judged, costs of parts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments import peers, swarm_parts
+from experiments.campaign import Campaign
+from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
+from experiments.contest.problems import BENCHMARKS
+from experiments.indicators import CORNER, Indicators, IndicatorsAgainst
+from experiments.peers_data import (
+    Scores,
+    contest_scores,
+    format_scores,
+    format_seconds,
+    read_scores,
+)
+from experiments.peers_tables import FAITHFUL, OURS, must_reach_table, ranks_tables
+from experiments.registry import Context
+from pymoo_hdte.checks import InvalidInput
+
+PROBLEMS = tuple(name for name in BENCHMARKS if name.startswith(("ZDT", "WFG")))
+ALGORITHMS = (OURS, FAITHFUL, "NSGA-II", "SMS-EMOA")
+
+
+def planted(rng, shift, seeds=10):
+    """Scores in which every algorithm's distances are those of ours times a factor."""
+    runs = rng.uniform(0.9, 1.1, (4, len(PROBLEMS), len(ALGORITHMS), 1, seeds))
+    factors = np.array(shift)[np.newaxis, np.newaxis, :, np.newaxis, np.newaxis]
+    values = 0.01 * runs * factors
+    # The hypervolume is a merit.
+    values[2] = 1.0 - values[2]
+    seconds = np.ones((len(PROBLEMS), len(ALGORITHMS)))
+    return Scores(PROBLEMS, ALGORITHMS, (10_000,), tuple(range(1, seeds + 1)), values, seconds)
+
+
+def demands(scores):
+    return {row[0]: (row[-1], row) for row in must_reach_table(scores).rows}
+
+
+# --- indicators ---------------------------------------------------------------------------------
+
+
+def test_indicators_of_a_plane_are_the_closed_forms():
+    line = np.linspace(0.0, 1.0, 101)
+    first, second = (grid.ravel() for grid in np.meshgrid(line, line))
+    inside = first + second <= 1.0 + 1e-12
+    plane = np.column_stack([first, second, 1.0 - first - second])[inside]
+    measure = IndicatorsAgainst(plane * [1.0, 10.0, 100.0])
+    corners = measure(np.diag([1.0, 10.0, 100.0]))
+    # Three corners: a unit cube cut at 1.1 less what no corner dominates.
+    step, rest = CORNER - 1.0, CORNER
+    assert corners.hypervolume == pytest.approx(3 * step * rest**2 - 3 * step**2 * rest + step**3)
+    assert corners.spacing == pytest.approx(0.0)
+    # A set shifted by d in every objective is d sqrt(3) away, and d in the plus sense sqrt(3) too.
+    shifted = measure((plane + 0.05) * [1.0, 10.0, 100.0])
+    assert shifted.igd_plus == pytest.approx(0.05 * np.sqrt(3.0), rel=1e-6)
+
+
+def test_an_empty_set_is_the_worst_and_a_front_that_does_not_vary_is_refused():
+    measure = IndicatorsAgainst([[0.0, 1.0], [1.0, 0.0]])
+    nothing = measure(np.empty((0, 2)))
+    assert nothing.igd == nothing.igd_plus == np.inf
+    assert nothing.hypervolume == 0.0
+    assert np.isnan(nothing.spacing)
+    with pytest.raises(InvalidInput, match="extent of the true front"):
+        IndicatorsAgainst([[0.0, 1.0], [0.0, 2.0]])
+
+
+# --- scores -------------------------------------------------------------------------------------
+
+
+def test_scores_survive_the_file(tmp_path, rng):
+    scores = planted(rng, [1.0, 2.0, 3.0, 4.0])
+    values = np.vectorize(lambda value: float(f"{value:.4g}"))(scores.values)
+    values[:, 2, 1] = np.nan
+    values[:, 3, 1, 0, 2] = [np.inf, np.inf, 0.0, np.nan]
+    scores = replace(scores, values=values)
+    path, seconds = tmp_path / "peers.csv", tmp_path / "seconds.csv"
+    path.write_text(format_scores(scores))
+    seconds.write_text(format_seconds(scores))
+    again = read_scores(path, seconds)
+    np.testing.assert_array_equal(again.values, scores.values)
+    np.testing.assert_array_equal(again.seconds, scores.seconds)
+    assert again.problems == scores.problems
+    assert again.algorithms == scores.algorithms
+
+
+def test_runs_are_measured_at_every_budget_and_a_rerun_reads_them(tmp_path):
+    arguments = (["ZDT1", "BNH"], [OURS, FAITHFUL, "NSPSO"], (200, 400), range(1, 3))
+    if not CONTESTANTS["NSPSO"].available:
+        arguments = (arguments[0], [OURS, FAITHFUL, "MOPSO-CD"], *arguments[2:])
+    scores = contest_scores(Campaign(tmp_path), *arguments)
+    assert scores.values.shape == (len(Indicators._fields), 2, 3, 2, 2)
+    ours = scores.values[:, :, 0]
+    assert np.isfinite(ours).all()
+    # More evaluations bring both closer to the front.
+    assert np.all(ours[0, 0, 1] < ours[0, 0, 0])
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.csv")}
+    again = contest_scores(Campaign(tmp_path), *arguments)
+    np.testing.assert_array_equal(again.values, scores.values)
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.csv")} == before
+
+
+# --- demands ------------------------------------------------------------------------------------
+
+
+def test_demands_are_met_by_who_is_best_and_missed_by_who_is_not(rng):
+    best = demands(planted(rng, [1.0, 3.0, 2.0, 1.5]))
+    assert {met for met, _ in best.values()} == {"yes"}
+    worst = demands(planted(rng, [80.0, 3.0, 2.0, 1.5]))
+    assert {met for met, _ in worst.values()} == {"no"}
+    assert worst["place 1 by average rank, IGD"][1][2] == "place 4 of 4, rank 4.00"
+
+
+def test_an_equal_rival_is_named_as_not_beaten(rng):
+    rows = demands(planted(rng, [1.0, 3.0, 2.0, 1.0]))
+    met, row = rows["better than every peer beyond chance, IGD"]
+    assert met == "no"
+    assert row[3].startswith("not: SMS-EMOA (p = ")
+    assert "NSGA-II" not in row[3]
+
+
+def test_worse_than_the_faithful_version_on_one_problem_is_found(rng):
+    scores = planted(rng, [1.0, 3.0, 2.0, 1.5])
+    scores.values[0, 4, 1] *= 0.1
+    met, row = demands(scores)[f"never worse than {FAITHFUL} beyond the noise"]
+    assert met == "no"
+    assert row[2] == f"worse on {PROBLEMS[4]} (IGD)"
+
+
+def test_ranks_come_with_intervals_that_hold_them(rng):
+    (table,) = ranks_tables(planted(rng, [1.0, 3.0, 1.02, 1.01]))
+    assert [row[0] for row in table.rows][-1] == FAITHFUL
+    for row in table.rows:
+        low, high = map(float, row[2].split(".."))
+        assert low - 0.06 <= row[1] <= high + 0.06
+
+
+# --- ablation -----------------------------------------------------------------------------------
+
+
+def test_the_cost_of_a_part_is_the_planted_one(rng):
+    logs = np.log(0.01) + 0.05 * rng.standard_normal((20, 3, 21))
+    logs[:, 1] += np.log(1.5)
+    cost, low, high = swarm_parts._costs(logs, rng)
+    np.testing.assert_array_equal([cost[0], low[0], high[0]], 1.0)
+    assert low[1] < 1.5 < high[1]
+    assert low[2] < 1.0 < high[2]
+    assert high[1] - low[1] < 0.05
+
+
+@pytest.mark.parametrize(
+    ("experiment", "algorithms"),
+    [(peers, set(CONTESTANTS)), (swarm_parts, {OURS, *SWARM_VARIANTS})],
+)
+def test_the_committed_outcome_is_whole_and_makes_the_report(tmp_path, experiment, algorithms):
+    scores = read_scores(experiment.COMMITTED, experiment.COMMITTED_SECONDS)
+    assert set(scores.problems) == set(BENCHMARKS)
+    assert set(scores.algorithms) == algorithms
+    assert scores.budgets == experiment.BUDGETS
+    result = experiment.run(Context(20, tmp_path, Campaign(tmp_path)))
+    assert result.tables[0].rows
