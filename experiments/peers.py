@@ -8,21 +8,13 @@ interrupted, and leaves the same files in the results folder; with ``--quick`` a
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.contest.job import FINAL_SIZE
 from experiments.contest.peers import CONTESTANTS
 from experiments.contest.problems import BENCHMARKS
-from experiments.peers_data import (
-    Scores,
-    contest_scores,
-    format_scores,
-    format_seconds,
-    read_scores,
-)
+from experiments.peers_data import Extent, Scores, scores_for
 from experiments.peers_tables import (
     NAMES,
     OURS,
@@ -39,13 +31,9 @@ from experiments.ranks import average_ranks, nemenyi_difference, problem_ranks
 from experiments.ranks_figures import critical_difference_plot, rank_heatmap
 from experiments.registry import Context
 from experiments.result import Picture, Result
-from experiments.store import TIMES, write_atomically
 
-COMMITTED = Path(__file__).parent / "data" / "peers.csv"
-COMMITTED_SECONDS = Path(__file__).parent / "data" / "peers_seconds.csv"
-
-BUDGETS, SEEDS = (10_000, 25_000), 21
-QUICK_BUDGETS, QUICK_SEEDS = (2_500,), 5
+FULL = Extent(budgets=(10_000, 25_000), seeds=21)
+QUICK = Extent(budgets=(2_500,), seeds=5)
 
 SETTING = (
     f"Every algorithm runs as its users run it, with the defaults of its library and 100 "
@@ -71,7 +59,8 @@ PEERS_NOTE = (
 
 def run(context: Context) -> Result:
     """Run the comparison or read its outcome, and rank."""
-    scores, missing = _scores(context)
+    present = [name for name, entry in CONTESTANTS.items() if entry.available]
+    scores = scores_for(context, "peers", present, FULL, QUICK)
     return Result(
         title="The elitist swarm against its peers",
         command="python -m experiments peers --full",
@@ -85,31 +74,17 @@ def run(context: Context) -> Result:
             times_table(scores),
         ),
         pictures=tuple(_pictures(scores)),
-        notes=(_extent(scores), *missing),
+        notes=(_extent(scores), *_absent(scores)),
         headline="must_reach",
     )
 
 
-def _scores(context: Context) -> tuple[Scores, tuple[str, ...]]:
-    if not (context.full or context.quick):
-        if not COMMITTED.is_file():
-            raise RuntimeError(f"no {COMMITTED.name} yet: run python -m experiments peers --full")
-        return read_scores(COMMITTED, COMMITTED_SECONDS), ()
-    absent = [name for name, entry in CONTESTANTS.items() if not entry.available]
-    algorithms = [name for name in CONTESTANTS if name not in absent]
-    budgets, seeds = (BUDGETS, SEEDS) if context.full else (QUICK_BUDGETS, QUICK_SEEDS)
-    scores = contest_scores(
-        context.campaign, list(BENCHMARKS), algorithms, budgets, range(1, seeds + 1)
-    )
-    folder = context.out / "peers"
-    write_atomically(folder / COMMITTED.name, format_scores(scores).encode())
-    times = context.out / TIMES / "peers"
-    write_atomically(times / COMMITTED_SECONDS.name, format_seconds(scores).encode())
-    return scores, tuple(
-        f"{name} did not take part: {CONTESTANTS[name].library} is not installed "
-        "(pip install '.[peers]')."
-        for name in absent
-    )
+def _absent(scores: Scores) -> list[str]:
+    return [
+        f"{name} did not take part: {entry.library} is not installed (pip install '.[peers]')."
+        for name, entry in CONTESTANTS.items()
+        if name not in scores.algorithms
+    ]
 
 
 def _extent(scores: Scores) -> str:

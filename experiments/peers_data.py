@@ -1,4 +1,4 @@
-"""Scores of the peer comparison: measured from runs, and as the CSV that the repository keeps.
+"""Scores of algorithms on the benchmark: measured from runs, and as the CSV that the repo keeps.
 
 Seconds stand in a file of their own, because they differ from run to run.
 """
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
 from experiments.contest.problems import BENCHMARKS, front_of
 from experiments.indicators import Indicators, IndicatorsAgainst
 from experiments.provenance import environment
+from experiments.registry import Context
+from experiments.store import TIMES, write_atomically
 
 _ENTRIES = CONTESTANTS | SWARM_VARIANTS
 _KEY = ("problem", "algorithm", "evaluations", "seed")
@@ -65,6 +68,51 @@ class Scores:
         """Return the rows of the problems that may, or may not, be tuned on; all for None."""
         kinds = [BENCHMARKS[name].tuning for name in self.problems]
         return np.array([i for i, kind in enumerate(kinds) if tuning is None or kind == tuning])
+
+
+class Extent(NamedTuple):
+    """Budgets of evaluations, and how many seeds, from 1."""
+
+    budgets: tuple[int, ...]
+    seeds: int
+
+
+def scores_for(
+    context: Context, name: str, algorithms: Sequence[str], full: Extent, quick: Extent
+) -> Scores:
+    """Return the committed scores of an experiment, or those of a full or quick run.
+
+    A run leaves its two files where the committed ones can be replaced by them.
+    """
+    if not (context.full or context.quick):
+        return committed_scores(name)
+    budgets, seeds = full if context.full else quick
+    scores = contest_scores(
+        context.campaign, list(BENCHMARKS), algorithms, budgets, range(1, seeds + 1)
+    )
+    values, seconds = _files(context.out / name, context.out / TIMES / name, name)
+    write_atomically(values, format_scores(scores).encode())
+    write_atomically(seconds, format_seconds(scores).encode())
+    return scores
+
+
+def committed_scores(name: str) -> Scores:
+    """Return the scores of the last full run of an experiment.
+
+    Raises
+    ------
+    RuntimeError
+        If none is committed.
+    """
+    folder = Path(__file__).parent / "data"
+    values, seconds = _files(folder, folder, name)
+    if not values.is_file():
+        raise RuntimeError(f"no {values.name} yet: run python -m experiments {name} --full")
+    return read_scores(values, seconds)
+
+
+def _files(values: Path, seconds: Path, name: str) -> tuple[Path, Path]:
+    return values / f"{name}.csv", seconds / f"{name}_seconds.csv"
 
 
 def contest_scores(

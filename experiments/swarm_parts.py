@@ -5,30 +5,17 @@ Without ``--full`` the report is made from ``experiments/data/swarm_parts.csv``.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.contest.peers import SWARM_VARIANTS
-from experiments.contest.problems import BENCHMARKS
-from experiments.peers_data import (
-    Scores,
-    contest_scores,
-    format_scores,
-    format_seconds,
-    read_scores,
-)
+from experiments.peers_data import Extent, Scores, scores_for
 from experiments.peers_tables import NAMES, OURS
 from experiments.registry import Context
 from experiments.result import Column, Result, Table
-from experiments.store import TIMES, write_atomically
 
-COMMITTED = Path(__file__).parent / "data" / "swarm_parts.csv"
-COMMITTED_SECONDS = Path(__file__).parent / "data" / "swarm_parts_seconds.csv"
-
-BUDGETS, SEEDS = (10_000,), 21
-QUICK_BUDGETS, QUICK_SEEDS = (2_500,), 5
+FULL = Extent(budgets=(10_000,), seeds=21)
+QUICK = Extent(budgets=(2_500,), seeds=5)
 RESAMPLES = 1000
 
 SETTING = (
@@ -42,7 +29,7 @@ SETTING = (
 
 def run(context: Context) -> Result:
     """Run the variants or read their outcome, and compare each with the whole."""
-    scores = _scores(context)
+    scores = scores_for(context, "swarm_parts", [OURS, *SWARM_VARIANTS], FULL, QUICK)
     return Result(
         title="What each part of the elitist swarm is worth",
         command="python -m experiments swarm_parts --full",
@@ -50,23 +37,6 @@ def run(context: Context) -> Result:
         tables=(_parts_table(scores), *_problems_tables(scores)),
         notes=(f"{len(scores.seeds)} seeds, {scores.budgets[-1]:,} evaluations.",),
     )
-
-
-def _scores(context: Context) -> Scores:
-    if not (context.full or context.quick):
-        if not COMMITTED.is_file():
-            raise RuntimeError(f"no {COMMITTED.name}: run python -m experiments swarm_parts --full")
-        return read_scores(COMMITTED, COMMITTED_SECONDS)
-    budgets, seeds = (BUDGETS, SEEDS) if context.full else (QUICK_BUDGETS, QUICK_SEEDS)
-    algorithms = [OURS, *SWARM_VARIANTS]
-    scores = contest_scores(
-        context.campaign, list(BENCHMARKS), algorithms, budgets, range(1, seeds + 1)
-    )
-    folder = context.out / "swarm_parts"
-    write_atomically(folder / COMMITTED.name, format_scores(scores).encode())
-    times = context.out / TIMES / "swarm_parts"
-    write_atomically(times / COMMITTED_SECONDS.name, format_seconds(scores).encode())
-    return scores
 
 
 def _parts_table(scores: Scores) -> Table:

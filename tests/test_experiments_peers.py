@@ -12,6 +12,7 @@ from experiments.contest.problems import BENCHMARKS
 from experiments.indicators import CORNER, Indicators, IndicatorsAgainst
 from experiments.peers_data import (
     Scores,
+    committed_scores,
     contest_scores,
     format_scores,
     format_seconds,
@@ -157,9 +158,9 @@ def test_the_cost_of_a_part_is_the_planted_one(rng):
     [(peers, set(CONTESTANTS)), (swarm_parts, {OURS, *SWARM_VARIANTS})],
 )
 def test_the_committed_outcome_is_whole_and_makes_the_report(tmp_path, experiment, algorithms):
-    scores = read_scores(experiment.COMMITTED, experiment.COMMITTED_SECONDS)
+    scores = committed_scores(experiment.__name__.rpartition(".")[2])
     assert set(scores.problems) == set(BENCHMARKS)
     assert set(scores.algorithms) == algorithms
-    assert scores.budgets == experiment.BUDGETS
+    assert scores.budgets == experiment.FULL.budgets
     result = experiment.run(Context(20, tmp_path, Campaign(tmp_path)))
     assert result.tables[0].rows
