@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from concurrent.futures import BrokenExecutor
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -14,9 +15,13 @@ from experiments.campaign import Campaign
 from experiments.registry import EXPERIMENTS, Context, Experiment
 from experiments.report import write_report
 from experiments.store import save
-from experiments.workers import make_executor
+from experiments.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
 
+SMALL_VERSIONS = ("peers", "swarm_parts")
+"""Experiments that take ``--quick``."""
+FAILED = 1
+"""Exit code where the workers fail."""
 INTERRUPTED = 130
 """Exit code that a shell expects of a program ended by Ctrl-C."""
 
@@ -29,6 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(_list_of_experiments())
         return 0
     chosen = _chosen(options.name, parser)
+    if options.quick and options.name not in SMALL_VERSIONS:
+        parser.error(f"--quick is for {' and '.join(SMALL_VERSIONS)}")
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         executor = make_executor(options.workers, options.dask)
@@ -58,6 +65,10 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
             print(f"\n{message}", file=sys.stderr)
             write_report(context.out, notice=message)
             return INTERRUPTED
+        except (BrokenExecutor, WorkerLost, WrongWorker) as error:
+            notes = getattr(error, "__notes__", [])
+            print("\n" + "\n".join([f"{experiment.name}: {error}", *notes]), file=sys.stderr)
+            return FAILED
     print(report)
     return 0
 
@@ -91,7 +102,9 @@ def _parser() -> argparse.ArgumentParser:
         "instead of reading its committed outcome",
     )
     extent.add_argument(
-        "--quick", action="store_true", help="run a small version of peers or swarm_parts, minutes"
+        "--quick",
+        action="store_true",
+        help=f"run a small version of {' or '.join(SMALL_VERSIONS)}, minutes",
     )
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"

@@ -62,9 +62,9 @@ class IndicatorsAgainst:
     def __call__(self, F: ArrayLike) -> Indicators:
         """Measure the set ``F``, shape (n, m).
 
-        pymoo gives an empty set an IGD of 0 and a duplicated one a Spacing of 0, each the best
+        pymoo gives an empty set an IGD of 0 and one of two points a Spacing of 0, each the best
         there is. Here an empty set has infinite distances, duplicates count once, and a set of
-        fewer than two different points has no Spacing (NaN).
+        fewer than three different points has no Spacing (NaN).
 
         Raises
         ------
@@ -78,7 +78,7 @@ class IndicatorsAgainst:
             float(self._igd(found)),
             float(self._igd_plus(found)),
             float(self._hypervolume(found)),
-            float(self._spacing(found)) if len(found) > 1 else np.nan,
+            float(self._spacing(found)) if len(found) > 2 else np.nan,
         )
 
     def normalise(self, F: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.contest.job import FINAL_SIZE
 from experiments.contest.peers import CONTESTANTS
+from experiments.contest.peers_pymoo import POPULATION
 from experiments.contest.problems import BENCHMARKS
-from experiments.peers_data import Extent, Scores, scores_for
+from experiments.peers_data import FINAL_SIZE, Extent, Scores, scores_for
 from experiments.peers_tables import (
     NAMES,
     OURS,
@@ -22,6 +22,7 @@ from experiments.peers_tables import (
     medians_tables,
     must_reach_table,
     ranks_tables,
+    reductions_table,
     rivals_table,
     smaller_is_better,
     times_table,
@@ -47,7 +48,7 @@ SETTING = (
 HELD_OUT = (
     "The elitist swarm was tuned on ZDT, moved ZDT (optima at random interior points), DTLZ2 and "
     "the toy twin. All other problems were held out: its form was frozen before it first ran on "
-    "them."
+    "them. Some of its ideas come from an earlier prototype, though, which had been judged on WFG."
 )
 PEERS_NOTE = (
     "MOPSO-CD (pymoo) and NSPSO (pygmo) know no constraints: the first is judged by the feasible "
@@ -69,12 +70,13 @@ def run(context: Context) -> Result:
             must_reach_table(scores),
             *ranks_tables(scores),
             rivals_table(scores),
+            reductions_table(scores),
             tuning_table(scores),
             *medians_tables(scores),
             times_table(scores),
         ),
         pictures=tuple(_pictures(scores)),
-        notes=(_extent(scores), *_absent(scores)),
+        notes=(*_extent(scores), *_absent(scores), *_broken_off(scores), *_without_volume(scores)),
         headline="must_reach",
     )
 
@@ -87,11 +89,32 @@ def _absent(scores: Scores) -> list[str]:
     ]
 
 
-def _extent(scores: Scores) -> str:
-    return (
+def _extent(scores: Scores) -> list[str]:
+    budgets = ", ".join(f"{budget:,}" for budget in scores.budgets)
+    return [
         f"{len(scores.problems)} problems, {len(scores.algorithms)} algorithms, "
-        f"{len(scores.seeds)} seeds, budgets of {', '.join(f'{b:,}' for b in scores.budgets)}."
-    )
+        f"{len(scores.seeds)} seeds (of {FULL.seeds} in full), budgets of {budgets}."
+    ]
+
+
+def _broken_off(scores: Scores) -> list[str]:
+    # A generation has at most the 100 solutions that everybody runs with.
+    least = np.array(scores.budgets)[:, np.newaxis] - POPULATION
+    early = (scores.spent > 0) & (scores.spent < least)
+    counts = dict(zip(scores.algorithms, early[:, :, -1].sum(axis=(0, 2)).tolist(), strict=True))
+    runs = [f"{count} of {name}" for name, count in counts.items() if count]
+    if not runs:
+        return []
+    return [f"Runs that broke off by themselves, judged by what they held: {', '.join(runs)}."]
+
+
+def _without_volume(scores: Scores) -> list[str]:
+    values = scores.of("hypervolume", scores.budgets[-1])
+    best = np.nanmax(values.reshape(len(scores.problems), -1), axis=1)
+    empty = [name for name, value in zip(scores.problems, best, strict=True) if value == 0.0]
+    if not empty:
+        return []
+    return [f"No run dominates any hypervolume on {', '.join(empty)}: a tie of all there."]
 
 
 def _pictures(scores: Scores) -> list[Picture]:

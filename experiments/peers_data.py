@@ -19,17 +19,26 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.benchmark_fronts import front_of
 from experiments.campaign import Campaign, Run
-from experiments.contest.job import ContestRun
+from experiments.contest.job import EVALUATIONS, SPENT, ContestRun
 from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
-from experiments.contest.problems import BENCHMARKS, front_of
+from experiments.contest.problems import BENCHMARKS
 from experiments.indicators import Indicators, IndicatorsAgainst
 from experiments.provenance import environment
 from experiments.registry import Context
 from experiments.store import TIMES, write_atomically
+from pymoo_hdte.algorithms.crowding import least_crowded
+from pymoo_hdte.algorithms.spread import most_spread
 
 _ENTRIES = CONTESTANTS | SWARM_VARIANTS
 _KEY = ("problem", "algorithm", "evaluations", "seed")
+
+FINAL_SIZE = 50
+MEASURES = (*Indicators._fields, "igd_crowding", "hypervolume_crowding")
+"""Indicators of the final set thinned out evenly, and two of that thinned out by crowding."""
+DIGITS = 6
+"""Kept of an indicator: with four, hypervolumes near 1 would tie that do not."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +49,11 @@ class Scores:
     ----------
     problems, algorithms : tuple of str
     budgets, seeds : tuple of int
-    values : ndarray, shape (4, problems, algorithms, budgets, seeds)
-        In the order of `Indicators`; a run without any feasible solution has infinite distances,
-        and an algorithm that cannot take a problem has NaN throughout.
+    values : ndarray, shape (6, problems, algorithms, budgets, seeds)
+        In the order of `MEASURES`; a run without any feasible solution has infinite distances, and
+        an algorithm that cannot take a problem has NaN throughout.
+    spent : ndarray of int, shape (problems, algorithms, budgets, seeds)
+        Evaluations; 0 where an algorithm cannot take a problem.
     seconds : ndarray, shape (problems, algorithms)
         Median wall time of a run of the largest budget.
     """
@@ -52,6 +63,7 @@ class Scores:
     budgets: tuple[int, ...]
     seeds: tuple[int, ...]
     values: NDArray[np.float64]
+    spent: NDArray[np.int_]
     seconds: NDArray[np.float64]
 
     def of(
@@ -61,7 +73,7 @@ class Scores:
 
         With ``tuning``, only of the problems that may, or may not, be tuned on.
         """
-        place = Indicators._fields.index(indicator), self.budgets.index(evaluations)
+        place = MEASURES.index(indicator), self.budgets.index(evaluations)
         return self.values[place[0], :, :, place[1], :][self.rows(tuning)]
 
     def rows(self, tuning: bool | None) -> NDArray[np.int_]:
@@ -133,23 +145,24 @@ def contest_scores(
         for entry in entries
         for budget in budgets_of_runs(entry[1], budgets)
     ]
-    values = np.full(
-        (len(Indicators._fields), len(problems), len(algorithms), len(budgets), len(seeds)), np.nan
-    )
+    shape = (len(problems), len(algorithms), len(budgets), len(seeds))
+    values = np.full((len(MEASURES), *shape), np.nan)
+    spent = np.zeros(shape, dtype=int)
     seconds = np.full((len(problems), len(algorithms), len(seeds)), np.nan)
-    for job, run in zip(jobs, campaign.run(jobs, "peers"), strict=True):
+    for job, run in zip(jobs, campaign.run(jobs, "contest"), strict=True):
         place = problems.index(job.problem), algorithms.index(job.algorithm)
         for budget in job.budgets:
             where = (*place, budgets.index(budget), seeds.index(job.seed))
-            values[(slice(None), *where)] = measure(job.problem, run, budget)
+            values[(slice(None), *where)], spent[where] = measure(job.problem, run, budget)
+        # The last run of an algorithm on a problem is that of the largest budget.
         seconds[(*place, seeds.index(job.seed))] = run.seconds
-    # The last run of an algorithm on a problem is that of the largest budget.
     return Scores(
         tuple(problems),
         tuple(algorithms),
         budgets,
         tuple(seeds),
         np.vectorize(_rounded)(values),
+        spent,
         np.median(seconds, axis=-1),
     )
 
@@ -161,8 +174,8 @@ def takes_part(algorithm: str, problem: str) -> bool:
 
 
 def budgets_of_runs(algorithm: str, budgets: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return the budgets that share a run: all, unless the algorithm moves by what it has left."""
-    if _ENTRIES[algorithm].knows_budget:
+    """Return the budgets that share a run: all, unless the algorithm starts anew for each."""
+    if _ENTRIES[algorithm].starts_anew:
         return [(budget,) for budget in budgets]
     return [budgets]
 
@@ -172,14 +185,21 @@ def _indicators(problem: str) -> IndicatorsAgainst:
     return IndicatorsAgainst(front_of(problem))
 
 
-def measure(problem: str, run: Run, budget: int) -> Indicators:
-    """Return the indicators of the final set that a run offers at one budget."""
-    return _indicators(problem)(run.values[run.values[:, 0] == budget][:, 2:])
+def measure(problem: str, run: Run, budget: int) -> tuple[list[float], int]:
+    """Return the `MEASURES` of what a run offers at one budget, and the evaluations it spent."""
+    rows = run.values[run.values[:, run.columns.index(EVALUATIONS)] == budget]
+    front = rows[:, run.columns.index(SPENT) + 1 :]
+    front = front[np.isfinite(front).all(axis=1)]
+    indicators = _indicators(problem)
+    even = indicators(front[most_spread(front, FINAL_SIZE)])
+    crowding = indicators(front[least_crowded(front, FINAL_SIZE)])
+    measured = [*even, crowding.igd, crowding.hypervolume]
+    return measured, int(rows[0, run.columns.index(SPENT)])
 
 
 def _rounded(value: float) -> float:
     """Return the number that the CSV keeps, so that both ways to the report give the same."""
-    return float(f"{value:.4g}")
+    return float(f"{value:.{DIGITS}g}")
 
 
 def format_scores(scores: Scores) -> str:
@@ -188,13 +208,13 @@ def format_scores(scores: Scores) -> str:
     text = io.StringIO()
     text.write(f"# {json.dumps(header)}\n")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*_KEY, *Indicators._fields])
+    writer.writerow([*_KEY, SPENT, *MEASURES])
     axes = (scores.problems, scores.algorithms, scores.budgets, scores.seeds)
-    for place in np.ndindex(*scores.values.shape[1:]):
-        row = scores.values[(slice(None), *place)]
-        if not np.isnan(row).all():
+    for place in np.ndindex(*scores.spent.shape):
+        if scores.spent[place]:
             key = [axis[i] for axis, i in zip(axes, place, strict=True)]
-            writer.writerow([*key, *(f"{value:.4g}" for value in row)])
+            row = [f"{value:.{DIGITS}g}" for value in scores.values[(slice(None), *place)]]
+            writer.writerow([*key, scores.spent[place], *row])
     return text.getvalue()
 
 
@@ -215,8 +235,8 @@ def read_scores(path: Path, seconds_path: Path) -> Scores:
         rows = list(csv.DictReader(file))
     problems, algorithms = (_in_order(rows, name) for name in _KEY[:2])
     budgets, seeds = (tuple(sorted({int(row[name]) for row in rows})) for name in _KEY[2:])
-    shape = (len(Indicators._fields), len(problems), len(algorithms), len(budgets), len(seeds))
-    values = np.full(shape, np.nan)
+    shape = (len(problems), len(algorithms), len(budgets), len(seeds))
+    values, spent = np.full((len(MEASURES), *shape), np.nan), np.zeros(shape, dtype=int)
     for row in rows:
         place = (
             problems.index(row["problem"]),
@@ -224,11 +244,12 @@ def read_scores(path: Path, seconds_path: Path) -> Scores:
             budgets.index(int(row["evaluations"])),
             seeds.index(int(row["seed"])),
         )
-        values[(slice(None), *place)] = [float(row[name]) for name in Indicators._fields]
+        values[(slice(None), *place)] = [float(row[name]) for name in MEASURES]
+        spent[place] = int(row[SPENT])
     with seconds_path.open(newline="", encoding="utf-8") as file:
         by_problem = {row["problem"]: row for row in csv.DictReader(file)}
     seconds = np.array([[float(by_problem[p][a]) for a in algorithms] for p in problems])
-    return Scores(problems, algorithms, budgets, seeds, values, seconds)
+    return Scores(problems, algorithms, budgets, seeds, values, spent, seconds)
 
 
 def _in_order(rows: Sequence[dict[str, str]], name: str) -> tuple[str, ...]:

@@ -5,19 +5,25 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
+from contextlib import suppress
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pymoo_hdte
 
-PACKAGES = ("numpy", "scipy", "pymoo", "moocore", "matplotlib")
+PACKAGES = ("numpy", "scipy", "numba", "pymoo", "moocore", "matplotlib")
 """Installed packages whose version can change a result."""
+EXTRAS = ("jmetalpy", "pygmo")
+"""Packages that can as well, where they are installed."""
 
 
 def environment() -> dict[str, str]:
     """Versions of what computes the results."""
     versions = {package: version(package) for package in PACKAGES}
+    for package in EXTRAS:
+        with suppress(PackageNotFoundError):
+            versions[package] = version(package)
     return {"python": platform.python_version(), "machine": platform.machine()} | versions
 
 
@@ -38,4 +44,4 @@ def fingerprint(*sources: Path) -> str:
 
 def report_fingerprint() -> str:
     """Identify the state of everything that a finished result depends on."""
-    return fingerprint(*sorted(Path(__file__).parent.glob("*.py")))
+    return fingerprint(*sorted(Path(__file__).parent.rglob("*.py")))

@@ -37,12 +37,16 @@ class Friedman(NamedTuple):
 
 
 class RivalTest(NamedTuple):
-    """A control against one rival: p after Holm, and on how many problems it is better, worse."""
+    """A control against one rival: p after Holm, and on how many problems it is better, worse.
+
+    ``ahead`` is whether the signed ranks, which p is about, speak for the control.
+    """
 
     rival: str
     p: float
     better: int
     worse: int
+    ahead: bool
 
 
 class WinTieLoss(NamedTuple):
@@ -181,7 +185,9 @@ def holm_against(
     gains = [_gain(ours, cost) for cost in theirs]
     p = holm([wilcoxon_p(gain, np.zeros_like(gain)) for gain in gains])
     return [
-        RivalTest(rival, float(adjusted), int(np.sum(gain > 0)), int(np.sum(gain < 0)))
+        RivalTest(
+            rival, float(adjusted), int(np.sum(gain > 0)), int(np.sum(gain < 0)), _ahead(gain)
+        )
         for rival, adjusted, gain in zip(rivals, p, gains, strict=True)
     ]
 
@@ -287,6 +293,12 @@ def _opponents(
     place = names.index(one_of("control", control, names))
     theirs = np.moveaxis(np.delete(costs, place, axis=1), 1, 0)
     return costs[:, place], theirs, names[:place] + names[place + 1 :]
+
+
+def _ahead(gain: NDArray[np.float64]) -> bool:
+    """Return whether the ranks of the gains outweigh those of the losses."""
+    moved = gain[gain != 0]
+    return bool(np.sum(np.sign(moved) * rankdata(np.abs(moved))) > 0)
 
 
 def _gain(ours: NDArray[np.float64], theirs: NDArray[np.float64]) -> NDArray[np.float64]:

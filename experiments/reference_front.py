@@ -1,27 +1,36 @@
-"""The true fronts of `RobustDTE`: computed twice, compared, and held against what is stored.
+"""The true fronts of the robust DTE problems: computed twice, compared, held against the stored.
 
-Writes ``front_<model>.csv`` beside its report; copied to ``pymoo_hdte/problems/data`` it is what
-``RobustDTE.pareto_front()`` returns.
+Writes ``front_<name>.csv`` beside its report; copied to ``pymoo_hdte/problems/data`` it is what
+``pareto_front()`` of that problem returns.
 """
 
 from __future__ import annotations
+
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from tqdm import tqdm
 
 from experiments.figures import BLUE, grid
+from experiments.front_agreement import disagreement
 from experiments.quality import TrueFront
 from experiments.registry import Context
 from experiments.result import Column, Finding, Picture, Result, Table
-from experiments.runs import robust_problem
 from experiments.store import write_atomically
-from experiments.true_front import second_objective_at, true_front
-from pymoo_hdte.drive import PRESETS
-from pymoo_hdte.problems import RobustDTE
+from experiments.tolerance_front import (
+    POINTS,
+    TOLERANCES,
+    tolerance_disagreement,
+    tolerance_front,
+)
+from experiments.true_front import true_front
+from pymoo_hdte.problems import RobustDTE, RobustDTETolerance, robust_dte_family
+from pymoo_hdte.problems.family import Member
 from pymoo_hdte.problems.reference import ReferenceFront, format_reference
 
 N_POINTS = 1000
@@ -32,33 +41,34 @@ _RIVAL_GENERATIONS = 300
 
 
 def run(context: Context) -> Result:
-    """Compute, cross-check and write the fronts of all presets."""
+    """Compute, cross-check and write the fronts of the printed model and of the whole family."""
+    members: dict[str, Member] = {"published": partial(RobustDTE, "published")}
+    members |= robust_dte_family()
     rows, findings, pictures = [], [], []
-    for name in tqdm(PRESETS, desc="reference_front", unit="front"):
-        problem = robust_problem(name)
-        (front, designs), second = (
-            true_front(problem, N_POINTS, np.random.default_rng(seed)) for seed in SEEDS
-        )
+    for name, build in tqdm(members.items(), desc="reference_front", unit="front"):
+        problem = build()
+        found, second = (_search(problem, seed) for seed in SEEDS)
+        front = found.front
         columns = (*problem.obj_names, *problem.var_names)
-        text = format_reference(ReferenceFront(front, designs), problem.settings, columns)
+        text = format_reference(found, problem.settings, columns)
         target = context.out / "reference_front" / f"front_{name}.csv"
         write_atomically(target, text.encode())
-        span = np.ptp(front, axis=0)
-        disagreement = 0.0
-        pieces = 1
+        differ = 0.0
+        pieces: int | None = 1
         if len(front) > 1:
-            disagreement = _disagreement(problem, front, *second)
-            pieces = len(TrueFront(front).pieces)
-            pictures.append(Picture(name, f"True front of {name}.", _picture(front)))
+            differ = _disagreement(problem, found, second)
+            pieces = len(TrueFront(front).pieces) if problem.n_obj == 2 else None
+            pictures.append(Picture(name, f"True front of {name}.", _picture(found)))
         undercut = _undercut(problem, front)
         stored = _distance_to_stored(problem, front)
-        rows.append((name, len(front), pieces, *span, disagreement, undercut, stored))
-        findings += _findings(name, disagreement, undercut, stored)
+        span = np.ptp(front, axis=0)[:2]
+        rows.append((name, len(front), pieces, *span, differ, undercut, stored))
+        findings += _findings(name, differ, undercut, stored)
     table = Table(
         "agreement",
         "Two independent searches, rival solutions, and the stored front",
         (
-            Column("model"),
+            Column("problem"),
             Column("points"),
             Column("pieces"),
             Column("mean", "arcsec", group="width in"),
@@ -71,35 +81,36 @@ def run(context: Context) -> Result:
         findings=tuple(findings),
     )
     return Result(
-        title="True fronts of the robust DTE problem",
+        title="True fronts of the robust DTE problems",
         command="python -m experiments reference_front",
         paragraphs=(
             f"Each front is searched from two seeds; rivals are {_RANDOM_DESIGNS} random designs "
             f"and NSGA-II after {_RIVAL_GENERATIONS} generations. A negative number means that no "
-            "rival undercuts the front.",
+            "rival undercuts the front. With a free tolerance there is a third objective, and the "
+            f"front is a sheet: {POINTS} points at each of {TOLERANCES} tolerances, compared at "
+            "each of them.",
         ),
         tables=(table,),
         pictures=tuple(pictures),
     )
 
 
+def _search(problem: RobustDTE | RobustDTETolerance, seed: int) -> ReferenceFront:
+    rng = np.random.default_rng(seed)
+    if isinstance(problem, RobustDTETolerance):
+        return tolerance_front(problem, rng)
+    return ReferenceFront(*true_front(problem, N_POINTS, rng))
+
+
 def _disagreement(
-    problem: RobustDTE,
-    front: NDArray[np.float64],
-    second_front: NDArray[np.float64],
-    second_designs: NDArray[np.float64],
+    problem: RobustDTE | RobustDTETolerance, found: ReferenceFront, second: ReferenceFront
 ) -> float:
-    """Return the largest difference of two searches: at both ends, and at every level of f1."""
-    width = np.ptp(front, axis=0)
-    rng = np.random.default_rng(SEEDS[1])
-    inner = front[1:-1]
-    other = second_objective_at(problem, inner[:, 0], second_designs, rng)
-    ends = abs(front[0, 0] - second_front[0, 0]), abs(front[-1, 1] - second_front[-1, 1])
-    between = np.max(np.abs(other - inner[:, 1])) / width[1]
-    return float(max(ends[0] / width[0], ends[1] / width[1], between))
+    if isinstance(problem, RobustDTETolerance):
+        return tolerance_disagreement(problem, found, second)
+    return disagreement(problem, found, second, np.ptp(found.front, axis=0))
 
 
-def _undercut(problem: RobustDTE, front: NDArray[np.float64]) -> float:
+def _undercut(problem: Problem, front: NDArray[np.float64]) -> float:
     """Return by how much of the width the best rival dominates the front, negative if none does."""
     rng = np.random.default_rng(SEEDS[0])
     designs = rng.uniform(problem.xl, problem.xu, (_RANDOM_DESIGNS, problem.n_var))
@@ -112,7 +123,7 @@ def _undercut(problem: RobustDTE, front: NDArray[np.float64]) -> float:
     return float(gain.min(axis=2).max())
 
 
-def _distance_to_stored(problem: RobustDTE, front: NDArray[np.float64]) -> float | None:
+def _distance_to_stored(problem: Problem, front: NDArray[np.float64]) -> float | None:
     stored = problem.pareto_front()
     if stored is None or stored.shape != front.shape:
         return None
@@ -120,13 +131,11 @@ def _distance_to_stored(problem: RobustDTE, front: NDArray[np.float64]) -> float
     return float(np.max(np.abs(stored - front) / width))
 
 
-def _findings(
-    name: str, disagreement: float, undercut: float, stored: float | None
-) -> list[Finding]:
+def _findings(name: str, differ: float, undercut: float, stored: float | None) -> list[Finding]:
     return [
         Finding(
-            max(disagreement, undercut) <= TOLERANCE,
-            f"On {name}, two searches differ by {disagreement:.1e} of the front's width, and the "
+            max(differ, undercut) <= TOLERANCE,
+            f"On {name}, two searches differ by {differ:.1e} of the front's width, and the "
             f"best rival undercuts it by {undercut:.1e}; {TOLERANCE:.0e} is allowed.",
             check=True,
         ),
@@ -140,10 +149,17 @@ def _findings(
     ]
 
 
-def _picture(front: NDArray[np.float64]) -> Figure:
+def _picture(found: ReferenceFront) -> Figure:
+    """Draw std over mean, coloured by tolerance where it is free."""
     figure, axes = grid(1, 1, width=5.0, height=3.6)
     axis = axes.flat[0]
-    axis.plot(front[:, 0], front[:, 1], ".", color=BLUE, markersize=2)
+    mean, std = found.front[:, :2].T
+    if found.front.shape[1] == 2:
+        axis.plot(mean, std, ".", color=BLUE, markersize=2)
+    else:
+        tolerance = 100.0 * found.designs[:, -1]
+        points = axis.scatter(mean, std, c=tolerance, s=2, cmap="viridis")
+        figure.colorbar(points, ax=axis, label="tolerance [%]")
     axis.set_xlabel("mean DTE [arcsec]")
     axis.set_ylabel("std DTE [arcsec]")
     return figure

@@ -73,8 +73,10 @@ EXPERIMENTS = (
     ),
     Experiment("emps", "EMPS: friction of a positioning system, measured by others"),
     Experiment("kinova", "Kinova Gen3: friction and ripple of a robot joint, measured by others"),
-    Experiment("peers", "The elitist swarm against the best algorithms of other libraries"),
-    Experiment("swarm_parts", "What each part of the elitist swarm is worth"),
+    Experiment(
+        "peers", "The elitist swarm against the best algorithms of other libraries", quick=False
+    ),
+    Experiment("swarm_parts", "What each part of the elitist swarm is worth", quick=False),
     Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
     Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
 )

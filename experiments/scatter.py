@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from experiments.published_values import Moments
 from experiments.quadrature import tensor_rule, weighted_moments
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
+from pymoo_hdte.surrogate import ExactMoments, SampledMoments, TruncatedNormal, UniformBand
 
 Inputs = Sequence[TruncatedNormal | UniformBand]
 
@@ -43,7 +43,8 @@ def exact_moments(problem: RobustDTE, design: ArrayLike, tolerance: float) -> Mo
 
 def theta_s_of(problem: RobustDTE) -> TruncatedNormal:
     """Return the distribution of theta_s, in rad."""
-    return cast(TruncatedNormal, problem.moments.uncertainty.inputs[0])
+    moments = cast(ExactMoments | SampledMoments, problem.moments)
+    return cast(TruncatedNormal, moments.uncertainty.inputs[0])
 
 
 def scatter_of(problem: RobustDTE, tolerance: float) -> Inputs:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from experiments.contest.peers import SWARM_VARIANTS
 from experiments.peers_data import Extent, Scores, scores_for
 from experiments.peers_tables import NAMES, OURS
+from experiments.ranks import medians
 from experiments.registry import Context
 from experiments.result import Column, Result, Table
 
@@ -51,13 +52,14 @@ def _parts_table(scores: Scores) -> Table:
             Column("worse on", group=group),
             Column("better on", group=group),
         ]
-        logs = np.log(scores.of("igd", scores.budgets[-1], tuning=tuning))
-        cost, low, high = _costs(logs, rng)
-        medians = np.median(logs, axis=-1)
+        runs = scores.of("igd", scores.budgets[-1], tuning=tuning)
+        cost, low, high = costs(runs, rng)
+        middle = medians(runs, smaller_is_better=True)
         for variant, row in enumerate(rows, start=1):
-            change = medians[:, variant] - medians[:, 0]
             interval = f"{low[variant]:.3f}..{high[variant]:.3f}"
-            row += [float(cost[variant]), interval, int(sum(change > 0)), int(sum(change < 0))]
+            worse = int(np.sum(middle[:, variant] > middle[:, 0]))
+            better = int(np.sum(middle[:, variant] < middle[:, 0]))
+            row += [float(cost[variant]), interval, worse, better]
     order = np.argsort([-float(row[1]) for row in rows], kind="stable")
     return Table(
         "parts",
@@ -69,30 +71,30 @@ def _parts_table(scores: Scores) -> Table:
     )
 
 
-def _costs(
-    logs: NDArray[np.float64], rng: np.random.Generator
+def costs(
+    runs: NDArray[np.float64], rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the ratio to the first algorithm and its interval, shape (algorithms,) each.
+    """Return the ratio to the first algorithm and its 95 % interval, shape (algorithms,) each.
 
-    ``logs`` are logarithms of IGD, shape (problems, algorithms, seeds).
+    ``runs`` are distances, shape (problems, algorithms, seeds); an algorithm whose median run
+    failed anywhere has an infinite ratio.
     """
 
-    def ratio(runs: NDArray[np.float64]) -> NDArray[np.float64]:
-        medians = np.median(runs, axis=-1)
-        return np.exp(np.mean(medians - medians[:, :1], axis=0))
+    def ratio(drawn: NDArray[np.float64]) -> NDArray[np.float64]:
+        logs = np.log(medians(drawn, smaller_is_better=True))
+        return np.exp(np.mean(logs - logs[:, :1], axis=0))
 
-    drawn = np.array(
-        [
-            ratio(np.take_along_axis(logs, rng.integers(logs.shape[-1], size=logs.shape), axis=-1))
-            for _ in range(RESAMPLES)
-        ]
-    )
-    low, high = np.quantile(drawn, (0.025, 0.975), axis=0)
-    return ratio(logs), low, high
+    resampled = [
+        ratio(np.take_along_axis(runs, rng.integers(runs.shape[-1], size=runs.shape), axis=-1))
+        for _ in range(RESAMPLES)
+    ]
+    # Between an infinite sample and another there is nothing to interpolate.
+    low, high = np.quantile(resampled, (0.025, 0.975), axis=0, method="inverted_cdf")
+    return ratio(runs), low, high
 
 
 def _problems_tables(scores: Scores) -> list[Table]:
-    values = np.median(scores.of("igd", scores.budgets[-1]), axis=-1)
+    values = medians(scores.of("igd", scores.budgets[-1]), smaller_is_better=True)
     return [
         Table(
             "problems",

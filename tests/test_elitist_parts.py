@@ -241,6 +241,9 @@ def test_infeasible_points_are_ordered_by_violation():
     np.testing.assert_array_equal(survivors(swarm, 1), [3])
     np.testing.assert_array_equal(survivors(swarm, 2), [1, 3])
     np.testing.assert_array_equal(survivors(swarm, 3), [0, 1, 3])
+    # Of equal violations those that were there first stay: no front to spread along.
+    level = points([[0, 0], [0.1, 0.1], [9, 9], [5, 5]], [1.0, 1.0, 1.0, 1.0])
+    np.testing.assert_array_equal(survivors(level, 2), [0, 1])
 
 
 def test_the_last_front_is_thinned_out_evenly_and_the_first_kept_whole():

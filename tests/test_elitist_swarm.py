@@ -133,6 +133,22 @@ def test_moves_can_be_exchanged():
     np.testing.assert_array_equal(result.algorithm.success.shares, [1.0])
 
 
+def test_a_move_whose_particles_never_survive_loses_its_share():
+    class ToTheCorner(Attraction):
+        def __call__(self, X, leaders, swarm, random_state):
+            return np.full_like(X, 10.0)
+
+    # Were the parents counted, both moves would have half.
+    result = run(ElitistSwarm(moves=[ToTheCorner(), Attraction()], **SMALL), Parabolas(), n_gen=40)
+    assert result.algorithm.success.shares[0] < 0.3
+
+
+@pytest.mark.parametrize("n_moves", [0, 20])
+def test_the_number_of_moves_is_checked(n_moves):
+    with pytest.raises(InvalidInput, match="number of moves"):
+        ElitistSwarm(moves=[Attraction()] * n_moves)
+
+
 @pytest.mark.parametrize("pop_size", [1, 10.0, None])
 def test_sizes_are_checked(pop_size):
     with pytest.raises(InvalidInput, match="pop_size"):

@@ -1,18 +1,23 @@
 """Campaigns: same bytes for any number of workers, and after an interruption."""
 
 import os
+import platform
+import re
 import subprocess
 import sys
 import time
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
-from experiments.campaign import Campaign, Run
-from experiments.workers import make_executor
+from experiments.campaign import Campaign, Run, execute, origin
+from experiments.workers import WrongWorker, arithmetic, make_executor
 from pymoo_hdte.checks import InvalidInput
 
 
@@ -63,8 +68,45 @@ class KilledWalk(RandomWalk):
         return super().execute()
 
 
+@dataclass(frozen=True)
+class JealousWalk(RandomWalk):
+    """The same job, but it fails beside another in the same process."""
+
+    under_way: ClassVar[list[int]] = []
+
+    def execute(self) -> Run:
+        self.under_way.append(self.seed)
+        run = super().execute()
+        if self.under_way != [self.seed]:
+            raise RuntimeError("not alone")
+        self.under_way.clear()
+        return run
+
+
+@dataclass(frozen=True)
+class ThreadCount(RandomWalk):
+    """How many threads numerical libraries have."""
+
+    def execute(self) -> Run:
+        counts = [[float(library["num_threads"])] for library in threadpool_info()]
+        return Run(("threads",), np.array(counts), 0.0)
+
+
+class HalfBrokenExecutor(Executor):
+    """Ends on seed 3, when everything else is finished and nothing has been asked for."""
+
+    def submit(self, function, job, *arguments):
+        future = Future()
+        if job.seed == 3:
+            future.set_exception(BrokenExecutor("the workers are gone"))
+        else:
+            future.set_result(function(job, *arguments))
+        return future
+
+
 SEEDS = range(1, 6)
 WALKS = [RandomWalk(seed) for seed in SEEDS]
+KEPT = "What is finished is kept in {}; a rerun goes on from it."
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -110,8 +152,12 @@ def test_interruption_keeps_what_is_finished_and_a_rerun_goes_on(tmp_path):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_failing_job_is_reported_and_the_finished_ones_are_kept(tmp_path, workers):
     executor = make_executor(workers)
-    with pytest.raises(ArithmeticError, match="a step too far"):
+    with pytest.raises(ArithmeticError, match="a step too far") as caught:
         Campaign(tmp_path, executor).run([FailingWalk(seed) for seed in SEEDS], "walks")
+    assert caught.value.__notes__ == [
+        "In the job walk_seed3.",
+        KEPT.format(tmp_path),
+    ]
     if executor:
         executor.shutdown()
     names = {Path(p).name for p in files(tmp_path)}
@@ -124,11 +170,80 @@ def test_a_killed_worker_is_an_error_and_not_a_wait_without_end(tmp_path):
         Campaign(tmp_path, executor).run([KilledWalk(seed) for seed in SEEDS], "walks")
 
 
+def test_an_executor_that_ends_takes_nothing_finished_with_it(tmp_path):
+    with pytest.raises(BrokenExecutor, match="the workers are gone") as caught:
+        Campaign(tmp_path, HalfBrokenExecutor()).run(WALKS, "walks")
+    names = {Path(path).stem for path in files(tmp_path)}
+    assert names == {"versions", *(f"walk_seed{seed}" for seed in (1, 2, 4, 5))}
+    # No job is to blame.
+    assert caught.value.__notes__ == [KEPT.format(tmp_path)]
+
+
 def test_another_source_does_not_reuse_the_runs(tmp_path, monkeypatch):
     Campaign(tmp_path).run(WALKS[:1], "walks")
     monkeypatch.setattr("experiments.campaign.fingerprint", lambda *sources: "another")
+    origin.cache_clear()
     Campaign(tmp_path).run(WALKS[:1], "walks")
+    origin.cache_clear()
     assert len([name for name in files(tmp_path) if name.endswith(".csv")]) == 2
+
+
+def test_threads_of_one_process_take_turns(tmp_path):
+    with ThreadPoolExecutor(4) as executor:
+        Campaign(tmp_path, executor).run([JealousWalk(seed) for seed in SEEDS], "walks")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_numerical_libraries_have_one_thread_wherever_a_job_runs(tmp_path, workers, monkeypatch):
+    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.setenv(variable, "2")
+    executor = make_executor(workers)
+    with threadpool_limits(2), executor or nullcontext():
+        for run in Campaign(tmp_path, executor).run([ThreadCount(1), ThreadCount(2)], "threads"):
+            np.testing.assert_array_equal(run.values, 1.0)
+
+
+def test_a_worker_tells_in_what_it_differs():
+    here = origin(Path(__file__).parent)
+    assert here.keys() >= {"source or versions", "numpy", "processor"}
+    job = WALKS[4]
+    np.testing.assert_array_equal(execute(job, here).values, job.execute().values)
+    for name in here:
+        difference = re.escape(f"bytes: {name} {here[name]} instead of other.")
+        with pytest.raises(WrongWorker, match=difference):
+            execute(job, here | {name: "other"})
+
+
+def test_a_worker_goes_by_the_source_that_it_has_loaded(tmp_path):
+    source = tmp_path / "module_of_a_worker.py"
+    source.write_text("answer = 1\n")
+    loaded = origin(tmp_path)
+    source.write_text("answer = 2\n")
+    (tmp_path / "another.py").touch()
+    assert origin(tmp_path) == loaded
+    origin.cache_clear()
+    assert origin(tmp_path) != loaded
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names of its processors")
+@pytest.mark.parametrize(
+    ("variable", "one", "other"),
+    [
+        ("OPENBLAS_CORETYPE", "Haswell", "Nehalem"),
+        ("NPY_DISABLE_CPU_FEATURES", "", "{features}"),
+    ],
+)
+def test_another_processor_has_another_arithmetic(variable, one, other):
+    features = " ".join(re.findall(r"X86_V[34]|AVX[0-9A-Z_]*[0-9A-Z]|FMA3", arithmetic()))
+    names = set()
+    for value in (one, other.format(features=features)):
+        command = "from experiments.workers import arithmetic; print(arithmetic())"
+        done = subprocess.run(
+            [sys.executable, "-c", command],
+            env=os.environ | {variable: value}, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        names.add(done.stdout)
+    assert len(names) == 2
 
 
 def test_a_dask_address_without_a_scheduler_is_refused():

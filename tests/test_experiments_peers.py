@@ -1,6 +1,7 @@
 """The peer comparison and the ablation: scores on disk, demands judged, costs of parts."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ from experiments import peers, swarm_parts
 from experiments.campaign import Campaign
 from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
 from experiments.contest.problems import BENCHMARKS
-from experiments.indicators import CORNER, Indicators, IndicatorsAgainst
+from experiments.indicators import CORNER, IndicatorsAgainst
 from experiments.peers_data import (
+    MEASURES,
     Scores,
     committed_scores,
     contest_scores,
@@ -33,8 +35,11 @@ def planted(rng, shift, seeds=10):
     values = 0.01 * runs * factors
     # The hypervolume is a merit.
     values[2] = 1.0 - values[2]
+    values = np.concatenate([values, values[[0, 2]]])
+    spent = np.full(values.shape[1:], 10_000)
     seconds = np.ones((len(PROBLEMS), len(ALGORITHMS)))
-    return Scores(PROBLEMS, ALGORITHMS, (10_000,), tuple(range(1, seeds + 1)), values, seconds)
+    seeds = tuple(range(1, seeds + 1))
+    return Scores(PROBLEMS, ALGORITHMS, (10_000,), seeds, values, spent, seconds)
 
 
 def demands(scores):
@@ -55,9 +60,16 @@ def test_indicators_of_a_plane_are_the_closed_forms():
     step, rest = CORNER - 1.0, CORNER
     assert corners.hypervolume == pytest.approx(3 * step * rest**2 - 3 * step**2 * rest + step**3)
     assert corners.spacing == pytest.approx(0.0)
-    # A set shifted by d in every objective is d sqrt(3) away, and d in the plus sense sqrt(3) too.
+    # A plane shifted by d in every objective is d sqrt(3) away, measured either way.
     shifted = measure((plane + 0.05) * [1.0, 10.0, 100.0])
     assert shifted.igd_plus == pytest.approx(0.05 * np.sqrt(3.0), rel=1e-6)
+    assert shifted.igd == pytest.approx(0.05 * np.sqrt(3.0), rel=0.02)
+
+
+def test_two_points_have_no_spacing():
+    measure = IndicatorsAgainst([[0.0, 1.0], [1.0, 0.0]])
+    assert np.isnan(measure([[0.0, 1.0], [1.0, 0.0]]).spacing)
+    assert measure([[0.0, 1.0], [0.5, 0.5], [1.0, 0.0]]).spacing == pytest.approx(0.0)
 
 
 def test_an_empty_set_is_the_worst_and_a_front_that_does_not_vary_is_refused():
@@ -75,15 +87,18 @@ def test_an_empty_set_is_the_worst_and_a_front_that_does_not_vary_is_refused():
 
 def test_scores_survive_the_file(tmp_path, rng):
     scores = planted(rng, [1.0, 2.0, 3.0, 4.0])
-    values = np.vectorize(lambda value: float(f"{value:.4g}"))(scores.values)
+    values = np.vectorize(lambda value: float(f"{value:.6g}"))(scores.values)
     values[:, 2, 1] = np.nan
-    values[:, 3, 1, 0, 2] = [np.inf, np.inf, 0.0, np.nan]
-    scores = replace(scores, values=values)
+    values[:, 3, 1, 0, 2] = [np.inf, np.inf, 0.0, np.nan, np.inf, 0.0]
+    spent = scores.spent.copy()
+    spent[2, 1], spent[3, 1, 0, 2] = 0, 9_936
+    scores = replace(scores, values=values, spent=spent)
     path, seconds = tmp_path / "peers.csv", tmp_path / "seconds.csv"
     path.write_text(format_scores(scores))
     seconds.write_text(format_seconds(scores))
     again = read_scores(path, seconds)
     np.testing.assert_array_equal(again.values, scores.values)
+    np.testing.assert_array_equal(again.spent, scores.spent)
     np.testing.assert_array_equal(again.seconds, scores.seconds)
     assert again.problems == scores.problems
     assert again.algorithms == scores.algorithms
@@ -94,7 +109,7 @@ def test_runs_are_measured_at_every_budget_and_a_rerun_reads_them(tmp_path):
     if not CONTESTANTS["NSPSO"].available:
         arguments = (arguments[0], [OURS, FAITHFUL, "MOPSO-CD"], *arguments[2:])
     scores = contest_scores(Campaign(tmp_path), *arguments)
-    assert scores.values.shape == (len(Indicators._fields), 2, 3, 2, 2)
+    assert scores.values.shape == (len(MEASURES), 2, 3, 2, 2)
     ours = scores.values[:, :, 0]
     assert np.isfinite(ours).all()
     # More evaluations bring both closer to the front.
@@ -144,13 +159,21 @@ def test_ranks_come_with_intervals_that_hold_them(rng):
 
 
 def test_the_cost_of_a_part_is_the_planted_one(rng):
-    logs = np.log(0.01) + 0.05 * rng.standard_normal((20, 3, 21))
-    logs[:, 1] += np.log(1.5)
-    cost, low, high = swarm_parts._costs(logs, rng)
+    runs = 0.01 * np.exp(0.05 * rng.standard_normal((20, 3, 21)))
+    runs[:, 1] *= 1.5
+    cost, low, high = swarm_parts.costs(runs, rng)
     np.testing.assert_array_equal([cost[0], low[0], high[0]], 1.0)
     assert low[1] < 1.5 < high[1]
     assert low[2] < 1.0 < high[2]
     assert high[1] - low[1] < 0.05
+
+
+def test_a_part_without_which_runs_fail_costs_everything(rng):
+    runs = rng.uniform(0.9, 1.1, (5, 2, 9))
+    runs[2, 1, :6] = np.inf
+    cost, low, _ = swarm_parts.costs(runs, rng)
+    assert cost[1] == np.inf
+    assert np.isfinite(low[0])
 
 
 @pytest.mark.parametrize(
@@ -158,7 +181,11 @@ def test_the_cost_of_a_part_is_the_planted_one(rng):
     [(peers, set(CONTESTANTS)), (swarm_parts, {OURS, *SWARM_VARIANTS})],
 )
 def test_the_committed_outcome_is_whole_and_makes_the_report(tmp_path, experiment, algorithms):
-    scores = committed_scores(experiment.__name__.rpartition(".")[2])
+    name = experiment.__name__.rpartition(".")[2]
+    if not (Path(experiment.__file__).parent / "data" / f"{name}.csv").is_file():
+        pytest.skip(f"python -m experiments {name} --full has not been run to its end yet")
+    scores = committed_scores(name)
+    assert len(scores.seeds) == experiment.FULL.seeds
     assert set(scores.problems) == set(BENCHMARKS)
     assert set(scores.algorithms) == algorithms
     assert scores.budgets == experiment.FULL.budgets

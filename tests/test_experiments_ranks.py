@@ -91,7 +91,7 @@ class TestDemsarsExample:
     def test_counts_against_a_control(self):
         """C4.5+m beats C4.5 on ten data sets and loses on two; on two both are equal."""
         tests = holm_against("C4.5+m", DEMSAR_NAMES, DEMSAR, smaller_is_better=False)
-        assert tests[0][0::2] == ("C4.5", 10)
+        assert (tests[0].rival, tests[0].better) == ("C4.5", 10)
         assert tests[0].worse == 2
 
 
@@ -225,9 +225,9 @@ class TestAgainstAControl:
         tests = holm_against("a", NAMES[:3], values, smaller_is_better=True)
         assert [test.rival for test in tests] == ["b", "c"]
         assert [test.p for test in tests] == pytest.approx([4 / 64, 4 / 64])
-        assert [test[2:] for test in tests] == [(6, 0), (6, 0)]
+        assert [test[2:] for test in tests] == [(6, 0, True), (6, 0, True)]
         swapped = holm_against("a", NAMES[:3], values, smaller_is_better=False)
-        assert [test[2:] for test in swapped] == [(0, 6), (0, 6)]
+        assert [test[2:] for test in swapped] == [(0, 6, False), (0, 6, False)]
 
     def test_a_failure_outweighs_every_other_difference(self):
         """The one lost problem takes the largest rank: by enumeration, not the 4 / 64 of rank 1."""
@@ -236,7 +236,13 @@ class TestAgainstAControl:
         (test,) = holm_against("a", NAMES[:2], values, smaller_is_better=True)
         sums = [np.dot(signs, range(1, 7)) for signs in product((0, 1), repeat=6)]
         assert test.p == pytest.approx(2 * np.mean(np.array(sums) <= 6))
-        assert test[2:] == (5, 1)
+        assert test[2:] == (5, 1, True)
+
+    def test_the_signed_ranks_decide_who_is_ahead_and_not_the_counts(self):
+        gains = np.array([0.1, 0.2, 0.3, 0.4, -5.0, -6.0, -7.0])
+        values = np.column_stack([np.zeros(7), gains])
+        (test,) = holm_against("a", NAMES[:2], values, smaller_is_better=True)
+        assert test[2:] == (4, 3, False)
 
     def test_problems_on_which_both_fail_do_not_count(self):
         values = np.column_stack([self.gains * 0, self.gains])

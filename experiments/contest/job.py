@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from experiments.campaign import Run
 from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
 from experiments.contest.problems import problem_of
-from pymoo_hdte.algorithms.spread import most_spread
 
-FINAL_SIZE = 50
+EVALUATIONS, SPENT = "evaluations", "spent"
+"""Columns of a run, before those of the objectives."""
 
 
 @dataclass(frozen=True)
 class ContestRun:
-    """One algorithm, one problem, one seed, and the final set at each budget of evaluations."""
+    """One algorithm, one problem, one seed, and the set it offers at each budget of evaluations."""
 
     problem: str
     algorithm: str
@@ -33,10 +33,10 @@ class ContestRun:
         return f"{self.problem}_{self.algorithm}_{budgets}_seed{self.seed}"
 
     def execute(self) -> Run:
-        """Run, and reduce what is offered to `FINAL_SIZE` in the same way for all.
+        """Run, and return the front of what is offered.
 
         Columns are the budget, the evaluations spent and the objectives, rows by budget and rising
-        objectives.
+        objectives. A budget at which nothing feasible is offered has one row without objectives.
         """
         problem = problem_of(self.problem)
         run = (CONTESTANTS | SWARM_VARIANTS)[self.algorithm].run
@@ -45,17 +45,18 @@ class ContestRun:
         seconds = time.perf_counter() - started
         rows = []
         for budget, offer in zip(self.budgets, offers, strict=True):
-            front = final_set(offer.F)
+            front = front_among(offer.F)
+            if not len(front):
+                front = np.full((1, problem.n_obj), np.nan)
             rows.append(np.column_stack([np.tile([budget, offer.spent], (len(front), 1)), front]))
-        columns = ("evaluations", "spent", *(f"f{1 + i}" for i in range(problem.n_obj)))
+        columns = (EVALUATIONS, SPENT, *(f"f{1 + i}" for i in range(problem.n_obj)))
         return Run(columns, np.concatenate(rows), seconds)
 
 
-def final_set(F: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return at most `FINAL_SIZE` different, non-dominated rows of ``F`` (n, m), evenly spread."""
+def front_among(F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the different, finite, non-dominated rows of ``F`` (n, m), in rising order."""
     F = F[np.isfinite(F).all(axis=1)]
     if not len(F):
         return F
     front = F[is_nondominated(F)]
-    front = front[np.lexsort(front.T[::-1])]
-    return front[most_spread(front, FINAL_SIZE)]
+    return front[np.lexsort(front.T[::-1])]

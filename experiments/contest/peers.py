@@ -27,14 +27,15 @@ class Contestant:
         Where it comes from.
     run : callable
         Takes a problem, ascending budgets and a seed; gives what is offered at each budget.
-    knows_budget : bool
-        Whether it moves otherwise if it may spend more; then every budget is a run of its own.
+    starts_anew : bool
+        Whether every budget is a run of its own: because the algorithm moves otherwise if it may
+        spend more, or cannot be stopped on the way.
     takes_constraints : bool
     """
 
     library: str
     run: RunFunction
-    knows_budget: bool = False
+    starts_anew: bool = False
     takes_constraints: bool = True
 
     @property
@@ -70,16 +71,13 @@ def _pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
 
 CONTESTANTS = {
     **{
-        name: Contestant("pymoo_hdte", partial(run_pymoo, make), knows_budget=knows)
+        name: Contestant("pymoo_hdte", partial(run_pymoo, make), starts_anew=knows)
         for name, (make, knows) in OWN.items()
     },
-    **{
-        name: Contestant("pymoo", partial(run_pymoo, make), takes_constraints=name != "MOPSO-CD")
-        for name, make in PYMOO.items()
-    },
+    **{name: Contestant("pymoo", partial(run_pymoo, make)) for name, make in PYMOO.items()},
     "SMPSO": Contestant("jmetal", _jmetal("SMPSO")),
-    "OMOPSO": Contestant("jmetal", _jmetal("OMOPSO"), knows_budget=True),
-    "NSPSO": Contestant("pygmo", _pygmo, takes_constraints=False),
+    "OMOPSO": Contestant("jmetal", _jmetal("OMOPSO"), starts_anew=True),
+    "NSPSO": Contestant("pygmo", _pygmo, starts_anew=True, takes_constraints=False),
     "random search": Contestant("numpy", run_random),
 }
 """All contestants by name."""

@@ -28,7 +28,10 @@ logging.getLogger("jmetal.core.algorithm").setLevel(logging.WARNING)
 
 SWARM = 100
 EPSILON = 0.0075
-"""Of OMOPSO's archive, in objectives as they are: the value in jMetalPy's examples."""
+"""Of OMOPSO's archive, in objectives as they are: the value in jMetalPy's examples.
+
+It decides which solutions are offered, not how the swarm moves.
+"""
 
 
 class WrappedProblem(FloatProblem):

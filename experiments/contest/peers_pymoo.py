@@ -58,19 +58,23 @@ def run_pymoo(
 
     Budgets ascend; a budget counts the evaluations that pymoo's evaluator was asked for, in whole
     generations that do not exceed it. AGE-MOEA-II of pymoo 0.6.2 may divide by zero where its front
-    is degenerate; such a run ends there, and what it held before counts.
+    is degenerate; such a run ends there, as one that finds no new design does, and what it held
+    counts.
     """
     offered = []
-    broken = False
     with seeded_default_rng(seed):
         algorithm = make(problem)
         algorithm.setup(problem, termination=("n_eval", budgets[-1]), seed=seed)
         for budget in budgets:
-            while not broken and algorithm.evaluator.n_eval + algorithm.pop_size <= budget:
+            while (
+                algorithm.has_next() and algorithm.evaluator.n_eval + algorithm.pop_size <= budget
+            ):
                 try:
                     algorithm.next()
                 except ZeroDivisionError:
-                    broken = True
+                    if not isinstance(algorithm, AGEMOEA2):
+                        raise
+                    algorithm.termination.force_termination = True
             offered.append(Offer(_feasible(algorithm, problem), algorithm.evaluator.n_eval))
     return offered
 

@@ -1,4 +1,4 @@
-"""The benchmark: which problems there are, which of them may be tuned on, and their true fronts."""
+"""The benchmark: which problems there are, and which of them may be tuned on."""
 
 from __future__ import annotations
 
@@ -6,26 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 
-import numpy as np
-from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 from pymoo.problems import get_problem
 
 from experiments.contest.moved_zdt import MovedZDT
-from experiments.contest.true_fronts import (
-    N_POINTS,
-    dtlz_front,
-    even_curve,
-    osy_front,
-    srn_front,
-    tnk_front,
-    welded_beam_front,
-    wfg_front,
-)
-from pymoo_hdte.problems import RobustDTE, RobustToy
+from pymoo_hdte.problems import RobustToy, robust_dte_family
 
 _ZDT = ("1", "2", "3", "4", "6")
 _DTLZ_VARIABLES = {1: 7, 2: 12, 7: 22}
+ROBUST_MEMBERS = ("calibrated", "resonant", "calibrated_duty_cycle", "calibrated_tolerance")
+"""Of `robust_dte_family`; its finer surrogates have nearly the fronts of these."""
+
 _WFG_POSITIONS, _WFG_DISTANCES = 4, 20
 
 
@@ -41,35 +32,18 @@ class Benchmark:
         Whether our algorithms may be tuned on it; all others are held out.
     make : callable
         Builds the problem.
-    front : callable
-        Gives the true front (n, m) of a problem that was built.
     """
 
     name: str
     family: str
     tuning: bool
     make: Callable[[], Problem]
-    front: Callable[[Problem], NDArray[np.float64]]
 
 
 @cache
 def problem_of(name: str) -> Problem:
     """Return the problem of that name, built once per process."""
     return BENCHMARKS[name].make()
-
-
-@cache
-def front_of(name: str) -> NDArray[np.float64]:
-    """Return the true front (n, m) of the problem of that name, found once per process."""
-    return BENCHMARKS[name].front(problem_of(name))
-
-
-def _pymoo_front(problem: Problem) -> NDArray[np.float64]:
-    return even_curve(problem.pareto_front(10 * N_POINTS))
-
-
-def _own_front(problem: Problem) -> NDArray[np.float64]:
-    return problem.pareto_front()
 
 
 def _zdt() -> list[Benchmark]:
@@ -88,50 +62,39 @@ def _zdt() -> list[Benchmark]:
         )
         for group, suffix, tuning, make in entries:
             full = name.upper() + suffix.replace(" ", "-")
-            group.append(Benchmark(full, "ZDT" + suffix, tuning, make, _pymoo_front))
+            group.append(Benchmark(full, "ZDT" + suffix, tuning, make))
     return plain + moved + rotated
 
 
 def _dtlz(number: int) -> Benchmark:
     make = partial(get_problem, f"dtlz{number}", n_var=_DTLZ_VARIABLES[number], n_obj=3)
-    return Benchmark(f"DTLZ{number}", "DTLZ", number == 2, make, lambda _: dtlz_front(number))
+    return Benchmark(f"DTLZ{number}", "DTLZ", number == 2, make)
 
 
 def _wfg(number: int) -> Benchmark:
     n_var = _WFG_POSITIONS + _WFG_DISTANCES
     make = partial(get_problem, f"wfg{number}", n_var=n_var, n_obj=2, k=_WFG_POSITIONS)
-    return Benchmark(f"WFG{number}", "WFG", False, make, lambda _: wfg_front(number))
+    return Benchmark(f"WFG{number}", "WFG", False, make)
 
 
-def _constrained() -> list[Benchmark]:
-    fronts: dict[str, Callable[[Problem], NDArray[np.float64]]] = {
-        "BNH": _pymoo_front,
-        "TNK": lambda _: tnk_front(),
-        "SRN": srn_front,
-        "OSY": osy_front,
-        "welded_beam": lambda _: welded_beam_front(),
-    }
-    return [
-        Benchmark(name, "constrained", False, partial(get_problem, name.lower()), front)
-        for name, front in fronts.items()
-    ]
+def _constrained(name: str) -> Benchmark:
+    known_as = {"WeldedBeam": "welded_beam"}.get(name, name.lower())
+    return Benchmark(name, "constrained", False, partial(get_problem, known_as))
 
 
-def _robust(model: str) -> Benchmark:
-    return Benchmark(
-        f"RobustDTE-{model}", "RobustDTE", False, partial(RobustDTE, model), _own_front
-    )
+def _robust(member: str) -> Benchmark:
+    return Benchmark(f"RobustDTE-{member}", "RobustDTE", False, robust_dte_family()[member])
 
 
 BENCHMARKS = {
     benchmark.name: benchmark
     for benchmark in (
         *_zdt(),
-        Benchmark("RobustToy", "toy twin", True, RobustToy, _own_front),
+        Benchmark("RobustToy", "toy twin", True, RobustToy),
         *map(_dtlz, (2, 1, 7)),
         *map(_wfg, range(1, 10)),
-        *_constrained(),
-        *map(_robust, ("calibrated", "resonant")),
+        *map(_constrained, ("BNH", "TNK", "SRN", "OSY", "WeldedBeam")),
+        *map(_robust, ROBUST_MEMBERS),
     )
 }
 """All problems by name."""

@@ -64,28 +64,37 @@ class NoMutation(SparseMutation):
         return np.zeros_like(steps)
 
 
-class InertialSwarm(ElitistSwarm):
-    """With the last step of every survivor added to its next, weighted by the archive's entropy.
+class WholeAttraction(Attraction):
+    """The pull of a classical swarm: in all variables."""
 
-    The weight is 0.1 + 0.4 (1 - S), S being the normalised entropy of the best front, in the
-    variables that the move touches: the extension that `pymoo_hdte.algorithms.inertia` suggests.
-    """
+    TAKES_PART = 1.0
 
-    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        super()._initialize_advance(infills, **kwargs)
-        self.members.set("step", np.zeros_like(self.swarm.X))
+
+class ConstantInertiaSwarm(ElitistSwarm):
+    """With 0.3 of the last step of every survivor added to its next, where a move touches it."""
+
+    def _weight(self) -> float:
+        return 0.3
 
     def _infill(self) -> Population:
-        before, last = self.swarm.X, self.members.get("step")
+        before = self.swarm.X
+        still = np.zeros(before.shape[1])
+        last = np.array([one.data.get("step", still) for one in self.pop])  # type: ignore[union-attr]
         particles = super()._infill()
         moved = np.array([particle.X for particle in particles])
-        diversity = normalised_entropy(self.swarm.F[best_front(self.swarm)], GRID_DIVISIONS)
-        weight = 0.1 + 0.4 * (1.0 - diversity)
-        carried = np.where(moved != before, weight * last, 0.0)
+        carried = np.where(moved != before, self._weight() * last, 0.0)
         X = np.clip(moved + carried, *self.problem.bounds())
         particles.set("X", X)
         particles.set("step", X - before)
         return particles
+
+
+class EntropyInertiaSwarm(ConstantInertiaSwarm):
+    """The same, weighted by 0.1 + 0.4 (1 - S), S being the normalised entropy of the best front."""
+
+    def _weight(self) -> float:
+        front = self.swarm.F[best_front(self.swarm)]
+        return 0.1 + 0.4 * (1.0 - normalised_entropy(front, GRID_DIVISIONS))
 
 
 REDUCED: dict[str, Callable[[Problem], ElitistSwarm]] = {
@@ -97,6 +106,10 @@ REDUCED: dict[str, Callable[[Problem], ElitistSwarm]] = {
     "mutation of one size": lambda _: ElitistSwarm(mutation=OneSizeMutation()),
     "crowding truncation": lambda _: ElitistSwarm(truncation=least_crowded),
     "leaders at random": lambda _: AnyLeaderSwarm(),
-    "with entropy inertia": lambda _: InertialSwarm(),
+    "attraction in all variables": lambda _: ElitistSwarm(
+        moves=(WholeAttraction(), Exchange(), Difference())
+    ),
+    "with constant inertia": lambda _: ConstantInertiaSwarm(),
+    "with entropy inertia": lambda _: EntropyInertiaSwarm(),
 }
 """Variants by what is missing, changed or added; all with 100 particles."""

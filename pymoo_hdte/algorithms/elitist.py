@@ -18,6 +18,7 @@ from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, 
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.algorithms.success_shares import SuccessShares
 from pymoo_hdte.algorithms.survival import Truncation, survivors
+from pymoo_hdte.checks import InvalidInput
 
 
 class ElitistSwarm(Swarm):
@@ -28,8 +29,9 @@ class ElitistSwarm(Swarm):
     out evenly. A move gets more particles the more of them survive. There is nothing to tune and no
     schedule: a run may be stopped or continued at any generation.
 
-    It is what the ablation left of ideas for AMP-MOPSO, whose results it does not borrow: inertia,
-    with an entropy weight or without, did not earn its place (`experiments/peers`).
+    It is what was left of ideas for AMP-MOPSO, whose results it does not borrow, when those that
+    gained nothing were taken out, inertia among them; ``python -m experiments swarm_parts`` tells
+    what each part is worth.
 
     Parameters
     ----------
@@ -38,7 +40,7 @@ class ElitistSwarm(Swarm):
     sampling : Sampling, array of shape (pop_size, n_var) or Population of that size, optional
         First positions, within the bounds; uniformly random by default.
     moves : sequence of Move, optional
-        By default `Attraction`, `Exchange` and `Difference`.
+        1 to 19 of them; by default `Attraction`, `Exchange` and `Difference`.
     mutation : SparseMutation, optional
     truncation : callable, optional
         Takes objectives (n, m) and a size, and returns the rows that stay; by default
@@ -49,14 +51,14 @@ class ElitistSwarm(Swarm):
     Raises
     ------
     InvalidInput
-        As `ParticleSwarm`, but for G_max, which is not needed.
+        As `ParticleSwarm`, but for G_max, which is not needed; for no or too many moves.
     TypeError
         For an argument that does not exist.
 
     Notes
     -----
     - a leader is the less crowded of two random members of the best front;
-    - a position cut to the box stays there;
+    - a position beyond the box is cut to it;
     - feasible solutions come before infeasible ones, these by total violation (Deb et al. 2002); a
       solution that is not finite comes last, copies of another one after that;
     - the result of a run is the best front of the swarm, at most ``pop_size`` solutions.
@@ -74,18 +76,18 @@ class ElitistSwarm(Swarm):
     ) -> None:
         super().__init__(pop_size, sampling, **kwargs)
         self.moves = (Attraction(), Exchange(), Difference()) if moves is None else tuple(moves)
+        if not 0 < len(self.moves) < 1.0 / SuccessShares.SMALLEST:
+            raise InvalidInput("number of moves", len(self.moves), "1 to 19, as each gets a share")
         self.mutation = SparseMutation() if mutation is None else mutation
         self.truncation = truncation
 
     def _setup(self, problem: Problem, **kwargs: Any) -> None:
         super()._setup(problem, **kwargs)
         self.success = SuccessShares(len(self.moves))
-        # As `pop`, which pymoo lets be None.
-        self.members = Population.empty()
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         self.swarm = self._evaluated(infills)
-        self.pop = self.members = infills
+        self.pop = infills
 
     def _infill(self) -> Population:
         X, random_state = self.swarm.X, self.random_state
@@ -116,9 +118,9 @@ class ElitistSwarm(Swarm):
         survived[kept] = True
         self.success.learn(self.chosen, survived[self.pop_size :])
         self.swarm = points[kept]
-        self.pop = self.members = Population.merge(self.members, infills)[kept]
+        self.pop = Population.merge(self.pop, infills)[kept]
 
     def _set_optimum(self) -> None:
         # pymoo reads the optimum in every generation, even if nothing could be judged so far.
         front = best_front(self.swarm)
-        self.opt = self.members[front] if len(front) else self.members[:1]
+        self.opt = self.pop[front if len(front) else [0]]  # type: ignore[index]

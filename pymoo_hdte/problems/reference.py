@@ -20,7 +20,7 @@ _FOLDER = files("pymoo_hdte.problems") / "data"
 
 @dataclass(frozen=True)
 class ReferenceFront:
-    """A true Pareto front and its set, row for row, sorted by the first objective.
+    """A true Pareto front and its set, row for row, sorted by the first of two objectives.
 
     Attributes
     ----------
@@ -32,7 +32,47 @@ class ReferenceFront:
     designs: NDArray[np.float64]
 
 
-def load_reference(name: str, settings: dict[str, Any]) -> ReferenceFront | None:
+class StoredFront:
+    """Mixin for a pymoo problem whose true front is stored.
+
+    Parameters
+    ----------
+    variant : str
+        The problem in a word; its front is stored under that name.
+    settings : dict
+        What decides the true front, JSON-able.
+    """
+
+    n_obj: int
+
+    def __init__(self, variant: str, settings: dict[str, Any]) -> None:
+        self.variant = variant
+        self._settings = settings
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What decides the true front, JSON-able: physics, surrogate, scatter, search space."""
+        return dict(self._settings)
+
+    def name(self) -> str:
+        """Return the name that pymoo shows, with the variant."""
+        return f"{type(self).__name__}({self.variant})"
+
+    def _reference(self) -> ReferenceFront | None:
+        return load_reference(self.variant, self.settings, self.n_obj)
+
+    def _calc_pareto_front(self) -> NDArray[np.float64] | None:
+        """Return the stored true front, shape (n, n_obj), or None for settings without one."""
+        reference = self._reference()
+        return None if reference is None else reference.front
+
+    def _calc_pareto_set(self) -> NDArray[np.float64] | None:
+        """Return the designs of `pareto_front`, row for row, shape (n, n_var), or None."""
+        reference = self._reference()
+        return None if reference is None else reference.designs
+
+
+def load_reference(name: str, settings: dict[str, Any], n_obj: int = 2) -> ReferenceFront | None:
     """Return the stored front of that name, or None if there is none for these settings."""
     file = _FOLDER / f"front_{name}.csv"
     if not file.is_file():
@@ -41,7 +81,7 @@ def load_reference(name: str, settings: dict[str, Any]) -> ReferenceFront | None
     if json.loads(header.removeprefix("# ")) != _normalised(settings):
         return None
     table = np.loadtxt(StringIO(rows), delimiter=",", skiprows=1, ndmin=2)
-    return ReferenceFront(table[:, :2], table[:, 2:])
+    return ReferenceFront(table[:, :n_obj], table[:, n_obj:])
 
 
 def format_reference(

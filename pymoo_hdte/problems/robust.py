@@ -17,6 +17,7 @@ from pymoo_hdte.surrogate import (
     SampledMoments,
     TruncatedNormal,
     UniformBand,
+    VariableBandMoments,
 )
 
 MOMENTS = ("exact", "sample")
@@ -51,9 +52,9 @@ class RobustProblem(Problem):
 
     Parameters
     ----------
-    moments : ExactMoments or SampledMoments
+    moments : ExactMoments, SampledMoments or VariableBandMoments
     obj_names : tuple of str
-        Names of the two objectives.
+        Names of the objectives: of these two, and of those that a subclass adds.
     units : dict of str
         Unit of every variable and objective, by name.
 
@@ -65,12 +66,13 @@ class RobustProblem(Problem):
 
     def __init__(
         self,
-        moments: ExactMoments | SampledMoments,
-        obj_names: tuple[str, str],
+        moments: ExactMoments | SampledMoments | VariableBandMoments,
+        obj_names: tuple[str, ...],
         units: dict[str, str],
     ) -> None:
         box: Box = moments.design_box
-        super().__init__(n_var=len(box), n_obj=2, xl=box.lower.copy(), xu=box.upper.copy())
+        n_obj = len(obj_names)
+        super().__init__(n_var=len(box), n_obj=n_obj, xl=box.lower.copy(), xu=box.upper.copy())
         self.moments = moments
         self.var_names = box.names
         self.obj_names = obj_names

@@ -14,6 +14,7 @@ from pymoo_hdte.surrogate.sensitivity import (
     sobol_indices_over_box,
 )
 from pymoo_hdte.surrogate.validation import Accuracy, accuracy, latin_hypercube
+from pymoo_hdte.surrogate.variable_band import VariableBandMoments
 
 __all__ = [
     "Accuracy",
@@ -25,6 +26,7 @@ __all__ = [
     "SobolIndices",
     "TruncatedNormal",
     "UniformBand",
+    "VariableBandMoments",
     "accuracy",
     "latin_hypercube",
     "sobol_indices",

@@ -1,4 +1,4 @@
-"""True fronts of the benchmark problems in closed form, or as a curve that a solver follows.
+"""True fronts of the benchmark problems: in closed form, stored, or as a solver found them.
 
 Sources: ZDT and DTLZ (Deb, Thiele, Laumanns, Zitzler 2005) as pymoo has them; WFG (Huband,
 Hingston, Barone, While 2006, shapes of section VIII with all distance parameters at their optimum);
@@ -7,6 +7,7 @@ OSY and TNK (Deb 2001, section 8.3).
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +17,17 @@ from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.optimize import minimize
 
+from experiments.contest.problems import BENCHMARKS, problem_of
+
 N_POINTS = 1000
-"""Of a front with two objectives; those with three have some 5,000."""
+"""Of a front with two objectives; those with three have thousands."""
 
 _PARTITIONS = 99
 
-WELDED_BEAM = Path(__file__).parent / "front_welded_beam.csv"
-WELDED_BEAM_LEVELS = np.geomspace(4.39e-4, 0.0158, 400)
-"""Deflections, in inches, from the stiffest beam to the cheapest."""
+WELDED_BEAM = Path(__file__).parent / "data" / "front_welded_beam.csv"
+_STIFFEST = 2.1952 / (10.0**3 * 5.0)
+WELDED_BEAM_LEVELS = _STIFFEST * np.concatenate([[1.0], np.geomspace(1.0 + 1e-4, 36.0, 1200)])
+"""Deflections, in inches, from that of the stiffest beam to that of the cheapest."""
 
 
 def wfg_front(number: int) -> NDArray[np.float64]:
@@ -109,6 +113,11 @@ def follow_welded_beam(problem: Problem, levels: NDArray[np.float64]) -> NDArray
     """Return least cost at falling stiffness, shape (n, 2), for rising deflections ``levels``.
 
     SLSQP starts from the last solution and from random ones, and what is better stays.
+
+    Raises
+    ------
+    ArithmeticError
+        If no start leads to a feasible beam.
     """
     rng = np.random.default_rng(1)
     width = problem.xu - problem.xl
@@ -116,7 +125,9 @@ def follow_welded_beam(problem: Problem, levels: NDArray[np.float64]) -> NDArray
     for level in levels:
         starts = [best, *(problem.xl + rng.random((5, problem.n_var)) * width)]
         found = [_least_cost(problem, level, start) for start in starts]
-        _, best = min(found, key=lambda entry: entry[0])
+        cost, best = min(found, key=lambda entry: entry[0])
+        if not np.isfinite(cost):
+            raise ArithmeticError(f"no feasible beam of deflection {level}")
         points.append(problem.evaluate(best, return_values_of=["F"]))
     return np.array(points)
 
@@ -129,8 +140,7 @@ def _least_cost(
 
     def slack(x: NDArray[np.float64]) -> NDArray[np.float64]:
         F, G = problem.evaluate(x, return_values_of=["F", "G"])
-        # Three constraints are forces and stresses of thousands, one is a length: one scale each.
-        return np.append(-G / np.array([1e4, 1e4, 1.0, 1e4]), 1.0 - F[1] / level)
+        return np.append(-G, 1.0 - F[1] / level)
 
     result = minimize(
         cost,
@@ -141,11 +151,11 @@ def _least_cost(
         options={"ftol": 1e-10, "maxiter": 200},
     )
     x = np.clip(result.x, problem.xl, problem.xu)
-    return (float(result.fun) if np.min(slack(x)) > -1e-6 else np.inf), x
+    return (float(result.fun) if np.min(slack(x)) > -1e-7 else np.inf), x
 
 
 def even_curve(F: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return some `N_POINTS` of the non-dominated rows of a dense curve, even in arc length.
+    """Return some `N_POINTS` of the non-dominated rows of a curve of more, even in arc length.
 
     Distances are in objectives normalised by the front, and steps of over 0.02 are gaps.
     """
@@ -158,3 +168,28 @@ def even_curve(F: NDArray[np.float64]) -> NDArray[np.float64]:
     ends = np.flatnonzero(steps > 0.02)
     rows = np.unique(np.concatenate([np.searchsorted(arc, wanted), ends, ends + 1]))
     return front[rows.clip(max=len(front) - 1)]
+
+
+@cache
+def front_of(name: str) -> NDArray[np.float64]:
+    """Return the true front (n, m) of the benchmark of that name, found once per process."""
+    return _front(name, problem_of(name))
+
+
+def _front(name: str, problem: Problem) -> NDArray[np.float64]:
+    match BENCHMARKS[name].family, name:
+        case "DTLZ", _:
+            return dtlz_front(int(name[-1]))
+        case "WFG", _:
+            return wfg_front(int(name[-1]))
+        case _, "TNK":
+            return tnk_front()
+        case _, "SRN":
+            return srn_front(problem)
+        case _, "OSY":
+            return osy_front(problem)
+        case _, "WeldedBeam":
+            return welded_beam_front()
+        case "RobustDTE" | "toy twin", _:
+            return problem.pareto_front()
+    return even_curve(problem.pareto_front(10 * N_POINTS))

@@ -1,0 +1,175 @@
+"""Operating conditions: at which speeds and loads a drive runs, and for what share of its time."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.drive import DriveModel, UnstableDrive
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+
+COLUMNS = ("speed_rpm", "load_Nm", "weight")
+"""Columns of a file of operating conditions, in any order."""
+
+
+@dataclass(frozen=True)
+class OperatingCondition:
+    """One entry of a duty cycle.
+
+    Parameters
+    ----------
+    input_speed : float
+        rad/s, above 0.
+    load_torque : float
+        N.m at the output, at least 0.
+    weight : float
+        Above 0; only the ratios of the weights of a duty cycle matter.
+
+    Raises
+    ------
+    InvalidInput
+        If a number is not finite or not in its range.
+    """
+
+    input_speed: float
+    load_torque: float
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        values = {
+            "input_speed": real_number("input_speed", self.input_speed, above=0.0),
+            "load_torque": real_number("load_torque", self.load_torque, at_least=0.0),
+            "weight": real_number("weight", self.weight, above=0.0),
+        }
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def __str__(self) -> str:
+        speed = self.input_speed / REVOLUTION_PER_MINUTE
+        return f"{speed:g} r/min and {self.load_torque:g} N.m"
+
+
+def load_conditions(path: str | Path) -> tuple[OperatingCondition, ...]:
+    """Read operating conditions from a CSV file with the `COLUMNS`.
+
+    Speeds are in r/min, loads in N.m. Blank lines and lines that start with ``#`` are skipped.
+
+    Raises
+    ------
+    InvalidInput
+        If a column is missing, repeated or unknown, a row has another number of cells, a value is
+        no number or not in its range, or there is no row. The error names file and line.
+    OSError
+        If the file cannot be read.
+    """
+    path = Path(path)
+    (header_line, header), *rows = _lines(path)
+    if sorted(header) != sorted(COLUMNS):
+        allowed = f"{', '.join(COLUMNS)}, each once"
+        raise InvalidInput(f"{path.name}, line {header_line}: columns", header, allowed)
+    if not rows:
+        field = f"{path.name}, line {header_line}: rows below the header"
+        raise InvalidInput(field, 0, "at least 1")
+    return tuple(_condition(f"{path.name}, line {line}", header, cells) for line, cells in rows)
+
+
+def hs_20_100_duty_cycle() -> tuple[OperatingCondition, ...]:
+    """Return a duty cycle for the HS-20-100, read from ``problems/data/duty_cycle.csv``.
+
+    Speeds and weights are our own choice, for want of a published one: the paper tests the drive
+    under rated conditions only. All lie at or below the rated 2000 r/min and 40 N.m.
+    """
+    with as_file(files("pymoo_hdte.problems") / "data" / "duty_cycle.csv") as path:
+        return load_conditions(path)
+
+
+def duty_cycle(conditions: Sequence[OperatingCondition]) -> tuple[OperatingCondition, ...]:
+    """Return the conditions as a tuple.
+
+    Raises
+    ------
+    InvalidInput
+        If there is none, or an entry is no `OperatingCondition`.
+    """
+    allowed = "one or more OperatingConditions"
+    if not isinstance(conditions, Sequence) or not conditions:
+        raise InvalidInput("conditions", conditions, allowed)
+    for index, entry in enumerate(conditions):
+        if not isinstance(entry, OperatingCondition):
+            raise InvalidInput(f"conditions[{index}]", entry, "an OperatingCondition")
+    return tuple(conditions)
+
+
+def shares(conditions: Sequence[OperatingCondition]) -> NDArray[np.float64]:
+    """Return the weights as shares of their sum, shape (n_conditions,)."""
+    weights = np.array([condition.weight for condition in conditions])
+    return weights / weights.sum()
+
+
+def duty_cycle_dte_arcsec(
+    model: DriveModel,
+    conditions: Sequence[OperatingCondition],
+    parameters: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the DTE of n designs, averaged over the duty cycle, shape (n,), in arcsec.
+
+    Parameters
+    ----------
+    model : DriveModel
+        Its own speed and load do not matter.
+    conditions : sequence of OperatingCondition
+        At least one.
+    parameters : ndarray, shape (n, 5)
+        As in `DriveModel.dte_arcsec`.
+
+    Raises
+    ------
+    UnstableDrive
+        If a design has no steady state under one of the conditions; names both.
+    """
+    average = np.zeros(len(parameters))
+    for condition, share in zip(conditions, shares(conditions), strict=True):
+        there = model.at(condition.input_speed, condition.load_torque)
+        try:
+            average += share * there.dte_arcsec(parameters)
+        except UnstableDrive as error:
+            raise UnstableDrive(f"at {condition}, {error}") from None
+    return average
+
+
+def _lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Return number and cells of the header and of every row."""
+    lines = []
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InvalidInput(path.name, str(error), "CSV text in UTF-8") from None
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            cells = next(csv.reader([line]))
+            lines.append((number, [cell.strip() for cell in cells]))
+    return lines or [(1, [])]
+
+
+def _condition(place: str, header: list[str], cells: list[str]) -> OperatingCondition:
+    if len(cells) != len(header):
+        allowed = f"{len(header)}, as in the header"
+        raise InvalidInput(f"{place}: number of cells", len(cells), allowed)
+    values = {}
+    for name, cell in zip(header, cells, strict=True):
+        try:
+            values[name] = float(cell)
+        except ValueError:
+            raise InvalidInput(f"{place}: {name}", cell, "a finite number") from None
+    # Checked before the change of units, so that an error shows what the file says.
+    speed = real_number(f"{place}: speed_rpm", values["speed_rpm"], above=0.0)
+    load = real_number(f"{place}: load_Nm", values["load_Nm"], at_least=0.0)
+    weight = real_number(f"{place}: weight", values["weight"], above=0.0)
+    return OperatingCondition(speed * REVOLUTION_PER_MINUTE, load, weight)

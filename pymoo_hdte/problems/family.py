@@ -1,0 +1,41 @@
+"""The robust DTE problems with a stored true front, for studies that compare algorithms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from pymoo_hdte.problems.duty_cycle import hs_20_100_duty_cycle
+from pymoo_hdte.problems.robust_dte import RobustDTE
+from pymoo_hdte.problems.robust_dte_tolerance import RobustDTETolerance
+
+Member = Callable[[], RobustDTE | RobustDTETolerance]
+
+
+def robust_dte_family() -> dict[str, Member]:
+    """Return the members by name, each as a function that builds the problem.
+
+    Building fits a surrogate: a tenth of a second at the paper's order 3, about one at order 5. All
+    but the last have two objectives and four variables; the last has three and five.
+
+    ======================== ==============================================================
+    calibrated               one smooth front; the optimum moves along the bounds
+    resonant                 a front of several pieces, inside the search space
+    ..._order4, ..._order5   the same on finer surrogates (3125 and 7776 model runs)
+    calibrated_duty_cycle    mean DTE over four operating conditions
+    calibrated_tolerance     the tolerance is a variable, its cost an objective
+    ======================== ==============================================================
+    """
+    orders = {"": 3, "_order4": 4, "_order5": 5}
+    members: dict[str, Member] = {
+        model + suffix: partial(RobustDTE, model, order)
+        for model in ("calibrated", "resonant")
+        for suffix, order in orders.items()
+    }
+    members["calibrated_duty_cycle"] = _duty_cycle
+    members["calibrated_tolerance"] = RobustDTETolerance
+    return members
+
+
+def _duty_cycle() -> RobustDTE:
+    return RobustDTE(conditions=hs_20_100_duty_cycle())

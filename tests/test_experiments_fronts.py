@@ -1,0 +1,66 @@
+"""The searches behind the stored fronts, on the toy whose front is closed form."""
+
+import numpy as np
+import pytest
+
+from experiments import tolerance_front
+from experiments.front_agreement import disagreement, on_level
+from pymoo_hdte.problems import RobustToy
+from pymoo_hdte.problems.reference import ReferenceFront
+
+TOY = RobustToy()
+WIDTH = np.ptp(TOY.pareto_front(), axis=0)
+
+
+def every(step):
+    rows = np.r_[0 : len(TOY.pareto_front()) : step, len(TOY.pareto_front()) - 1]
+    return ReferenceFront(TOY.pareto_front()[rows], TOY.pareto_set()[rows])
+
+
+def test_two_samples_of_one_front_agree():
+    assert disagreement(TOY, every(100), every(70), WIDTH) < 1e-9
+
+
+@pytest.mark.parametrize(("row", "objective"), [(0, 0), (5, 1), (-1, 1)])
+def test_a_point_beside_the_front_is_noticed(row, objective):
+    wrong = every(100)
+    wrong.front[row, objective] += 1e-4 * WIDTH[objective]
+    assert disagreement(TOY, wrong, every(70), WIDTH) == pytest.approx(1e-4, rel=1e-3)
+
+
+def test_a_search_at_fixed_tolerance_finds_the_front(monkeypatch):
+    monkeypatch.setattr(tolerance_front, "POINTS", 12)
+    monkeypatch.setattr(tolerance_front, "_COARSE_POINTS", 6)
+    designs = tolerance_front._front_designs(TOY, np.random.default_rng(1))
+    front = TOY.evaluate(designs)
+    # The closed form at the u_1 that has this mean: u_2 = 1, so the mean is u_1 + 1.
+    best = TOY.pareto_set()[0] * [0.0, 1.0, 1.0] + np.outer(front[:, 0] - 1.0, [1.0, 0.0, 0.0])
+    assert len(front) == 12
+    # u_3 does not move the mean: where that is least, the search only breaks ties by the deviation.
+    assert front[0] == pytest.approx(TOY.pareto_front()[0], rel=1e-3)
+    assert front[1:, 1] == pytest.approx(TOY.closed_form(best)[1][1:], abs=1e-8)
+    steps = np.hypot(*(np.diff(front, axis=0) / WIDTH).T)
+    assert steps.max() < 1.02 * steps.min()
+
+
+def test_a_design_is_moved_on_to_a_level_close_by_and_left_below_one_far_off():
+    design = np.array([1.5, 1.0, 1.4])
+    mean = TOY.evaluate(design)[0]
+    for level in (mean * (1.0 + 5e-7), mean * (1.0 - 5e-7)):
+        moved = on_level(TOY, design, level)
+        assert TOY.evaluate(moved)[0] == pytest.approx(level, rel=1e-14)
+        # The second variable rests on its bound.
+        assert np.array_equal(moved[1:], design[1:])
+    assert np.array_equal(on_level(TOY, design, mean + 0.1), design)
+
+
+def test_local_optima_give_way_to_the_solution_beside_them():
+    search = tolerance_front._LevelSearch(TOY, np.random.default_rng(1))
+    first, last = search.lowest(0), search.lowest(1)
+    levels = np.linspace(first.objectives[0], last.objectives[0], 5)
+    right = [first, *(search.best(level, search.starts(level)) for level in levels[1:-1]), last]
+    stuck = search._solution(np.array([0.3, 0.0, 0.9]))
+    solutions = [*right[:2], stuck, *right[3:]]
+    tolerance_front._hand_over(search, levels, solutions)
+    for found, expected in zip(solutions, right, strict=True):
+        assert found.objectives == pytest.approx(expected.objectives, rel=1e-8)
