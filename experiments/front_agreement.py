@@ -6,11 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.true_front import FrontSearch
+from experiments.level_search import LevelSearch
 from pymoo_hdte.problems.reference import ReferenceFront
-
-_BESIDE = 1e-6
-"""A design closer to its level than this, relatively, is meant to be on it."""
 
 
 def disagreement(
@@ -40,7 +37,7 @@ def _second_objective_at(
     problem: Problem, levels: NDArray[np.float64], designs: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the least f2 at these levels of f1, shape (n,), found from the designs of a front."""
-    search = FrontSearch(problem, np.random.default_rng(0))
+    search = LevelSearch(problem, np.random.default_rng(0))
     firsts = problem.evaluate(designs)[:, 0]
     cubes = (designs - problem.xl) / (problem.xu - problem.xl)
     values = np.full(len(levels), np.inf)
@@ -49,27 +46,7 @@ def _second_objective_at(
         between = (cubes[nearest - 1] + cubes[nearest]) / 2.0
         # One by one, since together only the starts that look best early are followed to the end.
         for start in (cubes[nearest - 1], between, cubes[nearest]):
-            found = search.below(level, [start])
+            found = search.best(level, [start])
             if found is not None:
-                design = on_level(problem, search.designs(found.cube), level)
-                values[row] = min(values[row], problem.evaluate(design)[1])
+                values[row] = min(values[row], found.objectives[1])
     return values
-
-
-def on_level(problem: Problem, design: NDArray[np.float64], level: float) -> NDArray[np.float64]:
-    """Move a design on to a level of f1, by one Newton step along its slope in the free part.
-
-    SLSQP leaves it beside the level by some 1e-7 of the range of f1 over all designs. That is more
-    than it seems: the front is far narrower than that range, and may be steep. A design well below
-    its level, as in a gap of the front, stays where it is.
-    """
-    values, slopes = problem.evaluate(design, return_values_of=["F", "dF"])
-    width = problem.xu - problem.xl
-    free = (design > problem.xl) & (design < problem.xu)
-    slope = np.where(free, slopes[0] * width, 0.0)
-    length = slope @ slope
-    missing = level - values[0]
-    if length == 0.0 or missing > _BESIDE * abs(level):
-        return design
-    step = missing / length * slope
-    return np.clip(design + step * width, problem.xl, problem.xu)

@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from experiments.figures import BLUE, grid
 from experiments.front_agreement import disagreement
+from experiments.level_search import without_local_optima
 from experiments.quality import TrueFront
 from experiments.registry import Context
 from experiments.result import Column, Finding, Picture, Result, Table
@@ -99,7 +100,8 @@ def _search(problem: RobustDTE | RobustDTETolerance, seed: int) -> ReferenceFron
     rng = np.random.default_rng(seed)
     if isinstance(problem, RobustDTETolerance):
         return tolerance_front(problem, rng)
-    return ReferenceFront(*true_front(problem, N_POINTS, rng))
+    found = ReferenceFront(*true_front(problem, N_POINTS, rng))
+    return without_local_optima(problem, found, rng)
 
 
 def _disagreement(

@@ -13,7 +13,8 @@ from pymoo.core.problem import Problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from tqdm import tqdm
 
-from experiments.front_agreement import disagreement, on_level
+from experiments.front_agreement import disagreement
+from experiments.level_search import LevelSearch, hand_over
 from experiments.true_front import FrontSearch, Solution
 from pymoo_hdte.problems import RobustDTETolerance
 from pymoo_hdte.problems.reference import ReferenceFront
@@ -26,9 +27,6 @@ POINTS = 50
 _COARSE_POINTS = 30
 _FINE_GRID = 1000
 _DECIMALS = 6
-_FAR = 0.1
-"""Of the search space in some variable."""
-_IMPROVEMENT = 1e-10
 
 
 def tolerance_front(problem: RobustDTETolerance, rng: np.random.Generator) -> ReferenceFront:
@@ -86,7 +84,7 @@ def _even_tolerances(problem: RobustDTETolerance) -> NDArray[np.float64]:
 
 def _front_designs(problem: Problem, rng: np.random.Generator) -> NDArray[np.float64]:
     """Return the designs of a front of two objectives, about even in arc length."""
-    search = _LevelSearch(problem, rng)
+    search = LevelSearch(problem, rng)
     first, last = search.lowest(0), search.lowest(1)
     coarse = [first]
     for level in np.linspace(first.objectives[0], last.objectives[0], _COARSE_POINTS)[1:-1]:
@@ -103,43 +101,8 @@ def _front_designs(problem: Problem, rng: np.random.Generator) -> NDArray[np.flo
         starts = [solutions[-1].cube, (ends[0] + ends[1]) / 2.0, *ends]
         solutions.append(search.best(level, starts) or solutions[-1])
     solutions.append(last)
-    _hand_over(search, levels, solutions)
+    hand_over(search, levels, solutions)
     return search.designs(np.array([solution.cube for solution in _falling(solutions)]))
-
-
-class _LevelSearch(FrontSearch):
-    """A search whose solutions lie on their levels exactly."""
-
-    def best(self, level: float, starts: list[NDArray[np.float64]]) -> Solution | None:
-        """Return what `below` finds from these starts, moved on to the level."""
-        found = self.below(level, starts)
-        if found is None:
-            return None
-        problem = self._problem
-        design = on_level(problem, self.designs(found.cube), level)
-        return self._solution((design - problem.xl) / self._width)
-
-
-def _hand_over(
-    search: _LevelSearch, levels: NDArray[np.float64], solutions: list[Solution]
-) -> None:
-    """Try at each level but the ends the solution beside it, until nothing improves.
-
-    Only neighbours far apart are tried: one of them may be a local optimum.
-    """
-    inner = range(1, len(solutions) - 1)
-    neighbours = [(i, i + 1) for i in reversed(inner)] + [(i, i - 1) for i in inner]
-    improved = True
-    while improved:
-        improved = False
-        for target, source in neighbours:
-            mine, other = solutions[target], solutions[source]
-            if np.max(np.abs(mine.cube - other.cube)) <= _FAR:
-                continue
-            found = search.best(levels[target], [other.cube])
-            limit = mine.objectives[1] * (1.0 - _IMPROVEMENT)
-            if found is not None and found.objectives[1] < limit:
-                solutions[target], improved = found, True
 
 
 def _falling(solutions: list[Solution]) -> list[Solution]:

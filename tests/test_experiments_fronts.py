@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from experiments import tolerance_front
-from experiments.front_agreement import disagreement, on_level
+from experiments.front_agreement import disagreement
+from experiments.level_search import LevelSearch, on_level, without_local_optima
 from pymoo_hdte.problems import RobustToy
 from pymoo_hdte.problems.reference import ReferenceFront
 
@@ -55,12 +56,20 @@ def test_a_design_is_moved_on_to_a_level_close_by_and_left_below_one_far_off():
 
 
 def test_local_optima_give_way_to_the_solution_beside_them():
-    search = tolerance_front._LevelSearch(TOY, np.random.default_rng(1))
-    first, last = search.lowest(0), search.lowest(1)
-    levels = np.linspace(first.objectives[0], last.objectives[0], 5)
-    right = [first, *(search.best(level, search.starts(level)) for level in levels[1:-1]), last]
-    stuck = search._solution(np.array([0.3, 0.0, 0.9]))
-    solutions = [*right[:2], stuck, *right[3:]]
-    tolerance_front._hand_over(search, levels, solutions)
-    for found, expected in zip(solutions, right, strict=True):
-        assert found.objectives == pytest.approx(expected.objectives, rel=1e-8)
+    front = every(100)
+    stuck = ReferenceFront(front.front.copy(), front.designs.copy())
+    stuck.designs[4, 1:] = 1.3, 1.9
+    stuck.front[4, 1] += 0.05
+    mended = without_local_optima(TOY, stuck, np.random.default_rng(1))
+    assert mended.front == pytest.approx(front.front, rel=1e-8)
+    assert mended.designs == pytest.approx(front.designs, abs=1e-3)
+    others = np.arange(len(front.front)) != 4
+    assert np.array_equal(mended.front[others], front.front[others])
+    assert np.array_equal(mended.designs[others], front.designs[others])
+
+
+def test_solutions_lie_on_their_level():
+    search = LevelSearch(TOY, np.random.default_rng(1))
+    for level in (2.1, 2.5, 2.9):
+        found = search.best(level, search.starts(level))
+        assert found.objectives[0] == pytest.approx(level, rel=1e-14)

@@ -57,9 +57,7 @@ class RobustToy(RobustProblem):
             response, Box(("a_1", "a_2", *_VARIABLES), lower, upper), order=1
         )
         design_box = Box(_VARIABLES, np.ones(3), np.full(3, 2.0))
-        scatter = make_moments(
-            moments, self.surrogate, inputs, design_box, n_samples, sample_seed
-        )
+        scatter = make_moments(moments, self.surrogate, inputs, design_box, n_samples, sample_seed)
         names = ("mean", "std")
         super().__init__(scatter, names, dict.fromkeys((*_VARIABLES, *names), "1"))
 
