@@ -18,8 +18,6 @@ from experiments.store import save
 from experiments.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
 
-SMALL_VERSIONS = ("peers", "swarm_parts")
-"""Experiments that take ``--quick``."""
 FAILED = 1
 """Exit code where the workers fail."""
 INTERRUPTED = 130
@@ -34,8 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(_list_of_experiments())
         return 0
     chosen = _chosen(options.name, parser)
-    if options.quick and options.name not in SMALL_VERSIONS:
-        parser.error(f"--quick is for {' and '.join(SMALL_VERSIONS)}")
+    if options.quick and not (options.name and chosen[0].has_small_version):
+        parser.error(f"--quick is for {_small_versions()}")
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         executor = make_executor(options.workers, options.dask)
@@ -104,7 +102,7 @@ def _parser() -> argparse.ArgumentParser:
     extent.add_argument(
         "--quick",
         action="store_true",
-        help=f"run a small version of {' or '.join(SMALL_VERSIONS)}, minutes",
+        help=f"run a small version of {_small_versions()}, minutes",
     )
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"
@@ -132,7 +130,7 @@ def _positive(text: str) -> int:
 
 def _chosen(name: str | None, parser: argparse.ArgumentParser) -> list[Experiment]:
     if name is None:
-        return [experiment for experiment in EXPERIMENTS if experiment.quick]
+        return [experiment for experiment in EXPERIMENTS if experiment.by_default]
     chosen = [experiment for experiment in EXPERIMENTS if experiment.name == name]
     if not chosen:
         known = ", ".join(experiment.name for experiment in EXPERIMENTS)
@@ -140,11 +138,15 @@ def _chosen(name: str | None, parser: argparse.ArgumentParser) -> list[Experimen
     return chosen
 
 
+def _small_versions() -> str:
+    return " and ".join(one.name for one in EXPERIMENTS if one.has_small_version)
+
+
 def _list_of_experiments() -> str:
     width = max(len(experiment.name) for experiment in EXPERIMENTS)
     return "\n".join(
         f"  {experiment.name:{width}}  {experiment.summary}"
-        + ("" if experiment.quick else " (by name only)")
+        + ("" if experiment.by_default else " (by name only)")
         for experiment in EXPERIMENTS
     )
 

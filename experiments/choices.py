@@ -13,7 +13,7 @@ from experiments.published_values import TABLE_9, Moments
 from experiments.runs import OptimisationRun, robust_problem
 from experiments.scatter import dte_samples, exact_moments
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
-from pymoo_hdte.problems.robust_dte import SURROGATE_BOX
+from pymoo_hdte.problems.drive_response import SURROGATE_BOX
 
 MODEL = "calibrated"
 INITIAL = "initial"

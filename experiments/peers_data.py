@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from experiments.benchmark_fronts import front_of
 from experiments.campaign import Campaign, Run
 from experiments.contest.job import EVALUATIONS, SPENT, ContestRun
-from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
+from experiments.contest.peers import EVERYONE
 from experiments.contest.problems import BENCHMARKS
 from experiments.indicators import Indicators, IndicatorsAgainst
 from experiments.provenance import environment
@@ -31,7 +31,6 @@ from experiments.store import TIMES, write_atomically
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
 
-_ENTRIES = CONTESTANTS | SWARM_VARIANTS
 _KEY = ("problem", "algorithm", "evaluations", "seed")
 
 FINAL_SIZE = 50
@@ -170,12 +169,12 @@ def contest_scores(
 def takes_part(algorithm: str, problem: str) -> bool:
     """Say whether an algorithm takes the problem at all."""
     unconstrained = BENCHMARKS[problem].family != "constrained"
-    return unconstrained or _ENTRIES[algorithm].takes_constraints
+    return unconstrained or EVERYONE[algorithm].takes_constraints
 
 
 def budgets_of_runs(algorithm: str, budgets: tuple[int, ...]) -> list[tuple[int, ...]]:
     """Return the budgets that share a run: all, unless the algorithm starts anew for each."""
-    if _ENTRIES[algorithm].starts_anew:
+    if EVERYONE[algorithm].starts_anew:
         return [(budget,) for budget in budgets]
     return [budgets]
 

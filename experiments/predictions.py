@@ -17,7 +17,7 @@ from experiments.ladder import NARROW, WIDE
 from experiments.published_values import TABLE_5, TABLE_6, TABLE_8, TABLE_9
 from experiments.quadrature import Rule, tensor_rule, weighted_moments
 from pymoo_hdte.drive import PARAMETERS, DriveModel, OrderSpectrum
-from pymoo_hdte.problems.robust_dte import SURROGATE_BOX, theta_s_scatter
+from pymoo_hdte.problems.drive_response import SURROGATE_BOX, theta_s_scatter
 from pymoo_hdte.surrogate import (
     Box,
     ChebyshevSurrogate,

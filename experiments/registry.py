@@ -39,12 +39,18 @@ class Context:
 class Experiment:
     """A module ``experiments.<name>`` with ``run(context: Context) -> Result``.
 
-    ``quick`` ones belong to the set that runs when no name is given.
+    Attributes
+    ----------
+    by_default
+        Whether it belongs to the set that runs when no name is given.
+    has_small_version
+        Whether it takes ``--quick``.
     """
 
     name: str
     summary: str
-    quick: bool = True
+    by_default: bool = True
+    has_small_version: bool = False
 
     def run(self, context: Context) -> Result:
         """Import the module and run it; nothing is imported for ``--list``."""
@@ -74,10 +80,18 @@ EXPERIMENTS = (
     Experiment("emps", "EMPS: friction of a positioning system, measured by others"),
     Experiment("kinova", "Kinova Gen3: friction and ripple of a robot joint, measured by others"),
     Experiment(
-        "peers", "The elitist swarm against the best algorithms of other libraries", quick=False
+        "peers",
+        "The elitist swarm against the best algorithms of other libraries",
+        by_default=False,
+        has_small_version=True,
     ),
-    Experiment("swarm_parts", "What each part of the elitist swarm is worth", quick=False),
-    Experiment("benchmark", "Speed ratios and agreement with integration", quick=False),
-    Experiment("reference_front", "The true fronts, computed anew and compared", quick=False),
+    Experiment(
+        "swarm_parts",
+        "What each part of the elitist swarm is worth",
+        by_default=False,
+        has_small_version=True,
+    ),
+    Experiment("benchmark", "Speed ratios and agreement with integration", by_default=False),
+    Experiment("reference_front", "The true fronts, computed anew and compared", by_default=False),
 )
 """In the order in which they run and are reported."""

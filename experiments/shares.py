@@ -12,7 +12,7 @@ from experiments.choices import BAND, INITIAL
 from experiments.scatter import Inputs, scatter_of
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.problems.robust_dte import SURROGATE_BOX
+from pymoo_hdte.problems.drive_response import SURROGATE_BOX
 from pymoo_hdte.surrogate import (
     ChebyshevSurrogate,
     SobolIndices,

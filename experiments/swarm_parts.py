@@ -35,7 +35,7 @@ def run(context: Context) -> Result:
         title="What each part of the elitist swarm is worth",
         command="python -m experiments swarm_parts --full",
         paragraphs=(SETTING,),
-        tables=(_parts_table(scores), *_problems_tables(scores)),
+        tables=(_parts_table(scores), _problems_table(scores)),
         notes=(f"{len(scores.seeds)} seeds, {scores.budgets[-1]:,} evaluations.",),
     )
 
@@ -93,17 +93,14 @@ def costs(
     return ratio(runs), low, high
 
 
-def _problems_tables(scores: Scores) -> list[Table]:
+def _problems_table(scores: Scores) -> Table:
     values = medians(scores.of("igd", scores.budgets[-1]), smaller_is_better=True)
-    return [
-        Table(
-            "problems",
-            f"Median {NAMES['igd']} on every problem",
-            (Column("problem"), *map(Column, scores.algorithms)),
-            tuple(
-                (problem, *row.tolist())
-                for problem, row in zip(scores.problems, values, strict=True)
-            ),
-            folded=True,
-        )
-    ]
+    return Table(
+        "problems",
+        f"Median {NAMES['igd']} on every problem",
+        (Column("problem"), *map(Column, scores.algorithms)),
+        tuple(
+            (problem, *row.tolist()) for problem, row in zip(scores.problems, values, strict=True)
+        ),
+        folded=True,
+    )

@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from experiments.front_agreement import disagreement
 from experiments.level_search import LevelSearch, hand_over
-from experiments.true_front import FrontSearch, Solution
+from experiments.true_front import FrontSearch, falling
 from pymoo_hdte.problems import RobustDTETolerance
 from pymoo_hdte.problems.reference import ReferenceFront
 from pymoo_hdte.problems.robust_dte_tolerance import PAPERS_TOLERANCE
@@ -89,7 +89,7 @@ def _front_designs(problem: Problem, rng: np.random.Generator) -> NDArray[np.flo
     coarse = [first]
     for level in np.linspace(first.objectives[0], last.objectives[0], _COARSE_POINTS)[1:-1]:
         coarse.append(search.best(level, [coarse[-1].cube, *search.starts(level)]) or coarse[-1])
-    coarse = _falling([*coarse, last])
+    coarse = falling([*coarse, last])
     values = np.array([solution.objectives for solution in coarse])
     steps = np.diff(values, axis=0) / np.ptp(values, axis=0)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.T))])
@@ -102,13 +102,4 @@ def _front_designs(problem: Problem, rng: np.random.Generator) -> NDArray[np.flo
         solutions.append(search.best(level, starts) or solutions[-1])
     solutions.append(last)
     hand_over(search, levels, solutions)
-    return search.designs(np.array([solution.cube for solution in _falling(solutions)]))
-
-
-def _falling(solutions: list[Solution]) -> list[Solution]:
-    """Sort by the first objective and leave out what does not lower the second."""
-    kept: list[Solution] = []
-    for solution in sorted(solutions, key=lambda entry: tuple(entry.objectives)):
-        if not kept or solution.objectives[1] < kept[-1].objectives[1]:
-            kept.append(solution)
-    return kept
+    return search.designs(np.array([solution.cube for solution in falling(solutions)]))

@@ -185,33 +185,10 @@ def true_front(
     if np.all(np.abs(span) <= 1e-6 * np.abs(first.objectives)):
         return first.objectives[None, :], search.designs(first.cube)[None, :]
     coarse = _sweep(search, first, last)
-    knots = _refine(search, _front_of(coarse), span)
+    knots = _refine(search, falling(coarse), span)
     filled = _fill(search, knots, span, n_points)
     front = np.array([solution.objectives for solution in filled])
     return front, search.designs(np.array([solution.cube for solution in filled]))
-
-
-def second_objective_at(
-    problem: Problem,
-    levels: NDArray[np.float64],
-    designs: NDArray[np.float64],
-    rng: np.random.Generator,
-) -> NDArray[np.float64]:
-    """Return g at the given levels of f1, shape (n,), found from the ``designs`` of a front.
-
-    With the designs of one search and the levels of another, it tells how far two independent
-    searches agree.
-    """
-    search = FrontSearch(problem, rng)
-    firsts = problem.evaluate(designs)[:, 0]
-    cubes = (designs - problem.xl) / (problem.xu - problem.xl)
-    values = []
-    for level in levels:
-        nearest = int(np.searchsorted(firsts, level).clip(1, len(firsts) - 1))
-        between = (cubes[nearest - 1] + cubes[nearest]) / 2.0
-        found = search.below(level, [cubes[nearest - 1], between, cubes[nearest]])
-        values.append(np.inf if found is None else found.objectives[1])
-    return np.array(values)
 
 
 def _sweep(search: FrontSearch, first: Solution, last: Solution) -> list[Solution]:
@@ -237,8 +214,8 @@ def _sweep(search: FrontSearch, first: Solution, last: Solution) -> list[Solutio
     return best
 
 
-def _front_of(solutions: list[Solution]) -> list[Solution]:
-    """Keep solutions that lower f2, in rising f1."""
+def falling(solutions: list[Solution]) -> list[Solution]:
+    """Sort by the first objective and leave out what does not lower the second."""
     kept: list[Solution] = []
     for solution in sorted(solutions, key=lambda item: tuple(item.objectives)):
         if not kept or solution.objectives[1] < kept[-1].objectives[1]:
@@ -276,7 +253,7 @@ def _refine(
             continue
         found.append(between)
         open_pairs += [(low, level, between), (between, middle, high)]
-    return _front_of(found)
+    return falling(found)
 
 
 def _fill(
@@ -294,7 +271,7 @@ def _fill(
         wanted = np.linspace(0.0, arc[-1], int(np.ceil(n_points * arc[-1] / total)) + 1)
         filled += _along(search, knots[start:stop], arc, wanted)
         start = stop
-    return _front_of(filled)
+    return falling(filled)
 
 
 def _along(

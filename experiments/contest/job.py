@@ -10,7 +10,7 @@ from moocore import is_nondominated
 from numpy.typing import NDArray
 
 from experiments.campaign import Run
-from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
+from experiments.contest.peers import EVERYONE
 from experiments.contest.problems import problem_of
 
 EVALUATIONS, SPENT = "evaluations", "spent"
@@ -39,7 +39,7 @@ class ContestRun:
         objectives. A budget at which nothing feasible is offered has one row without objectives.
         """
         problem = problem_of(self.problem)
-        run = (CONTESTANTS | SWARM_VARIANTS)[self.algorithm].run
+        run = EVERYONE[self.algorithm].run
         started = time.perf_counter()
         offers = run(problem, self.budgets, self.seed)
         seconds = time.perf_counter() - started

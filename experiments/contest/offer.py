@@ -7,6 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+POPULATION = 100
+"""Of every algorithm that has one."""
+
 
 class Offer(NamedTuple):
     """Objectives (n, m) of the feasible set an algorithm holds, and the evaluations it has spent.

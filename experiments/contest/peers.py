@@ -86,3 +86,5 @@ SWARM_VARIANTS = {
     name: Contestant("pymoo_hdte", partial(run_pymoo, make)) for name, make in REDUCED.items()
 }
 """Variants of the elitist swarm, which compete with it alone."""
+
+EVERYONE = CONTESTANTS | SWARM_VARIANTS

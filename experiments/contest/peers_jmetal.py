@@ -22,11 +22,10 @@ from jmetal.util.termination_criterion import StoppingByEvaluations
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.contest.offer import Offer
+from experiments.contest.offer import POPULATION, Offer
 
 logging.getLogger("jmetal.core.algorithm").setLevel(logging.WARNING)
 
-SWARM = 100
 EPSILON = 0.0075
 """Of OMOPSO's archive, in objectives as they are: the value in jMetalPy's examples.
 
@@ -125,9 +124,9 @@ def _dominance(problem: WrappedProblem) -> DominanceComparator:
 def _smpso(problem: WrappedProblem, budget: int) -> SMPSO:
     return SMPSO(
         problem=problem,
-        swarm_size=SWARM,
+        swarm_size=POPULATION,
         mutation=PolynomialMutation(1.0 / problem.number_of_variables(), 20),
-        leaders=CrowdingDistanceArchive(SWARM, _dominance(problem)),
+        leaders=CrowdingDistanceArchive(POPULATION, _dominance(problem)),
         dominance_comparator=_dominance(problem),
         termination_criterion=StoppingByEvaluations(budget),
         swarm_evaluator=BatchEvaluator(),
@@ -138,11 +137,11 @@ def _omopso(problem: WrappedProblem, budget: int) -> OMOPSO:
     rate = 1.0 / problem.number_of_variables()
     return OMOPSO(
         problem=problem,
-        swarm_size=SWARM,
+        swarm_size=POPULATION,
         epsilon=EPSILON,
         uniform_mutation=UniformMutation(rate, 0.5),
-        non_uniform_mutation=NonUniformMutation(rate, 0.5, budget // SWARM),
-        leaders=CrowdingDistanceArchive(SWARM, _dominance(problem)),
+        non_uniform_mutation=NonUniformMutation(rate, 0.5, budget // POPULATION),
+        leaders=CrowdingDistanceArchive(POPULATION, _dominance(problem)),
         termination_criterion=StoppingByEvaluations(budget),
         swarm_evaluator=BatchEvaluator(),
     )

@@ -9,9 +9,7 @@ import pygmo
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.contest.offer import Offer
-
-SWARM = 100
+from experiments.contest.offer import POPULATION, Offer
 
 
 class WrappedProblem:
@@ -43,9 +41,9 @@ def run_pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer
     """
     offered = []
     for budget in budgets:
-        generations = budget // SWARM - 1
+        generations = budget // POPULATION - 1
         algorithm = pygmo.algorithm(pygmo.nspso(gen=generations, seed=seed))
-        swarm = pygmo.population(pygmo.problem(WrappedProblem(problem)), SWARM, seed=seed)
+        swarm = pygmo.population(pygmo.problem(WrappedProblem(problem)), POPULATION, seed=seed)
         evolved = algorithm.evolve(swarm)
         spent = evolved.problem.get_fevals()
         if spent != budget:

@@ -19,10 +19,9 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
-from experiments.contest.offer import Offer
+from experiments.contest.offer import POPULATION, Offer
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
 
-POPULATION = 100
 _PARTITIONS = {2: 99, 3: 12}
 """Of the reference directions of NSGA-III: 100 for two objectives and 91 for three."""
 

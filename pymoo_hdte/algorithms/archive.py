@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.population import Population
 
-from pymoo_hdte.algorithms.crowding import crowding_distance, least_crowded
+from pymoo_hdte.algorithms.crowding import crowding_tournaments, least_crowded
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.points import Points
 
@@ -52,6 +52,4 @@ class LeaderArchive:
 
     def draw(self, n: int, random_state: np.random.Generator) -> NDArray[np.float64]:
         """Draw ``n`` positions (n, d), each the less crowded of two random members."""
-        pairs = random_state.integers(len(self), size=(n, 2))
-        distance = crowding_distance(self.points.F)[pairs]
-        return self.points.X[np.where(distance[:, 0] >= distance[:, 1], pairs[:, 0], pairs[:, 1])]
+        return self.points.X[crowding_tournaments(self.points.F, n, random_state)]

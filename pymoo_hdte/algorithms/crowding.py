@@ -28,6 +28,15 @@ def crowding_distance(F: NDArray[np.float64]) -> NDArray[np.float64]:
     return gaps.sum(axis=1)
 
 
+def crowding_tournaments(
+    F: NDArray[np.float64], n: int, random_state: np.random.Generator
+) -> NDArray[np.int_]:
+    """Return ``n`` rows of ``F`` (k, m), each the less crowded of two drawn at random."""
+    pairs = random_state.integers(len(F), size=(n, 2))
+    distance = crowding_distance(F)[pairs]
+    return np.where(distance[:, 0] >= distance[:, 1], pairs[:, 0], pairs[:, 1])
+
+
 def least_crowded(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
     """Return the rows, ascending, that stay when the most crowded leave one by one until ``size``.
 

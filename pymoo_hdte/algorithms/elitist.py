@@ -12,7 +12,7 @@ from pymoo.core.problem import Problem
 from pymoo.core.sampling import Sampling
 
 from pymoo_hdte.algorithms.base import Swarm, particles_at
-from pymoo_hdte.algorithms.crowding import crowding_distance
+from pymoo_hdte.algorithms.crowding import crowding_tournaments
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, SparseMutation
 from pymoo_hdte.algorithms.spread import most_spread
@@ -106,10 +106,8 @@ class ElitistSwarm(Swarm):
         front = best_front(self.swarm)
         if not len(front):
             return self.swarm.X
-        pairs = self.random_state.integers(len(front), size=(self.pop_size, 2))
-        distance = crowding_distance(self.swarm.F[front])[pairs]
-        less_crowded = np.where(distance[:, 0] >= distance[:, 1], pairs[:, 0], pairs[:, 1])
-        return self.swarm.X[front[less_crowded]]
+        chosen = crowding_tournaments(self.swarm.F[front], self.pop_size, self.random_state)
+        return self.swarm.X[front[chosen]]
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         points = self.swarm.followed_by(self._evaluated(infills))

@@ -131,26 +131,18 @@ def _best_repetition(finding: Finding, chosen: Rival, rival: Rival) -> NextTest:
         )
         if factor != 1.0
     )
-    if separation < 1.0:
-        return NextTest(
-            name,
-            size,
-            rate,
-            (chosen.label, rival.label),
-            separation,
-            "No repetition of these records at another size or speed separates "
-            f"{in_words(chosen.label)} from {in_words(rival.label)}: it takes another motion.",
-        )
     told = f"{in_words(chosen.label)} and {in_words(rival.label)}"
-    return NextTest(
-        name,
-        size,
-        rate,
-        (chosen.label, rival.label),
-        separation,
-        f"Repeat {name} at {how or 'the same size, for longer'}: there {told} differ by "
-        f"{separation:.2g} times what the model leaves now.",
-    )
+    if separation < 1.0:
+        description = (
+            "No repetition of these records at another size or speed separates "
+            f"{told}: it takes another motion."
+        )
+    else:
+        description = (
+            f"Repeat {name} at {how or 'the same size, for longer'}: there {told} differ by "
+            f"{separation:.2g} times what the model leaves now."
+        )
+    return NextTest(name, size, rate, (chosen.label, rival.label), separation, description)
 
 
 def _separation(

@@ -20,8 +20,6 @@ from pymoo_hdte.problems.reference import StoredFront
 from pymoo_hdte.problems.robust import MOMENTS, RobustProblem, make_moments
 from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
 
-__all__ = ["SURROGATE_BOX", "RobustDTE", "theta_s_scatter"]
-
 
 class RobustDTE(StoredFront, RobustProblem):
     """Minimise mean and standard deviation of the dynamic transmission error (DTE).
