@@ -18,9 +18,14 @@ class WrappedProblem:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
-    def fitness(self, x: NDArray[np.float64]) -> list[float]:
+    def fitness(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the objectives of one point."""
-        return self.problem.evaluate(x[np.newaxis], return_values_of=["F"])[0].tolist()
+        return self.batch_fitness(x)
+
+    def batch_fitness(self, designs: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the objectives of points, both one after the other."""
+        X = designs.reshape(-1, self.problem.n_var)
+        return self.problem.evaluate(X, return_values_of=["F"]).ravel()
 
     def get_bounds(self) -> tuple[list[float], list[float]]:
         """Return the bounds."""
@@ -42,7 +47,9 @@ def run_pygmo(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer
     offered = []
     for budget in budgets:
         generations = budget // POPULATION - 1
-        algorithm = pygmo.algorithm(pygmo.nspso(gen=generations, seed=seed))
+        nspso = pygmo.nspso(gen=generations, seed=seed)
+        nspso.set_bfe(pygmo.bfe())
+        algorithm = pygmo.algorithm(nspso)
         swarm = pygmo.population(pygmo.problem(WrappedProblem(problem)), POPULATION, seed=seed)
         evolved = algorithm.evolve(swarm)
         spent = evolved.problem.get_fevals()
