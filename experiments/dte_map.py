@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from tqdm import tqdm
 
 from experiments.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.models import model_sentences
 from experiments.registry import Context
 from experiments.result import Cell, Column, Picture, Result, Table, significant
 from experiments.runs import robust_problem
-from experiments.speed_load_map import (
+from pymoo_hdte.drive import PRESETS
+from pymoo_hdte.drive.speed_load_map import (
     SpeedLoadMap,
     critical_speeds,
+    neighbouring_resonances,
     speed_load_map,
     torsional_mode,
 )
-from pymoo_hdte.drive import PRESETS
 
 SPEEDS = np.arange(100.0, 4001.0, 50.0)
 LOADS = np.arange(0.0, 41.0, 4.0)
@@ -39,7 +41,10 @@ SETTING = (
 
 def run(context: Context) -> Result:
     """Map all presets."""
-    maps = [speed_load_map(robust_problem(name).model, SPEEDS, LOADS) for name in PRESETS]
+    maps = [
+        speed_load_map(robust_problem(name).model, SPEEDS, LOADS)
+        for name in tqdm(PRESETS, desc="maps", leave=False)
+    ]
     return Result(
         title="DTE over input speed and load",
         command="python -m experiments dte_map",
@@ -105,20 +110,9 @@ def _figure(maps: Sequence[SpeedLoadMap]) -> Figure:
     for entry, (left, right) in zip(maps, axes, strict=True):
         _draw_map(figure, left, entry)
         _draw_curves(right, entry)
-        for label, speed in _resonances(entry):
-            _mark_resonance(left, right, label, speed)
+        for orders, speed in neighbouring_resonances(entry.model, float(SPEEDS[-1])):
+            _mark_resonance(left, right, f"order {orders}", speed)
     return figure
-
-
-def _resonances(entry: SpeedLoadMap) -> Iterator[tuple[str, float]]:
-    """Yield label and speed of those within the map, one for orders too close to tell apart."""
-    within = [(o, speed) for o, speed in critical_speeds(entry.model) if speed <= SPEEDS[-1]]
-    while within:
-        speed = within[0][1]
-        together = [order for order, other in within if abs(other - speed) <= 0.05 * speed]
-        orders = ", ".join(f"{order:g}" for order in together)
-        yield f"order {orders}", speed
-        within = within[len(together) :]
 
 
 def _mark_resonance(left: Axes, right: Axes, label: str, speed: float) -> None:

@@ -1,11 +1,15 @@
 """The command line: exit codes, what is printed where, nothing half-written."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
 from pymoo_hdte import cli
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.commands import discrepancy
+from pymoo_hdte.drive import UnstableDrive
 
 DOCUMENT = {
     "status": "named",
@@ -19,7 +23,7 @@ DOCUMENT = {
 
 @pytest.fixture
 def ready(monkeypatch):
-    monkeypatch.setattr(cli, "_discrepancy", lambda campaign, out, data: DOCUMENT)
+    monkeypatch.setattr(discrepancy, "_analysed", lambda *arguments: DOCUMENT)
 
 
 def run(*options):
@@ -64,13 +68,14 @@ def test_a_missing_campaign_is_one_line_and_writes_nothing(tmp_path, capsys):
     [
         (InvalidInput("believed.ratio", -1.0, "above 1"), "believed.ratio"),
         (PermissionError(13, "Permission denied", "/kept"), "/kept: Permission denied"),
+        (UnstableDrive("at 877 Hz it grows"), "at 877 Hz"),
     ],
 )
 def test_a_mistake_is_named_without_a_traceback(error, words, monkeypatch, capsys):
-    def fail(campaign, out, data):
+    def fail(*arguments):
         raise error
 
-    monkeypatch.setattr(cli, "_discrepancy", fail)
+    monkeypatch.setattr(discrepancy, "_analysed", fail)
     assert run() == 2
     printed = capsys.readouterr().err
     assert words in printed
@@ -78,10 +83,10 @@ def test_a_mistake_is_named_without_a_traceback(error, words, monkeypatch, capsy
 
 
 def test_an_interrupt_has_the_code_of_the_shell(monkeypatch, capsys):
-    def stop(campaign, out, data):
+    def stop(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "_discrepancy", stop)
+    monkeypatch.setattr(discrepancy, "_analysed", stop)
     assert run() == 130
     assert "nothing was written" in capsys.readouterr().err
 
@@ -94,8 +99,31 @@ def test_what_is_missing_is_a_usage_error(options, capsys):
     assert "usage: pymoo-hdte" in capsys.readouterr().err
 
 
-def test_help_has_an_example(capsys):
+@pytest.mark.parametrize("command", cli.COMMANDS, ids=lambda command: command.name)
+def test_help_has_an_example_and_the_exit_codes(command, capsys):
     with pytest.raises(SystemExit) as stopped:
-        cli.main(["discrepancy", "--help"])
+        cli.main([command.name, "--help"])
     assert stopped.value.code == 0
-    assert "pymoo-hdte discrepancy campaigns/rig-01 --out" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert f"  pymoo-hdte {command.name} " in printed
+    assert "Exit codes: 0" in printed
+
+
+def test_progress_goes_to_stderr_alone(monkeypatch, capsys):
+    def tells(campaign, out, data, say):
+        say("reading the records")
+        return DOCUMENT
+
+    monkeypatch.setattr(discrepancy, "_analysed", tells)
+    assert run("--json") == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out) == DOCUMENT
+    assert printed.err == "reading the records ...\n"
+
+
+def test_help_waits_for_nothing_heavy():
+    code = "import sys; from pymoo_hdte import cli; cli._parser(); print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert not {"scipy", "pymoo", "matplotlib", "numba"} & set(loaded)

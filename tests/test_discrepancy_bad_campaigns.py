@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from quick_campaigns import quick_campaign
 from virtual_rig_cases import effect
 
 from pymoo_hdte import cli
-from pymoo_hdte.discrepancy import report, report_folder, workflow, write_campaign
+from pymoo_hdte.discrepancy import report, workflow, write_campaign
+from pymoo_hdte.discrepancy.report_folder import FILES, VERDICT_FILE
 from pymoo_hdte.drive import load_datasheet, load_model, simulate
+from pymoo_hdte.reports.folder import PAGE_FILE, write_folder
 
 ROW = "run_2000rpm_40Nm.csv.gz"
 IDLE = "run_2000rpm_00Nm.csv.gz"
@@ -220,20 +223,20 @@ def test_an_interrupted_run_leaves_nothing(stage, folder, analysed, tmp_path, mo
 
 
 def test_interrupted_in_the_last_step_the_earlier_report_stays(tmp_path, monkeypatch):
-    files = {report_folder.VERDICT_FILE: "{}", report_folder.PAGE_FILE: "earlier"}
-    report_folder.write_folder(tmp_path / "out", files)
-    moved = report_folder.Path.replace
+    files = {VERDICT_FILE: "{}", PAGE_FILE: "earlier"}
+    write_folder(tmp_path / "out", files)
+    moved = Path.replace
 
     def stop(path, target):
         if path.name == "report":
             raise KeyboardInterrupt
         return moved(path, target)
 
-    monkeypatch.setattr(report_folder.Path, "replace", stop)
+    monkeypatch.setattr(Path, "replace", stop)
     with pytest.raises(KeyboardInterrupt):
-        report_folder.write_folder(tmp_path / "out", files | {report_folder.PAGE_FILE: "later"})
+        write_folder(tmp_path / "out", files | {PAGE_FILE: "later"})
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
-    assert (tmp_path / "out" / report_folder.PAGE_FILE).read_text() == "earlier"
+    assert (tmp_path / "out" / PAGE_FILE).read_text() == "earlier"
 
 
 def test_too_few_conditions_and_nothing_held_out_are_said(clean, tmp_path, capsys):
@@ -270,7 +273,7 @@ def test_twice_the_same_bytes(reported):
         {p.name: p.read_bytes() for p in (reported / n).iterdir()} for n in ("one", "other")
     )
     assert one == other
-    assert one.keys() == set(report_folder.FILES)
+    assert one.keys() == set(FILES)
 
 
 def test_the_verdict_holds_what_was_promised(reported):

@@ -15,10 +15,10 @@ from pymoo_hdte.discrepancy.candidate import lines_of, polar, wave, wave_starts
 from pymoo_hdte.discrepancy.forward import coefficients_of
 from pymoo_hdte.discrepancy.library import candidates, out_of_tolerance
 from pymoo_hdte.discrepancy.parameters import MECHANICAL
-from pymoo_hdte.discrepancy.revise import model_toml
 from pymoo_hdte.drive import preset
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.drive.toml_fields import Fields
+from pymoo_hdte.drive.toml_text import model_toml
 from pymoo_hdte.units import ARCSEC
 
 NAMES = {

@@ -16,12 +16,13 @@ from pymoo_hdte.discrepancy.library import candidates
 from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.parameters import base_parameters
 from pymoo_hdte.discrepancy.prove import prove
-from pymoo_hdte.discrepancy.revise import drive_model, model_toml, revised_model, sheet_toml
+from pymoo_hdte.discrepancy.revise import drive_model, revised_model
 from pymoo_hdte.discrepancy.rig_runs import Condition
 from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.discrepancy.virtual_rig import run_campaign
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.drive import load_datasheet, load_model
+from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.units import ARCSEC
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 6.0]

@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.next_experiment import Proposal
 from pymoo_hdte.discrepancy.optimum import OptimumShift, optimum_shift
 from pymoo_hdte.discrepancy.prove import prove
 from pymoo_hdte.discrepancy.report import write_report
-from pymoo_hdte.discrepancy.report_folder import FILES, number
+from pymoo_hdte.discrepancy.report_folder import FILES
 from pymoo_hdte.discrepancy.report_tables import certainty, gap_sentence, parameter_rows
 from pymoo_hdte.discrepancy.revise import accepted_fit, drive_model, revised_model
 from pymoo_hdte.discrepancy.virtual_rig import run_campaign
@@ -30,6 +30,7 @@ from pymoo_hdte.drive import (
     preset,
 )
 from pymoo_hdte.drive.mesh_laws import SoftWindup
+from pymoo_hdte.reports.page import number
 from pymoo_hdte.units import ARCSEC
 
 PROPOSAL = Proposal("Turn it backwards.", "running", -600.0, 40.0, ("a", "b"), 12.0)

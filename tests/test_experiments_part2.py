@@ -32,18 +32,18 @@ from experiments.rival_surrogates import FAMILIES, SCREENED, TENSOR, fit_grid, r
 from experiments.runs import robust_problem
 from experiments.scatter import exact_moments
 from experiments.shares import design_indices, falls_when_halved, scatter_indices, study_designs
-from experiments.speed_load_map import (
-    RPM,
+from experiments.store import load, png_bytes, save
+from pymoo_hdte.drive import MeshStiffnessVariation, floquet_multipliers, preset
+from pymoo_hdte.drive.measurement import CUTOFF, FILTER_ORDER, SAMPLING_RATE
+from pymoo_hdte.drive.speed_load_map import (
     SpeedLoadMap,
     critical_speeds,
     speed_load_map,
     torsional_mode,
 )
-from experiments.store import load, png_bytes, save
-from pymoo_hdte.drive import MeshStiffnessVariation, floquet_multipliers, preset
-from pymoo_hdte.drive.measurement import CUTOFF, FILTER_ORDER, SAMPLING_RATE
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, TruncatedNormal, latin_hypercube
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 from pymoo_hdte.validation import validation_metrics
 
 HIGH, LOW = NUMBERS.index(HIGHEST), NUMBERS.index(LOWEST)
@@ -190,7 +190,8 @@ def test_quick_experiments_can_be_stored_and_read_again(experiment, tmp_path):
 
 class TestMap:
     def test_the_rated_condition_is_the_preset_s_own(self, model):
-        speed, load_torque = model.sheet.input_speed / RPM, model.sheet.load_torque
+        speed = model.sheet.input_speed / REVOLUTION_PER_MINUTE
+        load_torque = model.sheet.load_torque
         found = speed_load_map(model, np.array([speed]), np.array([load_torque]))
         assert found.dte[0, 0] == pytest.approx(model.dte_arcsec(model.nominal[None])[0], rel=1e-12)
 
@@ -234,7 +235,8 @@ class TestMap:
         # The stiffness varies twice per turn, and does most harm at twice the natural frequency.
         worst = torsional_mode(wild).speed(1.0)
         speeds = np.array([worst, 3.0 * worst])
-        coefficients = wild.at(worst * RPM, 40.0).coefficients(wild.nominal[None])
+        at_worst = wild.at(worst * REVOLUTION_PER_MINUTE, 40.0)
+        coefficients = at_worst.coefficients(wild.nominal[None])
         assert np.abs(floquet_multipliers(coefficients)).max() > 1.0
         found = speed_load_map(wild, speeds, np.array([0.0, 20.0, 40.0]))
         assert found.unstable == 3

@@ -14,7 +14,6 @@ from pymoo_hdte.discrepancy.next_experiment import Proposal
 from pymoo_hdte.discrepancy.optimum import SURROGATE_ORDER, OptimumShift, optimum_shift
 from pymoo_hdte.discrepancy.prove import Proof
 from pymoo_hdte.discrepancy.report_figures import (
-    data_uri,
     gap_by_channel,
     gap_by_order,
     misfit_map,
@@ -22,13 +21,7 @@ from pymoo_hdte.discrepancy.report_figures import (
     optimum_fronts,
     overlay,
 )
-from pymoo_hdte.discrepancy.report_folder import (
-    PAGE_FILE,
-    VERDICT_FILE,
-    check_folder,
-    page,
-    write_folder,
-)
+from pymoo_hdte.discrepancy.report_folder import VERDICT_FILE, check_report_folder
 from pymoo_hdte.discrepancy.report_tables import (
     STATUSES,
     certainty,
@@ -44,12 +37,14 @@ from pymoo_hdte.discrepancy.revise import (
     SHEET_FILE,
     accepted_fit,
     drive_model,
-    model_toml,
     revised_model,
-    sheet_toml,
 )
 from pymoo_hdte.discrepancy.verdict_file import verdict_document
 from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
+from pymoo_hdte.reports.figures import data_uri
+from pymoo_hdte.reports.folder import PAGE_FILE, write_folder
+from pymoo_hdte.reports.page import page
 
 
 def write_report(
@@ -80,7 +75,7 @@ def write_report(
         If it cannot be written.
     """
     out = Path(out)
-    check_folder(out)
+    check_report_folder(out)
     document = verdict_document(
         analysis, location, None if proof is None else proof.as_dict(), proposal
     )
@@ -101,7 +96,8 @@ def _revision(analysis: Analysis) -> tuple[dict[str, str], OptimumShift]:
         before = drive_model(analysis.campaign, analysis.verdict.base, "before", "the fitted base")
     except InvalidInput as error:
         return {}, OptimumShift((), f"The revised drive is no drive model: {error}.")
-    files = {MODEL_FILE: model_toml(model), SHEET_FILE: sheet_toml(model.sheet)}
+    how_to_read = f'# Read it with load_model("{MODEL_FILE}", load_datasheet("{SHEET_FILE}")).\n'
+    files = {MODEL_FILE: how_to_read + model_toml(model), SHEET_FILE: sheet_toml(model.sheet)}
     if not accepted_fit(analysis.verdict).candidates:
         return files, OptimumShift((), "No effect was added, so the optimum stays where it was.")
     return files, optimum_shift(before, model)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Sequence
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
@@ -18,24 +15,13 @@ from pymoo_hdte.discrepancy.misfit_map import Location
 from pymoo_hdte.discrepancy.optimum import OptimumShift
 from pymoo_hdte.discrepancy.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.prove import Overlay, Proof
-
-# Okabe and Ito's palette, told apart by colour-blind readers.
-BEFORE, AFTER = "#D55E00", "#0072B2"
-GREY, FAINT = "#5B6570", "#E4E8EC"
+from pymoo_hdte.reports.figures import AFTER, BEFORE, FAINT, GREY
 
 MAP_COLOURS = "cividis"
 LARGEST_SHOWN = 30.0
 """Misfit, in standard deviations, from which on all cells look the same."""
 
 WORDS = {name: name.replace("_", " ") for name in CHANNELS}
-
-
-def data_uri(figure: Figure) -> str:
-    """Return a figure as the address of an inline SVG; the same figure gives the same bytes."""
-    buffer = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "pymoo_hdte"}):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
 def misfit_overview(location: Location) -> Figure:

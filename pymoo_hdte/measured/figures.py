@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.report_figures import AFTER, BEFORE, GREY
 from pymoo_hdte.measured.investigate import Finding
 from pymoo_hdte.measured.prove import MeasuredGap
+from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY
 
 Values = NDArray[np.float64]
 

@@ -9,14 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.report_figures import data_uri
-from pymoo_hdte.discrepancy.report_folder import (
-    PAGE_FILE,
-    VERDICT_FILE,
-    check_folder,
-    page,
-    write_folder,
-)
+from pymoo_hdte.discrepancy.report_folder import VERDICT_FILE, check_report_folder
 from pymoo_hdte.discrepancy.report_tables import STATUSES
 from pymoo_hdte.discrepancy.revise import MODEL_FILE
 from pymoo_hdte.measured.figures import gaps as gaps_figure
@@ -26,6 +19,9 @@ from pymoo_hdte.measured.next_test import next_test
 from pymoo_hdte.measured.prove import MeasuredGap, fitted_mechanism, prove_measured
 from pymoo_hdte.measured.rig_files import rig_toml
 from pymoo_hdte.measured.verdict_document import measured_document
+from pymoo_hdte.reports.figures import data_uri
+from pymoo_hdte.reports.folder import PAGE_FILE, write_folder
+from pymoo_hdte.reports.page import page
 
 _SIZES = 5
 """Parameters on the first screen."""
@@ -48,7 +44,7 @@ def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict
     OSError
         If it cannot be written.
     """
-    check_folder(Path(out))
+    check_report_folder(Path(out))
     gaps = prove_measured(finding)
     document = measured_document(title, finding, gaps, next_test(finding))
     document["revised_model"] = {"file": MODEL_FILE}

@@ -7,13 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
-from tqdm import tqdm
 
-from pymoo_hdte.drive import DriveModel, UnstableDrive
+from pymoo_hdte.drive.model import DriveModel
+from pymoo_hdte.drive.stability import UnstableDrive
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
-RPM = np.pi / 30.0
 _PROMINENCE = 0.02
 """A peak over speed stands out by at least this share of its height."""
+
+_NEIGHBOURS = 0.05
+"""Share of the speed within which resonances stand together."""
 
 
 @dataclass(frozen=True)
@@ -100,14 +103,29 @@ def critical_speeds(model: DriveModel) -> list[tuple[float, float]]:
     return [(order, mode.speed(order)) for order in sorted(orders)]
 
 
+def neighbouring_resonances(model: DriveModel, fastest: float) -> list[tuple[str, float]]:
+    """Return the orders, as a text, and the speed (r/min) of resonances up to ``fastest`` r/min.
+
+    Orders whose speeds lie within 5 % of the highest stand together.
+    """
+    within = [(order, speed) for order, speed in critical_speeds(model) if speed <= fastest]
+    found = []
+    while within:
+        speed = within[0][1]
+        together = [order for order, other in within if abs(other - speed) <= _NEIGHBOURS * speed]
+        found.append((", ".join(f"{order:g}" for order in together), speed))
+        within = within[len(together) :]
+    return found
+
+
 def speed_load_map(
     model: DriveModel, speeds: NDArray[np.float64], loads: NDArray[np.float64]
 ) -> SpeedLoadMap:
     """Evaluate the nominal design at all speeds (r/min) and loads (N.m)."""
     dte = np.full((len(loads), len(speeds)), np.nan)
     conditions = [(row, column) for row in range(len(loads)) for column in range(len(speeds))]
-    for row, column in tqdm(conditions, desc=f"map of {model.name}", leave=False, delay=2.0):
-        there = model.at(float(speeds[column]) * RPM, float(loads[row]))
+    for row, column in conditions:
+        there = model.at(float(speeds[column]) * REVOLUTION_PER_MINUTE, float(loads[row]))
         try:
             dte[row, column] = there.dte_arcsec(model.nominal[None])[0]
         except UnstableDrive:

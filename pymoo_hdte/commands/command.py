@@ -1,0 +1,43 @@
+"""What every command of the command line is made of."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+Say = Callable[[str], None]
+"""Tells the user what is being done."""
+
+
+class Outcome(NamedTuple):
+    """What a command found: as a JSON-able document, and in a few lines for the terminal."""
+
+    document: dict[str, Any]
+    summary: str
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command.
+
+    Attributes
+    ----------
+    name, summary : str
+        The word on the command line, and what it does in a line.
+    details : str
+        Example, files and exit codes, shown below the options.
+    add_arguments : callable
+        Adds the options to the command's parser.
+    run : callable
+        Takes the parsed options and `Say`. Heavy modules are imported there, not before, so that
+        ``--help`` need not wait for them. It raises `InvalidInput`, `ArithmeticError` (such as
+        `UnstableDrive`) or OSError for what a user can mend, and then leaves nothing half-written.
+    """
+
+    name: str
+    summary: str
+    details: str
+    add_arguments: Callable[[argparse.ArgumentParser], None]
+    run: Callable[[argparse.Namespace, Say], Outcome]

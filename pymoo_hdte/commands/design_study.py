@@ -1,0 +1,193 @@
+"""A robust design study: the front, the design that a preference chooses, and a check of both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.optimize import minimize
+
+from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+from pymoo_hdte.drive import DriveModel
+from pymoo_hdte.problems import OperatingCondition, RobustDTE
+from pymoo_hdte.problems.drive_response import DESIGN_VARIABLES, theta_s_scatter
+from pymoo_hdte.problems.duty_cycle import duty_cycle_dte_arcsec
+from pymoo_hdte.surrogate import SobolIndices, TruncatedNormal, UniformBand, sobol_indices
+
+POPULATION = 100
+CHECKED_DRIVES = 1000
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a study is made with.
+
+    Attributes
+    ----------
+    tolerance, box : float
+        Relative half-widths of the parts' scatter and of the search space.
+    order : int
+        Of the surrogate.
+    conditions : tuple of OperatingCondition or None
+        The duty cycle; None for the rated condition.
+    evaluations : int
+        Of the swarm, in whole generations of `POPULATION`.
+    seed : int
+    """
+
+    tolerance: float
+    box: float
+    order: int
+    conditions: tuple[OperatingCondition, ...] | None
+    evaluations: int
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """What the drive model itself says of a design, where the study asked its surrogate.
+
+    Attributes
+    ----------
+    mean, std : float
+        Of the DTE, arcsec: the surrogate's exact moments, corrected by what surrogate and model
+        differ in on the same drives (a control variate).
+    mean_error : float
+        Standard error of ``mean``, arcsec.
+    sample : ndarray, shape (CHECKED_DRIVES,)
+        DTE of these drives by the model, arcsec.
+    """
+
+    mean: float
+    std: float
+    mean_error: float
+    sample: Values
+
+
+@dataclass(frozen=True, eq=False)
+class DesignStudy:
+    """The outcome of a study.
+
+    Attributes
+    ----------
+    problem : RobustDTE
+    settings : Settings
+    designs : ndarray, shape (n, 4)
+        K, J_in, B_in, B_fc of the front, SI, by rising mean DTE.
+    front : ndarray, shape (n, 2)
+        Mean and standard deviation of the DTE, arcsec, row for row.
+    chosen : dict of int
+        Row that each of `PREFERENCES` chooses.
+    preference : str
+        The one that was asked for.
+    initial : ndarray, shape (2,)
+        Mean and standard deviation at the nominal design, at the same tolerance.
+    initial_check, optimum_check : Check
+        Of the nominal and of the chosen design, on the same random drives.
+    sources : SobolIndices
+        What causes the scatter that is left at the chosen design.
+    """
+
+    problem: RobustDTE
+    settings: Settings
+    designs: Values
+    front: Values
+    chosen: dict[str, int]
+    preference: str
+    initial: Values
+    initial_check: Check
+    optimum_check: Check
+    sources: SobolIndices
+
+    @property
+    def design(self) -> Values:
+        """The chosen design, shape (4,), SI."""
+        return self.designs[self.chosen[self.preference]]
+
+    @property
+    def objectives(self) -> Values:
+        """Its mean and standard deviation, shape (2,), arcsec."""
+        return self.front[self.chosen[self.preference]]
+
+    @property
+    def gain(self) -> tuple[float, float]:
+        """How far the mean falls by the model itself, arcsec, and the standard error of that."""
+        difference = self.initial_check.sample - self.optimum_check.sample
+        return float(difference.mean()), float(difference.std(ddof=1) / len(difference) ** 0.5)
+
+
+def design_study(model: DriveModel, preference: str, settings: Settings) -> DesignStudy:
+    """Optimise a drive and choose a design.
+
+    Parameters
+    ----------
+    model : DriveModel
+    preference : str
+        One of `PREFERENCES`.
+    settings : Settings
+
+    Raises
+    ------
+    InvalidInput
+        For a setting that is not allowed, or a theta_s that could become negative.
+    UnstableDrive
+        If a design of the search space has no steady state.
+    """
+    problem = RobustDTE(
+        model,
+        order=settings.order,
+        tolerance=settings.tolerance,
+        box=settings.box,
+        conditions=settings.conditions,
+    )
+    result = minimize(
+        problem,
+        ElitistSwarm(pop_size=POPULATION),
+        ("n_eval", settings.evaluations),
+        seed=settings.seed,
+    )
+    order = np.argsort(result.F[:, 0], kind="stable")
+    designs, front = result.X[order], result.F[order]
+    chosen = {word: WeightedUtopia(PREFERENCES[word]).do(front) for word in PREFERENCES}
+    design = designs[chosen[preference]]
+    bands = [UniformBand(settings.tolerance) for _ in DESIGN_VARIABLES]
+    inputs: list[TruncatedNormal | UniformBand] = [theta_s_scatter(model), *bands]
+    initial_check, optimum_check = (
+        _check(problem, inputs, one, settings.seed) for one in (problem.nominal, design)
+    )
+    return DesignStudy(
+        problem=problem,
+        settings=settings,
+        designs=designs,
+        front=front,
+        chosen=chosen,
+        preference=preference,
+        initial=problem.evaluate(problem.nominal[None])[0],
+        initial_check=initial_check,
+        optimum_check=optimum_check,
+        sources=sobol_indices(problem.surrogate, inputs, design),
+    )
+
+
+def _check(
+    problem: RobustDTE, inputs: Sequence[TruncatedNormal | UniformBand], design: Values, seed: int
+) -> Check:
+    """Judge a design by the model on random drives, the same ones for every design."""
+    rng = np.random.default_rng(seed)
+    drives = np.column_stack([entry.sample(rng, CHECKED_DRIVES) for entry in inputs])
+    drives[:, 1:] *= design
+    by_model = duty_cycle_dte_arcsec(problem.model, problem.conditions, drives)
+    by_surrogate = problem.surrogate(drives)
+    mean, std = problem.evaluate(design[None])[0]
+    difference = by_model - by_surrogate
+    return Check(
+        mean=float(mean + difference.mean()),
+        std=float(std * by_model.std() / by_surrogate.std()),
+        mean_error=float(difference.std(ddof=1) / CHECKED_DRIVES**0.5),
+        sample=by_model,
+    )

@@ -1,0 +1,119 @@
+"""``pymoo-hdte discrepancy``: from a folder of records to a verdict on what the model lacks."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.commands.command import Command, Outcome, Say
+
+_DETAILS = """example:
+  pymoo-hdte discrepancy campaigns/rig-01 --out reports/rig-01
+
+The campaign is a folder with campaign.toml and its records, of a harmonic drive, or with rig.toml
+and its records, of any other mechanism. DIR gets verdict.json, revised_model.toml and report.html;
+an earlier report there is replaced, anything else refused.
+Exit codes: 0 a verdict was reached, whatever it is; 2 the input is at fault."""
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN", help="folder of the campaign")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for verdict and report"
+    )
+    parser.add_argument(
+        "--data", type=Path, metavar="DIR", help="folder of the records that rig.toml names"
+    )
+
+
+def _run(options: argparse.Namespace, say: Say) -> Outcome:
+    document = _analysed(options.campaign, options.out, options.data, say)
+    return Outcome(document, _summary(document, options.out))
+
+
+def _analysed(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
+    """Analyse a campaign or a rig and write its report; return the verdict's document."""
+    from pymoo_hdte.discrepancy.report_folder import check_report_folder
+    from pymoo_hdte.measured.rig_files import RIG_FILE
+
+    check_report_folder(out)
+    if (folder / RIG_FILE).is_file() or folder.suffix == ".toml":
+        return _of_mechanism(folder, out, data, say)
+    if data is not None:
+        raise InvalidInput("--data", str(data), f"none without a {RIG_FILE}")
+    return _of_drive(folder, out, say)
+
+
+def _of_mechanism(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
+    from threadpoolctl import threadpool_limits
+
+    from pymoo_hdte.measured import investigate
+    from pymoo_hdte.measured.report import write_measured_report
+    from pymoo_hdte.measured.rig_files import read_rig
+
+    say("reading the records")
+    rig = read_rig(folder, data)
+    with threadpool_limits(limits=1):
+        say("looking for what is missing")
+        finding = investigate(rig.mechanism, rig.records, rig.cutoff, rig.effects)
+        say("proving it on the records that were held out")
+        return write_measured_report(rig.title, finding, out)
+
+
+def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
+    from threadpoolctl import threadpool_limits
+
+    from pymoo_hdte.discrepancy import read_campaign
+    from pymoo_hdte.discrepancy.locate import locate
+    from pymoo_hdte.discrepancy.next_experiment import next_experiment
+    from pymoo_hdte.discrepancy.prove import prove
+    from pymoo_hdte.discrepancy.report import write_report
+    from pymoo_hdte.discrepancy.report_folder import VERDICT_FILE
+    from pymoo_hdte.discrepancy.workflow import analyse
+
+    say("reading the records")
+    campaign = read_campaign(folder)
+    say("looking for what is missing")
+    analysis = analyse(campaign)
+    with threadpool_limits(limits=1):
+        say("locating the misfit")
+        location = locate(analysis)
+        say("proving it on the records that were held out")
+        proof = prove(analysis)
+        say("choosing the next test and writing the report")
+        written = write_report(analysis, location, proof, next_experiment(analysis), out)
+    document: dict[str, Any] = json.loads((written / VERDICT_FILE).read_text(encoding="utf-8"))
+    return document
+
+
+def _summary(document: dict[str, Any], out: Path) -> str:
+    from pymoo_hdte.discrepancy.effect_words import in_words
+
+    names = " + ".join(_name(one) for one in document["effects"])
+    lines = [
+        f"{document['status']}{': ' + names if names else ''}",
+        document["sentence"],
+        document["location"]["sentence"],
+        *document["limits"],
+        f"Next: {in_words(document['next_experiment']['description'])}",
+        f"Report: {out / 'report.html'}",
+    ]
+    return "\n".join(lines)
+
+
+def _name(effect: dict[str, Any]) -> str:
+    if effect["name"] == "parameter":
+        return str(effect["port"]).replace("_", " ")
+    return f"{effect['name']} at the {effect['port']}"
+
+
+DISCREPANCY = Command(
+    "discrepancy",
+    "find where model and measurement disagree, name the effect and prove it",
+    _DETAILS,
+    _add_arguments,
+    _run,
+)

@@ -1,0 +1,63 @@
+"""Which drive a command works on: a data sheet, and the model of what moves in it."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pymoo_hdte.drive import DataSheet, DriveModel
+
+BUILT_IN_SHEET = "hs_20_100"
+
+DRIVE_DETAILS = """DATASHEET is a TOML file with teeth, rated condition and nominal values, or the
+word hs_20_100 for the drive of the paper. MODEL is a TOML file with the make-up of theta_s and the
+effects beside Eq. (9), or a preset: calibrated, resonant or published, made for the HS-20-100."""
+
+
+def add_drive_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add DATASHEET and --model."""
+    parser.add_argument("datasheet", metavar="DATASHEET", help=f"TOML file, or {BUILT_IN_SHEET}")
+    parser.add_argument(
+        "--model", default="calibrated", help="TOML file or preset (default calibrated)"
+    )
+
+
+def read_drive(options: argparse.Namespace) -> DriveModel:
+    """Return the drive that the options name.
+
+    Raises
+    ------
+    InvalidInput
+        For a wrong field in one of the files.
+    OSError
+        If one cannot be read.
+    """
+    from pymoo_hdte.drive import PRESETS, load_model, preset
+
+    sheet = read_sheet(options.datasheet)
+    if options.model in PRESETS:
+        return replace(preset(options.model), sheet=sheet)
+    return load_model(Path(options.model), sheet)
+
+
+def read_sheet(named: str) -> DataSheet:
+    """Return the data sheet of that file, or `BUILT_IN_SHEET`; errors as `read_drive`."""
+    from pymoo_hdte.drive import hs_20_100, load_datasheet
+
+    return hs_20_100() if named == BUILT_IN_SHEET else load_datasheet(Path(named))
+
+
+def borrowed(model: DriveModel) -> tuple[str, ...]:
+    """Say, in a sentence or none, what a preset lends to another drive than its own."""
+    from pymoo_hdte.drive import PRESETS, hs_20_100
+
+    if model.name not in PRESETS or model.sheet.nominal == hs_20_100().nominal:
+        return ()
+    return (
+        f"Effects, order lines and scatter of theta_s are those of the model {model.name!r}, made "
+        f"for the HS-20-100; they need not hold for {model.sheet.name}. Measure them, or give "
+        "--model.",
+    )

@@ -1,0 +1,150 @@
+"""What a folder of bench records says of a series: stiffness, damping, errors of the components."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.identification import (
+    ErrorStatistics,
+    LinearFit,
+    NoLoadRun,
+    NormalSample,
+    Series,
+    TorsionLoop,
+    bearing_damping,
+    error_statistics,
+    mesh_damping,
+    read_error_measurements,
+    read_no_load_runs,
+    read_torsion_loops,
+    series,
+    stiffness,
+)
+from pymoo_hdte.identification.prototypes import RunKey
+
+LOOPS, BEARING, COMPLETE, OUTPUT, ERRORS = FILES = (
+    "torsion_loops.csv",
+    "no_load_bearing.csv",
+    "no_load_complete.csv",
+    "no_load_output.csv",
+    "errors.csv",
+)
+UNITS = {
+    "K": "N.m/rad",
+    "B_in": "N.m.s/rad",
+    "B_fc": "N.m.s/rad",
+    "B_out": "N.m.s/rad",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Parameter:
+    """One parameter, identified from every run of every prototype.
+
+    Attributes
+    ----------
+    name : str
+        A key of `UNITS`, which gives the unit of all values.
+    fits : mapping of (prototype, repeat) to LinearFit
+    """
+
+    name: str
+    fits: Mapping[RunKey, LinearFit]
+
+    @property
+    def series(self) -> Series | None:
+        """What the prototypes say of the series; None for a single one."""
+        if len({prototype for prototype, _ in self.fits}) < 2:
+            return None
+        return series({key: fit.slope for key, fit in self.fits.items()})
+
+    @property
+    def value(self) -> float:
+        """Mean over the prototypes of the means of their repeats."""
+        found = self.series
+        return found.between.mean if found else float(np.mean(self._slopes))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of `value`: over prototypes, else repeats, else of the fitted line."""
+        if found := self.series:
+            return found.between.mean_interval()
+        if len(self.fits) > 1:
+            return NormalSample.of(self._slopes).mean_interval()
+        return next(iter(self.fits.values())).slope_interval()
+
+    @property
+    def _slopes(self) -> list[float]:
+        return [fit.slope for fit in self.fits.values()]
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """The outcome.
+
+    Attributes
+    ----------
+    folder : str
+    parameters : tuple of Parameter
+    loops : mapping of (prototype, repeat) to TorsionLoop
+    errors : ErrorStatistics or None
+        In micrometres.
+    """
+
+    folder: str
+    parameters: tuple[Parameter, ...]
+    loops: Mapping[RunKey, TorsionLoop]
+    errors: ErrorStatistics | None
+
+
+def identification(folder: Path) -> Identification:
+    """Read the `FILES` that are there and identify what they hold.
+
+    Raises
+    ------
+    InvalidInput
+        If none is there, the whole drive was run without its bearing, or a record is at fault.
+    OSError
+        If the folder or a file cannot be read.
+    """
+    present = {path.name for path in folder.iterdir()} & set(FILES)
+    if not present:
+        raise InvalidInput("records", str(folder), f"a folder with one of {', '.join(FILES)}")
+    if COMPLETE in present and BEARING not in present:
+        allowed = f"also {BEARING}, whose torque is taken off"
+        raise InvalidInput("records", COMPLETE, allowed)
+    loops = read_torsion_loops(folder / LOOPS) if LOOPS in present else {}
+    runs = {
+        name: read_no_load_runs(folder / name)
+        for name in (BEARING, COMPLETE, OUTPUT)
+        if name in present
+    }
+    fits: dict[str, dict[RunKey, LinearFit]] = {
+        "K": {key: stiffness(loop) for key, loop in loops.items()},
+        "B_in": {key: bearing_damping(run) for key, run in runs.get(BEARING, {}).items()},
+        "B_fc": {
+            key: mesh_damping(_same(runs[BEARING], key), run)
+            for key, run in runs.get(COMPLETE, {}).items()
+        },
+        "B_out": {key: bearing_damping(run) for key, run in runs.get(OUTPUT, {}).items()},
+    }
+    return Identification(
+        folder=folder.name or str(folder),
+        parameters=tuple(Parameter(name, found) for name, found in fits.items() if found),
+        loops=loops,
+        errors=error_statistics(*read_error_measurements(folder / ERRORS))
+        if ERRORS in present
+        else None,
+    )
+
+
+def _same(runs: Mapping[RunKey, NoLoadRun], key: RunKey) -> NoLoadRun:
+    if key not in runs:
+        allowed = f"only runs that stand in {BEARING} too"
+        raise InvalidInput(f"{COMPLETE}: (prototype, repeat)", key, allowed)
+    return runs[key]

@@ -1,0 +1,58 @@
+"""``pymoo-hdte identify``: from bench records of prototypes to the values of a data sheet."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from pymoo_hdte.commands.command import Command, Outcome, Say
+from pymoo_hdte.commands.drive_arguments import BUILT_IN_SHEET
+
+_DETAILS = """example:
+  pymoo-hdte identify bench/series-1 --out reports/series-1
+
+RECORDS is a folder with one or more of these CSV files, each with columns prototype and repeat:
+  torsion_loops.csv      torque_Nm, torsion_arcsec: input locked, 0 -> +T -> 0 -> -T -> 0   (K)
+  no_load_bearing.csv    speed_r_min, torque_Nm: wave generator and flexible bearing alone  (B_in)
+  no_load_complete.csv   the same of the whole drive, at the same speeds                    (B_fc)
+  no_load_output.csv     the same of the output bearing, at its own speeds                  (B_out)
+  errors.csv             one column SYMBOL_um for each error of a component         (Table 2)
+DIR gets report.html, parameters.json and, with --datasheet, identified_sheet.toml: that data sheet
+with the identified values in it. An earlier report there is replaced, anything else refused.
+Exit codes: 0 identified; 2 the input is at fault."""
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("records", type=Path, metavar="RECORDS", help="folder of the CSV files")
+    parser.add_argument(
+        "--datasheet", metavar="DATASHEET", help=f"TOML file, or {BUILT_IN_SHEET}, to be filled in"
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
+    )
+
+
+def _run(options: argparse.Namespace, say: Say) -> Outcome:
+    from pymoo_hdte.commands.drive_arguments import read_sheet
+    from pymoo_hdte.commands.identification import identification
+    from pymoo_hdte.commands.identification_report import (
+        check_identification_folder,
+        write_identification_report,
+    )
+    from pymoo_hdte.reports.folder import PAGE_FILE
+
+    check_identification_folder(options.out)
+    sheet = read_sheet(options.datasheet) if options.datasheet else None
+    say("reading the records and fitting")
+    document = write_identification_report(identification(options.records), sheet, options.out)
+    lines = [*document["sentences"], *document["limits"], f"Report: {options.out / PAGE_FILE}"]
+    return Outcome(document, "\n".join(lines))
+
+
+IDENTIFY = Command(
+    "identify",
+    "identify stiffness, damping and error statistics from bench records",
+    _DETAILS,
+    _add_arguments,
+    _run,
+)

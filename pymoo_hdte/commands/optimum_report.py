@@ -1,0 +1,215 @@
+"""The report on a design study: page, document, front and the chosen drive, all or nothing."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte import __version__
+from pymoo_hdte.commands.design_study import CHECKED_DRIVES, POPULATION, DesignStudy
+from pymoo_hdte.commands.drive_arguments import borrowed
+from pymoo_hdte.decision import tolerance_band
+from pymoo_hdte.drive import DriveModel
+from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
+from pymoo_hdte.reports.folder import PAGE_FILE, check_folder, write_folder
+from pymoo_hdte.reports.front import Front, design_rows, front_svg
+from pymoo_hdte.reports.page import number, page
+
+DOCUMENT_FILE = "optimum.json"
+FRONT_FILE = "front.csv"
+SHEET_FILE = "optimum_sheet.toml"
+MODEL_FILE = "optimum_model.toml"
+FILES = (PAGE_FILE, DOCUMENT_FILE, FRONT_FILE, SHEET_FILE, MODEL_FILE)
+
+_WORTHLESS = 0.02
+"""Share of the mean below which a gain is hardly worth a change of design."""
+
+
+def check_optimum_folder(out: Path) -> None:
+    """Refuse a folder that could not take a report; errors as `check_folder`."""
+    check_folder(out, FILES)
+
+
+def write_optimum_report(study: DesignStudy, out: Path) -> dict[str, Any]:
+    """Write a folder with all of `FILES` or, after an error, none; return the document.
+
+    Raises
+    ------
+    InvalidInput
+        If ``out`` holds anything but an earlier report.
+    OSError
+        If it cannot be written.
+    """
+    check_optimum_folder(out)
+    document = optimum_document(study)
+    optimum = optimum_model(study)
+    write_folder(
+        out,
+        {
+            DOCUMENT_FILE: json.dumps(document, indent=1, ensure_ascii=False) + "\n",
+            PAGE_FILE: _page(study, document),
+            FRONT_FILE: _front_csv(study),
+            SHEET_FILE: sheet_toml(optimum.sheet),
+            MODEL_FILE: model_toml(optimum),
+        },
+    )
+    return document
+
+
+def optimum_model(study: DesignStudy) -> DriveModel:
+    """Return the drive model with the chosen design as its nominal values."""
+    model = study.problem.model
+    stiffness, input_inertia, input_damping, mesh_damping = study.design.tolist()
+    nominal = replace(
+        model.sheet.nominal,
+        stiffness=stiffness,
+        input_inertia=input_inertia,
+        input_damping=input_damping,
+        mesh_damping=mesh_damping,
+    )
+    source = f"{study.preference} design of pymoo-hdte optimise, from: {model.sheet.source}"
+    return replace(model, sheet=replace(model.sheet, nominal=nominal, source=source))
+
+
+def optimum_document(study: DesignStudy) -> dict[str, Any]:
+    """Return what ``optimum.json`` holds; designs in SI, moments of the DTE in arcsec."""
+    problem, settings = study.problem, study.settings
+    lower, upper = tolerance_band(study.design, settings.tolerance)
+    gain, gain_error = study.gain
+    return {
+        "format": "pymoo_hdte optimum",
+        "version": 1,
+        "made_by": f"pymoo_hdte {__version__}",
+        "sentences": sentences(study),
+        "limits": limits(study),
+        "preference": study.preference,
+        "designs": {
+            word: {
+                "row_of_front": row,
+                **_design(study, row),
+            }
+            for word, row in study.chosen.items()
+        },
+        "tolerance_band": {
+            name: {"lower": low, "upper": high, "unit": problem.units[name]}
+            for name, low, high in zip(
+                problem.var_names, lower.tolist(), upper.tolist(), strict=True
+            )
+        },
+        "initial": dict(zip(problem.obj_names, study.initial.tolist(), strict=True)),
+        "checked_on_the_model": {
+            "drives": CHECKED_DRIVES,
+            "initial": _checked(study.initial_check),
+            "optimum": _checked(study.optimum_check),
+            "mean_falls_by_arcsec": gain,
+            "standard_error_arcsec": gain_error,
+        },
+        "sources_of_scatter": dict(
+            zip(study.sources.names, study.sources.total.tolist(), strict=True)
+        ),
+        "settings": {
+            "algorithm": "ElitistSwarm",
+            "population": POPULATION,
+            "evaluations": settings.evaluations,
+            "seed": settings.seed,
+            **problem.settings,
+        },
+        "model": problem.model.to_dict(),
+        "front": {"file": FRONT_FILE, "designs": len(study.front)},
+    }
+
+
+def _design(study: DesignStudy, row: int) -> dict[str, Any]:
+    problem = study.problem
+    entries = zip(problem.var_names, study.designs[row].tolist(), strict=True)
+    return {name: {"value": value, "unit": problem.units[name]} for name, value in entries} | dict(
+        zip(problem.obj_names, study.front[row].tolist(), strict=True)
+    )
+
+
+def _checked(check: Any) -> dict[str, float]:
+    return {
+        "mean_dte_arcsec": check.mean,
+        "std_dte_arcsec": check.std,
+        "standard_error_of_mean_arcsec": check.mean_error,
+    }
+
+
+def sentences(study: DesignStudy) -> list[str]:
+    """Say which design was chosen, what it gains, and whether the model confirms it."""
+    problem = study.problem
+    changes = 100.0 * (study.design / problem.nominal - 1.0)
+    parts = [
+        f"{name} {number(float(value), 4)} {problem.units[name]} ({change:+.1f} %)"
+        for name, value, change in zip(problem.var_names, study.design, changes, strict=True)
+    ]
+    before, after = study.initial_check, study.optimum_check
+    gain, error = study.gain
+    promised = float(study.initial[0] - study.objectives[0])
+    return [
+        f"Take {', '.join(parts)}.",
+        f"The mean DTE falls from {study.initial[0]:.2f} to {study.objectives[0]:.2f} arcsec, the "
+        f"standard deviation from {study.initial[1]:.2f} to {study.objectives[1]:.2f}.",
+        f"These are values of the surrogate. By the drive model itself, on {CHECKED_DRIVES} random "
+        f"drives, the mean falls by {gain:.2f} ± {2.0 * error:.2f} arcsec instead of "
+        f"{promised:.2f}, the standard deviation from {before.std:.2f} to {after.std:.2f}.",
+    ]
+
+
+def limits(study: DesignStudy) -> list[str]:
+    """Say what a reader should know before quoting the result."""
+    found = list(borrowed(study.problem.model))
+    share = 1.0 - float(study.objectives[0] / study.initial[0])
+    if share < _WORTHLESS:
+        found.append(
+            f"The mean improves by {100.0 * share:.1f} %: this model has next to nothing to gain "
+            "by these design variables."
+        )
+    off = abs(study.optimum_check.mean - float(study.objectives[0]))
+    if off > 0.5 * abs(float(study.initial[0] - study.objectives[0])):
+        found.append(
+            f"The surrogate is off by {off:.2f} arcsec at the chosen design, which is more than "
+            "half of what is gained; a higher --order is sharper."
+        )
+    return found
+
+
+def _front_csv(study: DesignStudy) -> str:
+    problem = study.problem
+    names = [f"{name} [{problem.units[name]}]" for name in problem.var_names]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*problem.obj_names, *names])
+    for objectives, design in zip(study.front.tolist(), study.designs.tolist(), strict=True):
+        writer.writerow([*objectives, *design])
+    return text.getvalue()
+
+
+def _page(study: DesignStudy, document: dict[str, Any]) -> str:
+    problem = study.problem
+    values = design_rows(study.designs, problem.nominal)
+    words = {word.replace("_", " "): row for word, row in study.chosen.items()}
+    return page(
+        "pymoo_hdte.commands",
+        "optimum.html.j2",
+        study=study,
+        model=problem.model,
+        document=document,
+        words=words,
+        figure=front_svg(
+            Front(
+                points=study.front,
+                marked=words,
+                initial=study.initial,
+                axes=("mean DTE [arcsec]", "standard deviation of the DTE [arcsec]"),
+            )
+        ),
+        rows=list(zip(study.front.tolist(), values, strict=True)),
+        variables=[(name, problem.units[name]) for name in problem.var_names],
+        sources=sorted(document["sources_of_scatter"].items(), key=lambda one: -one[1]),
+        checked_drives=CHECKED_DRIVES,
+    )

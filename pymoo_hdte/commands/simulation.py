@@ -1,0 +1,90 @@
+"""One drive under one condition: steady state, integration in time, and the speeds around."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.drive import DriveModel, Run, simulate
+from pymoo_hdte.drive.speed_load_map import (
+    SpeedLoadMap,
+    TorsionalMode,
+    critical_speeds,
+    speed_load_map,
+    torsional_mode,
+)
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+
+FASTEST = 2.0
+"""End of the speeds that are looked at, as a multiple of the condition's."""
+SPEEDS = 80
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """What the nominal design does.
+
+    Attributes
+    ----------
+    model : DriveModel
+        At the condition that is simulated.
+    run : Run
+        One output turn, integrated from rest with a free input angle.
+    steady : float
+        DTE of the steady state, arcsec.
+    lines : dict of float
+        Amplitude of theta_d, arcsec, by order of the input turn.
+    speeds : SpeedLoadMap
+        Over `SPEEDS` speeds up to `FASTEST` times this one, at this load.
+    mode : TorsionalMode
+    resonances : list of (order, input speed in r/min)
+    """
+
+    model: DriveModel
+    run: Run
+    steady: float
+    lines: dict[float, float]
+    speeds: SpeedLoadMap
+    mode: TorsionalMode
+    resonances: list[tuple[float, float]]
+
+    @property
+    def speed(self) -> float:
+        """Input speed, r/min."""
+        return self.model.sheet.input_speed / REVOLUTION_PER_MINUTE
+
+    @property
+    def difference(self) -> float:
+        """Share by which the integration differs from the steady state."""
+        return self.run.dte_arcsec() / self.steady - 1.0
+
+
+def simulation(model: DriveModel) -> Simulation:
+    """Simulate the nominal design of a model at the condition of its data sheet.
+
+    Raises
+    ------
+    UnstableDrive
+        If it has no steady state there.
+    ArithmeticError
+        If the integrator or the harmonic balance gives up.
+    """
+    spectrum = model.steady_state(model.nominal[None])
+    fastest = FASTEST * model.sheet.input_speed / REVOLUTION_PER_MINUTE
+    speeds = np.linspace(0.0, fastest, SPEEDS + 1)[1:]
+    return Simulation(
+        model=model,
+        run=simulate(model, model.nominal),
+        steady=float(spectrum.peak_to_peak(model.sheet.ratio)[0] / ARCSEC),
+        lines={
+            order: float(amplitude[0] / ARCSEC)
+            for order, amplitude in spectrum.amplitudes().items()
+        },
+        speeds=speed_load_map(model, speeds, np.array([model.sheet.load_torque])),
+        mode=torsional_mode(model),
+        resonances=critical_speeds(model),
+    )

@@ -1,0 +1,34 @@
+"""The page of a report, and how numbers look in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+
+def page(package: str, template: str, **values: Any) -> str:
+    """Return a page from a template of a package, which may include what stands in this one."""
+    environment = Environment(
+        loader=ChoiceLoader([PackageLoader(one, ".") for one in (package, "pymoo_hdte.reports")]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = number
+    return environment.get_template(template).render(**values)
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a number for the reader, without an exponent where it can be helped."""
+    if value is None or not np.isfinite(value):
+        return "\N{EN DASH}"
+    size = abs(value)
+    if value == 0.0 or 1e-3 <= size < 1e5:
+        shown = np.format_float_positional(value, digits, fractional=False, trim="-")
+        return shown.replace("-", "\N{MINUS SIGN}")
+    mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
+    power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{mantissa}·10{power}".replace("-", "\N{MINUS SIGN}")

@@ -1,0 +1,178 @@
+"""``pymoo-hdte identify``: the truth of a virtual bench comes back from its CSV files."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from pymoo_hdte import cli
+from pymoo_hdte.drive import hs_20_100, load_datasheet
+from pymoo_hdte.identification.virtual_bench import (
+    COMPLETE_DRIVE,
+    INPUT_BEARING,
+    OUTPUT_BEARING,
+    TorsionBench,
+)
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+
+TRUTH = {"K": 2.4e4, "B_in": 1.7e-4, "B_fc": 4.4e-4, "B_out": 5.0e-4}
+BENCH = TorsionBench()
+
+
+def identify(*arguments):
+    return cli.main(["identify", *map(str, arguments)])
+
+
+def write_runs(path, runs):
+    lines = ["prototype,repeat,speed_r_min,torque_Nm"]
+    for (prototype, repeat), run in runs.items():
+        speeds = (run.speed / REVOLUTION_PER_MINUTE).tolist()
+        for speed, torque in zip(speeds, run.torque.tolist(), strict=True):
+            lines.append(f"{prototype},{repeat},{speed!r},{torque!r}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    """Six prototypes, three repeats each, that scatter by two per cent."""
+    rng = np.random.default_rng(20261122)
+    folder = tmp_path_factory.mktemp("bench") / "series-1"
+    folder.mkdir()
+    loops = ["prototype,repeat,torque_Nm,torsion_arcsec"]
+    runs = {"bearing": {}, "complete": {}, "output": {}}
+    for prototype in range(1, 7):
+        k, b_in, b_fc, b_out = np.array(list(TRUTH.values())) * rng.normal(1.0, 0.02, 4)
+        loop = BENCH.record(k, rng)
+        torsion = (loop.torsion / ARCSEC).tolist()
+        loops += [
+            f"{prototype},1,{torque!r},{angle!r}"
+            for torque, angle in zip(loop.torque.tolist(), torsion, strict=True)
+        ]
+        for repeat in (1, 2, 3):
+            runs["bearing"][prototype, repeat] = INPUT_BEARING.record(b_in, rng)
+            runs["complete"][prototype, repeat] = COMPLETE_DRIVE.record(b_in + b_fc, rng)
+            runs["output"][prototype, repeat] = OUTPUT_BEARING.record(b_out, rng)
+    (folder / "torsion_loops.csv").write_text("\n".join(loops) + "\n")
+    for name, of_it in runs.items():
+        write_runs(folder / f"no_load_{name}.csv", of_it)
+    rows = ["prototype,repeat,dFp1_um,mine_um"]
+    for prototype in range(1, 7):
+        true = rng.normal([8.0, 3.0], [0.9, 0.3])
+        for repeat in range(1, 5):
+            read = (true + rng.normal(0.0, 0.05, 2)).tolist()
+            rows.append(f"{prototype},{repeat},{read[0]!r},{read[1]!r}")
+    (folder / "errors.csv").write_text("\n".join(rows) + "\n")
+    return folder
+
+
+@pytest.fixture
+def copied(records, tmp_path):
+    return shutil.copytree(records, tmp_path / "series-1")
+
+
+@pytest.fixture(scope="module")
+def written(records, tmp_path_factory):
+    out = tmp_path_factory.mktemp("identify") / "report"
+    assert identify(records, "--datasheet", "hs_20_100", "--out", out, "--quiet") == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def document(written):
+    return json.loads((written / "parameters.json").read_text())
+
+
+def test_the_truth_lies_within_twice_the_interval(document):
+    truth = TRUTH | {"K": BENCH.loading_stiffness(TRUTH["K"])}
+    for name, true in truth.items():
+        found = document["parameters"][name]
+        low, high = found["interval95"]
+        half = (high - low) / 2.0
+        assert abs(found["value"] - true) < 2.0 * half
+        assert half < 0.1 * true
+        assert (found["prototypes"], found["runs"]) == (6, 6 if name == "K" else 18)
+
+
+def test_the_sheet_has_the_identified_values_and_keeps_the_rest(written, document):
+    sheet, before = load_datasheet(written / "identified_sheet.toml"), hs_20_100()
+    values = {name: one["value"] for name, one in document["parameters"].items()}
+    nominal = sheet.nominal
+    assert nominal.stiffness == values["K"]
+    assert nominal.input_damping == values["B_in"]
+    assert nominal.mesh_damping == values["B_fc"]
+    assert nominal.output_damping == values["B_out"]
+    assert nominal.input_inertia == before.nominal.input_inertia
+    errors = {source.symbol: source for source in sheet.error_sources}
+    assert errors["dFp1"].mean == pytest.approx(1e-6 * document["errors_um"]["dFp1"]["mean"])
+    assert errors["e13"] == next(one for one in before.error_sources if one.symbol == "e13")
+
+
+def test_what_the_data_sheet_does_not_know_is_said(document):
+    assert any("no error source mine" in one for one in document["limits"])
+
+
+def test_any_of_the_files_is_enough(copied, tmp_path, capsys):
+    for path in copied.iterdir():
+        if path.name != "torsion_loops.csv":
+            path.unlink()
+    assert identify(copied, "--out", tmp_path / "out") == 0
+    assert capsys.readouterr().out.startswith("K 2")
+    assert not (tmp_path / "out" / "identified_sheet.toml").exists()
+
+
+def test_one_prototype_says_nothing_of_the_scatter(copied, tmp_path, capsys):
+    for path in copied.iterdir():
+        if path.name != "no_load_output.csv":
+            path.unlink()
+    path = copied / "no_load_output.csv"
+    header, *rows = path.read_text().splitlines()
+    first = [row for row in rows if row.startswith("1,1,")]
+    path.write_text("\n".join([header, *first]) + "\n")
+    assert identify(copied, "--out", tmp_path / "out", "--json") == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["parameters"]["B_out"]["std_between_prototypes"] is None
+    assert "says nothing of the scatter of B_out" in found["limits"][0]
+
+
+def test_negative_damping_is_said_and_left_out_of_the_sheet(copied, tmp_path, capsys):
+    for path in copied.iterdir():
+        if path.name != "no_load_output.csv":
+            path.unlink()
+    path = copied / "no_load_output.csv"
+    header, *rows = path.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    path.write_text("\n".join([header, *(f"{p},{r},{s},{-float(t)}" for p, r, s, t in cells)]))
+    arguments = ("--datasheet", "hs_20_100", "--out", tmp_path / "out")
+    assert identify(copied, *arguments) == 0
+    assert "keeps its value" in capsys.readouterr().out
+    sheet = load_datasheet(tmp_path / "out" / "identified_sheet.toml")
+    assert sheet.nominal == hs_20_100().nominal
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda folder: [path.unlink() for path in folder.iterdir()], "a folder with one of"),
+        (lambda folder: (folder / "no_load_bearing.csv").unlink(), "also no_load_bearing.csv"),
+        (lambda folder: shutil.rmtree(folder), "series-1"),
+        (
+            lambda folder: (folder / "torsion_loops.csv").write_text("prototype,repeat\n1,1\n"),
+            "torsion_loops.csv, line 1",
+        ),
+        (
+            lambda folder: write_runs(folder / "no_load_complete.csv", {(9, 1): INPUT_RUN}),
+            "only runs that stand in",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(spoil, words, copied, tmp_path, capsys):
+    spoil(copied)
+    assert identify(copied, "--out", tmp_path / "out", "--quiet") == cli.MISTAKE
+    printed = capsys.readouterr().err
+    assert words in printed
+    assert printed.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+INPUT_RUN = INPUT_BEARING.record(1.7e-4, np.random.default_rng(1))

@@ -1,0 +1,191 @@
+"""``pymoo-hdte optimise``: what it writes is the optimum it claims, and reads back as a drive."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import qmc, truncnorm
+
+from pymoo_hdte import cli
+from pymoo_hdte.commands import optimum_report
+from pymoo_hdte.commands.design_study import Settings, design_study
+from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
+from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
+from pymoo_hdte.problems import RobustDTE
+
+QUICK = ("--order", "2", "--evaluations", "1000")
+
+
+def optimise(*arguments):
+    return cli.main(["optimise", *map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    out = tmp_path_factory.mktemp("optimise") / "report"
+    assert optimise("hs_20_100", "--out", out, "--quiet", *QUICK) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def document(written):
+    return json.loads((written / "optimum.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def front(written):
+    with (written / "front.csv").open() as file:
+        return np.array(list(csv.reader(file))[1:], dtype=float)
+
+
+def test_the_front_holds_what_the_problem_says_of_its_designs(front):
+    problem = RobustDTE(order=2)
+    np.testing.assert_allclose(problem.evaluate(front[:, 2:]), front[:, :2], rtol=1e-13)
+    assert np.all(np.diff(front[:, 0]) > 0.0)
+    assert np.all(np.diff(front[:, 1]) < 0.0)
+
+
+def test_each_preference_has_its_design(front, document):
+    for word, weights in PREFERENCES.items():
+        row = WeightedUtopia(weights).do(front[:, :2])
+        found = document["designs"][word]
+        assert found["row_of_front"] == row
+        values = [found[name]["value"] for name in ("K", "J_in", "B_in", "B_fc")]
+        np.testing.assert_array_equal(values, front[row, 2:])
+        assert (found["mean_dte_arcsec"], found["std_dte_arcsec"]) == tuple(front[row, :2])
+
+
+def test_the_chosen_drive_reads_back_and_has_the_dte_of_its_design(written, document):
+    sheet = load_datasheet(written / "optimum_sheet.toml")
+    model = load_model(written / "optimum_model.toml", sheet)
+    chosen = document["designs"]["balanced"]
+    names = ("K", "J_in", "B_in", "B_fc")
+    np.testing.assert_array_equal(model.nominal[1:], [chosen[name]["value"] for name in names])
+    design = np.r_[model.nominal[0], model.nominal[1:]]
+    assert model.dte_arcsec(design[None]) == preset("calibrated").dte_arcsec(design[None])
+    assert model.effects == preset("calibrated").effects
+
+
+def test_limits_to_order_enclose_the_design_by_the_tolerance(document):
+    for name, band in document["tolerance_band"].items():
+        value = document["designs"]["balanced"][name]["value"]
+        assert band["lower"] == pytest.approx(0.95 * value)
+        assert band["upper"] == pytest.approx(1.05 * value)
+
+
+def test_the_same_seed_gives_the_same_bytes(written, tmp_path):
+    assert optimise("hs_20_100", "--out", tmp_path / "again", "--quiet", *QUICK) == 0
+    for name in optimum_report.FILES:
+        assert (tmp_path / "again" / name).read_bytes() == (written / name).read_bytes()
+
+
+def test_another_preference_goes_into_the_sheet(written, tmp_path, document):
+    arguments = ("--preference", "robustness_first", "--out", tmp_path / "out", "--quiet")
+    assert optimise("hs_20_100", *arguments, *QUICK) == 0
+    sheet = load_datasheet(tmp_path / "out" / "optimum_sheet.toml")
+    wanted = document["designs"]["robustness_first"]["K"]["value"]
+    assert sheet.nominal.stiffness == wanted != document["designs"]["balanced"]["K"]["value"]
+
+
+def test_the_words_say_what_the_document_holds(written, capsys, tmp_path, document):
+    assert optimise("hs_20_100", "--out", tmp_path / "out", *QUICK) == 0
+    printed = capsys.readouterr().out
+    chosen = document["designs"]["balanced"]
+    assert f"to {chosen['mean_dte_arcsec']:.2f}" in printed
+    assert f"falls by {document['checked_on_the_model']['mean_falls_by_arcsec']:.2f}" in printed
+    assert str(tmp_path / "out" / "report.html") in printed
+
+
+def test_json_is_the_document(written, capsys, tmp_path, document):
+    assert optimise("hs_20_100", "--out", tmp_path / "out", "--json", *QUICK) == 0
+    assert json.loads(capsys.readouterr().out) == document
+
+
+class TestCheck:
+    settings = Settings(0.05, 0.25, 3, None, 1000, 1)
+
+    def test_where_the_surrogate_is_exact_the_model_confirms_it(self):
+        # As printed, the DTE is proportional to theta_s and next to constant in the design.
+        study = design_study(preset("published"), "balanced", self.settings)
+        check = study.optimum_check
+        assert check.mean == pytest.approx(study.objectives[0], rel=1e-5)
+        assert check.std == pytest.approx(study.objectives[1], rel=1e-4)
+        assert check.mean_error < 1e-4
+
+    def test_where_it_is_coarse_the_check_agrees_with_quasi_random_runs_of_the_model(self):
+        study = design_study(preset("calibrated"), "balanced", self.settings)
+        cube = qmc.Sobol(5, rng=np.random.default_rng(1)).random(2**12)
+        mean, std = study.problem.model.nominal[0], study.problem.model.kinematic_error.std
+        theta_s = truncnorm(-3.0, 3.0, loc=mean, scale=std).ppf(cube[:, 0])
+        drives = np.column_stack([theta_s, study.design * (0.95 + 0.1 * cube[:, 1:])])
+        dte = study.problem.model.dte_arcsec(drives)
+        assert abs(study.objectives[0] - dte.mean()) > 0.3
+        assert study.optimum_check.mean == pytest.approx(dte.mean(), abs=0.06)
+        assert study.optimum_check.std == pytest.approx(dte.std(), abs=0.1)
+
+    def test_the_gain_is_that_of_the_means_on_the_same_drives(self):
+        study = design_study(preset("calibrated"), "balanced", self.settings)
+        gain, error = study.gain
+        by_means = study.initial_check.mean - study.optimum_check.mean
+        assert abs(gain - by_means) < 5.0 * error
+        assert error < 0.2
+
+
+def test_a_preset_on_another_drive_is_said_to_be_borrowed(tmp_path, capsys):
+    text = sheet_toml(hs_20_100()).replace("HS-20-100", "MY-17-100").replace("25830.0", "20000.0")
+    (tmp_path / "mine.toml").write_text(text)
+    assert optimise(tmp_path / "mine.toml", "--out", tmp_path / "out", *QUICK) == 0
+    printed = capsys.readouterr().out
+    assert "need not hold for MY-17-100" in printed
+    (tmp_path / "model.toml").write_text(
+        model_toml(preset("calibrated")).replace('name = "calibrated"', 'name = "mine"')
+    )
+    arguments = ("--model", tmp_path / "model.toml", "--out", tmp_path / "out2")
+    assert optimise(tmp_path / "mine.toml", *arguments, *QUICK) == 0
+    assert "need not hold" not in capsys.readouterr().out
+
+
+def test_a_model_without_trade_off_is_said_to_gain_nothing(tmp_path, capsys):
+    arguments = ("--model", "published", "--out", tmp_path / "out")
+    assert optimise("hs_20_100", *arguments, *QUICK) == 0
+    assert "next to nothing to gain" in capsys.readouterr().out
+
+
+def test_a_duty_cycle_is_averaged_over(tmp_path, capsys):
+    cycle = tmp_path / "cycle.csv"
+    cycle.write_text("speed_rpm,load_Nm,weight\n200,40,1\n2000,40,3\n")
+    arguments = ("--cycle", cycle, "--out", tmp_path / "out", "--json")
+    assert optimise("hs_20_100", *arguments, *QUICK) == 0
+    shares = [row["share"] for row in json.loads(capsys.readouterr().out)["settings"]["conditions"]]
+    assert shares == [0.25, 0.75]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--preference", "cheap"), "--preference is 'cheap'"),
+        (("--tolerance", "1.5"), "tolerance is 1.5"),
+        (("--box", "nan"), "box is nan"),
+        (("--order", "9"), "order is 9"),
+        (("--evaluations", "50"), "--evaluations is 50"),
+        (("--seed", "-1"), "--seed is -1"),
+        (("--model", "nowhere.toml"), "nowhere.toml"),
+        (("--cycle", "nowhere.csv"), "nowhere.csv"),
+    ],
+)
+def test_a_mistake_is_one_line_and_leaves_nothing(options, words, tmp_path, capsys):
+    assert optimise("hs_20_100", "--out", tmp_path / "out", *options, "--quiet") == cli.MISTAKE
+    printed = capsys.readouterr().err
+    assert words in printed
+    assert printed.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_of_somebody_else_is_refused_before_the_work(tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.tex").write_text("years of work")
+    assert optimise("hs_20_100", "--out", tmp_path / "out", "--quiet") == cli.MISTAKE
+    assert "an earlier report" in capsys.readouterr().err
+    assert (tmp_path / "out" / "thesis.tex").read_text() == "years of work"
