@@ -1,4 +1,4 @@
-"""Every report in headless Chromium, wide and narrow: all is visible, nothing comes from outside."""
+"""Every report in headless Chromium, wide and narrow: all visible, nothing from outside."""
 
 import json
 
@@ -8,13 +8,11 @@ import pytest
 from browser import CHROMIUM, probe
 from quick_campaigns import quick_campaign
 from test_cli_identify import records  # noqa: F401
+from test_experiments_report import example
 from virtual_rig_cases import effect
 
-from experiments.campaign import Campaign
-from experiments.registry import Context
 from experiments.report import write_report
 from experiments.store import save
-from experiments.table5 import run as table5
 from pymoo_hdte import cli
 from pymoo_hdte.discrepancy import write_campaign
 from pymoo_hdte.measured import investigate
@@ -45,7 +43,10 @@ def looked_at(page, tmp_path, width, script="null"):
 def pages(tmp_path_factory, records):  # noqa: F811
     """One report of every kind."""
     top = tmp_path_factory.mktemp("reports")
-    write_campaign(quick_campaign(4, effect("torque_ripple")), top / "rig")
+    write_campaign(
+        quick_campaign(4, effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7)),
+        top / "rig",
+    )
     quick = ("--order", "2", "--evaluations", "1000")
     commands = {
         "optimise": ("hs_20_100", *quick),
@@ -63,7 +64,7 @@ def pages(tmp_path_factory, records):  # noqa: F811
     runs = [rig.record_of(rig.cubic), rig.record_of(rig.cubic, "held_out", seed=3)]
     write_measured_report("oscillator", investigate(oscillator, runs), top / "measured")
     found = {name: top / name / "report.html" for name in (*commands, "measured")}
-    save(top / "results", "table5", table5(Context(2, top / "results", Campaign(top / "results"))))
+    save(top / "results", "table7", example())
     return found | {"experiments": write_report(top / "results")}
 
 
