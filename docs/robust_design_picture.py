@@ -1,0 +1,54 @@
+"""Draw docs/robust_design.png, the first picture of the README: scatter of the DTE, and the front."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from pymoo.optimize import minimize
+from scipy.stats import gaussian_kde
+
+from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+from pymoo_hdte.problems import RobustDTE
+
+PICTURE = Path(__file__).with_name("robust_design.png")
+DATA_SHEET, CHOSEN = "#D55E00", "#0072B2"
+DRIVES = 2000
+
+
+def draw(target: Path = PICTURE) -> None:
+    """Optimise the calibrated drive and draw what that does to drives as they are built."""
+    problem = RobustDTE()
+    found = minimize(problem, ElitistSwarm(), ("n_eval", 20_000), seed=1)
+    chosen = found.X[WeightedUtopia(PREFERENCES["balanced"]).do(found.F)]
+    figure = Figure(figsize=(9.6, 3.4), layout="constrained")
+    scatter, front = figure.subplots(1, 2)
+    front.plot(*problem.pareto_front().T, color="0.6", linewidth=5, label="true front")
+    front.plot(*found.F.T, ".", color=CHOSEN, markersize=4, label="ElitistSwarm")
+    for name, design, colour, line in (
+        ("data sheet", problem.nominal, DATA_SHEET, "--"),
+        ("balanced design", chosen, CHOSEN, "-"),
+    ):
+        dte = of_built_drives(problem, design)
+        values = np.linspace(25.0, 150.0, 300)
+        label = f"{name}: {dte.mean():.1f} ± {dte.std():.1f} arcsec"
+        scatter.plot(values, gaussian_kde(dte)(values), line, color=colour, label=label)
+        front.plot(*problem.evaluate(design), "x", color=colour, markersize=9, mew=2.2, label=name)
+    scatter.set(xlabel="DTE of a built drive [arcsec]", yticks=[], ylim=(0.0, 0.036))
+    front.set(xlabel="mean DTE [arcsec]", ylabel="standard deviation [arcsec]")
+    for axis in (scatter, front):
+        axis.legend(frameon=False, fontsize=9)
+    figure.savefig(target, dpi=100, metadata={"Software": None})
+
+
+def of_built_drives(problem: RobustDTE, design: np.ndarray) -> np.ndarray:
+    """Return the DTE of random drives of one design, by the drive model, shape (DRIVES,)."""
+    rng = np.random.default_rng(1)
+    theta_s, std = problem.model.nominal[0], problem.model.kinematic_error.std
+    scatter = theta_s + std * np.clip(rng.standard_normal(DRIVES), -3.0, 3.0)
+    parts = design * rng.uniform(0.95, 1.05, (DRIVES, 4))
+    return problem.model.dte_arcsec(np.column_stack([scatter, parts]))
+
+
+if __name__ == "__main__":
+    draw()
