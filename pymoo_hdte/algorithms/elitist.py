@@ -42,6 +42,7 @@ class ElitistSwarm(Swarm):
     moves : sequence of Move, optional
         1 to 19 of them; by default `Attraction`, `Exchange` and `Difference`.
     mutation : SparseMutation, optional
+        What is added to every step; by default a `SparseMutation`.
     truncation : callable, optional
         Takes objectives (n, m) and a size, and returns the rows that stay; by default
         `most_spread`.

@@ -27,7 +27,7 @@ class ParticleSwarm(Swarm):
     One generation moves every particle,
     V = w V + c1 r1 (own best - X) + c2 r2 (leader - X), X = X + V + mutation, cut to the box,
     with w from ``inertia``, and c1, c2 and the mutation from ``hierarchy``. The result of a run
-    (``res.F``) is the archive.
+    (``res.F``) is the archive (paper, Section 5.1).
 
     Parameters
     ----------

@@ -29,6 +29,9 @@ _FRONT_POINTS = 1000
 class RobustToy(RobustProblem):
     """The closed-form twin, run through the same surrogate and moments as `RobustDTE`.
 
+    The response is our own, chosen for its closed forms. X has shape (n, 3), F shape (n, 2); all is
+    dimensionless.
+
     Parameters
     ----------
     moments, n_samples, sample_seed, tolerance
@@ -64,7 +67,18 @@ class RobustToy(RobustProblem):
     def closed_form(
         self, designs: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean and standard deviation, shape (n,) each, for designs of shape (n, 3)."""
+        """Return the true mean and standard deviation.
+
+        Parameters
+        ----------
+        designs : ndarray, shape (n, 3)
+            Dimensionless.
+
+        Returns
+        -------
+        mean, std : ndarray, shape (n,)
+            Dimensionless.
+        """
         first, second, third = designs.T
         band = self.tolerance**2 / 3.0
         variance = (

@@ -1,0 +1,306 @@
+"""What a machine can check of a docstring: parameters, shapes, units, errors and sources.
+
+The sections are read by docstring_parser, a library without dependencies; numpydoc, which also
+validates docstrings, brings all of Sphinx, and its checks know no shapes, units or sources.
+"""
+
+import ast
+import builtins
+import dataclasses
+import functools
+import importlib
+import inspect
+import re
+import sys
+import textwrap
+from collections.abc import Iterator
+
+import docstring_parser
+from docstring_parser import DocstringParam, DocstringRaises, DocstringStyle
+
+from pymoo_hdte import checks
+
+PACKAGES = (
+    "drive", "surrogate", "identification", "problems", "algorithms", "decision", "discrepancy",
+    "mechanism", "measured", "validation",
+)  # fmt: skip
+
+CHECKS = {
+    name
+    for name, check in inspect.getmembers(checks, inspect.isfunction)
+    if check.__module__ == checks.__name__
+}
+"""Functions that raise InvalidInput for those who call them."""
+
+ARRAY = re.compile(
+    r"NDArray|ArrayLike|\b(Values|Phasors|Vector)\b|(tuple|Sequence)\[float(, \.\.\.)?\]"
+)
+QUANTITY = re.compile(rf"\bfloat\b|{ARRAY.pattern}")
+COUNTED = re.compile(r"NDArray\[np\.(bool_|int_)\]|tuple\[str, float[^]]*\]")
+"""Arrays that are no quantities."""
+
+_LENGTH = r"(?:\d+|[a-zA-Z]|[a-zA-Z]_\w+|\.\.\.|size)(?: ?[-+*] ?\w+| \w)*"
+SHAPE = re.compile(
+    rf"shape \([^)]*\)|\({_LENGTH}(?:,|(?:, ?{_LENGTH})+,?)\)|length [\w(]|(?:same|any|one) shape"
+)
+
+_SYMBOLS = (
+    r"rad2?(?:/s(?:\^?[2-4])?)?|arcsec|N\.m(?:\.s2?)?(?:/rad[23]?)?|kg\.m2|N(?:\.s)?(?:/m)?|m|s|Hz|J"
+)
+_WORDS = (
+    "SI|units?|dimensionless|pure|relative|ratio|share|factor|multiple|cycles|orders?|probability|"
+    "density|degrees? of freedom|confidence level|per cent|percent|weights?|progress|"
+    "distances?|objectives|positions|correlation|acceleration|p-values?|Pearson's|indices|"
+    "determination|radians?|metres|seconds|shifts"
+)
+UNIT = re.compile(
+    rf"(?:^|[,;:(] *|\bin |\band |\bor |\bby )(?:{_SYMBOLS})(?=[,;:.)]?(?:\s|$))|\b(?i:{_WORDS})\b"
+)
+
+LAW = re.compile(r"\b\w+(?:\([^)]*\))?'* = [^.,;]*?(?: [-+/*] |\^|\(|[A-Z] [A-Z]\b)")
+SOURCE = re.compile(r"Eqs?\. ?\(?\d|Tables? \d|Sections? \d|Fig\. \d|\b(?:1[89]|20)\d\d\b")
+
+
+@functools.cache
+def public_objects() -> dict[str, object]:
+    """Return every public class, function, method and property of the package, by full name."""
+    found: dict[str, object] = {}
+    for package in PACKAGES:
+        module = importlib.import_module(f"pymoo_hdte.{package}")
+        for name in module.__all__:
+            target = getattr(module, name)
+            if inspect.isclass(target):
+                found[f"{package}.{name}"] = target
+                found |= {f"{package}.{name}.{one}": it for one, it in members(target).items()}
+            elif callable(target):
+                found[f"{package}.{name}"] = target
+    return found
+
+
+def members(kind: type) -> dict[str, object]:
+    """Return the public methods and properties of a class that this package defines."""
+    found: dict[str, object] = {}
+    for base in reversed(kind.__mro__):
+        if not base.__module__.startswith(("pymoo_hdte", "test")):
+            continue
+        for name, value in vars(base).items():
+            if name.startswith("_") and name != "__call__":
+                continue
+            value = getattr(value, "fget", None) or getattr(value, "func", value)
+            value = getattr(value, "__func__", value)
+            if inspect.isfunction(value):
+                found[name] = value
+    return found
+
+
+def annotations(target: object) -> dict[str, str]:
+    """Return the annotations of what has to be documented: parameters, or fields of a class."""
+    fields = {}
+    if inspect.isclass(target):
+        if dataclasses.is_dataclass(target):
+            fields = {field.name: str(field.type) for field in dataclasses.fields(target)}
+        target = vars(target).get("__init__")
+        if not inspect.isfunction(target) or target.__module__ == "typing":
+            return fields
+    parameters = list(inspect.signature(target).parameters.values())  # type: ignore[arg-type]
+    named = {one.name: str(one.annotation) for one in parameters}
+    return fields | {name: kind for name, kind in named.items() if name not in ("self", "cls")}
+
+
+def docstring(target: object) -> str:
+    """Return the docstring of a target itself, not one it inherits."""
+    return inspect.cleandoc(getattr(target, "__doc__", None) or "")
+
+
+def entries(target: object) -> dict[str, str]:
+    """Return type and description of all that a docstring lists, by name."""
+    found = {}
+    if inspect.isclass(target):
+        for base in reversed(target.__mro__):
+            if dataclasses.is_dataclass(base) or base is target:
+                found |= _entries(docstring_parser.parse_from_object(base, DocstringStyle.NUMPYDOC))
+    return found | _entries(_parsed(target))
+
+
+def _entries(parsed: docstring_parser.Docstring) -> dict[str, str]:
+    return {
+        name.strip().lstrip("*"): f"{one.type_name or ''}; {one.description or ''}"
+        for one in parsed.meta
+        if isinstance(one, DocstringParam)
+        for name in one.arg_name.split(",")
+    }
+
+
+def _parsed(target: object) -> docstring_parser.Docstring:
+    return docstring_parser.parse(docstring(target), DocstringStyle.NUMPYDOC)
+
+
+def prose(target: object) -> str:
+    """Return a docstring without its lists of parameters and errors, on one line."""
+    parsed = _parsed(target)
+    parts = [parsed.short_description, parsed.long_description]
+    for one in parsed.meta:
+        if not isinstance(one, DocstringParam | DocstringRaises):
+            parts += [getattr(one, "type_name", None), one.description]
+    return re.sub(r"\s+", " ", " ".join(part for part in parts if part))
+
+
+def referred(target: object, owner: object, name: str) -> object | None:
+    """Return what a name in backticks stands for: a member of the owner, of a module, or public."""
+    name = "__call__" if name == "a call" else name
+    for place in (owner, inspect.getmodule(target)):
+        found = members(place).get(name) if inspect.isclass(place) else getattr(place, name, None)
+        if found is not None:
+            return found
+    public = {full.partition(".")[2]: one for full, one in public_objects().items()}
+    return public.get(name)
+
+
+def delegates(target: object, owner: object, word: str) -> Iterator[object]:
+    """Yield what a sentence such as "Parameters and errors as in `steady_state`." refers to."""
+    for sentence in re.split(r"(?<=[.;]) ", prose(target)):
+        if re.search(rf"\b{word}\b", sentence, re.IGNORECASE):
+            for name in re.findall(r"`([\w.]+)`|\b(a call)\b", sentence):
+                found = referred(target, owner, "".join(name))
+                if found is not None and found is not target:
+                    yield found
+
+
+def described(target: object, owner: object, name: str) -> str | None:
+    """Return what is said of a parameter, here or where the docstring sends the reader."""
+    said = entries(target).get(name)
+    if said is None:
+        others = delegates(target, owner, "parameters|arguments")
+        return next((found for one in others if (found := described(one, owner, name))), None)
+    sent = re.search(r"; As (?:in|for|of) `([\w.]+)`", said)
+    other = referred(target, owner, sent[1]) if sent else None
+    return said if other is None else described(other, owner, name)
+
+
+def raised(function: object) -> set[str]:
+    """Return the names of the errors that a function raises itself, private helpers included."""
+    module = sys.modules[function.__module__]
+    found: set[str] = set()
+    seen: set[object] = set()
+    waiting = [function]
+    while waiting:
+        one = waiting.pop()
+        if one in seen or not inspect.isfunction(inspect.unwrap(one)):
+            continue
+        seen.add(one)
+        try:
+            tree = ast.parse(textwrap.dedent(inspect.getsource(one)))
+        except OSError:
+            continue  # Written by dataclass, without source.
+        owner = _owner(module, one)
+        for node in ast.walk(tree):
+            call = node.exc if isinstance(node, ast.Raise) else node
+            callee = call.func if isinstance(call, ast.Call) else None
+            name = getattr(callee, "id", None) or getattr(callee, "attr", None)
+            if isinstance(node, ast.Raise):
+                maker = getattr(module, name or "", None)
+                is_function = inspect.isfunction(maker)
+                found |= {maker.__annotations__["return"] if is_function else name} - {None}
+            elif name in CHECKS:
+                found.add("InvalidInput")
+            elif name and name.startswith("_") and not name.startswith("__"):
+                waiting.append(getattr(module, name, None) or getattr(owner, name, None))
+    return found
+
+
+def _owner(module: object, function: object) -> object:
+    return getattr(module, getattr(function, "__qualname__", "").partition(".")[0], None)
+
+
+def told(target: object, owner: object) -> set[str]:
+    """Return the names of the errors that a docstring tells of."""
+    found = set(re.findall(r"`?\b(\w*(?:Input|Error|Drive))\b`?", prose(target)))
+    for one in _parsed(target).meta:
+        if isinstance(one, DocstringRaises) and one.type_name:
+            found |= {name.strip() for name in one.type_name.split(",")}
+    for other in delegates(target, owner, "errors"):
+        found |= told(other, owner)
+    return found
+
+
+def ancestors(module: object, name: str) -> set[str]:
+    """Return the names of an exception and of those it is a kind of."""
+    places = (module, checks, builtins)
+    kind = next(getattr(place, name) for place in places if hasattr(place, name))
+    return {base.__name__ for base in kind.__mro__} - {"Exception", "BaseException", "object"}
+
+
+def faults(target: object, owner: object = None) -> list[str]:
+    """Return what a docstring lacks, a sentence each."""
+    return [
+        *_undocumented(target, owner),
+        *_without_shape(target, owner),
+        *_without_unit(target, owner),
+        *_untold_errors(target, owner),
+        *_without_source(target, owner),
+    ]
+
+
+def _undocumented(target: object, owner: object) -> Iterator[str]:
+    if not docstring(target):
+        yield "has no docstring"
+    names = annotations(target)
+    for name in names:
+        if described(target, owner, name) is None:
+            plain = name.rstrip("s").replace("_", "[ _]")
+            obvious = not inspect.isclass(target) and len(names) == 1
+            if not (obvious and re.search(rf"\b{plain}s?\b", prose(target), re.IGNORECASE)):
+                yield f"does not document {name}"
+
+
+def _without_shape(target: object, owner: object) -> Iterator[str]:
+    needed = 0
+    for name, annotation in annotations(target).items():
+        if ARRAY.search(annotation):
+            said = described(target, owner, name)
+            needed += said is None
+            if said is not None and not SHAPE.search(said):
+                yield f"does not say the shape of {name}"
+    needed += bool(ARRAY.search(result(target)))
+    if len(SHAPE.findall(prose(target))) < needed:
+        yield "does not say the shape of what it takes or returns"
+
+
+def _without_unit(target: object, owner: object) -> Iterator[str]:
+    said_in_prose = False
+    for name, annotation in annotations(target).items():
+        if QUANTITY.search(COUNTED.sub("", annotation)):
+            said = described(target, owner, name)
+            said_in_prose |= said is None
+            if said is not None and not UNIT.search(SHAPE.sub("", said)):
+                yield f"does not say the unit of {name}"
+    said_in_prose |= bool(QUANTITY.search(COUNTED.sub("", result(target))))
+    if said_in_prose and not UNIT.search(SHAPE.sub("", prose(target))):
+        yield "does not say the unit of what it takes or returns"
+
+
+def result(target: object) -> str:
+    """Return the annotation of what a function returns."""
+    if inspect.isclass(target):
+        return ""
+    return str(inspect.signature(target).return_annotation)  # type: ignore[arg-type]
+
+
+def _untold_errors(target: object, owner: object) -> Iterator[str]:
+    functions = [target]
+    if inspect.isclass(target):
+        functions = [vars(target).get(name) for name in ("__init__", "__post_init__")]
+        functions = [one for one in functions if getattr(one, "__module__", "") != "typing"]
+    module = inspect.getmodule(target)
+    for function in functions:
+        if inspect.isfunction(function):
+            for name in sorted(raised(function)):
+                if not ancestors(module, name) & told(target, owner):
+                    yield f"does not tell that it raises {name}"
+
+
+def _without_source(target: object, owner: object) -> Iterator[str]:
+    law = LAW.search(prose(target))
+    texts = docstring(target) + (docstring(owner) if owner else "")
+    if law and not SOURCE.search(texts):
+        yield f"does not say where {law[0]!r} is from"
