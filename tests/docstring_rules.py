@@ -8,7 +8,6 @@ import ast
 import builtins
 import dataclasses
 import functools
-import importlib
 import inspect
 import re
 import sys
@@ -17,13 +16,9 @@ from collections.abc import Iterator
 
 import docstring_parser
 from docstring_parser import DocstringParam, DocstringRaises, DocstringStyle
+from public_names import HERE, members, public_objects
 
 from pymoo_hdte import checks
-
-PACKAGES = (
-    "drive", "surrogate", "identification", "problems", "algorithms", "decision", "discrepancy",
-    "mechanism", "measured", "validation",
-)  # fmt: skip
 
 CHECKS = {
     name
@@ -41,11 +36,13 @@ COUNTED = re.compile(r"NDArray\[np\.(bool_|int_)\]|tuple\[str, float[^]]*\]")
 
 _LENGTH = r"(?:\d+|[a-zA-Z]|[a-zA-Z]_\w+|\.\.\.|size)(?: ?[-+*] ?\w+| \w)*"
 SHAPE = re.compile(
-    rf"shape \([^)]*\)|\({_LENGTH}(?:,|(?:, ?{_LENGTH})+,?)\)|length [\w(]|(?:same|any|one) shape"
+    rf"shape \([^)]*\)|\({_LENGTH}(?:,|(?:, ?{_LENGTH})+,?)\)"
+    r"|length (?:\d|[a-z]\b|[a-z]_)|(?:same|any|one) shape"
 )
 
 _SYMBOLS = (
-    r"rad2?(?:/s(?:\^?[2-4])?)?|arcsec|N\.m(?:\.s2?)?(?:/rad[23]?)?|kg\.m2|N(?:\.s)?(?:/m)?|m|s|Hz|J"
+    r"rad2?(?:/s(?:\^?[2-4])?)?|arcsec|N\.m(?:\.s2?)?(?:/rad[23]?)?|kg\.m2"
+    r"|N(?:\.s)?(?:/m)?|m|s|Hz|J"
 )
 _WORDS = (
     "SI|units?|dimensionless|pure|relative|ratio|share|factor|multiple|cycles|orders?|probability|"
@@ -61,50 +58,37 @@ LAW = re.compile(r"\b\w+(?:\([^)]*\))?'* = [^.,;]*?(?: [-+/*] |\^|\(|[A-Z] [A-Z]
 SOURCE = re.compile(r"Eqs?\. ?\(?\d|Tables? \d|Sections? \d|Fig\. \d|\b(?:1[89]|20)\d\d\b")
 
 
-@functools.cache
-def public_objects() -> dict[str, object]:
-    """Return every public class, function, method and property of the package, by full name."""
-    found: dict[str, object] = {}
-    for package in PACKAGES:
-        module = importlib.import_module(f"pymoo_hdte.{package}")
-        for name in module.__all__:
-            target = getattr(module, name)
-            if inspect.isclass(target):
-                found[f"{package}.{name}"] = target
-                found |= {f"{package}.{name}.{one}": it for one, it in members(target).items()}
-            elif callable(target):
-                found[f"{package}.{name}"] = target
-    return found
-
-
-def members(kind: type) -> dict[str, object]:
-    """Return the public methods and properties of a class that this package defines."""
-    found: dict[str, object] = {}
-    for base in reversed(kind.__mro__):
-        if not base.__module__.startswith(("pymoo_hdte", "test")):
-            continue
-        for name, value in vars(base).items():
-            if name.startswith("_") and name != "__call__":
-                continue
-            value = getattr(value, "fget", None) or getattr(value, "func", value)
-            value = getattr(value, "__func__", value)
-            if inspect.isfunction(value):
-                found[name] = value
-    return found
-
-
 def annotations(target: object) -> dict[str, str]:
-    """Return the annotations of what has to be documented: parameters, or fields of a class."""
+    """Return the annotations of what has to be listed: parameters, or attributes of a class."""
     fields = {}
     if inspect.isclass(target):
+        fields = class_attributes(target)
         if dataclasses.is_dataclass(target):
-            fields = {field.name: str(field.type) for field in dataclasses.fields(target)}
+            fields |= {field.name: _written(field.type) for field in dataclasses.fields(target)}
         target = vars(target).get("__init__")
         if not inspect.isfunction(target) or target.__module__ == "typing":
             return fields
     parameters = list(inspect.signature(target).parameters.values())  # type: ignore[arg-type]
-    named = {one.name: str(one.annotation) for one in parameters}
-    return fields | {name: kind for name, kind in named.items() if name not in ("self", "cls")}
+    named = {one.name: one for one in parameters if one.name not in ("self", "cls")}
+    return fields | {name: _written(one.annotation) for name, one in named.items()}
+
+
+def _written(annotation: object) -> str:
+    """Return an annotation as it is written, which only a postponed one tells."""
+    if not isinstance(annotation, str):
+        raise TypeError(f"{annotation!r} is no text: from __future__ import annotations is missing")
+    return annotation
+
+
+def class_attributes(kind: type) -> dict[str, str]:
+    """Return the types of the public attributes of a class that are no methods or properties."""
+    return {
+        name: type(value).__name__
+        for base in kind.__mro__
+        if base.__module__.startswith(HERE)
+        for name, value in vars(base).items()
+        if not name.startswith("_") and not hasattr(value, "__get__")
+    }
 
 
 def docstring(target: object) -> str:
@@ -112,6 +96,7 @@ def docstring(target: object) -> str:
     return inspect.cleandoc(getattr(target, "__doc__", None) or "")
 
 
+@functools.cache
 def entries(target: object) -> dict[str, str]:
     """Return type and description of all that a docstring lists, by name."""
     found = {}
@@ -135,6 +120,7 @@ def _parsed(target: object) -> docstring_parser.Docstring:
     return docstring_parser.parse(docstring(target), DocstringStyle.NUMPYDOC)
 
 
+@functools.cache
 def prose(target: object) -> str:
     """Return a docstring without its lists of parameters and errors, on one line."""
     parsed = _parsed(target)
@@ -248,9 +234,13 @@ def _undocumented(target: object, owner: object) -> Iterator[str]:
     for name in names:
         if described(target, owner, name) is None:
             plain = name.rstrip("s").replace("_", "[ _]")
-            obvious = not inspect.isclass(target) and len(names) == 1
-            if not (obvious and re.search(rf"\b{plain}s?\b", prose(target), re.IGNORECASE)):
+            in_prose = re.search(rf"\b{plain}s?\b", prose(target), re.IGNORECASE)
+            if not (_may_stay_in_prose(target) and in_prose):
                 yield f"does not document {name}"
+
+
+def _may_stay_in_prose(target: object) -> bool:
+    return not inspect.isclass(target) and len(annotations(target)) == 1
 
 
 def _without_shape(target: object, owner: object) -> Iterator[str]:
@@ -258,7 +248,7 @@ def _without_shape(target: object, owner: object) -> Iterator[str]:
     for name, annotation in annotations(target).items():
         if ARRAY.search(annotation):
             said = described(target, owner, name)
-            needed += said is None
+            needed += said is None and _may_stay_in_prose(target)
             if said is not None and not SHAPE.search(said):
                 yield f"does not say the shape of {name}"
     needed += bool(ARRAY.search(result(target)))
@@ -271,7 +261,7 @@ def _without_unit(target: object, owner: object) -> Iterator[str]:
     for name, annotation in annotations(target).items():
         if QUANTITY.search(COUNTED.sub("", annotation)):
             said = described(target, owner, name)
-            said_in_prose |= said is None
+            said_in_prose |= said is None and _may_stay_in_prose(target)
             if said is not None and not UNIT.search(SHAPE.sub("", said)):
                 yield f"does not say the unit of {name}"
     said_in_prose |= bool(QUANTITY.search(COUNTED.sub("", result(target))))
@@ -283,7 +273,7 @@ def result(target: object) -> str:
     """Return the annotation of what a function returns."""
     if inspect.isclass(target):
         return ""
-    return str(inspect.signature(target).return_annotation)  # type: ignore[arg-type]
+    return _written(inspect.signature(target).return_annotation)  # type: ignore[arg-type]
 
 
 def _untold_errors(target: object, owner: object) -> Iterator[str]:

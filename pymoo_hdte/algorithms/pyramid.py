@@ -87,7 +87,7 @@ class Pyramid:
     TOP_RANKS : int
         Last rank of the top layer.
     MUTATION_PROBABILITY : float
-        Of a particle of the bottom layer, in a generation.
+        Probability that a particle of the bottom layer mutates in a generation.
     """
 
     TOP_RANKS = 2

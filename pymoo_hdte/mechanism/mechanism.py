@@ -126,8 +126,7 @@ class Input:
 class Loop:
     """A control law: input = position_gain (reference - coordinate) - speed_gain coordinate'.
 
-    Proportional-derivative control with a limit: Astrom and Murray, Feedback Systems, Princeton
-    University Press 2008.
+    Proportional-derivative: Astrom and Murray, Feedback Systems, Princeton University Press 2008.
 
     Attributes
     ----------
@@ -162,9 +161,7 @@ class Mechanism:
         Mass, kg, or inertia, kg.m2, by coordinate, which is measured where a record has a channel
         of its name.
     ports : sequence of Port
-        Where parts move against each other.
     inputs : sequence of Input
-        What drives the mechanism.
     loops : sequence of Loop
         Closed loops of records that have their references; an input without one is taken from its
         channel.
