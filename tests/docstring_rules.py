@@ -5,27 +5,16 @@ validates docstrings, brings all of Sphinx, and its checks know no shapes, units
 """
 
 import ast
-import builtins
 import dataclasses
 import functools
 import inspect
 import re
-import sys
-import textwrap
 from collections.abc import Iterator
 
 import docstring_parser
 from docstring_parser import DocstringParam, DocstringRaises, DocstringStyle
 from public_names import HERE, members, public_objects
-
-from pymoo_hdte import checks
-
-CHECKS = {
-    name
-    for name, check in inspect.getmembers(checks, inspect.isfunction)
-    if check.__module__ == checks.__name__
-}
-"""Functions that raise InvalidInput for those who call them."""
+from raised_errors import ancestors, nodes, raised
 
 ARRAY = re.compile(
     r"NDArray|ArrayLike|\b(Values|Phasors|Vector)\b|(tuple|Sequence)\[float(, \.\.\.)?\]"
@@ -42,13 +31,11 @@ SHAPE = re.compile(
 
 _SYMBOLS = (
     r"rad2?(?:/s(?:\^?[2-4])?)?|arcsec|N\.m(?:\.s2?)?(?:/rad[23]?)?|kg\.m2"
-    r"|N(?:\.s)?(?:/m)?|m|s|Hz|J"
+    r"|N(?:\.s)?(?:/m)?|m|s(?:\^k)?|Hz|J"
 )
 _WORDS = (
-    "SI|units?|dimensionless|pure|relative|ratio|share|factor|multiple|cycles|orders?|probability|"
-    "density|degrees? of freedom|confidence level|per cent|percent|weights?|progress|"
-    "distances?|objectives|positions|correlation|acceleration|p-values?|Pearson's|indices|"
-    "determination|radians?|metres|seconds|shifts"
+    "SI|units?|dimensionless|pure number|relative|ratio|share|factors?|cycles|probability|per cent|"
+    "percent|weight|(?:micro)?metres|seconds"
 )
 UNIT = re.compile(
     rf"(?:^|[,;:(] *|\bin |\band |\bor |\bby )(?:{_SYMBOLS})(?=[,;:.)]?(?:\s|$))|\b(?i:{_WORDS})\b"
@@ -68,7 +55,7 @@ def annotations(target: object) -> dict[str, str]:
         target = vars(target).get("__init__")
         if not inspect.isfunction(target) or target.__module__ == "typing":
             return fields
-    parameters = list(inspect.signature(target).parameters.values())  # type: ignore[arg-type]
+    parameters = list(inspect.signature(target).parameters.values())
     named = {one.name: one for one in parameters if one.name not in ("self", "cls")}
     return fields | {name: _written(one.annotation) for name, one in named.items()}
 
@@ -163,57 +150,17 @@ def described(target: object, owner: object, name: str) -> str | None:
     return said if other is None else described(other, owner, name)
 
 
-def raised(function: object) -> set[str]:
-    """Return the names of the errors that a function raises itself, private helpers included."""
-    module = sys.modules[function.__module__]
-    found: set[str] = set()
-    seen: set[object] = set()
-    waiting = [function]
-    while waiting:
-        one = waiting.pop()
-        if one in seen or not inspect.isfunction(inspect.unwrap(one)):
-            continue
-        seen.add(one)
-        try:
-            tree = ast.parse(textwrap.dedent(inspect.getsource(one)))
-        except OSError:
-            continue  # Written by dataclass, without source.
-        owner = _owner(module, one)
-        for node in ast.walk(tree):
-            call = node.exc if isinstance(node, ast.Raise) else node
-            callee = call.func if isinstance(call, ast.Call) else None
-            name = getattr(callee, "id", None) or getattr(callee, "attr", None)
-            if isinstance(node, ast.Raise):
-                maker = getattr(module, name or "", None)
-                is_function = inspect.isfunction(maker)
-                found |= {maker.__annotations__["return"] if is_function else name} - {None}
-            elif name in CHECKS:
-                found.add("InvalidInput")
-            elif name and name.startswith("_") and not name.startswith("__"):
-                waiting.append(getattr(module, name, None) or getattr(owner, name, None))
-    return found
-
-
-def _owner(module: object, function: object) -> object:
-    return getattr(module, getattr(function, "__qualname__", "").partition(".")[0], None)
-
-
 def told(target: object, owner: object) -> set[str]:
     """Return the names of the errors that a docstring tells of."""
-    found = set(re.findall(r"`?\b(\w*(?:Input|Error|Drive))\b`?", prose(target)))
+    # A class tells in its prose what its methods raise, too.
+    spoken = "" if inspect.isclass(target) else prose(target)
+    found = set(re.findall(r"\b\w*(?:Input|Error|Drive)\b", spoken))
     for one in _parsed(target).meta:
         if isinstance(one, DocstringRaises) and one.type_name:
             found |= {name.strip() for name in one.type_name.split(",")}
     for other in delegates(target, owner, "errors"):
         found |= told(other, owner)
     return found
-
-
-def ancestors(module: object, name: str) -> set[str]:
-    """Return the names of an exception and of those it is a kind of."""
-    places = (module, checks, builtins)
-    kind = next(getattr(place, name) for place in places if hasattr(place, name))
-    return {base.__name__ for base in kind.__mro__} - {"Exception", "BaseException", "object"}
 
 
 def faults(target: object, owner: object = None) -> list[str]:
@@ -231,12 +178,24 @@ def _undocumented(target: object, owner: object) -> Iterator[str]:
     if not docstring(target):
         yield "has no docstring"
     names = annotations(target)
-    for name in names:
+    for name in [*names, *(one for one in _set_by_constructor(target) if one not in names)]:
         if described(target, owner, name) is None:
             plain = name.rstrip("s").replace("_", "[ _]")
             in_prose = re.search(rf"\b{plain}s?\b", prose(target), re.IGNORECASE)
             if not (_may_stay_in_prose(target) and in_prose):
                 yield f"does not document {name}"
+
+
+def _set_by_constructor(target: object) -> list[str]:
+    """Return the public attributes that the constructor of a class sets."""
+    constructor = vars(target).get("__init__") if inspect.isclass(target) else None
+    stored = [node for node in nodes(constructor) if isinstance(node, ast.Attribute)]
+    stored = [one for one in stored if isinstance(one.ctx, ast.Store)]
+    return [
+        one.attr
+        for one in stored
+        if getattr(one.value, "id", None) == "self" and not one.attr.startswith("_")
+    ]
 
 
 def _may_stay_in_prose(target: object) -> bool:
@@ -251,7 +210,11 @@ def _without_shape(target: object, owner: object) -> Iterator[str]:
             needed += said is None and _may_stay_in_prose(target)
             if said is not None and not SHAPE.search(said):
                 yield f"does not say the shape of {name}"
-    needed += bool(ARRAY.search(result(target)))
+    if ARRAY.search(result(target)):
+        arrays = [one for one in returned(target) if re.search("array|tuple", one)]
+        needed += not arrays
+        if not all(SHAPE.search(one) for one in arrays):
+            yield "does not say the shape of what it returns"
     if len(SHAPE.findall(prose(target))) < needed:
         yield "does not say the shape of what it takes or returns"
 
@@ -264,16 +227,25 @@ def _without_unit(target: object, owner: object) -> Iterator[str]:
             said_in_prose |= said is None and _may_stay_in_prose(target)
             if said is not None and not UNIT.search(SHAPE.sub("", said)):
                 yield f"does not say the unit of {name}"
-    said_in_prose |= bool(QUANTITY.search(COUNTED.sub("", result(target))))
+    if QUANTITY.search(COUNTED.sub("", result(target))):
+        values = [one for one in returned(target) if re.search("array|float", one)]
+        said_in_prose |= not values
+        if not all(UNIT.search(SHAPE.sub("", one)) for one in values):
+            yield "does not say the unit of what it returns"
     if said_in_prose and not UNIT.search(SHAPE.sub("", prose(target))):
         yield "does not say the unit of what it takes or returns"
+
+
+def returned(target: object) -> list[str]:
+    """Return type and description of all that a docstring lists as returned."""
+    return [f"{one.type_name}; {one.description}" for one in _parsed(target).many_returns]
 
 
 def result(target: object) -> str:
     """Return the annotation of what a function returns."""
     if inspect.isclass(target):
         return ""
-    return _written(inspect.signature(target).return_annotation)  # type: ignore[arg-type]
+    return _written(inspect.signature(target).return_annotation)
 
 
 def _untold_errors(target: object, owner: object) -> Iterator[str]:

@@ -140,6 +140,23 @@ class Planted:
     def shape_of_result(self, length: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the squares, m, of length, shape (n,)."""
 
+    def shape_of_listed_result(self) -> NDArray[np.float64]:
+        """Return the lengths of n things, shape (n,) in m.
+
+        Returns
+        -------
+        ndarray
+            m.
+        """
+
+    def unit_of_listed_result(self) -> NDArray[np.float64]:
+        """Return the lengths of n things in m.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+
     def length_of_tuple(self) -> tuple[float, ...]:
         """Return what is measured, in m."""
 
@@ -214,12 +231,28 @@ class PlantedFields:
         real_number("listed", self.listed)
 
 
+class PlantedAttribute:
+    """A class that does not tell all it holds.
+
+    Parameters
+    ----------
+    length : float
+        m.
+    """
+
+    def __init__(self, length: float) -> None:
+        self.length = length
+        self.square = length**2
+
+
 FOUND = {
     "docstring": "has no docstring",
     "parameter": "does not document width",
     "obvious_parameter": "does not document path",
     "shape": "does not say the shape of length",
     "shape_of_result": "does not say the shape of what it takes or returns",
+    "shape_of_listed_result": "does not say the shape of what it returns",
+    "unit_of_listed_result": "does not say the unit of what it returns",
     "length_of_tuple": "does not say the shape of what it takes or returns",
     "unit": "does not say the unit of length",
     "unit_of_result": "does not say the unit of what it takes or returns",
@@ -245,3 +278,7 @@ def test_planted_faults_of_fields_are_found():
         "does not document missing",
         "does not tell that it raises InvalidInput",
     ]
+
+
+def test_planted_attribute_is_found():
+    assert faults(PlantedAttribute) == ["does not document square"]

@@ -23,7 +23,7 @@ class InertiaWeight(Protocol):
         progress : float
             Elapsed share t / G_max of the generations, in [0, 1].
         front : ndarray, shape (n, m)
-            Objectives of the archive.
+            Objectives of the archive, in any units.
         """
         ...
 
@@ -57,7 +57,7 @@ class LinearDecrease:
         progress : float
             Elapsed share t / G_max of the generations, in [0, 1].
         front : ndarray, shape (n, m)
-            Objectives of the archive; play no part.
+            Objectives of the archive, in any units; play no part.
 
         Returns
         -------
@@ -101,7 +101,7 @@ class EntropyWeight:
         progress : float
             Elapsed share t / G_max of the generations, in [0, 1]; plays no part.
         front : ndarray, shape (n, m)
-            Objectives of the archive.
+            Objectives of the archive, in any units.
 
         Returns
         -------

@@ -44,7 +44,8 @@ class ParticleSwarm(Swarm):
         Without it, the limit of the termination on evaluations or generations serves (1000
         generations with pymoo's default termination and 100 particles). It is fixed at ``setup``.
     sampling : Sampling, array of shape (pop_size, n_var) or Population of that size, optional
-        First positions, within the bounds; uniformly random by default.
+        First positions, within the bounds and in the units of the problem; uniformly random by
+        default.
     **kwargs
         Any other argument of `pymoo.core.algorithm.Algorithm`.
 

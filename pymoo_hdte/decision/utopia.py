@@ -35,7 +35,7 @@ class WeightedUtopia(DecisionMaking):
     Parameters
     ----------
     weights : sequence of float, length m
-        Weights of the objectives, at least two, none negative, with sum 1 (to 1e-9).
+        Weights of the objectives, dimensionless: at least two, none negative, with sum 1 (to 1e-9).
 
     Raises
     ------

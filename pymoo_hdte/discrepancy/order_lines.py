@@ -63,7 +63,7 @@ class OrderLines:
         the input encoder stands in the transmission error, in the input angle, and in the slopes of
         all lines.
     bends : ndarray of complex, shape (3, 1 + m)
-        Mean and phasors, s^k, that signals (t - t_mid)^k / k!, k = 2, 3, 4, leave: a drift is no
+        Mean and phasors, in s^k, that signals (t - t_mid)^k / k!, k = 2, 3, 4, leave: a drift is no
         straight line in a record of ten minutes, and an order that turns once in it takes what is
         bent.
     """

@@ -87,7 +87,7 @@ class KinematicError:
         Returns
         -------
         ndarray of complex, shape (n_orders,)
-            p_j of theta_s = theta_s value x Re sum_j p_j exp(i o_j theta_in), dimensionless.
+            p_j, dimensionless: the error is its value times Re sum_j p_j exp(i o_j theta_in).
 
         Raises
         ------

@@ -37,6 +37,11 @@ class RobustToy(RobustProblem):
     moments, n_samples, sample_seed, tolerance
         As in `RobustDTE`; the tolerance is at most 0.2, so that x_1 keeps its trade-off.
 
+    Attributes
+    ----------
+    surrogate : ChebyshevSurrogate
+        The response over (a_1, a_2, x_1, x_2, x_3), exact as it is linear in each.
+
     Raises
     ------
     InvalidInput

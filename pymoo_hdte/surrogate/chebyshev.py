@@ -33,6 +33,11 @@ class ChebyshevSurrogate:
     provenance : mapping, optional
         What made the surrogate, e.g. the model and its parameters; must be writable as JSON.
 
+    Attributes
+    ----------
+    polynomial : TensorPolynomial
+        The same on the cube [-1, 1]^d.
+
     Raises
     ------
     InvalidInput

@@ -36,6 +36,11 @@ class ExactMoments:
     design_box : Box
         The m designed variables (those with a `UniformBand`) and the range of their designs.
 
+    Attributes
+    ----------
+    uncertainty : Uncertainty
+        The inputs, checked against the boxes.
+
     Raises
     ------
     InvalidInput

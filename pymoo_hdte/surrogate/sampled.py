@@ -34,6 +34,11 @@ class SampledMoments:
     seed : int
         Seed of the generator that draws them, at least 0.
 
+    Attributes
+    ----------
+    uncertainty : Uncertainty
+        The inputs, checked against the boxes.
+
     Raises
     ------
     InvalidInput
