@@ -34,7 +34,7 @@ _SYMBOLS = (
     r"|N(?:\.s)?(?:/m)?|m|s(?:\^k)?|Hz|J"
 )
 _WORDS = (
-    "SI|units?|dimensionless|pure number|relative|ratio|share|factors?|cycles|probability|per cent|"
+    "SI|units?|dimensionless|pure number|relative|ratios?|share|factors?|cycles|probability|per cent|"
     "percent|weight|(?:micro)?metres|seconds"
 )
 UNIT = re.compile(

@@ -30,7 +30,7 @@ class OperatingCondition:
     load_torque : float
         N.m at the output, at least 0.
     weight : float
-        Dimensionless, above 0; only the ratios of the weights of a duty cycle matter.
+        Above 0; only the ratios of the weights of a duty cycle matter.
 
     Raises
     ------

@@ -33,15 +33,15 @@ class Box:
     lower, upper : array_like, shape (d,)
         Finite bounds in the variables' own units, ``lower < upper`` everywhere.
 
-    Attributes
-    ----------
-    centre, half_width : ndarray, shape (d,)
-        Midpoint and half the length of every interval, in the variables' own units.
-
     Raises
     ------
     InvalidInput
         If names repeat or are no words, or bounds are not finite, in order and of length d.
+
+    Attributes
+    ----------
+    centre, half_width : ndarray, shape (d,)
+        Midpoint and half the length of every interval, in the variables' own units.
     """
 
     names: tuple[str, ...]

@@ -139,13 +139,7 @@ class ChebyshevSurrogate:
         return self._derivatives(self.box.to_cube(points).T).T / self.box.half_width
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the surrogate to ``path`` as an npz file, replacing it in one step.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written.
-        """
+        """Write the surrogate to ``path`` as an npz file, replacing it in one step."""
         header = {
             "names": self.box.names,
             "lower": self.box.lower.tolist(),
@@ -162,7 +156,7 @@ class ChebyshevSurrogate:
         Parameters
         ----------
         path : str or path-like
-            Of the npz file.
+            Of the file.
 
         Returns
         -------
