@@ -34,8 +34,8 @@ _SYMBOLS = (
     r"|N(?:\.s)?(?:/m)?|m|s(?:\^k)?|Hz|J"
 )
 _WORDS = (
-    "SI|units?|dimensionless|pure number|relative|ratios?|share|factors?|cycles|probability|per cent|"
-    "percent|weight|(?:micro)?metres|seconds"
+    "SI|units?|dimensionless|pure number|relative|ratios?|share|factors?|cycles|probability|"
+    "per cent|percent|weight|(?:micro)?metres|seconds"
 )
 UNIT = re.compile(
     rf"(?:^|[,;:(] *|\bin |\band |\bor |\bby )(?:{_SYMBOLS})(?=[,;:.)]?(?:\s|$))|\b(?i:{_WORDS})\b"
