@@ -12,7 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 
 class InvalidInput(ValueError):
-    """A value that a user supplied is not allowed; the message says which, and what is."""
+    """A value that a user supplied is not allowed; the message says which, and what is.
+
+    Attributes
+    ----------
+    field : str
+        Name of what was supplied.
+    value : Any
+        What it was.
+    allowed : str
+        What it may be.
+    """
 
     def __init__(self, field: str, value: Any, allowed: str) -> None:
         super().__init__(f"{field} is {value!r}, allowed: {allowed}")

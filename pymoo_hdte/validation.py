@@ -11,20 +11,23 @@ from scipy.stats import t
 from pymoo_hdte.checks import finite_array
 from pymoo_hdte.surrogate import Accuracy, accuracy
 
+__all__ = ["CONFIDENCE", "ValidationMetrics", "validation_metrics"]
+
 CONFIDENCE = 0.95
+"""Level of the interval of the mean error, dimensionless."""
 
 
 @dataclass(frozen=True)
 class ValidationMetrics(Accuracy):
-    """Error measures of predictions held against measurements, in the output's unit.
+    """Error measures of predictions held against measurements (Section 4, Table 6).
 
-    Beside those of `Accuracy`:
+    Those of `pymoo_hdte.surrogate.Accuracy`, and the mean error with its interval.
     """
 
     mean_error: float
-    """Mean of predicted minus measured: negative if predictions are low."""
+    """Mean of predicted minus measured, in the output's unit: negative if predictions are low."""
     mean_error_interval: tuple[float, float]
-    """95 % confidence interval of the mean error, by Student's t."""
+    """95 % confidence interval of the mean error, in the output's unit, by Student's t."""
     n: int
     """Number of measurements."""
 
@@ -41,7 +44,8 @@ def validation_metrics(predicted: ArrayLike, measured: ArrayLike) -> ValidationM
     Parameters
     ----------
     predicted, measured : array_like, shape (n,)
-        Finite; the measured values must not be zero (relative errors) nor all equal (R2).
+        Finite, of one unit; the measured values must not be zero (relative errors) nor all equal
+        (R2).
 
     Returns
     -------

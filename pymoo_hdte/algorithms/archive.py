@@ -16,8 +16,8 @@ class LeaderArchive:
 
     Until a feasible solution is known it holds the least infeasible one; a solution with an
     objective that is not finite or a constraint that is not a number never enters. Above
-    ``capacity`` the solution of smallest crowding distance leaves, one at a time (paper,
-    Section 5.1, step 5).
+    ``capacity`` the solution of smallest crowding distance (Deb, Pratap, Agarwal, Meyarivan 2002)
+    leaves, one at a time (paper, Section 5.1, step 5).
 
     Parameters
     ----------
@@ -43,7 +43,15 @@ class LeaderArchive:
         return len(self.points)
 
     def update(self, population: Population, points: Points) -> None:
-        """Let an evaluated population in, row for row the given points, and keep the best."""
+        """Let an evaluated population in and keep the best.
+
+        Parameters
+        ----------
+        population : Population
+            n evaluated individuals.
+        points : Points
+            The same as arrays, row for row.
+        """
         everyone = Population.merge(self.members, population)
         points = self.points.followed_by(points)
         front = best_front(points)
@@ -51,5 +59,18 @@ class LeaderArchive:
         self.members, self.points = everyone[kept], points[kept]
 
     def draw(self, n: int, random_state: np.random.Generator) -> NDArray[np.float64]:
-        """Draw ``n`` positions (n, d), each the less crowded of two random members."""
+        """Draw positions of leaders, each the less crowded of two random members.
+
+        Parameters
+        ----------
+        n : int
+            Number of positions.
+        random_state : numpy.random.Generator
+            Source of random numbers.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+            Positions in the units of the problem's variables.
+        """
         return self.points.X[crowding_tournaments(self.points.F, n, random_state)]

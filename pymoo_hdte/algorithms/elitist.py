@@ -38,10 +38,12 @@ class ElitistSwarm(Swarm):
     pop_size : int
         Number of particles, at least 2.
     sampling : Sampling, array of shape (pop_size, n_var) or Population of that size, optional
-        First positions, within the bounds; uniformly random by default.
+        First positions, within the bounds and in the units of the problem; uniformly random by
+        default.
     moves : sequence of Move, optional
         1 to 19 of them; by default `Attraction`, `Exchange` and `Difference`.
     mutation : SparseMutation, optional
+        What is added to every step; by default a `SparseMutation`.
     truncation : callable, optional
         Takes objectives (n, m) and a size, and returns the rows that stay; by default
         `most_spread`.

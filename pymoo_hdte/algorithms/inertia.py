@@ -22,8 +22,8 @@ class InertiaWeight(Protocol):
         ----------
         progress : float
             Elapsed share t / G_max of the generations, in [0, 1].
-        front : (n, m) array
-            Objectives of the archive.
+        front : ndarray, shape (n, m)
+            Objectives of the archive, in any units.
         """
         ...
 
@@ -37,7 +37,7 @@ class LinearDecrease:
     Parameters
     ----------
     w_min, w_max : float
-        Weight at the end and at the start, 0 <= w_min <= w_max.
+        Weight at the end and at the start, dimensionless, 0 <= w_min <= w_max.
 
     Raises
     ------
@@ -50,7 +50,20 @@ class LinearDecrease:
         self.w_min = real_number("w_min", w_min, at_least=0.0, at_most=self.w_max)
 
     def __call__(self, progress: float, front: NDArray[np.float64]) -> float:
-        """Return the weight at this progress; the front plays no part."""
+        """Return the inertia weight.
+
+        Parameters
+        ----------
+        progress : float
+            Elapsed share t / G_max of the generations, in [0, 1].
+        front : ndarray, shape (n, m)
+            Objectives of the archive, in any units; play no part.
+
+        Returns
+        -------
+        float
+            Dimensionless.
+        """
         return self.w_max - (self.w_max - self.w_min) * progress
 
 
@@ -65,7 +78,7 @@ class EntropyWeight:
     Parameters
     ----------
     w_min, w_max : float
-        Smallest and largest weight, 0 <= w_min <= w_max.
+        Smallest and largest weight, dimensionless, 0 <= w_min <= w_max.
     divisions : int
         Grid cells along each objective, at least 2.
 
@@ -81,7 +94,20 @@ class EntropyWeight:
         self.divisions = whole_number("divisions", divisions, at_least=2)
 
     def __call__(self, progress: float, front: NDArray[np.float64]) -> float:
-        """Return the weight for this front; the progress plays no part."""
+        """Return the inertia weight.
+
+        Parameters
+        ----------
+        progress : float
+            Elapsed share t / G_max of the generations, in [0, 1]; plays no part.
+        front : ndarray, shape (n, m)
+            Objectives of the archive, in any units.
+
+        Returns
+        -------
+        float
+            Dimensionless.
+        """
         diversity = normalised_entropy(front, self.divisions)
         return self.w_min + (self.w_max - self.w_min) * (1.0 - diversity)
 

@@ -28,12 +28,12 @@ class Hierarchy(Protocol):
 
         Parameters
         ----------
-        ranks : (n,) array
+        ranks : ndarray of int, shape (n,)
             Pareto ranks of the swarm, from 1.
         progress : float
             Elapsed share t / G_max of the generations, in [0, 1].
-        span : (d,) array
-            Widths of the search box.
+        span : ndarray, shape (d,)
+            Widths of the search box, in the units of the problem's variables.
         random_state : numpy.random.Generator
             Source of random numbers.
         """
@@ -41,12 +41,23 @@ class Hierarchy(Protocol):
 
 
 class Flat:
-    """No division of labour: c1 = c2 = 2 for all, no mutation (Kennedy and Eberhart, 1995)."""
+    """No division of labour: c1 = c2 = 2 for all, no mutation (Kennedy and Eberhart 1995)."""
 
     def acceleration(
         self, ranks: NDArray[np.int_]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return c1 and c2, 2 each, whatever the ranks (n,)."""
+        """Return the cognitive and the social factors, 2 each whatever the ranks.
+
+        Parameters
+        ----------
+        ranks : ndarray of int, shape (n,)
+            Pareto ranks of the swarm, from 1.
+
+        Returns
+        -------
+        c1, c2 : ndarray, shape (n,)
+            Dimensionless.
+        """
         both = np.full(len(ranks), 2.0)
         return both, both
 
@@ -57,7 +68,10 @@ class Flat:
         span: NDArray[np.float64],
         random_state: np.random.Generator,
     ) -> NDArray[np.float64]:
-        """Return zeros (n, d)."""
+        """Return zeros, shape (n, d), in the units of the problem's variables.
+
+        Parameters as in `Pyramid.mutation`; only the lengths n and d play a part.
+        """
         return np.zeros((len(ranks), len(span)))
 
 
@@ -67,6 +81,13 @@ class Pyramid:
     Ranks 1 and 2 follow the leaders, c1 = 1 and c2 = 2. All others follow their own memory, c1 = 2
     and c2 = 1, and with probability 0.4 the whole position is shifted by a normal random vector
     of standard deviation 0.2 span max(0.05, 1 - t / G_max). The velocity is left as it is.
+
+    Attributes
+    ----------
+    TOP_RANKS : int
+        Last rank of the top layer.
+    MUTATION_PROBABILITY : float
+        Probability that a particle of the bottom layer mutates in a generation.
     """
 
     TOP_RANKS = 2
@@ -75,7 +96,18 @@ class Pyramid:
     def acceleration(
         self, ranks: NDArray[np.int_]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return c1 and c2 by the layer of each rank (n,)."""
+        """Return the cognitive and the social factors by the layer of each rank.
+
+        Parameters
+        ----------
+        ranks : ndarray of int, shape (n,)
+            Pareto ranks of the swarm, from 1.
+
+        Returns
+        -------
+        c1, c2 : ndarray, shape (n,)
+            Dimensionless.
+        """
         top = ranks <= self.TOP_RANKS
         return np.where(top, 1.0, 2.0), np.where(top, 2.0, 1.0)
 
@@ -86,7 +118,24 @@ class Pyramid:
         span: NDArray[np.float64],
         random_state: np.random.Generator,
     ) -> NDArray[np.float64]:
-        """Return the normal shifts (n, d) of the chosen bottom particles, zeros for the others."""
+        """Return the normal shifts of the chosen bottom particles, zeros for the others.
+
+        Parameters
+        ----------
+        ranks : ndarray of int, shape (n,)
+            Pareto ranks of the swarm, from 1.
+        progress : float
+            Elapsed share t / G_max of the generations, in [0, 1].
+        span : ndarray, shape (d,)
+            Widths of the search box, in the units of the problem's variables.
+        random_state : numpy.random.Generator
+            Source of random numbers.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+            In the units of the problem's variables.
+        """
         struck = random_state.random(len(ranks)) < self.MUTATION_PROBABILITY
         struck &= ranks > self.TOP_RANKS
         shift = np.zeros((len(ranks), len(span)))

@@ -27,7 +27,7 @@ class ParticleSwarm(Swarm):
     One generation moves every particle,
     V = w V + c1 r1 (own best - X) + c2 r2 (leader - X), X = X + V + mutation, cut to the box,
     with w from ``inertia``, and c1, c2 and the mutation from ``hierarchy``. The result of a run
-    (``res.F``) is the archive.
+    (``res.F``) is the archive (paper, Section 5.1).
 
     Parameters
     ----------
@@ -44,7 +44,8 @@ class ParticleSwarm(Swarm):
         Without it, the limit of the termination on evaluations or generations serves (1000
         generations with pymoo's default termination and 100 particles). It is fixed at ``setup``.
     sampling : Sampling, array of shape (pop_size, n_var) or Population of that size, optional
-        First positions, within the bounds; uniformly random by default.
+        First positions, within the bounds and in the units of the problem; uniformly random by
+        default.
     **kwargs
         Any other argument of `pymoo.core.algorithm.Algorithm`.
 

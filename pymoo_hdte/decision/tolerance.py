@@ -11,14 +11,19 @@ from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 def tolerance_band(
     design: ArrayLike, tolerance: float = 0.05
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the lower and upper limits (m,) around a design (paper, Eq. (41) and Table 9).
+    """Return the lower and upper limits around a design (paper, Eq. (41) and Table 9).
 
     Parameters
     ----------
-    design : (m,) array
+    design : array_like, shape (m,)
         Nominal values, above 0, in any units.
     tolerance : float
         Relative half-width, 0 <= tolerance < 1.
+
+    Returns
+    -------
+    lower, upper : ndarray, shape (m,)
+        In the units of the design.
 
     Raises
     ------
@@ -31,14 +36,19 @@ def tolerance_band(
 
 
 def deviation_degree(prototypes: ArrayLike, optimum: ArrayLike) -> NDArray[np.float64]:
-    """Return the relative distance D_i of each prototype from the optimum, Eq. (42); shape (n,).
+    """Return the relative distance D_i of each prototype from the optimum (paper, Eq. 42).
 
     Parameters
     ----------
-    prototypes : (n, m) array
+    prototypes : array_like, shape (n, m)
         Parameters of n prototypes, in the units of ``optimum``.
-    optimum : (m,) array
-        Parameters of the optimal design, above 0.
+    optimum : array_like, shape (m,)
+        Parameters of the optimal design, above 0, in any units.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Dimensionless.
 
     Raises
     ------

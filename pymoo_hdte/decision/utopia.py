@@ -34,8 +34,8 @@ class WeightedUtopia(DecisionMaking):
 
     Parameters
     ----------
-    weights : sequence of m floats
-        Weights of the objectives, at least two, none negative, with sum 1 (to 1e-9).
+    weights : sequence of float, length m
+        Weights of the objectives, dimensionless: at least two, none negative, with sum 1 (to 1e-9).
 
     Raises
     ------
@@ -60,7 +60,23 @@ class WeightedUtopia(DecisionMaking):
         self.weights = array
 
     def distances(self, F: ArrayLike) -> NDArray[np.float64]:
-        """Return the weighted distance of every row of objectives ``F`` (n, m); shape (n,)."""
+        """Return the weighted distance of every solution from the ideal point.
+
+        Parameters
+        ----------
+        F : array_like, shape (n, m)
+            Objectives, in any units.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Dimensionless.
+
+        Raises
+        ------
+        InvalidInput
+            If ``F`` is not finite or has another shape.
+        """
         front = finite_array("F", F, (None, len(self.weights)))
         span = np.ptp(front, axis=0)
         scaled = (front - front.min(axis=0)) / np.where(span > 0, span, 1.0)

@@ -10,18 +10,18 @@ from pymoo_hdte.units import ARCSEC
 
 @dataclass(frozen=True)
 class Believed:
-    """Believed parameters of the drive and its load, with their tolerances.
+    """Believed parameters of the drive and its load in Eq. (9), with their tolerances.
 
     Attributes
     ----------
     ratio : float
-        Transmission ratio N.
+        Transmission ratio N, dimensionless.
     stiffness, damping : float
         K and c of the mesh at the output, N.m/rad and N.m.s/rad.
     input_inertia, output_inertia, load_inertia : float
         kg.m2; the load inertia may be zero.
     input_damping, output_damping : float
-        N.m.s/rad.
+        Of the bearings, N.m.s/rad.
     error_orders : tuple of float, length n_lines
         Orders of the static error in cycles per input turn.
     error_amplitudes : tuple of float, length n_lines
@@ -94,8 +94,9 @@ class Rig:
     angle_quantisation : float
         Step, rad.
     input_torque_gain, output_torque_gain : float
+        Of the torque sensors, relative.
     input_torque_zero, output_torque_zero : float
-        N.m.
+        Of the torque sensors, N.m.
 
     Raises
     ------

@@ -28,7 +28,9 @@ class Campaign:
     title, drive : str
         One line of printable text each.
     believed : Believed
+        Drive and load, as they are thought to be.
     rig : Rig
+        Speed loop and sensors.
     running : tuple of RunningRecord
         At least one.
     torsion : tuple of TorsionRecord

@@ -35,6 +35,17 @@ Checked = TypeVar("Checked", Believed, Rig, RunningRecord | TorsionRecord)
 def read_campaign(folder: str | Path) -> Campaign:
     """Read and check a campaign.
 
+    Parameters
+    ----------
+    folder : str or Path
+        With ``campaign.toml`` and a ``.csv.gz`` file for each record, whose fields and columns have
+        their units in their names.
+
+    Returns
+    -------
+    Campaign
+        SI units.
+
     Raises
     ------
     InvalidInput
@@ -64,6 +75,13 @@ def read_campaign(folder: str | Path) -> Campaign:
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> None:
     """Write a campaign to a new or empty folder: all of it or nothing, always the same bytes.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        SI units; the files have those in their names.
+    folder : str or Path
+        That `read_campaign` will read.
 
     Raises
     ------

@@ -39,27 +39,33 @@ BLOCK = 64
 
 @dataclass(frozen=True, eq=False)
 class OrderLines:
-    """Order lines of one record; channels in the order of `CHANNELS`, SI units.
+    """Order lines of one record.
+
+    The channels are transmission error (rad), input torque (N.m), output torque (N.m) and input
+    angle (rad), in this order.
 
     Attributes
     ----------
     orders : ndarray, shape (m,)
         Cycles per input turn.
     mean : ndarray, shape (4,)
-        Value of the straight line at the middle of the record.
+        Value of the straight line at the middle of the record, rad or N.m.
     slope : ndarray, shape (4,)
-        Of the straight line, per second; that of the input angle is the mean input speed.
-    phasors : complex ndarray, shape (4, m)
-        With the loss by averaging undone.
+        Of the straight line, rad/s or N.m/s; that of the input angle is the mean input speed.
+    phasors : ndarray of complex, shape (4, m)
+        With the loss by averaging undone, rad or N.m.
     covariance : ndarray, shape (4, 1 + 2 m, 1 + 2 m)
-        Of (mean, Re phasors, Im phasors) of each channel, from sensor noise and quantisation.
+        Of (mean, Re phasors, Im phasors) of each channel, from sensor noise and quantisation, in
+        the square of its unit.
     row_covariance : ndarray, shape (4, 4)
-        Of the noise of one row between channels. The covariance of channel a with channel b is
-        ``covariance[a] * row_covariance[a, b] / row_covariance[a, a]``: the input encoder stands
-        in the transmission error, in the input angle, and in the slopes of all lines.
-    bends : complex ndarray, shape (3, 1 + m)
-        Mean and phasors that signals (t - t_mid)^k / k!, k = 2, 3, 4, leave: a drift is no straight
-        line in a record of ten minutes, and an order that turns once in it takes what is bent.
+        Of the noise of one row between channels, in the product of their units. The covariance of
+        channel a with channel b is ``covariance[a] * row_covariance[a, b] / row_covariance[a, a]``:
+        the input encoder stands in the transmission error, in the input angle, and in the slopes of
+        all lines.
+    bends : ndarray of complex, shape (3, 1 + m)
+        Mean and phasors, in s^k, that signals (t - t_mid)^k / k!, k = 2, 3, 4, leave: a drift is no
+        straight line in a record of ten minutes, and an order that turns once in it takes what is
+        bent.
     """
 
     orders: NDArray[np.float64]
@@ -76,15 +82,24 @@ def order_lines(
 ) -> OrderLines:
     """Fit order lines to every channel of a record by least squares.
 
+    Sinusoids at known frequencies that need not be periodic in the record, with a straight line:
+    the model of a least-squares spectrum (Lomb, Astrophysics and Space Science 39, 1976), all lines
+    at once.
+
     Parameters
     ----------
     record : RunningRecord
+        Of a drive at constant speed.
     rig : Rig
         For the noise.
     ratio : float
-        Transmission ratio N.
-    orders : array, shape (m,)
+        Transmission ratio N, dimensionless.
+    orders : array_like, shape (m,)
         Cycles per input turn, above zero, below the Nyquist order of the record.
+
+    Returns
+    -------
+    OrderLines
 
     Raises
     ------
@@ -148,7 +163,8 @@ def residual_spectrum(
     """Return what the order lines leave, at every multiple of 1/N, in units of the noise.
 
     Each line is fitted to the residual after it, too, was cleared of the fitted lines, so that
-    these do not leak into it. Multiples of 1/N too close to a fitted line are left out.
+    these do not leak into it. Multiples of 1/N too close to a fitted line are left out. Under noise
+    alone the power is exponential (Scargle, Astrophysical Journal 263, 1982).
 
     Parameters
     ----------
@@ -157,11 +173,12 @@ def residual_spectrum(
 
     Returns
     -------
-    ndarray, shape (k,)
-        Orders, up to `HIGHEST_ORDER` or the Nyquist order.
-    ndarray, shape (4, k)
-        Amplitudes over their root mean square under noise alone. The square is then exponential
-        with mean 1: a line exceeds x by chance with probability exp(-x**2).
+    orders : ndarray, shape (k,)
+        Cycles per input turn, up to 14 or the Nyquist order.
+    amplitudes : ndarray, shape (4, k)
+        Dimensionless, by channel as in `OrderLines`: over their root mean square under noise alone.
+        The square is then exponential with mean 1: a line exceeds x by chance with probability
+        exp(-x**2).
 
     Raises
     ------

@@ -26,8 +26,8 @@ class RunningRecord:
     ----------
     name : str
         Letters, digits, ``.``, ``-`` and ``_``; also the stem of its file.
-    role : str
-        One of `ROLES`.
+    role : {"train", "held_out"}
+        To be fitted, or only to judge the result.
     input_speed : float
         Set speed, rad/s; negative in the reverse direction.
     load_torque : float
@@ -74,7 +74,10 @@ class RunningRecord:
         _check_record(self, ("input_angle", "output_angle", "input_torque", "output_torque"))
 
     def transmission_error(self, ratio: float) -> NDArray[np.float64]:
-        """Return ``input_angle / ratio - output_angle``, rad, shape (n,)."""
+        """Return ``input_angle / ratio - output_angle`` (Eq. 10), rad, shape (n,).
+
+        The ratio is N, dimensionless.
+        """
         return self.input_angle / ratio - self.output_angle
 
 

@@ -17,8 +17,15 @@ Phasors = NDArray[np.complex128]
 class SpeedLoop:
     """The motor's torque P (w_set - w) + I integral(w_set - w) dt + constant.
 
-    ``proportional`` in N.m.s/rad and ``integral`` in N.m/rad, at the input; both 0 is a motor of
-    constant torque. The constant is whatever holds the mean speed.
+    Both gains 0 is a motor of constant torque. The constant is whatever holds the mean speed.
+    Proportional-integral control: Astrom and Hagglund, Advanced PID Control, ISA 2006.
+
+    Attributes
+    ----------
+    proportional : float
+        P, N.m.s/rad at the input.
+    integral : float
+        I, N.m/rad at the input.
     """
 
     proportional: float = 0.0
@@ -48,6 +55,7 @@ class Balance:
     energy : ndarray of complex, shape (n, n_harmonics)
         Half the square of the input speed, rad2/s2.
     converged : ndarray of bool, shape (n,)
+        Whether the balance of the case was found; if not, its other values mean nothing.
     """
 
     torus: Torus
@@ -60,11 +68,21 @@ class Balance:
     converged: NDArray[np.bool_]
 
     def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> Balance:
-        """Return some of the cases, each as often as its place is given."""
+        """Return some of the cases, each as often as its place is given.
+
+        Parameters
+        ----------
+        rows : slice or ndarray of int or bool, shape (m,)
+            Places of the cases.
+
+        Returns
+        -------
+        Balance
+        """
         return Balance(self.torus, *(getattr(self, name)[rows] for name in BY_CASE))
 
     def spectrum(self) -> OrderSpectrum:
-        """Return theta_d as an order spectrum."""
+        """Return theta_d of the n cases as an order spectrum, rad."""
         return OrderSpectrum(self.torus.orders, self.transmission_error)
 
 

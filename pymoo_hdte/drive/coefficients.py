@@ -22,18 +22,32 @@ from pymoo_hdte.drive.mesh_laws import PeriodicStiffness
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Coefficients of n designs under one operating condition, SI units.
+    """Coefficients of Eq. (9), with what effects add to it, of n designs under one condition.
 
     Attributes
     ----------
-    ratio, input_speed, load_torque : float
-        N; mean speed of the input in rad/s; T_L in N.m.
-    stiffness, damping : ndarray, shape (n,)
-        Mean K and c between input (referred to the output) and output.
-    stiffness_depth, stiffness_phase : float
-        kappa and psi of the stiffness variation; kappa is 0 where the stiffness is constant.
-    input_inertia, input_damping : ndarray, shape (n,)
-    output_inertia, output_damping : float or ndarray, shape (n,)
+    ratio : float
+        Transmission ratio N, dimensionless.
+    input_speed : float
+        Mean speed of the input, rad/s.
+    load_torque : float
+        T_L, N.m at the output.
+    stiffness : ndarray, shape (n,)
+        Mean K between input (referred to the output) and output, N.m/rad.
+    damping : ndarray, shape (n,)
+        c beside it, N.m.s/rad.
+    stiffness_depth : float
+        kappa of the stiffness variation, dimensionless; 0 where the stiffness is constant.
+    stiffness_phase : float
+        psi of the stiffness variation, rad.
+    input_inertia : ndarray, shape (n,)
+        J_in, kg.m2.
+    input_damping : ndarray, shape (n,)
+        B_in, N.m.s/rad.
+    output_inertia : float or ndarray, shape (n,)
+        J_out with all that turns with it, kg.m2.
+    output_damping : float or ndarray, shape (n,)
+        B_out, N.m.s/rad.
     error_orders : ndarray, shape (n_orders,)
         Orders of theta_s in cycles per input turn.
     error_phasors : ndarray of complex, shape (n, n_orders)
@@ -44,7 +58,7 @@ class Coefficients:
         Ports, each with a law whose torque is added there.
     reaction : float
         Share of the mesh torque's reaction on the input through the slope of theta_s: 0 in
-        Eq. (9), 1 by the principle of virtual work.
+        Eq. (9), 1 by the principle of virtual work; dimensionless.
     """
 
     ratio: float
@@ -65,7 +79,17 @@ class Coefficients:
     reaction: float = 0.0
 
     def rows(self, rows: slice | NDArray[np.int_]) -> Coefficients:
-        """Return the coefficients of some of the designs."""
+        """Return the coefficients of some of the designs.
+
+        Parameters
+        ----------
+        rows : slice or ndarray of int, shape (m,)
+            Places of the designs.
+
+        Returns
+        -------
+        Coefficients
+        """
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         parts = {k: v[rows] for k, v in values.items() if k in _BY_DESIGN and np.ndim(v)}
         return replace(self, **parts)
@@ -73,12 +97,28 @@ class Coefficients:
     def torque_at(
         self, input_speed: NDArray[np.float64], load_torque: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the mean mesh torque without laws at n operating conditions, N.m."""
+        """Return the mean mesh torque without laws at n operating conditions, one a design.
+
+        Parameters
+        ----------
+        input_speed : ndarray, shape (n,)
+            rad/s.
+        load_torque : ndarray, shape (n,)
+            N.m at the output.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Load and bearing friction, N.m at the output.
+        """
         return load_torque + self.output_damping * input_speed / self.ratio
 
     @property
     def mean_mesh_torque(self) -> float | NDArray[np.float64]:
-        """Mean of k d + c d' in steady state: load and bearing friction, N.m at the output."""
+        """Mean of k d + c d' in steady state: load and bearing friction, N.m at the output.
+
+        A float, or of shape (n,) where `output_damping` is.
+        """
         return self.load_torque + self.output_damping * self.input_speed / self.ratio
 
     @property

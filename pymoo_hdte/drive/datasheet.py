@@ -20,10 +20,16 @@ class ErrorSource:
     Attributes
     ----------
     component, symbol, description : str
+        As in Table 1.
     error_class : str
         One of `ERROR_CLASSES`.
     mean, std : float
         Of the normal distribution over prototypes, in metres.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown class, or a mean or std that is negative or not finite.
     """
 
     component: str
@@ -46,13 +52,18 @@ class Mesh:
     Attributes
     ----------
     error_influence : float
-        K_b, influence of the errors under multi-tooth meshing.
+        K_b, influence of the errors under multi-tooth meshing, dimensionless.
     teeth_in_mesh : int
         z_t.
     pitch_diameter : float
         d of the circular spline, in metres.
     pressure_angle : float
         alpha_n of the flexspline's pitch circle, in radians.
+
+    Raises
+    ------
+    InvalidInput
+        For a value that is not finite or out of range.
     """
 
     error_influence: float
@@ -81,6 +92,11 @@ class Nominal:
         J_in, J_out, kg.m2.
     input_damping, mesh_damping, output_damping : float
         B_in, B_fc, B_out, N.m.s/rad.
+
+    Raises
+    ------
+    InvalidInput
+        For a value that is not finite or not above 0.
     """
 
     static_error: float
@@ -103,6 +119,7 @@ class DataSheet:
     Attributes
     ----------
     name, source : str
+        Of the drive, and of its numbers.
     flexspline_teeth, circular_spline_teeth : int
         Z_f < Z_c.
     input_speed : float
@@ -110,8 +127,17 @@ class DataSheet:
     load_torque : float
         Rated, N.m at the output.
     nominal : Nominal
+        Parameters of Eq. (9) as in Table 4: ``static_error`` in rad, ``stiffness`` in N.m/rad,
+        inertias in kg.m2 and damping in N.m.s/rad.
     mesh : Mesh
+        Constants of Eq. (2).
     error_sources : tuple of ErrorSource
+        Tables 1 and 2, in metres.
+
+    Raises
+    ------
+    InvalidInput
+        For a value that is not finite or out of range, or a symbol that two error sources share.
     """
 
     name: str
@@ -135,12 +161,16 @@ class DataSheet:
 
     @property
     def ratio(self) -> float:
-        """Transmission ratio N with the flexspline fixed and the circular spline as output."""
+        """Transmission ratio N = Z_c / (Z_c - Z_f), dimensionless.
+
+        The flexspline is fixed, the circular spline is the output (Musser, US Patent 2906143 of
+        1959).
+        """
         return self.circular_spline_teeth / (self.circular_spline_teeth - self.flexspline_teeth)
 
     @property
     def error_orders(self) -> dict[str, float]:
-        """Order of each error class in multiples of the input angle (Eq. 1)."""
+        """Order of each error class of Eq. (1) by name, in cycles per input turn."""
         flexspline = 2.0 * self.circular_spline_teeth / self.flexspline_teeth
         tooth = 2.0 * self.circular_spline_teeth
         return {"e_m": 2.0, "e_g": flexspline, "e_w": 1.0, "e_p": 2.0, "e_h": tooth}
@@ -148,6 +178,15 @@ class DataSheet:
 
 def load_datasheet(path: str | Path) -> DataSheet:
     """Read and check a data sheet in the format of ``drive/data/hs_20_100.toml``.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a TOML file, in which every quantity has its unit.
+
+    Returns
+    -------
+    DataSheet
 
     Raises
     ------
@@ -176,7 +215,7 @@ def load_datasheet(path: str | Path) -> DataSheet:
 
 
 def hs_20_100() -> DataSheet:
-    """Return the data sheet of the drive in the paper."""
+    """Return the data sheet of the drive in the paper, HS-20-100 (Tables 1, 2 and 4)."""
     with as_file(files("pymoo_hdte.drive") / "data" / "hs_20_100.toml") as path:
         return load_datasheet(path)
 

@@ -29,7 +29,7 @@ WAVE_GENERATOR_ORDER = 2.0
 
 
 class Effect(Protocol):
-    """Something Eq. (9) does not hold."""
+    """Something Eq. (9) does not hold: what every effect of a drive model offers."""
 
     @property
     def name(self) -> str:
@@ -61,8 +61,15 @@ class LoadInertia:
 
     Attributes
     ----------
+    name : str
+        ``"load_inertia"``, in model files and verdicts.
     inertia : float
-        J_L, kg.m2, added to J_out.
+        J_L, kg.m2, added to J_out of Eq. (9).
+
+    Raises
+    ------
+    InvalidInput
+        If the inertia is negative or not finite.
     """
 
     name: ClassVar[str] = "load_inertia"
@@ -94,8 +101,15 @@ class DampingReference:
 
     Attributes
     ----------
+    name : str
+        ``"damping_reference"``, in model files and verdicts.
     factor : float
         Multiple of N^2, dimensionless.
+
+    Raises
+    ------
+    InvalidInput
+        If the factor is not above 0 or not finite.
     """
 
     name: ClassVar[str] = "damping_reference"
@@ -123,12 +137,19 @@ class MeshStiffnessVariation:
 
     Attributes
     ----------
+    name : str
+        ``"mesh_stiffness_variation"``, in model files and verdicts.
     depth : float
         kappa, dimensionless, at least 0 and below 1.
     phase : float
         psi, rad.
     order : float
         Cycles per input turn; 2 is that of the wave generator's two lobes.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite or out of range.
     """
 
     name: ClassVar[str] = "mesh_stiffness_variation"

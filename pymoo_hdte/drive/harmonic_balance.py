@@ -64,21 +64,31 @@ def harmonic_balance(
     tolerance: float = 1e-11,
     start: Balance | None = None,
 ) -> Balance:
-    """Return the steady state of the n designs of ``coefficients``.
+    """Return the steady state of the n designs of ``coefficients``, laws at ports included.
+
+    Newton's method on the harmonics over the input angle; the torques are evaluated on a grid
+    (alternating time and frequency, Cameron and Griffin, J. Applied Mechanics 56, 1989).
 
     Parameters
     ----------
     coefficients : Coefficients
+        Of n designs.
     input_speed, load_torque : ndarray, shape (n,), optional
         An operating condition for each row, rad/s and N.m, in place of that of ``coefficients``. A
         negative speed is the reverse direction; a load keeps its sense in space.
     motor : SpeedLoop
+        What holds the speed; by default a constant torque.
     torus : Torus, optional
-        By default that of `torus_of`.
+        Harmonics that are kept; by default all excited orders and their combinations.
     tolerance : float
         Largest change of the torsion, relative to its size, at which the iteration ends.
     start : Balance, optional
         Nearby cases, a row each, to begin from; ignored if their torus is another.
+
+    Returns
+    -------
+    Balance
+        A row a design; one without a steady state is marked as not converged.
 
     Raises
     ------

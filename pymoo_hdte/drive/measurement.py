@@ -24,16 +24,21 @@ FILTER_ORDER = 4
 def low_pass(
     signal: ArrayLike, sampling_rate: float = SAMPLING_RATE, cutoff: float = CUTOFF
 ) -> NDArray[np.float64]:
-    """Return the signal after the zero-phase low pass.
+    """Return the signal after the zero-phase low pass of Section 4.
 
     Forward and backward passes square the gain: at the cutoff it is 1/2, at 67 Hz 0.96.
 
     Parameters
     ----------
-    signal : array, shape (n_times,)
+    signal : array_like, shape (n_times,)
         Equally spaced samples, any unit.
     sampling_rate, cutoff : float
         Hz; the cutoff lies below half the sampling rate.
+
+    Returns
+    -------
+    ndarray, shape (n_times,)
+        In the unit of the signal.
 
     Raises
     ------
@@ -59,15 +64,15 @@ def measured_dte(
 ) -> float:
     """Return the DTE of a record in rad: filtered transmission error, peak-to-peak of one turn.
 
-    The turn evaluated is the middle one of the record, away from the ends where the filter has no
-    neighbours to average with.
+    The chain is that of Section 4, see `low_pass`. The turn evaluated is the middle one of the
+    record, away from the ends where the filter has no neighbours to average with.
 
     Parameters
     ----------
-    input_angle, output_angle : array, shape (n_times,)
+    input_angle, output_angle : array_like, shape (n_times,)
         Encoder angles in rad, unwrapped, equally spaced in time.
     ratio : float
-        Transmission ratio N.
+        Transmission ratio N, dimensionless.
     sampling_rate, cutoff : float
         Hz.
 

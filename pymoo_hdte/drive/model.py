@@ -25,8 +25,10 @@ PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")
 """The uncertain parameters xi of Section 2.3, in this order."""
 
 PARAMETER_UNITS = ("rad", "N.m/rad", "kg.m2", "N.m.s/rad", "N.m.s/rad")
+"""Units of `PARAMETERS`, one for each."""
 
 PRESETS = ("published", "calibrated", "resonant")
+"""Names of the models that `preset` returns."""
 
 LARGEST_STATIC_ERROR = 0.1
 """rad; any larger theta_s must be an angle in other units."""
@@ -36,17 +38,23 @@ _READINGS = {"peak_to_peak": 1.0, "semi_amplitude": 2.0}
 
 @dataclass(frozen=True)
 class KinematicError:
-    """Shape and scatter of theta_s = sum_j a_j sin(o_j theta_in + phi_j).
+    """Shape and scatter of theta_s = sum_j a_j sin(o_j theta_in + phi_j), as Eq. (1) has it.
 
     Attributes
     ----------
-    orders, amplitudes, phases : tuple of float
+    orders, amplitudes, phases : tuple of float, length n_orders
         o_j in cycles per input turn; a_j relative to each other; phi_j in rad.
     reading : str
         What the value theta_s measures: the ``"peak_to_peak"`` of the sum over one output turn, or
         its ``"semi_amplitude"``, half of that.
     std : float
         Standard deviation of theta_s over prototypes (before truncation at 3 std), rad.
+
+    Raises
+    ------
+    InvalidInput
+        For another reading, lists of different lengths, a number that is not finite or out of
+        range, or amplitudes that are all 0.
     """
 
     orders: tuple[float, ...]
@@ -69,7 +77,23 @@ class KinematicError:
             )
 
     def unit_phasors(self, ratio: float) -> NDArray[np.complex128]:
-        """Return the phasors, shape (n_orders,), of the error whose value theta_s is 1 rad."""
+        """Return the phasors of the error per rad of its value theta_s.
+
+        Parameters
+        ----------
+        ratio : float
+            Transmission ratio N, dimensionless.
+
+        Returns
+        -------
+        ndarray of complex, shape (n_orders,)
+            p_j, dimensionless: the error is its value times Re sum_j p_j exp(i o_j theta_in).
+
+        Raises
+        ------
+        InvalidInput
+            If the ratio is not above 0, or the lines cancel each other.
+        """
         phasors = sine_phasor(self.amplitudes, self.phases)
         shape = OrderSpectrum(np.array(self.orders), phasors[None, :])
         peak_to_peak = shape.peak_to_peak(ratio)[0]
@@ -88,8 +112,16 @@ class DriveModel:
         ``description`` says in a sentence what the model is, ``provenance`` where its values come
         from.
     sheet : DataSheet
+        The drive and its rated condition.
     kinematic_error : KinematicError
+        What theta_s is over the input angle.
     effects : tuple of Effect
+        In the order in which they are applied.
+
+    Raises
+    ------
+    InvalidInput
+        If an effect stands twice at one port and order.
     """
 
     name: str
@@ -128,8 +160,12 @@ class DriveModel:
 
         Parameters
         ----------
-        parameters : array, shape (n, 5)
+        parameters : array_like, shape (n, 5)
             `PARAMETERS` in SI units, each above 0.
+
+        Returns
+        -------
+        Coefficients
 
         Raises
         ------
@@ -164,7 +200,10 @@ class DriveModel:
         return coefficients
 
     def steady_state(self, parameters: ArrayLike) -> OrderSpectrum:
-        """Return the steady-state theta_d of n designs as an order spectrum.
+        """Return the steady-state theta_d of n designs, rad, as an order spectrum.
+
+        Parameters as in `coefficients`; the methods are those of
+        `pymoo_hdte.drive.steady_state`.
 
         Raises
         ------
@@ -186,12 +225,32 @@ class DriveModel:
         return self.steady_state(parameters).peak_to_peak(self.sheet.ratio) / ARCSEC
 
     def at(self, input_speed: float, load_torque: float) -> DriveModel:
-        """Return the model at another operating condition (rad/s, N.m)."""
+        """Return the model at another operating condition.
+
+        Parameters
+        ----------
+        input_speed : float
+            Mean speed of the input, rad/s, above 0.
+        load_torque : float
+            N.m at the output, at least 0.
+
+        Returns
+        -------
+        DriveModel
+
+        Raises
+        ------
+        InvalidInput
+            If a value is not finite or out of range.
+        """
         sheet = replace(self.sheet, input_speed=input_speed, load_torque=load_torque)
         return replace(self, sheet=sheet)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what makes the model, JSON-able, as a record beside results."""
+        """Return what makes the model, JSON-able, as a record beside results.
+
+        Units stand in the keys; ``nominal`` is in SI.
+        """
         error = self.kinematic_error
         return {
             "name": self.name,
@@ -216,6 +275,17 @@ class DriveModel:
 
 def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
     """Read a model file in the format of ``drive/data/calibrated.toml``.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a TOML file, in which every quantity has its unit.
+    sheet : DataSheet
+        Of the drive that the model is of.
+
+    Returns
+    -------
+    DriveModel
 
     Raises
     ------
@@ -249,9 +319,16 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
 def preset(name: str) -> DriveModel:
     """Return one of the `PRESETS` of the HS-20-100.
 
-    ``"published"`` is Eq. (9) with the printed values; ``"calibrated"`` adds named effects whose
-    values were fitted to published statistics; ``"resonant"`` is an earlier fit with a
-    disconnected front, a harder benchmark.
+    Parameters
+    ----------
+    name : {"published", "calibrated", "resonant"}
+        ``"published"`` is Eq. (9) with the printed values of Table 4; ``"calibrated"`` adds named
+        effects whose values were fitted to published statistics; ``"resonant"`` is an earlier fit
+        with a disconnected front, a harder benchmark.
+
+    Returns
+    -------
+    DriveModel
 
     Raises
     ------

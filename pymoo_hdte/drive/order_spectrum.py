@@ -36,6 +36,11 @@ class OrderSpectrum:
         Orders o_l in cycles per input turn; may be negative or fractional.
     phasors : ndarray of complex, shape (n, n_lines)
         c_l in rad.
+
+    Raises
+    ------
+    InvalidInput
+        If shapes do not match or a value is not finite.
     """
 
     orders: NDArray[np.float64]
@@ -53,11 +58,22 @@ class OrderSpectrum:
             raise InvalidInput("phasors", self.phasors, "all finite")
 
     def at(self, input_angle: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the signals, shape (n, n_angles), at input angles of shape (n_angles,) in rad."""
+        """Return the signals at given input angles.
+
+        Parameters
+        ----------
+        input_angle : ndarray, shape (n_angles,)
+            rad.
+
+        Returns
+        -------
+        ndarray, shape (n, n_angles)
+            rad.
+        """
         return (self.phasors @ np.exp(1j * np.outer(self.orders, input_angle))).real
 
     def amplitudes(self) -> dict[float, NDArray[np.float64]]:
-        """Return the amplitude, shape (n,), of each physical order |o| (rad), in rising order.
+        """Return the amplitudes, rad, shape (n,) each, by order in cycles per input turn, rising.
 
         Lines at +o and -o are one sinusoid: c exp(i o x) and d exp(-i o x) add to c + conj(d).
         """
@@ -76,12 +92,17 @@ class OrderSpectrum:
         Parameters
         ----------
         ratio : float
-            Transmission ratio N; the window is 0 <= theta_in <= 2 pi N.
+            Transmission ratio N, dimensionless; the window is 0 <= theta_in <= 2 pi N.
 
         Returns
         -------
         ndarray, shape (n,)
-            In rad, exact to rounding.
+            rad, exact to rounding.
+
+        Raises
+        ------
+        InvalidInput
+            If the ratio is not above 0.
         """
         real_number("ratio", ratio, above=0.0)
         moving = self.orders != 0.0

@@ -89,13 +89,21 @@ an empty one is dimensionless)."""
 
 @dataclass(frozen=True)
 class LawAtPort:
-    """A law of `LAWS` at a port.
+    """A law at a port: friction, drag, clearance, hysteresis or another of `port_effects.LAWS`.
 
     Attributes
     ----------
     name : str
+        Of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
     port : str
+        ``"input"``, ``"output"`` or ``"mesh"``, where the law may stand.
     law : Law
+        Of the type that belongs to the name; its numbers are in SI.
+
+    Raises
+    ------
+    InvalidInput
+        For an unknown name, a port where such a law does not stand, or a law of another type.
     """
 
     name: str
@@ -148,9 +156,23 @@ def _defaults(kind: type) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class KinematicErrorLine:
-    """A further order of theta_s: amplitude sin(order theta_in + phase), in rad.
+    """A further order of theta_s: amplitude sin(order theta_in + phase).
 
     It does not scale with theta_s, which is a property of the orders of Eq. (1).
+
+    Attributes
+    ----------
+    name : str
+        ``"kinematic_error"``, in model files and verdicts.
+    order : float
+        Cycles per input turn, above 0.
+    amplitude, phase : float
+        rad at the output, and rad.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite, or an order that is not above 0.
     """
 
     name: ClassVar[str] = "kinematic_error"
@@ -187,7 +209,19 @@ class KinematicErrorLine:
 class KinematicReaction:
     """The mesh torque acts back on the input through the slope of theta_s.
 
-    Eq. (9) leaves out this term of Lagrange's equation; ``share`` is 1 by virtual work.
+    Eq. (9) leaves out this term of Lagrange's equation.
+
+    Attributes
+    ----------
+    name : str
+        ``"kinematic_reaction"``, in model files and verdicts.
+    share : float
+        Of the reaction that is there, dimensionless: 1 by virtual work.
+
+    Raises
+    ------
+    InvalidInput
+        If the share is not finite.
     """
 
     name: ClassVar[str] = "kinematic_reaction"

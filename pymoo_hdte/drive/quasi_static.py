@@ -37,6 +37,7 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     The angle of the locked input is not known: a stiffness and clearances that vary with it are
     taken at their means, which is wrong by up to the depth of the variation and by up to half the
     clearance, and angle-periodic friction as none. The static error is a constant and is left out.
+    The test is that of Section 3.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ def mean_torsion(coefficients: Coefficients, torque: Values) -> Values:
     By parts, the integral of d over T is one of T over d: the jump of a clearance and the rest
     before breakaway are averaged as they are, however wide apart the points.
 
-    Parameters, errors and limits are those of `quasi_static_torsion`.
+    Parameters, errors and limits are those of `quasi_static_torsion`; b is the number of points.
 
     Returns
     -------

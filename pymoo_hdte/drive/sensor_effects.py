@@ -22,10 +22,17 @@ class Eccentricity:
 
     Attributes
     ----------
+    name, port : str
+        ``"eccentricity"`` and ``"sensor"``, in model files and verdicts.
     amplitude, phase : float
         rad.
     order : float
         Cycles per output turn: 1 off centre, 2 oval or tilted, more for the scale itself.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite, or an order that is not above 0.
     """
 
     name: ClassVar[str] = "eccentricity"
@@ -44,7 +51,20 @@ class Eccentricity:
         return coefficients
 
     def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
-        """Return what is added to the reading of true output angles (n,), rad, shape (n,)."""
+        """Return what is added to the reading of true output angles.
+
+        Parameters
+        ----------
+        output_angle : ndarray, shape (n,)
+            rad.
+        elapsed : float or ndarray, shape (n,)
+            Time of the session, s; plays no part.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            rad.
+        """
         return np.asarray(self.amplitude * np.cos(self.order * output_angle + self.phase))
 
     def to_dict(self) -> dict[str, object]:
@@ -60,10 +80,17 @@ class ThermalDrift:
 
     Attributes
     ----------
+    name, port : str
+        ``"thermal_drift"`` and ``"sensor"``, in model files and verdicts.
     rate : float
         At the start of the session, rad/s.
     time : float
         Time constant, s; infinite for a steady drift, rate t.
+
+    Raises
+    ------
+    InvalidInput
+        For a rate that is not finite, or a time constant that is not above 0.
     """
 
     name: ClassVar[str] = "thermal_drift"
@@ -81,18 +108,45 @@ class ThermalDrift:
         return coefficients
 
     def after(self, elapsed: Values) -> Values:
-        """Return what is added after ``elapsed`` seconds of the session, rad."""
+        """Return what is added to the reading, rad, after elapsed seconds of the session.
+
+        Both have one shape, e.g. (n,).
+        """
         if self.time == math.inf:
             return np.asarray(self.rate * elapsed)
         return np.asarray(-self.rate * self.time * np.expm1(-elapsed / self.time))
 
     def bends(self, elapsed: Values) -> Values:
-        """Return the second to fourth derivative of `after`, rad/s^2 to rad/s^4, shape (3, n)."""
+        """Return the second to fourth derivative of `after` by time.
+
+        Parameters
+        ----------
+        elapsed : ndarray, shape (n,)
+            Time of the session, s.
+
+        Returns
+        -------
+        ndarray, shape (3, n)
+            rad/s^2, rad/s^3 and rad/s^4.
+        """
         rate = self.rate * np.exp(-elapsed / self.time)
         return np.array([rate / (-self.time) ** power for power in (1, 2, 3)])
 
     def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
-        """Return what is added after ``elapsed`` seconds of the session, rad, shape (n,)."""
+        """Return what is added to the reading of true output angles.
+
+        Parameters
+        ----------
+        output_angle : ndarray, shape (n,)
+            rad; plays no part.
+        elapsed : float or ndarray, shape (n,)
+            Time of the session, s.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            rad.
+        """
         drift = self.after(np.asarray(elapsed, dtype=float))
         return np.broadcast_to(drift, np.shape(output_angle))
 

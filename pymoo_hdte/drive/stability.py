@@ -23,7 +23,7 @@ _ROUNDING = 1e-9
 
 
 class UnstableDrive(ArithmeticError):
-    """The motion grows from period to period: there is no steady state."""
+    """The motion of a drive grows from period to period: it has no steady state."""
 
 
 def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
@@ -34,7 +34,18 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
     product of steps with the stiffness of their midpoints, each the (2, 2) Pade approximant of the
     exponential: it is A-stable, so stiff damping costs no small steps, and of second order in the
     step. Steps resolve the torsional vibration; see `require_stable` for drives so slow that they
-    cannot.
+    cannot. Floquet theory: Nayfeh and Mook, Nonlinear Oscillations, Wiley 1979; Pade approximants:
+    Moler and Van Loan, SIAM Review 20, 1978.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of n designs.
+
+    Returns
+    -------
+    ndarray of complex, shape (n, 3)
+        Dimensionless; a modulus above 1 is a motion that grows.
     """
     period, cycles = _period(coefficients)
     least, most = _LEAST_STEPS * cycles, _MOST_STEPS * cycles

@@ -22,11 +22,12 @@ _ARCSEC_MM_PER_UM = 412.8
 
 @dataclass(frozen=True)
 class StaticErrorSample:
-    """Static errors of n virtual prototypes.
+    """Static errors of n virtual prototypes, Eqs. (1) and (2).
 
     Attributes
     ----------
     sheet : DataSheet
+        Whose error sources they are.
     magnitudes : ndarray, shape (n, n_sources)
         Size of each error source, m.
     phases : ndarray, shape (n, n_sources)
@@ -38,9 +39,22 @@ class StaticErrorSample:
     phases: NDArray[np.float64]
 
     def class_phasor(self, error_class: str) -> NDArray[np.complex128]:
-        """Return the resultant of one class, shape (n,): rad at the output, sine reference.
+        """Return the resultant of the sources of one class (Eqs. 1 and 2).
 
-        The angle of the phasor is the phase phi of ``|phasor| sin(order theta_in + phi)``.
+        Parameters
+        ----------
+        error_class : {"e_m", "e_g", "e_w", "e_p", "e_h"}
+            Class of Eq. (1).
+
+        Returns
+        -------
+        ndarray of complex, shape (n,)
+            rad at the output; its angle is the phase phi of ``|phasor| sin(order theta_in + phi)``.
+
+        Raises
+        ------
+        InvalidInput
+            For another class.
         """
         one_of("error_class", error_class, ERROR_CLASSES)
         member = [source.error_class == error_class for source in self.sheet.error_sources]
@@ -48,7 +62,22 @@ class StaticErrorSample:
         return _output_angle(self.sheet, error_class) * vectors.sum(axis=1)
 
     def spectrum(self, classes: tuple[str, ...] = ERROR_CLASSES) -> OrderSpectrum:
-        """Return theta_s(theta_in) of the given classes (all by default) as an order spectrum."""
+        """Return theta_s over theta_in, rad, as an order spectrum of n rows (Eqs. 1 and 2).
+
+        Parameters
+        ----------
+        classes : tuple of str
+            Classes of Eq. (1) that take part, all by default.
+
+        Returns
+        -------
+        OrderSpectrum
+
+        Raises
+        ------
+        InvalidInput
+            For no class or one that does not exist.
+        """
         if not classes:
             raise InvalidInput("classes", classes, f"one or more of {', '.join(ERROR_CLASSES)}")
         for name in classes:
@@ -58,7 +87,10 @@ class StaticErrorSample:
         return OrderSpectrum(orders, -1j * sines)
 
     def peak_to_peak(self, classes: tuple[str, ...] = ERROR_CLASSES) -> NDArray[np.float64]:
-        """Return the peak-to-peak of theta_s over one output turn, shape (n,), rad."""
+        """Return the peak-to-peak of theta_s over one output turn, shape (n,), rad.
+
+        Parameters and errors as in `spectrum`.
+        """
         return self.spectrum(classes).peak_to_peak(self.sheet.ratio)
 
 
@@ -66,6 +98,19 @@ def sample_static_error(
     sheet: DataSheet, n_samples: int, rng: np.random.Generator
 ) -> StaticErrorSample:
     """Draw prototypes: truncated normal errors, independent uniform phases (Section 2.1).
+
+    Parameters
+    ----------
+    sheet : DataSheet
+        Means and standard deviations of the error sources (Table 2).
+    n_samples : int
+        Number of prototypes n, at least 1.
+    rng : numpy.random.Generator
+        Source of the randomness.
+
+    Returns
+    -------
+    StaticErrorSample
 
     Raises
     ------
@@ -81,10 +126,20 @@ def sample_static_error(
 
 
 def class_amplitudes(sheet: DataSheet) -> dict[str, float]:
-    """Return each class's amplitude at the output (rad): root sum of squares of its mean errors.
+    """Return each class's amplitude at the output, rad: root sum of squares of its mean errors.
 
     The square is the expected squared resultant of sources with independent uniform phases, but for
-    the variances of the magnitudes.
+    the variances of the magnitudes. The angle at the output is that of Eq. (2).
+
+    Parameters
+    ----------
+    sheet : DataSheet
+        Mean errors (Table 2) and the constants of Eq. (2).
+
+    Returns
+    -------
+    dict of str to float
+        rad, by class of Eq. (1).
     """
     squares = dict.fromkeys(ERROR_CLASSES, 0.0)
     for source in sheet.error_sources:

@@ -29,9 +29,21 @@ _TAIL = 1e-9
 def transfer_function(
     coefficients: Coefficients, orders: NDArray[np.float64]
 ) -> NDArray[np.complex128]:
-    """Return H from theta_s to theta_d at constant stiffness, shape (n, n_orders).
+    """Return H from theta_s to theta_d of Eq. (9) at constant stiffness.
 
     H = Z G / (1 + Z G), Z = K + i w c and G = 1/P the compliance of the two free inertias.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of n designs; laws at ports and the variation of the stiffness are left out.
+    orders : ndarray, shape (n_orders,)
+        Cycles per input turn; w is their multiple of the input speed.
+
+    Returns
+    -------
+    ndarray of complex, shape (n, n_orders)
+        Dimensionless.
     """
     frequency = orders * coefficients.input_speed
     mesh = coefficients.stiffness[:, None] + 1j * frequency * coefficients.damping[:, None]
@@ -39,7 +51,20 @@ def transfer_function(
 
 
 def steady_state(coefficients: Coefficients) -> OrderSpectrum:
-    """Return theta_d = theta_s + d as an order spectrum.
+    """Return theta_d = theta_s + d of Eqs. (9) and (10), rad, as an order spectrum.
+
+    By `transfer_function` at constant stiffness, by Hill's method (Nayfeh and Mook, Nonlinear
+    Oscillations, Wiley 1979) where it varies twice per input turn, and by `harmonic_balance` where
+    laws stand at ports. The first two take theta_in = Omega t.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of n designs, a row of the spectrum each.
+
+    Returns
+    -------
+    OrderSpectrum
 
     Raises
     ------
@@ -47,7 +72,8 @@ def steady_state(coefficients: Coefficients) -> OrderSpectrum:
         If the varying stiffness makes the motion of a design grow, so that there is no steady
         state for the equations to have.
     ArithmeticError
-        If laws at ports are such that the harmonic balance finds no steady state.
+        If laws at ports are such that the harmonic balance finds no steady state, or the harmonics
+        of a deeply varying stiffness do not die out.
     """
     require_stable(coefficients)
     if coefficients.laws or coefficients.reaction:

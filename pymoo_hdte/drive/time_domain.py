@@ -44,6 +44,7 @@ class Run:
     transmission_error : ndarray, shape (n_times,)
         theta_d, rad.
     ratio : float
+        Transmission ratio N, dimensionless.
     """
 
     time: NDArray[np.float64]
@@ -89,17 +90,19 @@ def simulate(
     settle: float = 1.5,
     rtol: float = 1e-8,
 ) -> Run:
-    """Integrate one design from rest to steady state and through one output turn.
+    """Integrate Eq. (9) for one design from rest to steady state and through one output turn.
 
-    The input torque rises smoothly from zero to the level that holds the rated speed, with what it
-    takes to accelerate the inertias in between; load and static error follow the same envelope.
-    The drive starts at the negative input angle from which it reaches 0 after ``ramp + settle``,
-    so that the output turn is the one the steady state is evaluated on.
+    Torque-driven as in Section 2.2, from the rest of Eq. (11). The input torque rises smoothly from
+    zero to the level that holds the rated speed, with what it takes to accelerate the inertias in
+    between; load and static error follow the same envelope. The drive starts at the negative input
+    angle from which it reaches 0 after ``ramp + settle``, so that the output turn is the one the
+    steady state is evaluated on.
 
     Parameters
     ----------
     model : DriveModel
-    parameters : array, shape (5,)
+        With its effects.
+    parameters : array_like, shape (5,)
         `PARAMETERS` in SI units.
     angle : {"free", "prescribed"}
         Whether theta_s and the stiffness follow the simulated input angle, as in a real drive, or
@@ -109,14 +112,18 @@ def simulate(
     ramp, settle : float
         Duration of the start-up and of the settling after it, s.
     rtol : float
-        Relative tolerance.
+        Relative tolerance, dimensionless.
+
+    Returns
+    -------
+    Run
 
     Raises
     ------
     InvalidInput
         For a wrong argument.
     ArithmeticError
-        If the integrator gives up.
+        If the integrator gives up, the speed does not settle, or no mean torque holds it.
     """
     if not isinstance(model, DriveModel):
         raise InvalidInput("model", model, "a DriveModel, e.g. preset('calibrated')")

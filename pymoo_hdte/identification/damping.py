@@ -25,7 +25,7 @@ SPEED_TOLERANCE = 0.01
 
 @dataclass(frozen=True)
 class NoLoadRun:
-    """Mean no-load torque at several constant speeds.
+    """Mean no-load torque at several constant speeds (Section 3).
 
     Attributes
     ----------
@@ -61,6 +61,12 @@ def bearing_damping(run: NoLoadRun) -> LinearFit:
 
     The standard errors assume independent noise at each speed. Coulomb friction, preload and the
     sensor's zero go into the intercept.
+
+    Parameters
+    ----------
+    run : NoLoadRun
+        For B_in wave generator and flexible bearing only, for B_out output bearing and circular
+        spline.
 
     Returns
     -------

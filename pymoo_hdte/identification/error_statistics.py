@@ -26,7 +26,7 @@ NORMAL, LOGNORMAL, EMPIRICAL = "normal", "lognormal", "empirical"
 
 @dataclass(frozen=True)
 class ErrorStatistics:
-    """What the readings say of the series, and what may be assumed of it.
+    """What the readings say of the series, and what may be assumed of it (Table 2 and Fig. 4).
 
     Attributes
     ----------
@@ -35,15 +35,21 @@ class ErrorStatistics:
     values : ndarray, shape (n_prototypes, n_errors)
         Mean of the valid readings, in the unit of the readings.
     rejected : ndarray of bool, shape (n_prototypes, n_errors, n_repeats)
-        Outliers.
+        Outliers, see `find_outliers`.
     repeatability : ndarray, shape (n_errors,)
-        Standard deviation of repeated readings.
-    samples : tuple of NormalSample
-        Mean and standard deviation over the prototypes, one for each error.
+        Standard deviation of repeated readings, in their unit.
+    samples : tuple of NormalSample, length n_errors
+        Mean and standard deviation over the prototypes, in the unit of the readings.
     shapiro_w, shapiro_p : ndarray, shape (n_errors,)
-        Shapiro-Wilk tests over the prototypes; p before adjustment.
+        Tests of Shapiro and Wilk (Biometrika 52, 1965) over the prototypes, dimensionless; p before
+        adjustment.
     correlation, correlation_p : ndarray, shape (n_errors, n_errors)
-        Pearson's, with two-sided p before adjustment (1 on the diagonal).
+        Pearson's, dimensionless, with two-sided p before adjustment (1 on the diagonal).
+
+    Notes
+    -----
+    Families of tests are adjusted by Holm's method (Scand. J. Statist. 6, 1979) to a probability of
+    0.05 of any false alarm.
     """
 
     symbols: tuple[str, ...]
@@ -71,7 +77,10 @@ class ErrorStatistics:
 
     @property
     def correlated_pairs(self) -> tuple[tuple[int, int], ...]:
-        """Pairs whose correlation is significant after Holm's adjustment for all pairs."""
+        """Pairs whose correlation is significant after Holm's adjustment for all pairs.
+
+        As places (i, j), i below j, in `symbols`.
+        """
         rows, columns = np.triu_indices(len(self.symbols), 1)
         significant = holm(self.correlation_p[rows, columns]) < SIGNIFICANCE
         return tuple(
@@ -119,6 +128,10 @@ def error_statistics(measurements: ArrayLike, symbols: Sequence[str]) -> ErrorSt
     symbols : sequence of str, length n_errors
         Different names.
 
+    Returns
+    -------
+    ErrorStatistics
+
     Raises
     ------
     InvalidInput
@@ -153,7 +166,22 @@ def error_statistics(measurements: ArrayLike, symbols: Sequence[str]) -> ErrorSt
 
 
 def detectable_correlation(n_prototypes: int, n_errors: int) -> float:
-    """Return the least |r| that is significant if it is the largest of all pairs (Holm)."""
+    """Return the least size of a correlation that is significant if it is the largest of all pairs.
+
+    By Student's test with Holm's adjustment (Scand. J. Statist. 6, 1979).
+
+    Parameters
+    ----------
+    n_prototypes : int
+        At least 3.
+    n_errors : int
+        At least 2; they make n_errors (n_errors - 1) / 2 pairs.
+
+    Returns
+    -------
+    float
+        Dimensionless, between 0 and 1.
+    """
     pairs = n_errors * (n_errors - 1) / 2
     freedom = n_prototypes - 2
     critical = float(student.isf(SIGNIFICANCE / pairs / 2.0, freedom))

@@ -20,7 +20,17 @@ def draw_errors(
 
     Each error follows its `ErrorStatistics.marginals`, normal and lognormal ones truncated at three
     standard deviations. If any correlation is significant, all errors are tied by a Gaussian copula
-    with the measured correlation matrix; otherwise they are independent.
+    (Nelsen, An Introduction to Copulas, Springer 2006) with the measured correlation matrix;
+    otherwise they are independent, as Section 2.1 has them.
+
+    Parameters
+    ----------
+    statistics : ErrorStatistics
+        Of measured prototypes.
+    n_samples : int
+        Number of virtual prototypes, at least 1.
+    rng : numpy.random.Generator
+        Source of the randomness.
 
     Returns
     -------

@@ -16,16 +16,18 @@ FEWEST_POINTS = 3
 
 @dataclass(frozen=True)
 class LinearFit:
-    """The line y = slope x + intercept.
+    """The line y = slope x + intercept, by least squares.
+
+    Standard errors and intervals as in Draper and Smith, Applied Regression Analysis, Wiley 1998.
 
     Attributes
     ----------
     slope, intercept : float
         In the units of y / x and of y.
     slope_error, intercept_error : float
-        Standard errors.
+        Standard errors, in the same units.
     degrees_of_freedom : float
-        Of the noise estimate behind the standard errors.
+        Of the noise estimate behind the standard errors; a pure number.
     """
 
     slope: float
@@ -35,11 +37,30 @@ class LinearFit:
     degrees_of_freedom: float
 
     def slope_interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Return the confidence interval of the slope."""
+        """Return the confidence interval of the slope, by Student's t.
+
+        Parameters
+        ----------
+        level : float
+            Probability that it holds the true value, above 0 and below 1.
+
+        Returns
+        -------
+        tuple of float, length 2
+            Lower and upper limit, in the unit of the slope.
+
+        Raises
+        ------
+        InvalidInput
+            For another level.
+        """
         return self._interval(self.slope, self.slope_error, level)
 
     def intercept_interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Return the confidence interval of the intercept."""
+        """Return the confidence interval of the intercept, length 2, in its unit.
+
+        Parameters and errors as in `slope_interval`.
+        """
         return self._interval(self.intercept, self.intercept_error, level)
 
     def _interval(self, value: float, error: float, level: float) -> tuple[float, float]:
@@ -49,7 +70,7 @@ class LinearFit:
 
 
 def fit_line(x: ArrayLike, y: ArrayLike, noise: Noise | None = None) -> LinearFit:
-    """Fit a line to points by ordinary least squares.
+    """Fit a line to points by ordinary least squares (Draper and Smith, Wiley 1998).
 
     The standard errors assume that ``x`` is exact and the noise of ``y`` normal and of one standard
     deviation. Without ``noise`` they take it as independent from point to point and as large as the
@@ -58,9 +79,13 @@ def fit_line(x: ArrayLike, y: ArrayLike, noise: Noise | None = None) -> LinearFi
     Parameters
     ----------
     x, y : array_like, shape (n,)
-        At least three points, in the order of the record.
+        At least three points, in the order of the record; any units.
     noise : Noise, optional
         Of ``y`` along the record.
+
+    Returns
+    -------
+    LinearFit
 
     Raises
     ------

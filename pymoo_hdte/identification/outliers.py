@@ -17,12 +17,20 @@ SIGMAS = 3.0
 
 
 def largest_deviation(n_repeats: int) -> float:
-    """Return the greatest possible distance from the mean, in standard deviations (ddof 1)."""
+    """Return the greatest possible distance from the mean, in standard deviations (ddof 1).
+
+    A pure number, (n - 1) / sqrt(n) (Samuelson, J. Am. Stat. Assoc. 63, 1968).
+
+    Parameters
+    ----------
+    n_repeats : int
+        Number n of readings, at least 1.
+    """
     return (n_repeats - 1) / n_repeats**0.5
 
 
 def find_outliers(measurements: ArrayLike) -> NDArray[np.bool_]:
-    """Mark the readings that lie more than three pooled sigmas off their own mean.
+    """Mark the readings that lie more than three pooled sigmas off their own mean (Section 2.1).
 
     The deviation is standardised by sqrt(1 - 1/n), since each reading pulls its mean. Only the
     worst reading of each prototype and error goes at a time, and mean and sigma are taken anew,
@@ -32,7 +40,7 @@ def find_outliers(measurements: ArrayLike) -> NDArray[np.bool_]:
     Parameters
     ----------
     measurements : array_like, shape (n_prototypes, n_errors, n_repeats)
-        Readings of one instrument, whose repeatability is the same for all prototypes.
+        Readings of one instrument, in any unit, whose repeatability is the same for all prototypes.
 
     Returns
     -------

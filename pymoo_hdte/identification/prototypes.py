@@ -28,6 +28,7 @@ class NormalSample:
     n : int
         Size of the sample, at least 2.
     mean, std : float
+        In the unit of the sample.
     """
 
     n: int
@@ -36,7 +37,22 @@ class NormalSample:
 
     @classmethod
     def of(cls, values: ArrayLike) -> NormalSample:
-        """Describe a sample, shape (n,); `InvalidInput` if n < 2 or a value is not finite."""
+        """Describe a sample.
+
+        Parameters
+        ----------
+        values : array_like, shape (n,)
+            At least two, in any unit.
+
+        Returns
+        -------
+        NormalSample
+
+        Raises
+        ------
+        InvalidInput
+            For fewer than two values, or one that is not finite.
+        """
         sample = finite_array("values", values, (None,))
         if len(sample) < 2:
             raise InvalidInput("number of values", len(sample), "at least 2")
@@ -44,27 +60,47 @@ class NormalSample:
 
     @property
     def mean_error(self) -> float:
-        """Standard error of the mean."""
+        """Standard error of the mean, in the unit of the sample."""
         return self.std / self.n**0.5
 
     @property
     def std_error(self) -> float:
-        """Standard error of the standard deviation, to first order in 1 / n."""
+        """Standard error of the standard deviation, in its unit, to first order in 1 / n."""
         return self.std / (2.0 * (self.n - 1)) ** 0.5
 
     @property
     def cv_percent(self) -> float:
-        """Coefficient of variation, per cent of the mean's size."""
+        """Coefficient of variation, per cent of the mean's size (Table 3)."""
         return 100.0 * self.std / abs(self.mean)
 
     def mean_interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Return the confidence interval of the mean."""
+        """Return the confidence interval of the mean, by Student's t.
+
+        Parameters
+        ----------
+        level : float
+            Probability that it holds the true value, above 0 and below 1.
+
+        Returns
+        -------
+        tuple of float, length 2
+            Lower and upper limit, in the unit of the sample.
+
+        Raises
+        ------
+        InvalidInput
+            For another level.
+        """
         level = real_number("level", level, above=0.0, below=1.0)
         half = self.mean_error * float(student.ppf(0.5 + level / 2.0, self.n - 1))
         return self.mean - half, self.mean + half
 
     def std_interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Return the confidence interval of the standard deviation."""
+        """Return the confidence interval of the standard deviation, by chi-square.
+
+        Its two limits, length 2, are in the unit of the sample. Parameters and errors as in
+        `mean_interval`.
+        """
         level = real_number("level", level, above=0.0, below=1.0)
         tails = chi2.ppf([0.5 + level / 2.0, 0.5 - level / 2.0], self.n - 1)
         low, high = self.std * np.sqrt((self.n - 1) / tails)
@@ -73,16 +109,18 @@ class NormalSample:
 
 @dataclass(frozen=True)
 class Series:
-    """A parameter over the prototypes of one design.
+    """A parameter over the prototypes of one design (Table 3).
 
     Attributes
     ----------
     prototypes : ndarray, shape (n_prototypes,)
-        Mean of each prototype's repeats, in the order of their numbers.
+        Mean of each prototype's repeats, in the unit of the parameter and the order of their
+        numbers.
     between : NormalSample
         Of these means: overall mean mu_p, inter-prototype std S_p, CV.
     repeatability : float
-        Standard deviation of repeats on one prototype, pooled; NaN without repeats.
+        Standard deviation of repeats on one prototype, pooled, in the unit of the parameter; NaN
+        without repeats.
     """
 
     prototypes: NDArray[np.float64]
@@ -91,7 +129,16 @@ class Series:
 
 
 def series(values: Mapping[RunKey, float]) -> Series:
-    """Summarise one identified value for each (prototype, repeat).
+    """Summarise one identified value for each (prototype, repeat), as Table 3 does.
+
+    Parameters
+    ----------
+    values : mapping of (int, int) to float
+        By number of the prototype and of the repeat, in one unit.
+
+    Returns
+    -------
+    Series
 
     Raises
     ------

@@ -43,6 +43,17 @@ Record = TypeVar("Record")
 def read_torsion_loops(path: str | Path) -> dict[RunKey, TorsionLoop]:
     """Read torque/torsion loops, by prototype and repeat.
 
+    Parameters
+    ----------
+    path : str or Path
+        Of a CSV file with the columns ``prototype, repeat, torque_Nm, torsion_arcsec`` and, if at
+        hand, ``time_s``.
+
+    Returns
+    -------
+    dict of (int, int) to TorsionLoop
+        In N.m and rad.
+
     Raises
     ------
     InvalidInput
@@ -62,6 +73,16 @@ def read_torsion_loops(path: str | Path) -> dict[RunKey, TorsionLoop]:
 
 def read_no_load_runs(path: str | Path) -> dict[RunKey, NoLoadRun]:
     """Read no-load torques over speed, by prototype and repeat.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a CSV file with the columns ``prototype, repeat, speed_r_min, torque_Nm``.
+
+    Returns
+    -------
+    dict of (int, int) to NoLoadRun
+        In rad/s and N.m.
 
     Raises
     ------
@@ -83,12 +104,17 @@ def read_no_load_runs(path: str | Path) -> dict[RunKey, NoLoadRun]:
 def read_error_measurements(path: str | Path) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Read repeated error measurements of prototypes.
 
+    Parameters
+    ----------
+    path : str or Path
+        Of a CSV file with the columns ``prototype, repeat`` and one ``<symbol>_um`` for each error.
+
     Returns
     -------
-    ndarray, shape (n_prototypes, n_errors, n_repeats)
+    readings : ndarray, shape (n_prototypes, n_errors, n_repeats)
         In micrometres, for `error_statistics`; prototypes and repeats in the order of the file.
-    tuple of str, length n_errors
-        Symbols, in the order of the columns.
+    symbols : tuple of str, length n_errors
+        In the order of the columns.
 
     Raises
     ------

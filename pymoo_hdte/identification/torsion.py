@@ -27,7 +27,7 @@ _NOISE_BAND = 3.0
 
 @dataclass(frozen=True)
 class TorsionLoop:
-    """One record of a torque/torsion loop.
+    """One record of a torque/torsion loop (Section 3 and Fig. 9).
 
     Attributes
     ----------
@@ -53,12 +53,12 @@ class TorsionLoop:
 
     @property
     def branches(self) -> dict[str, slice]:
-        """Samples of ``"a1"`` .. ``"a4"``."""
+        """Samples of the branches ``"a1"`` .. ``"a4"``, see `loop_branches`."""
         return loop_branches(self.torque)
 
 
 def loop_branches(torque: NDArray[np.float64]) -> dict[str, slice]:
-    """Find the four branches of a loop from its torque alone.
+    """Find the four branches of a loop from its torque alone (Fig. 9).
 
     The ends of a1 and a3 are the middle of the samples that reach the extreme torque within noise,
     so that dwells are halved; a2 ends where as many samples as are positive have passed, so that
@@ -102,11 +102,17 @@ def loop_branches(torque: NDArray[np.float64]) -> dict[str, slice]:
 def stiffness(loop: TorsionLoop) -> LinearFit:
     """Return the stiffness K: the slope of torque over torsion on the forward loading branch a1.
 
-    The interval holds for the straight line that fits the noise-free branch best. Friction bends
-    the start of a1; this moves the slope itself, not its standard error. The error assumes normal
-    noise of torque and torsion with a first-order autocorrelation, judged from the whole record
-    (see `noise_of`). Noise s of the torsion lowers the slope by the share (s / S)^2, where S is the
-    standard deviation of the torsion over the branch: 1e-4 for 1 arcsec in 0..320 arcsec.
+    That is the paper's stiffness (Section 3). The interval holds for the straight line that fits
+    the noise-free branch best. Friction bends the start of a1; this moves the slope itself, not its
+    standard error. The error assumes normal noise of torque and torsion with a first-order
+    autocorrelation, judged from the whole record (see `noise_of`). Noise s of the torsion lowers
+    the slope by the share (s / S)^2, where S is the standard deviation of the torsion over the
+    branch: 1e-4 for 1 arcsec in 0..320 arcsec.
+
+    Parameters
+    ----------
+    loop : TorsionLoop
+        In N.m and rad.
 
     Returns
     -------
@@ -122,7 +128,7 @@ def stiffness(loop: TorsionLoop) -> LinearFit:
 def hysteresis_width(loop: TorsionLoop) -> float:
     """Return the torsion at zero torque after forward minus that after reverse loading, rad.
 
-    Each is read off a straight line through the samples within 10 % of the peak torque.
+    Each is read off a straight line through the samples of the loop within 10 % of the peak torque.
     """
     branches = loop.branches
     falling = slice(branches["a2"].start, branches["a3"].stop)

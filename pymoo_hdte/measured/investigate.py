@@ -44,12 +44,16 @@ class Finding:
     Attributes
     ----------
     mechanism : Mechanism
+        Without the effects that were to be found.
     records : tuple of Record
+        All that were given, training and held out.
     cutoff : float
         Hz, up to which the motion is known.
     data : MeasuredData
         Training records; their noise is the rest that nobody explains.
     verdict : Verdict
+        What is missing: its ``status`` is ``"adequate"``, ``"named"``, ``"class"``,
+        ``"parameter"`` or ``"unlisted"``.
     """
 
     mechanism: Mechanism
@@ -71,22 +75,31 @@ class Finding:
 
     @property
     def share_removed(self) -> float:
-        """Share of the power of the misfit beyond the sensors' noise that the effects remove."""
+        """Share of the power of the misfit beyond the sensors' noise that the effects remove.
+
+        Dimensionless, 0 to 1.
+        """
         return share_removed(self.sensors, self.data, self.verdict.base, self.accepted)
 
     @property
     def sensor_noise(self) -> NDArray[np.float64]:
-        """Root mean square of the sensors' noise in each balance, N or N.m."""
+        """Root mean square of the sensors' noise in each balance, shape (n_balances,), N or N.m."""
         return root_mean_square(self.sensors, np.ones_like(self.verdict.base.residuals))
 
     @property
     def base_misfit(self) -> NDArray[np.float64]:
-        """Root mean square of what the base leaves of each balance, N or N.m."""
+        """Root mean square of what the base leaves of each balance.
+
+        Shape (n_balances,), N or N.m.
+        """
         return root_mean_square(self.data, self.verdict.base.residuals)
 
     @property
     def remainder(self) -> NDArray[np.float64]:
-        """Root mean square of what the accepted model leaves of each balance, N or N.m."""
+        """Root mean square of what the accepted model leaves of each balance.
+
+        Shape (n_balances,), N or N.m.
+        """
         return root_mean_square(self.data, self.accepted.residuals)
 
 
@@ -98,7 +111,9 @@ def investigate(
 ) -> Finding:
     """Return the verdict on records of a mechanism.
 
-    By inverse dynamics, for which every coordinate has to be measured.
+    By inverse dynamics, for which every coordinate has to be measured (of robots: Janot,
+    Vandanjon and Gautier, IEEE Trans. Control Systems Technology 22, 2014). Candidate effects are
+    compared by the Bayesian information criterion (Schwarz, Annals of Statistics 6, 1978).
 
     Parameters
     ----------
@@ -110,6 +125,10 @@ def investigate(
         Hz, up to which the motion is known; by default where it ceases to stand out of its noise.
     known : sequence of LawAt
         Effects that the mechanism is known to have.
+
+    Returns
+    -------
+    Finding
 
     Raises
     ------

@@ -25,6 +25,11 @@ class Believed:
         SI; at least 0.
     tolerance : float
         Relative, 0 for a value that is known; 1 allows everything from nothing to twice the value.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite or out of range.
     """
 
     value: float
@@ -40,7 +45,26 @@ NOTHING = Believed(0.0)
 
 @dataclass(frozen=True)
 class ErrorLine:
-    """What a port moves beside its motion: amplitude sin(order q + phase) of a coordinate q."""
+    """What a port moves beside its motion: amplitude sin(order q + phase) of a coordinate q.
+
+    The form of Eq. (1) of the paper.
+
+    Attributes
+    ----------
+    coordinate : str
+        Name of q.
+    order : float
+        Cycles per turn of an angle in rad; of a length, radians per m.
+    amplitude : float
+        In the unit of the port's motion, m or rad.
+    phase : float
+        rad.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite.
+    """
 
     coordinate: str
     order: float
@@ -60,9 +84,9 @@ class Port:
     ----------
     name : str
     motion : mapping of str to float
-        Share of each coordinate in the motion d of the port.
+        Share of each coordinate in the motion d of the port, by name.
     stiffness, damping : Believed
-        Of the linear spring and damper that stand there.
+        Of the linear spring and damper that stand there, N/m and N.s/m or N.m/rad and N.m.s/rad.
     read : bool
         True for a force sensor: what acts at the port is measured, as the channel of this name,
         and does not act on the coordinates.
@@ -88,9 +112,9 @@ class Input:
     name : str
         Its channel.
     acts : mapping of str to float
-        Share with which it acts on each coordinate.
+        Share with which it acts on each coordinate, by name.
     gain : Believed
-        Force, or torque, per unit of the signal.
+        Force, N, or torque, N.m, per unit of the signal.
     """
 
     name: str
@@ -102,14 +126,18 @@ class Input:
 class Loop:
     """A control law: input = position_gain (reference - coordinate) - speed_gain coordinate'.
 
+    Proportional-derivative: Astrom and Murray, Feedback Systems, Princeton University Press 2008.
+
     Attributes
     ----------
     input, reference : str
         The input that it commands, and the channel of the reference.
     coordinate : str
+        That it controls.
     position_gain, speed_gain : float
+        Units of the input per m or rad, and per m/s or rad/s.
     limit : float
-        Of the size of the command; infinite without saturation.
+        Of the size of the command, in units of the input; infinite without saturation.
     """
 
     input: str
@@ -122,13 +150,16 @@ class Loop:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Coordinates, ports and inputs.
+    """Coordinates, ports and inputs of a lumped mechanism; SI units throughout.
+
+    M q'' is what the inputs put on the coordinates q, less what springs, dampers and laws at the
+    ports answer with: Lagrange's equations, as in Eqs. (3) to (9) of the paper.
 
     Attributes
     ----------
     inertias : mapping of str to Believed
-        Mass or inertia by coordinate. A coordinate is measured where a record has a channel of
-        its name.
+        Mass, kg, or inertia, kg.m2, by coordinate, which is measured where a record has a channel
+        of its name.
     ports : sequence of Port
     inputs : sequence of Input
     loops : sequence of Loop
@@ -189,12 +220,12 @@ class Mechanism:
         return tuple(port.name for port in self.ports)
 
     def port(self, name: str) -> Port:
-        """Return a port; raises `InvalidInput` for one that is not there."""
+        """Return the port of that name; raises `InvalidInput` where there is none."""
         return self.ports[self.port_names.index(one_of("port", name, self.port_names))]
 
     @property
     def quantities(self) -> dict[str, Believed]:
-        """What is believed, by the name under which a fit knows it, values of nothing left out."""
+        """What is believed, SI, by the name under which a fit knows it; what is 0 is left out."""
         found = {f"inertia of {name}": one for name, one in self.inertias.items()}
         for port in self.ports:
             found[f"stiffness of {port.name}"] = port.stiffness
@@ -209,7 +240,16 @@ class Mechanism:
         Parameters
         ----------
         values : mapping of str to float
-            By name, as in `quantities`; what is not there stays as it is.
+            SI, by name as in `quantities`; what is not there stays as it is.
+
+        Returns
+        -------
+        Mechanism
+
+        Raises
+        ------
+        InvalidInput
+            For a value that is not finite or negative, or an inertia that is not above 0.
         """
 
         def known(name: str, before: Believed) -> Believed:
@@ -249,7 +289,9 @@ class LawAt:
     name : str
         Of the effect, as verdicts have it.
     port : str
+        Name of the port.
     law : Law
+        Force or torque over the port's motion; its numbers are in SI.
     """
 
     name: str

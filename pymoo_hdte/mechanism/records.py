@@ -27,21 +27,22 @@ class Record:
     Attributes
     ----------
     name : str
-    role : str
-        One of `ROLES`.
+        Of the test.
+    role : {"train", "held_out"}
+        To be fitted, or only to judge the result.
     time : ndarray, shape (n,)
-        s, uniform within 1 % of a step; at least `FEWEST_SAMPLES` of them.
+        s, uniform within 1 % of a step; at least 16 of them.
     channels : dict of str to ndarray, shape (n,)
         Coordinates, inputs, references and force sensors by name, SI.
     noise : dict of str to float
-        Standard deviation of the white noise of channels, where it is known; of the others it is
-        estimated, see `noise_of`.
+        Standard deviation of the white noise of channels, SI, where it is known; of the others it
+        is estimated, see `noise_of`.
 
     Raises
     ------
     InvalidInput
-        For times that are not uniform, a channel of another length or with a value that is not
-        finite, or a noise that is not positive or of no channel.
+        For another role, times that are not uniform, a channel of another length or with a value
+        that is not finite, or a noise that is not positive or of no channel.
     """
 
     name: str
@@ -92,24 +93,35 @@ class Record:
             object.__setattr__(self, attribute, value)
 
     def channel(self, name: str) -> NDArray[np.float64]:
-        """Return a channel, shape (n,); raises `InvalidInput` where the record has none."""
+        """Return the channel of that name, SI, shape (n,); `InvalidInput` where there is none."""
         if name not in self.channels:
             allowed = f"with {name!r}, which the mechanism needs"
             raise InvalidInput(f"channels of record {self.name}", sorted(self.channels), allowed)
         return self.channels[name]
 
     def noise_of(self, channel: str, jumps: bool = False) -> float:
-        """Return the standard deviation of the noise of a channel: known, or estimated; SI.
+        """Return the standard deviation of the white noise of a channel: known, or estimated.
 
-        ``jumps`` tells whether its signal may, as that of a force.
+        Parameters
+        ----------
+        channel : str
+            Name of the channel.
+        jumps : bool
+            Whether its signal may jump, as that of a force.
+
+        Returns
+        -------
+        float
+            SI.
         """
         return self.noise.get(channel) or noise_of(self.channels[channel], jumps)
 
     def finer(self, factor: int) -> Record:
         """Return the record with ``factor`` samples for each, on a smooth curve through them.
 
-        What takes signals for straight between samples is wrong by three per cent where there are
-        ten of them to a period, and by more at a resonance.
+        The curve is a cubic spline; n samples become factor (n - 1) + 1. What takes signals for
+        straight between samples is wrong by three per cent where there are ten of them to a period,
+        and by more at a resonance.
         """
         n = len(self.time)
         places, between = np.arange(n), np.arange(factor * (n - 1) + 1) / factor

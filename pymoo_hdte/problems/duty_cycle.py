@@ -57,9 +57,18 @@ class OperatingCondition:
 
 
 def load_conditions(path: str | Path) -> tuple[OperatingCondition, ...]:
-    """Read operating conditions from a CSV file with the `COLUMNS`.
+    """Read operating conditions from a CSV file.
 
-    Speeds are in r/min, loads in N.m. Blank lines and lines that start with ``#`` are skipped.
+    Parameters
+    ----------
+    path : str or Path
+        Of the file, with the columns ``speed_rpm``, ``load_Nm`` and ``weight`` in any order. Speeds
+        are in r/min, loads in N.m. Blank lines and lines that start with ``#`` are skipped.
+
+    Returns
+    -------
+    tuple of OperatingCondition
+        In the order of the file, SI.
 
     Raises
     ------

@@ -53,6 +53,7 @@ class RobustProblem(Problem):
     Parameters
     ----------
     moments : ExactMoments, SampledMoments or VariableBandMoments
+        Of the response, over the designs.
     obj_names : tuple of str
         Names of the objectives: of these two, and of those that a subclass adds.
     units : dict of str
@@ -61,7 +62,13 @@ class RobustProblem(Problem):
     Attributes
     ----------
     var_names, obj_names : tuple of str
+        Names in the order of X, shape (n, n_var), and F, shape (n, n_obj).
     units : dict of str
+        Unit of each, by name.
+
+    Notes
+    -----
+    Evaluating a design outside the box, or one that is NaN, raises `ExtrapolationError`.
     """
 
     def __init__(

@@ -22,7 +22,7 @@ from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
 
 
 class RobustDTE(StoredFront, RobustProblem):
-    """Minimise mean and standard deviation of the dynamic transmission error (DTE).
+    """Minimise mean and standard deviation of the dynamic transmission error (DTE), Section 5.1.
 
     Design variables are the nominal stiffness K and the nominal J_in, B_in and B_fc, each within
     ``box`` of its value in the data sheet. Around a design the four vary uniformly by
@@ -42,9 +42,9 @@ class RobustDTE(StoredFront, RobustProblem):
     n_samples, sample_seed : int
         Number and seed of those samples; only used with ``moments="sample"``.
     tolerance : float
-        Relative half-width of the band around a design.
+        Relative half-width of the band around a design, above 0 and below 1; the paper's is 0.05.
     box : float
-        Relative half-width of the search space.
+        Relative half-width of the search space, above 0 and below 1; the paper's is 0.25.
     conditions : sequence of OperatingCondition, optional
         A duty cycle. The DTE is then its weighted mean over these conditions, of which each part
         runs through all; without, it is that under the rated condition of the data sheet.
@@ -52,14 +52,16 @@ class RobustDTE(StoredFront, RobustProblem):
     Attributes
     ----------
     model : DriveModel
+        Whose DTE it is.
     conditions : tuple of OperatingCondition
         The rated condition alone if no duty cycle is given.
     surrogate : ChebyshevSurrogate
         DTE in arcsec over ``PARAMETERS``. Its box is +-35 % (wider if box and tolerance reach
         further) in the four design variables and mean +- 3 std in theta_s.
     moments : ExactMoments or SampledMoments
+        Of the surrogate, over the designs.
     nominal : ndarray, shape (4,)
-        The initial design.
+        The initial design, SI units.
     var_names, obj_names, units
         Names in the order of X and F, and the unit of each. X is in SI units, F in arcsec.
 

@@ -44,8 +44,8 @@ class RobustDTETolerance(StoredFront, RobustProblem):
     ----------
     model, order, box, conditions
         As in `RobustDTE`.
-    tolerances : tuple of float
-        Smallest and largest tolerance. At 8 % and the default box the scatter just fills the
+    tolerances : tuple of float, length 2
+        Smallest and largest tolerance, relative, above 0 and below 1. At 8 % and the default box the scatter just fills the
         surrogate's +-35 %, so at each tolerance the problem is `RobustDTE` of that tolerance.
 
     Attributes
@@ -53,6 +53,7 @@ class RobustDTETolerance(StoredFront, RobustProblem):
     model, conditions, surrogate, nominal, var_names, obj_names, units
         As in `RobustDTE`; the tolerance and its cost are pure numbers.
     moments : VariableBandMoments
+        Of the surrogate, over designs and tolerances.
 
     Raises
     ------
@@ -94,6 +95,15 @@ class RobustDTETolerance(StoredFront, RobustProblem):
 
     def at_tolerance(self, tolerance: float) -> RobustProblem:
         """Return the problem of the four design variables and two moments at one tolerance.
+
+        Parameters
+        ----------
+        tolerance : float
+            Relative half-width of the bands, in the range of the problem's.
+
+        Returns
+        -------
+        RobustProblem
 
         Raises
         ------

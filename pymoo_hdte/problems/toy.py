@@ -29,10 +29,18 @@ _FRONT_POINTS = 1000
 class RobustToy(RobustProblem):
     """The closed-form twin, run through the same surrogate and moments as `RobustDTE`.
 
+    The response is our own, chosen for its closed forms. X has shape (n, 3), F shape (n, 2); all is
+    dimensionless.
+
     Parameters
     ----------
     moments, n_samples, sample_seed, tolerance
         As in `RobustDTE`; the tolerance is at most 0.2, so that x_1 keeps its trade-off.
+
+    Attributes
+    ----------
+    surrogate : ChebyshevSurrogate
+        The response over (a_1, a_2, x_1, x_2, x_3), exact as it is linear in each.
 
     Raises
     ------
@@ -64,7 +72,18 @@ class RobustToy(RobustProblem):
     def closed_form(
         self, designs: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean and standard deviation, shape (n,) each, for designs of shape (n, 3)."""
+        """Return the true mean and standard deviation.
+
+        Parameters
+        ----------
+        designs : ndarray, shape (n, 3)
+            Dimensionless.
+
+        Returns
+        -------
+        mean, std : ndarray, shape (n,)
+            Dimensionless.
+        """
         first, second, third = designs.T
         band = self.tolerance**2 / 3.0
         variance = (

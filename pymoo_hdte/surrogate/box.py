@@ -16,7 +16,10 @@ _EDGE = 1e-12
 
 
 class ExtrapolationError(InvalidInput):
-    """A point lies outside the box on which a polynomial was built."""
+    """A point lies outside the box on which a polynomial was built.
+
+    Attributes as in `pymoo_hdte.checks.InvalidInput`: the variable, its value and its interval.
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +41,7 @@ class Box:
     Attributes
     ----------
     centre, half_width : ndarray, shape (d,)
-        Midpoint and half the length of every interval.
+        Midpoint and half the length of every interval, in the variables' own units.
     """
 
     names: tuple[str, ...]
@@ -90,6 +93,7 @@ class Box:
         Returns
         -------
         ndarray, shape (n, d)
+            Dimensionless, -1 to 1.
 
         Raises
         ------
@@ -110,11 +114,25 @@ class Box:
         return cube.T
 
     def from_cube(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Map points of the cube [-1, 1]^d, shape (n, d), to the box (Eq. 25)."""
+        """Map points of the cube [-1, 1]^d to the box (Eq. 25).
+
+        Parameters
+        ----------
+        cube : ndarray, shape (n, d)
+            Dimensionless.
+
+        Returns
+        -------
+        ndarray, shape (n, d)
+            In the variables' own units.
+        """
         return self.centre + self.half_width * cube
 
     def check_inside(self, points: ArrayLike) -> None:
-        """Raise `ExtrapolationError` unless all points, shape (n, d), lie in the box."""
+        """Raise an error unless all points lie in the box.
+
+        Parameters and errors as in `to_cube`.
+        """
         self.to_cube(points)
 
     def _as_points(self, points: ArrayLike) -> NDArray[np.float64]:

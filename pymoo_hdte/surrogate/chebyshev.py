@@ -29,9 +29,14 @@ class ChebyshevSurrogate:
         The d variables and their intervals.
     coefficients : array_like, shape (p_1, ..., p_d)
         Entry ``i`` multiplies T_i1 ... T_id of the variables mapped to [-1, 1]. The factor
-        (1/2)^h of Eq. (23) is already in them.
+        (1/2)^h of Eq. (23) is already in them. In the output's unit.
     provenance : mapping, optional
         What made the surrogate, e.g. the model and its parameters; must be writable as JSON.
+
+    Attributes
+    ----------
+    polynomial : TensorPolynomial
+        The same on the cube [-1, 1]^d.
 
     Raises
     ------
@@ -59,7 +64,7 @@ class ChebyshevSurrogate:
         order: int,
         provenance: Mapping[str, Any] | None = None,
     ) -> ChebyshevSurrogate:
-        """Interpolate ``function`` at the tensor grid of Chebyshev nodes.
+        """Interpolate ``function`` at the tensor grid of Chebyshev nodes (Eqs. 20, 23 and 24).
 
         Parameters
         ----------
@@ -91,12 +96,12 @@ class ChebyshevSurrogate:
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
-        """Read-only coefficients, shape (p_1, ..., p_d)."""
+        """Read-only coefficients, shape (p_1, ..., p_d), in the output's unit."""
         return self.polynomial.coefficients[0]
 
     @property
     def orders(self) -> tuple[int, ...]:
-        """Highest degree in each variable."""
+        """Highest degree in each of the d variables."""
         return tuple(size - 1 for size in self.coefficients.shape)
 
     @property
@@ -105,22 +110,31 @@ class ChebyshevSurrogate:
         return json.loads(self._provenance)
 
     def __call__(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return the values, shape (n,), at points of shape (n, d).
+        """Return the values of the surrogate.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, d)
+            In the box's units.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            In the output's unit.
 
         Raises
         ------
         ExtrapolationError
             If a point lies outside the box.
+        InvalidInput
+            If ``points`` is no array of numbers of shape (n, d).
         """
         return self.polynomial(self.box.to_cube(points).T)[0]
 
     def gradient(self, points: ArrayLike) -> NDArray[np.float64]:
         """Return the gradient, shape (n, d), in the output's unit per unit of each variable.
 
-        Raises
-        ------
-        ExtrapolationError
-            If a point lies outside the box.
+        Parameters and errors as in `__call__`.
         """
         return self._derivatives(self.box.to_cube(points).T).T / self.box.half_width
 
@@ -138,6 +152,15 @@ class ChebyshevSurrogate:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> ChebyshevSurrogate:
         """Read a surrogate that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or path-like
+            Of the file.
+
+        Returns
+        -------
+        ChebyshevSurrogate
 
         Raises
         ------

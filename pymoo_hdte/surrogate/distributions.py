@@ -23,18 +23,23 @@ _NODES_FOR_NORMAL = 128
 
 @dataclass(frozen=True)
 class TruncatedNormal:
-    """A noise variable: normal, cut off symmetrically, independent of the design.
+    """A noise variable: normal, cut off symmetrically, independent of the design (Section 2.1).
 
     Parameters
     ----------
     mean : float
-        Mean, of the normal and of the truncated variable alike.
+        Mean, of the normal and of the truncated variable alike, in the variable's own unit.
     std : float
-        Standard deviation of the normal *before* the cut, positive. The truncated variable
-        scatters less, see `truncated_std`: 0.9866 of it at a cut of 3.
+        Standard deviation of the normal *before* the cut, positive, in the same unit. The truncated
+        variable scatters less, see `truncated_std`: 0.9866 of it at a cut of 3.
     cut : float
-        Values farther than ``cut`` times ``std`` from the mean do not occur; above 0, at most 10
-        (beyond, a normal variable is not cut at all within double precision).
+        Dimensionless: values farther than ``cut`` times ``std`` from the mean do not occur; above
+        0, at most 10 (beyond, a normal variable is not cut at all within double precision).
+
+    Attributes
+    ----------
+    scales_design : bool
+        False: the standard variable is the input's value itself.
 
     Raises
     ------
@@ -55,17 +60,20 @@ class TruncatedNormal:
 
     @property
     def support(self) -> tuple[float, float]:
-        """Smallest and largest value."""
+        """Smallest and largest value, in the variable's unit."""
         return self.mean - self.cut * self.std, self.mean + self.cut * self.std
 
     @property
     def truncated_std(self) -> float:
-        """Standard deviation of the truncated variable, smaller than ``std``."""
+        """Standard deviation of the truncated variable, smaller than ``std`` and in its unit."""
         values, weights = self.quadrature(2)
         return float(np.sqrt(weights @ (values - self.mean) ** 2))
 
     def pdf(self, x: ArrayLike) -> NDArray[np.float64]:
-        """Return the probability density of the truncated variable at ``x``, of any shape."""
+        """Return the probability density of the truncated variable, in 1 over its unit.
+
+        It has the shape of ``x``, which may be any shape, e.g. (n,), in the variable's unit.
+        """
         z = (np.asarray(x, dtype=float) - self.mean) / self.std
         inside = np.sqrt(2.0 * np.pi) * self.std * (ndtr(self.cut) - ndtr(-self.cut))
         return np.where(np.abs(z) <= self.cut, np.exp(-0.5 * z**2) / inside, 0.0)
@@ -74,6 +82,13 @@ class TruncatedNormal:
         """Return values and weights whose sums are expectations of polynomials up to ``degree``.
 
         Gauss-Legendre over the support, with the density in the weights; exact to rounding.
+
+        Returns
+        -------
+        values : ndarray, shape (q,)
+            In the variable's unit.
+        weights : ndarray, shape (q,)
+            Dimensionless; they sum to 1.
         """
         nodes, weights = leggauss(_NODES_FOR_NORMAL + degree)
         z = self.cut * nodes
@@ -81,7 +96,20 @@ class TruncatedNormal:
         return self.mean + self.std * z, weights / weights.sum()
 
     def sample(self, random_state: np.random.Generator, size: int) -> NDArray[np.float64]:
-        """Draw ``size`` values, shape (size,), by inversion of the distribution function."""
+        """Draw values by inversion of the distribution function.
+
+        Parameters
+        ----------
+        random_state : numpy.random.Generator
+            Source of the randomness.
+        size : int
+            Number of values.
+
+        Returns
+        -------
+        ndarray, shape (size,)
+            In the variable's unit.
+        """
         low, high = ndtr(-self.cut), ndtr(self.cut)
         z = ndtri(low + (high - low) * random_state.random(size))
         return self.mean + self.std * np.clip(z, -self.cut, self.cut)
@@ -91,12 +119,17 @@ class TruncatedNormal:
 class UniformBand:
     """A design variable with a relative tolerance: u is uniform in u (1 - t) .. u (1 + t).
 
-    The standard variable is the factor, uniform in 1 - t .. 1 + t.
+    The standard variable is the factor, uniform in 1 - t .. 1 + t (Sections 2.3 and 5.1).
 
     Parameters
     ----------
     tolerance : float
-        t, at least 0 (no scatter) and below 1.
+        t, relative: at least 0 (no scatter) and below 1.
+
+    Attributes
+    ----------
+    scales_design : bool
+        True: the standard variable multiplies the design's value.
 
     Raises
     ------
@@ -114,18 +147,36 @@ class UniformBand:
 
     @property
     def support(self) -> tuple[float, float]:
-        """Smallest and largest factor."""
+        """Smallest and largest factor, dimensionless."""
         return 1.0 - self.tolerance, 1.0 + self.tolerance
 
     def quadrature(self, degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return factors and weights whose sums are expectations of polynomials up to ``degree``.
 
         Gauss-Legendre of just enough nodes.
+
+        Returns
+        -------
+        factors, weights : ndarray, shape (q,)
+            Dimensionless; the weights sum to 1.
         """
         # A band of no width is one point: one node keeps its scatter at exactly zero.
         nodes, weights = leggauss(degree // 2 + 1 if self.tolerance else 1)
         return 1.0 + self.tolerance * nodes, weights / weights.sum()
 
     def sample(self, random_state: np.random.Generator, size: int) -> NDArray[np.float64]:
-        """Draw ``size`` factors, shape (size,)."""
+        """Draw factors.
+
+        Parameters
+        ----------
+        random_state : numpy.random.Generator
+            Source of the randomness.
+        size : int
+            Number of factors.
+
+        Returns
+        -------
+        ndarray, shape (size,)
+            Dimensionless.
+        """
         return 1.0 + self.tolerance * (2.0 * random_state.random(size) - 1.0)

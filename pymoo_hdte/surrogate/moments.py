@@ -24,7 +24,8 @@ class ExactMoments:
     The inputs are independent and the surrogate is a tensor polynomial of degree k_j in each
     variable. Its mean over all scatter is therefore a tensor polynomial of degree k_j in each
     design variable u_j, and its variance one of degree 2 k_j. Both are found once, from their
-    values on a Chebyshev grid of designs; evaluating a design sums two short series.
+    values on a Chebyshev grid of designs; evaluating a design sums two short series. They are the
+    objectives of Eqs. (29) and (30) without the paper's sampling.
 
     Parameters
     ----------
@@ -34,6 +35,11 @@ class ExactMoments:
         The scatter of each variable of the surrogate, in its order.
     design_box : Box
         The m designed variables (those with a `UniformBand`) and the range of their designs.
+
+    Attributes
+    ----------
+    uncertainty : Uncertainty
+        The inputs, checked against the boxes.
 
     Raises
     ------
@@ -63,6 +69,8 @@ class ExactMoments:
         ------
         ExtrapolationError
             If a design lies outside ``design_box``.
+        InvalidInput
+            If ``designs`` is no array of numbers of shape (n, m).
         """
         mean, variance = self._polynomial(self.design_box.to_cube(designs).T)
         return mean, _square_root(variance)
@@ -70,8 +78,9 @@ class ExactMoments:
     def gradient(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the gradients of mean and standard deviation, shape (n, m) each.
 
-        Where the standard deviation is zero it has a kink or is constant; its gradient is then
-        given as zero. Arguments and errors as in a call.
+        In the output's unit per unit of each variable. Where the standard deviation is zero it has
+        a kink or is constant; its gradient is then given as zero. Parameters and errors as in
+        `__call__`.
         """
         cube = self.design_box.to_cube(designs).T
         std = _square_root(self._polynomial(cube)[1])

@@ -34,6 +34,11 @@ class SampledMoments:
     seed : int
         Seed of the generator that draws them, at least 0.
 
+    Attributes
+    ----------
+    uncertainty : Uncertainty
+        The inputs, checked against the boxes.
+
     Raises
     ------
     InvalidInput
@@ -59,7 +64,7 @@ class SampledMoments:
         self._surrogate = surrogate
 
     def __call__(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return mean and standard deviation of the samples, shape (n,) each.
+        """Return mean and standard deviation of the samples, shape (n,) each, in the output's unit.
 
         The standard deviation divides by the number of samples (population convention).
 
@@ -72,6 +77,8 @@ class SampledMoments:
         ------
         ExtrapolationError
             If a design lies outside ``design_box``.
+        InvalidInput
+            If ``designs`` is no array of numbers of shape (n, m).
         """
         checked = self._checked(designs)
         mean, std = np.empty((2, len(checked)))
@@ -84,7 +91,8 @@ class SampledMoments:
     def gradient(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the exact gradients, shape (n, m) each, of what a call returns.
 
-        Where the standard deviation is zero its gradient is given as zero.
+        In the output's unit per unit of each variable. Where the standard deviation is zero its
+        gradient is given as zero. Parameters and errors as in `__call__`.
         """
         checked = self._checked(designs)
         dmean, dstd = np.empty((2, *checked.shape))

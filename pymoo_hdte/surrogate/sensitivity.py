@@ -27,11 +27,12 @@ Rule = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class SobolIndices:
-    """How the variance of an output divides among its independent inputs.
+    """How the variance of an output divides among its independent inputs (Sobol indices).
 
     Attributes
     ----------
     names : tuple of str, length d
+        Of the inputs.
     mean, variance : float
         Of the output, in its unit and the square of that.
     first : ndarray, shape (d,)
@@ -43,7 +44,7 @@ class SobolIndices:
     Notes
     -----
     First-order indices sum to at most 1, total ones to at least 1. All are 0 where the output does
-    not vary and there is nothing to share.
+    not vary and there is nothing to share. Sobol, Mathematics and Computers in Simulation 55, 2001.
     """
 
     names: tuple[str, ...]
@@ -56,7 +57,10 @@ class SobolIndices:
 def sobol_indices(
     surrogate: ChebyshevSurrogate, inputs: Sequence[UncertainInput], design: ArrayLike
 ) -> SobolIndices:
-    """Return the indices over the scatter around one design.
+    """Return the indices over the scatter around one design, in closed form.
+
+    From the coefficients in polynomials that are orthonormal under the inputs (Sudret, Reliability
+    Engineering and System Safety 93, 2008).
 
     Parameters
     ----------
@@ -99,11 +103,19 @@ def sobol_indices(
 def sobol_indices_over_box(surrogate: ChebyshevSurrogate, box: Box) -> SobolIndices:
     """Return the indices for variables that are uniform over a whole ``box``.
 
+    Closed form as in `sobol_indices` (Sudret 2008).
+
     Parameters
     ----------
     surrogate : ChebyshevSurrogate
+        Polynomial in d variables, of any orders.
     box : Box
         Of the surrogate's variables, e.g. ``surrogate.box`` itself.
+
+    Returns
+    -------
+    SobolIndices
+        Exact to rounding, as are its mean and variance.
 
     Raises
     ------

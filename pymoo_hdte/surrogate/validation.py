@@ -15,7 +15,7 @@ from pymoo_hdte.surrogate.box import Box
 def latin_hypercube(
     box: Box, n: int, random_state: int | np.random.Generator
 ) -> NDArray[np.float64]:
-    """Draw a Latin hypercube of ``n`` points, shape (n, d), in the box.
+    """Draw a Latin hypercube of ``n`` points in the box.
 
     Every variable has exactly one point in each of n equal slices of its interval (McKay,
     Beckman and Conover, Technometrics 21, 1979).
@@ -28,6 +28,11 @@ def latin_hypercube(
         Number of points, at least 1.
     random_state : int or numpy.random.Generator
         Source of the randomness, or a seed of at least 0 for one.
+
+    Returns
+    -------
+    ndarray, shape (n, d)
+        In the box's units.
 
     Raises
     ------
@@ -42,18 +47,18 @@ def latin_hypercube(
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Error measures of a prediction, in the output's unit unless stated."""
+    """Error measures of a prediction (Table 5)."""
 
     mae: float
-    """Mean absolute error."""
+    """Mean absolute error, in the output's unit."""
     rmse: float
-    """Root mean square error."""
+    """Root mean square error, in the output's unit."""
     mape_percent: float
     """Mean of the absolute errors relative to the actual values, in percent."""
     max_error: float
-    """Largest absolute error."""
+    """Largest absolute error, in the output's unit."""
     r2: float
-    """Coefficient of determination: 1 minus residual over total sum of squares."""
+    """Coefficient of determination, dimensionless: 1 minus residual over total sum of squares."""
 
 
 def accuracy(predicted: ArrayLike, actual: ArrayLike) -> Accuracy:
@@ -62,7 +67,8 @@ def accuracy(predicted: ArrayLike, actual: ArrayLike) -> Accuracy:
     Parameters
     ----------
     predicted, actual : array_like, shape (n,)
-        Finite; the actual values must not be zero (relative errors) nor all equal (R2).
+        Finite, of one unit; the actual values must not be zero (relative errors) nor all equal
+        (R2).
 
     Returns
     -------

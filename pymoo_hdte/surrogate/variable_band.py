@@ -29,9 +29,10 @@ class VariableBandMoments:
 
     A designed variable is x = u (1 + t s) with s uniform in -1..1 and one tolerance t for all. At
     every (u, t) the surrogate is written anew in polynomials that are orthonormal under the
-    scatter: Legendre's in each s, others in the noise. This is a polynomial chaos expansion of
-    finite degree, hence exact. Its first coefficient is the mean, and the squares of all others
-    add up to the variance; nothing large is subtracted. `ExactMoments` is faster where t is fixed.
+    scatter: Legendre's in each s, others in the noise. This is a polynomial chaos expansion (Xiu
+    and Karniadakis, SIAM J. Scientific Computing 24, 2002) of finite degree, hence exact. Its first
+    coefficient is the mean, and the squares of all others add up to the variance; nothing large is
+    subtracted. `ExactMoments` is faster where t is fixed.
 
     Parameters
     ----------
@@ -83,6 +84,8 @@ class VariableBandMoments:
         ------
         ExtrapolationError
             If a design lies outside ``design_box``.
+        InvalidInput
+            If ``designs`` is no array of numbers of shape (n, m + 1).
         """
         points = self._inside(designs)
         mean, std = np.empty((2, len(points)))
@@ -95,8 +98,8 @@ class VariableBandMoments:
     def gradient(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the gradients of mean and standard deviation, shape (n, m + 1) each.
 
-        The gradient of a standard deviation of zero is given as zero. Arguments and errors as in a
-        call.
+        In the output's unit per unit of each variable. The gradient of a standard deviation of zero
+        is given as zero. Parameters and errors as in `__call__`.
         """
         points = self._inside(designs)
         dmean, dstd = np.empty((2, *points.shape))
