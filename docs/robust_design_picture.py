@@ -1,4 +1,4 @@
-"""Draw docs/robust_design.png, the first picture of the README: scatter of the DTE, and the front."""
+"""Draw docs/robust_design.png, the first picture of the README: scatter of the DTE and front."""
 
 from pathlib import Path
 

@@ -1,14 +1,26 @@
-"""The README's Python runs as printed, and prints what it says."""
+"""The README's Python and commands run as printed, its pictures are drawn, its numbers are ours."""
 
 import contextlib
+import csv
 import io
 import re
+import shlex
+import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.image import imread
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+from experiments.published_values import TABLE_7
+from pymoo_hdte import cli
+from pymoo_hdte.problems import RobustDTE
+from pymoo_hdte.surrogate import latin_hypercube
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+COMMANDS = re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
 
 
 def output_of(snippet: str) -> str:
@@ -19,12 +31,15 @@ def output_of(snippet: str) -> str:
 
 
 def test_study_prints_what_the_readme_says():
-    printed = output_of(SNIPPETS[0])
-    assert re.search(r"prints `(.*?)`", README).group(1) == printed
+    assert re.search(r"prints `(.*?)`", README).group(1) == output_of(SNIPPETS[0])
 
 
-def test_the_swarm_to_use_prints_what_the_readme_says():
-    assert re.findall(r"prints `(.*?)`", README)[1] == output_of(SNIPPETS[1])
+def test_the_friction_of_another_machine_is_named():
+    printed = output_of(SNIPPETS[1])
+    said = re.findall(r"prints `(.*?)`", README)[1]
+    beginning, _ = said.split("...")
+    assert printed.startswith(beginning)
+    assert float(beginning.split("=")[1]) == pytest.approx(0.3, rel=0.01)
 
 
 def test_both_solvers_of_the_drive_snippet_agree():
@@ -33,12 +48,89 @@ def test_both_solvers_of_the_drive_snippet_agree():
     assert integrated != pytest.approx(steady, rel=1e-4)
 
 
-def test_the_friction_of_another_machine_is_named():
-    printed = output_of(SNIPPETS[3])
-    assert printed.startswith("named")
-    level = float(re.search(r"CoulombFriction\(level=([\d.]+)\)", printed).group(1))
-    assert level == pytest.approx(0.3, rel=0.01)
-
-
 def test_every_snippet_is_run_here():
-    assert len(SNIPPETS) == 4
+    assert len(SNIPPETS) == 3
+
+
+def test_the_commands_for_a_design_run_one_after_the_other(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    lines = [line for block in COMMANDS for line in block.splitlines()]
+    designs = [line for line in lines if "pymoo-hdte optimise" in line or "simulate" in line]
+    assert len(designs) == 2
+    for line in designs:
+        assert cli.main(shlex.split(line)[1:]) == 0
+    assert (tmp_path / "reports" / "simulation" / "report.html").is_file()
+
+
+def test_the_campaign_to_try_holds_the_effect_that_is_named(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    make, look = next(block for block in COMMANDS if "virtual_campaign" in block).splitlines()
+    _, script, folder = shlex.split(make)
+    monkeypatch.setattr(sys, "argv", [script, str(tmp_path / folder)])
+    exec(compile(Path(script).read_text(), script, "exec"), {"__name__": "__main__"})
+    _, *arguments = shlex.split(look)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(arguments) == 0
+    printed = capsys.readouterr().out
+    assert "hidden is HiddenEffect(name='torque_ripple'" in printed
+    assert "named: torque_ripple at the input" in printed
+
+
+def test_the_first_picture_is_drawn_by_its_script(tmp_path):
+    script = ROOT / "docs" / "robust_design_picture.py"
+    scope = {"__file__": str(script), "__name__": "picture"}
+    exec(compile(script.read_text(), str(script), "exec"), scope)
+    scope["draw"](tmp_path / "drawn.png")
+    drawn, stored = imread(tmp_path / "drawn.png"), imread(ROOT / "docs" / "robust_design.png")
+    assert drawn.shape == stored.shape
+    assert np.mean(np.abs(drawn - stored)) < 0.005
+
+
+def test_pictures_of_the_readme_exist_and_are_small():
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", README)
+    assert len(pictures) == 2
+    assert sum((ROOT / name).stat().st_size for name in pictures) < 300_000
+
+
+def test_links_lead_to_files():
+    for target in re.findall(r"\]\((?!http)(.*?)\)", README):
+        assert (ROOT / target).exists()
+
+
+def row(words: str) -> list[list[float]]:
+    """Return the numbers in the cells of the table row that holds these words."""
+    line = next(line for line in README.splitlines() if line.startswith("|") and words in line)
+    _, _, paper, ours, _ = line.split("|")
+    return [[float(n) for n in re.findall(r"\d+\.\d+", cell)] for cell in (paper, ours)]
+
+
+class TestNumbersBesideThePaper:
+    def test_nominal_design(self):
+        _, ours = row("DTE of the nominal design")
+        problem = RobustDTE()
+        assert ours == [round(value, 2) for value in problem.evaluate(problem.nominal)]
+
+    def test_surrogate(self):
+        problem = RobustDTE()
+        _, (ours,) = row("RMSE over the box")
+        box = problem.surrogate.box
+        points = latin_hypercube(box, 4000, np.random.default_rng(2))
+        error = problem.surrogate(points) - problem.model.dte_arcsec(points)
+        assert np.sqrt(np.mean(error**2)) == pytest.approx(ours, rel=0.15)
+
+    def test_balanced_designs(self):
+        paper, ours = row("The paper's balanced design")
+        assert paper == [85.99, 15.77]
+        design = [2.998e4, 2.282e-4, 1.887e-4, 3.405e-4]
+        assert ours == [round(value, 2) for value in RobustDTE().evaluate(np.array(design))]
+
+    def test_published_comparison(self):
+        for words, indicator in (("IGD of AMP-MOPSO", "igd"), ("Spacing of the same", "spacing")):
+            paper, _ = row(words)
+            names = ("AMP-MOPSO", "MOPSO", "NSGA-II")
+            assert paper == [getattr(TABLE_7[name], indicator) for name in names]
+
+    def test_rows_have_both_sides(self):
+        with io.StringIO(README) as text:
+            rows = [line for line in csv.reader(text, delimiter="|") if len(line) == 5]
+        assert all(cell.strip() for line in rows for cell in line[2:4])
