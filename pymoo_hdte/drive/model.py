@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib.resources import as_file, files
@@ -16,6 +16,7 @@ from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
 from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100
 from pymoo_hdte.drive.effects import Effect, effect_from_fields, place_of
+from pymoo_hdte.drive.model_file import FORMAT, model_tables, parts_of
 from pymoo_hdte.drive.order_spectrum import OrderSpectrum, sine_phasor
 from pymoo_hdte.drive.steady_state import steady_state
 from pymoo_hdte.drive.toml_fields import Fields, read_toml
@@ -213,6 +214,33 @@ class DriveModel:
             "effects": [effect.to_dict() for effect in self.effects],
         }
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the whole model to ``path``, replacing it in one step (``docs/file_format.md``).
+
+        Raises
+        ------
+        InvalidInput
+            If the file could not give the model back: a text or the list of error sources is
+            empty, or an effect is not one that `effect_from_fields` builds.
+        OSError
+            If the file cannot be written.
+        """
+        tables = model_tables(self)
+        if _from_fields(*parts_of(tables)).effects != tuple(self.effects):
+            raise InvalidInput("effects", self.effects, "those that `effect_from_fields` builds")
+        FORMAT.write(path, tables)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> DriveModel:
+        """Read a model that `save` wrote.
+
+        Raises
+        ------
+        InvalidInput, OSError
+            As `FileFormat.read`, and for a field that `load_datasheet` or `load_model` refuses.
+        """
+        return _from_fields(*parts_of(FORMAT.read(path)[0]))
+
 
 def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
     """Read a model file in the format of ``drive/data/calibrated.toml``.
@@ -224,7 +252,10 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
     OSError
         If the file cannot be read.
     """
-    fields = read_toml(Path(path))
+    return _from_fields(read_toml(Path(path)), sheet)
+
+
+def _from_fields(fields: Fields, sheet: DataSheet) -> DriveModel:
     error = fields.table("kinematic_error")
     effects = fields.tables("effect") if fields.has("effect") else []
     model = DriveModel(
@@ -233,9 +264,9 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
         provenance=fields.text("provenance"),
         sheet=sheet,
         kinematic_error=KinematicError(
-            orders=_numbers(error, "orders"),
-            amplitudes=_numbers(error, "amplitudes"),
-            phases=_numbers(error, "phases"),
+            orders=error.numbers("orders"),
+            amplitudes=error.numbers("amplitudes"),
+            phases=error.numbers("phases"),
             reading=error.text("reading"),
             std=error.quantity("std", "angle"),
         ),
@@ -261,10 +292,3 @@ def preset(name: str) -> DriveModel:
     one_of("model", name, PRESETS)
     with as_file(files("pymoo_hdte.drive") / "data" / f"{name}.toml") as path:
         return load_model(path, hs_20_100())
-
-
-def _numbers(table: Fields, field: str) -> tuple[float, ...]:
-    raw = table.take(field, "a list of numbers")
-    if not isinstance(raw, Sequence) or isinstance(raw, str):
-        raise InvalidInput(field, raw, "a list of numbers")
-    return tuple(real_number(f"{field}[{index}]", value) for index, value in enumerate(raw))
