@@ -1,7 +1,7 @@
 """One file for what shall be loaded years later: npz with a JSON header, versioned, no pickle.
 
 ``docs/file_format.md`` describes the files. They are read as if an enemy had written them: sizes
-are compared with what is really there before anything is unpacked, and nothing is ever executed.
+are compared with what is really there, nothing is unpacked, and nothing is ever executed.
 """
 
 from __future__ import annotations
@@ -143,16 +143,13 @@ def _replace(target: Path, contents: bytes) -> None:
 
 
 def _contents_of(path: Path) -> bytes:
-    status = path.stat()
     # Reading a pipe or a device may never end.
-    if not stat.S_ISREG(status.st_mode):
+    if not stat.S_ISREG(path.stat().st_mode):
         raise InvalidInput("path", str(path), "a regular file")
-    contents = b""
-    if status.st_size <= LARGEST_FILE:
-        with path.open("rb") as file:
-            contents = file.read(LARGEST_FILE + 1)
-    size = max(status.st_size, len(contents))
-    if size > LARGEST_FILE:
+    with path.open("rb") as file:
+        contents = file.read(LARGEST_FILE + 1)
+    if len(contents) > LARGEST_FILE:
+        size = path.stat().st_size
         raise InvalidInput("size of the file", size, f"at most {LARGEST_FILE} bytes")
     return contents
 
@@ -161,19 +158,18 @@ def _members(contents: bytes) -> dict[str, bytes]:
     """Return the members of a zip file by their names without ``.npy``."""
     if len(contents) > LARGEST_FILE:
         raise ValueError(f"its size is {len(contents)}, allowed: at most {LARGEST_FILE} bytes")
-    mark, *_, directory_size, _, comment = _END_OF_DIRECTORY.unpack(
-        contents[-_END_OF_DIRECTORY.size :]
-    )
+    end = contents[-_END_OF_DIRECTORY.size :]
+    mark, *_, directory_size, _, _ = _END_OF_DIRECTORY.unpack(end)
     # zipfile believes this size, and builds an object for every entry it finds.
-    if mark != b"PK\5\6" or comment or contents[_MARK_OF_ZIP64] == b"PK\6\7":
+    if mark != b"PK\5\6" or contents[_MARK_OF_ZIP64] == b"PK\6\7":
         raise ValueError("it does not end as a plain zip file")
     if directory_size > _LARGEST_DIRECTORY:
         raise ValueError("it has too many members")
     members = {}
     with zipfile.ZipFile(io.BytesIO(contents)) as archive:
         for entry in archive.infolist():
-            # Without compression no member is larger than the file: nothing to blow up.
-            if entry.compress_type != zipfile.ZIP_STORED or entry.file_size > len(contents):
+            # Without compression no member is larger than the file, whatever size it states.
+            if entry.compress_type != zipfile.ZIP_STORED:
                 raise ValueError(f"{entry.filename!r} is compressed")
             name = entry.filename.removesuffix(".npy")
             if name in members or name == entry.filename:
@@ -213,10 +209,12 @@ def _header(member: bytes) -> Any:
         parse_constant=_finite,
     )
     level, depth = [header], 0
-    while level:
+    while level := [part for part in level if isinstance(part, dict | list)]:
+        depth += 1
         if depth > DEEPEST_HEADER:
             raise ValueError(f"the header is nested deeper than {DEEPEST_HEADER}")
-        level, depth = [part for whole in level for part in _parts(whole)], depth + 1
+        parts = [part.values() if isinstance(part, dict) else part for part in level]
+        level = [one for some in parts for one in some]
     return header
 
 
@@ -237,12 +235,6 @@ def _finite(text: str) -> float:
 def _whole(text: str) -> int:
     _finite(text)
     return int(text)
-
-
-def _parts(value: Any) -> list[Any]:
-    if isinstance(value, dict):
-        return list(value.values())
-    return value if isinstance(value, list) else []
 
 
 def _as_json(header: Mapping[str, Any]) -> str:

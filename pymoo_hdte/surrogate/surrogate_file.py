@@ -45,7 +45,7 @@ def write_surrogate(
     FORMAT.write(path, header, coefficients=coefficients)
 
 
-def read_surrogate(path: str | os.PathLike[str]) -> tuple[Box, NDArray[np.float64], Any]:
+def read_surrogate(path: str | os.PathLike[str]) -> tuple[Box, NDArray[np.float64], dict[str, Any]]:
     """Return box, coefficients and provenance of a file that `write_surrogate` made.
 
     Raises
@@ -64,6 +64,8 @@ def read_surrogate(path: str | os.PathLike[str]) -> tuple[Box, NDArray[np.float6
     box = Box(header["names"], _numbers("lower", header), _numbers("upper", header))
     if len(actual) == len(box) and actual != orders:
         raise InvalidInput("orders of the coefficients", actual, f"as stated: {orders}")
+    if not isinstance(header["provenance"], dict):
+        raise InvalidInput("provenance", header["provenance"], "a table")
     return box, arrays["coefficients"], header["provenance"]
 
 
