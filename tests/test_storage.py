@@ -120,6 +120,17 @@ def test_a_file_is_read_by_numpy_alone(kind):
         assert set(arrays) - {"header"} <= {"coefficients"}
 
 
+def test_the_documented_reading_by_numpy_gives_the_surrogate_s_value(tmp_path, monkeypatch, capsys):
+    document = Path(__file__).parents[1] / "docs" / "file_format.md"
+    snippet = document.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    (tmp_path / "surrogate.npz").write_bytes(SURROGATE)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(snippet, str(document), "exec"), {})
+    surrogate = ChebyshevSurrogate.load("surrogate.npz")
+    point = surrogate.box.lower + 0.3 * (surrogate.box.upper - surrogate.box.lower)
+    assert float(capsys.readouterr().out) == pytest.approx(surrogate([point])[0], rel=1e-12)
+
+
 def test_earlier_versions_are_read_and_later_ones_named(tmp_path):
     first, second = (FileFormat("a test", version, ("size",)) for version in (1, 2))
     first.write(tmp_path / "first", {"size": 1})
