@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from contextlib import redirect_stdout
+from importlib.metadata import version
 from multiprocessing.pool import ThreadPool
 
 import numpy as np
@@ -32,6 +33,7 @@ from pymoo.util.display.column import Column
 from pymoo.util.display.multi import MultiObjectiveOutput
 from swarm_problems import digest
 
+import pymoo_hdte
 from pymoo_hdte.algorithms import AMPMOPSO, MOPSO, ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
@@ -62,6 +64,29 @@ def problem(request):
 @pytest.fixture(scope="module")
 def dte():
     return RobustDTE()
+
+
+# --- import -----------------------------------------------------------------------------------
+
+IMPORTED = """
+import sys
+before = set(sys.modules)
+import pymoo_hdte
+print(*set(sys.modules) - before)
+"""
+
+
+def test_the_package_s_name_imports_nothing_else():
+    """As `import pymoo`, which takes hardly longer than Python's own start."""
+    command = [sys.executable, "-c", IMPORTED]
+    done = subprocess.run(command, check=True, timeout=60, capture_output=True, text=True)
+    assert done.stdout.split() == ["pymoo_hdte"]
+
+
+def test_the_version_is_that_of_the_installed_package():
+    assert pymoo_hdte.__version__ == version("pymoo-hdte")
+    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+        _ = pymoo_hdte.nonsense
 
 
 # --- minimize ---------------------------------------------------------------------------------
