@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 
-LARGEST_FILE = 2**24
-"""Bytes; two million coefficients."""
+LARGEST_FILE = 2**22
+"""Bytes; half a million coefficients, as of order 12 in five variables."""
 
-LARGEST_HEADER = 2**20
+LARGEST_HEADER = 2**18
 """Characters."""
 
 DEEPEST_HEADER = 50

@@ -177,7 +177,7 @@ class Wobble:
         ({"provenance": ""}, "model.provenance is '', allowed: a non-empty string"),
         ({"description": 7}, "model.description is 7"),
         ({"sheet": replace(MODEL.sheet, error_sources=())}, "data_sheet.error_source is"),
-        ({"description": "long" * 2**19}, "at most 1048576 characters"),
+        ({"description": "long" * 2**16}, "at most 262144 characters"),
     ],
 )
 def test_what_a_file_cannot_give_back_is_not_written(tmp_path, changes, message):

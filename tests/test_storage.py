@@ -192,7 +192,7 @@ def end_of_zip64(directory):
 
 
 ENTRY = b"PK\1\2" + struct.pack("<4B4HL2L5H2L", *[20, 3, 20, 0] + [0] * 7 + [1] + [0] * 6) + b"a"
-CROWD = ENTRY * 200_000
+CROWD = ENTRY * 80_000
 STORED_AND_NOT = [("header.npy", HEADER, zipfile.ZIP_STORED), ("coefficients.npy", NUMBERS, 8)]
 BARE = [(name.removesuffix(".npy"), data) for name, data in members_of(SURROGATE).items()]
 WHOLE = list(members_of(SURROGATE).items())

@@ -133,7 +133,7 @@ class ChebyshevSurrogate:
         Raises
         ------
         InvalidInput
-            If it is too large for a file: about two million coefficients.
+            If it is too large for a file: more than half a million coefficients.
         OSError
             If the file cannot be written.
         """
