@@ -4,6 +4,13 @@
 polynomial with exact moments, ``problems`` and ``algorithms`` plug both into pymoo.
 """
 
-from importlib.metadata import version
+__version__: str
 
-__version__ = version("pymoo-hdte")
+
+def __getattr__(name: str) -> str:
+    # The metadata of packages take longer to look up than all of `import pymoo`.
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("pymoo-hdte")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -10,13 +10,13 @@ from pymoo_hdte.drive.effects import (
     MeshStiffnessVariation,
 )
 from pymoo_hdte.drive.harmonic_balance import harmonic_balance
+from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.measurement import low_pass, measured_dte
 from pymoo_hdte.drive.model import (
     PARAMETER_UNITS,
     PARAMETERS,
     PRESETS,
     DriveModel,
-    KinematicError,
     load_model,
     preset,
 )

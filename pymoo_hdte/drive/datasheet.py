@@ -112,6 +112,18 @@ class Nominal:
             real_number(field.name, getattr(self, field.name), above=0.0)
 
 
+NOMINAL_QUANTITIES = {
+    "static_error": "angle",
+    "stiffness": "stiffness",
+    "input_inertia": "inertia",
+    "input_damping": "damping",
+    "mesh_damping": "damping",
+    "output_inertia": "inertia",
+    "output_damping": "damping",
+}
+"""The quantity, among `toml_fields.UNITS`, of every field of `Nominal`."""
+
+
 @dataclass(frozen=True)
 class DataSheet:
     """A harmonic drive with fixed flexspline, as its maker and the test bench describe it.
@@ -195,7 +207,17 @@ def load_datasheet(path: str | Path) -> DataSheet:
     OSError
         If the file cannot be read.
     """
-    sheet = read_toml(Path(path))
+    return datasheet_from_fields(read_toml(Path(path)))
+
+
+def datasheet_from_fields(sheet: Fields) -> DataSheet:
+    """Build a data sheet from its table.
+
+    Raises
+    ------
+    InvalidInput
+        As `load_datasheet`.
+    """
     teeth = sheet.table("teeth")
     rated = sheet.table("rated")
     result = DataSheet(
@@ -221,16 +243,9 @@ def hs_20_100() -> DataSheet:
 
 
 def _nominal(table: Fields) -> Nominal:
-    kinds = {
-        "static_error": "angle",
-        "stiffness": "stiffness",
-        "input_inertia": "inertia",
-        "input_damping": "damping",
-        "mesh_damping": "damping",
-        "output_inertia": "inertia",
-        "output_damping": "damping",
+    values = {
+        name: table.quantity(name, kind, above=0.0) for name, kind in NOMINAL_QUANTITIES.items()
     }
-    values = {name: table.quantity(name, kind, above=0.0) for name, kind in kinds.items()}
     table.finish()
     return Nominal(**values)
 

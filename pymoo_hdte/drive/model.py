@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from importlib.resources import as_file, files
@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
+from pymoo_hdte.checks import InvalidInput, finite_array, one_of
 from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100
 from pymoo_hdte.drive.effects import Effect, effect_from_fields, place_of
-from pymoo_hdte.drive.order_spectrum import OrderSpectrum, sine_phasor
+from pymoo_hdte.drive.kinematic_error import KinematicError
+from pymoo_hdte.drive.model_file import FORMAT, model_tables, parts_of
+from pymoo_hdte.drive.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.steady_state import steady_state
 from pymoo_hdte.drive.toml_fields import Fields, read_toml
 from pymoo_hdte.units import ARCSEC
@@ -32,74 +34,6 @@ PRESETS = ("published", "calibrated", "resonant")
 
 LARGEST_STATIC_ERROR = 0.1
 """rad; any larger theta_s must be an angle in other units."""
-
-_READINGS = {"peak_to_peak": 1.0, "semi_amplitude": 2.0}
-
-
-@dataclass(frozen=True)
-class KinematicError:
-    """Shape and scatter of theta_s = sum_j a_j sin(o_j theta_in + phi_j), as Eq. (1) has it.
-
-    Attributes
-    ----------
-    orders, amplitudes, phases : tuple of float, length n_orders
-        o_j in cycles per input turn; a_j relative to each other; phi_j in rad.
-    reading : str
-        What the value theta_s measures: the ``"peak_to_peak"`` of the sum over one output turn, or
-        its ``"semi_amplitude"``, half of that.
-    std : float
-        Standard deviation of theta_s over prototypes (before truncation at 3 std), rad.
-
-    Raises
-    ------
-    InvalidInput
-        For another reading, lists of different lengths, a number that is not finite or out of
-        range, or amplitudes that are all 0.
-    """
-
-    orders: tuple[float, ...]
-    amplitudes: tuple[float, ...]
-    phases: tuple[float, ...]
-    reading: str
-    std: float
-
-    def __post_init__(self) -> None:
-        one_of("kinematic_error.reading", self.reading, tuple(_READINGS))
-        real_number("kinematic_error.std", self.std, above=0.0)
-        orders = finite_array("kinematic_error.orders", self.orders, (None,))
-        if not orders.size or np.any(orders <= 0.0):
-            raise InvalidInput("kinematic_error.orders", self.orders, "one or more, above 0")
-        for name in ("amplitudes", "phases"):
-            finite_array(f"kinematic_error.{name}", getattr(self, name), (len(orders),))
-        if min(self.amplitudes) < 0.0 or max(self.amplitudes) == 0.0:
-            raise InvalidInput(
-                "kinematic_error.amplitudes", self.amplitudes, "at least 0, not all 0"
-            )
-
-    def unit_phasors(self, ratio: float) -> NDArray[np.complex128]:
-        """Return the phasors of the error per rad of its value theta_s.
-
-        Parameters
-        ----------
-        ratio : float
-            Transmission ratio N, dimensionless.
-
-        Returns
-        -------
-        ndarray of complex, shape (n_orders,)
-            p_j, dimensionless: the error is its value times Re sum_j p_j exp(i o_j theta_in).
-
-        Raises
-        ------
-        InvalidInput
-            If the ratio is not above 0, or the lines cancel each other.
-        """
-        phasors = sine_phasor(self.amplitudes, self.phases)
-        shape = OrderSpectrum(np.array(self.orders), phasors[None, :])
-        peak_to_peak = shape.peak_to_peak(ratio)[0]
-        if peak_to_peak <= 1e-9 * sum(self.amplitudes):
-            raise InvalidInput("kinematic_error", self, "lines that do not cancel each other")
-        return phasors * _READINGS[self.reading] / peak_to_peak
 
 
 @dataclass(frozen=True)
@@ -272,6 +206,42 @@ class DriveModel:
             "effects": [effect.to_dict() for effect in self.effects],
         }
 
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the whole model to ``path``, replacing it in one step (``docs/file_format.md``).
+
+        Raises
+        ------
+        InvalidInput
+            If the file could not give the model back: a text or the list of error sources is
+            empty, or an effect is not one that `effect_from_fields` builds.
+        OSError
+            If the file cannot be written.
+        """
+        tables = model_tables(self)
+        if _from_fields(*parts_of(tables)).effects != tuple(self.effects):
+            raise InvalidInput("effects", self.effects, "those that `effect_from_fields` builds")
+        FORMAT.write(path, tables)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> DriveModel:
+        """Read a model that `save` wrote.
+
+        Parameters
+        ----------
+        path : str or path-like
+            Of a file in the format of ``docs/file_format.md``.
+
+        Returns
+        -------
+        DriveModel
+
+        Raises
+        ------
+        InvalidInput, OSError
+            As `FileFormat.read`, and for a field that `load_datasheet` or `load_model` refuses.
+        """
+        return _from_fields(*parts_of(FORMAT.read(path)[0]))
+
 
 def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
     """Read a model file in the format of ``drive/data/calibrated.toml``.
@@ -294,7 +264,10 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
     OSError
         If the file cannot be read.
     """
-    fields = read_toml(Path(path))
+    return _from_fields(read_toml(Path(path)), sheet)
+
+
+def _from_fields(fields: Fields, sheet: DataSheet) -> DriveModel:
     error = fields.table("kinematic_error")
     effects = fields.tables("effect") if fields.has("effect") else []
     model = DriveModel(
@@ -303,9 +276,9 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
         provenance=fields.text("provenance"),
         sheet=sheet,
         kinematic_error=KinematicError(
-            orders=_numbers(error, "orders"),
-            amplitudes=_numbers(error, "amplitudes"),
-            phases=_numbers(error, "phases"),
+            orders=error.numbers("orders"),
+            amplitudes=error.numbers("amplitudes"),
+            phases=error.numbers("phases"),
             reading=error.text("reading"),
             std=error.quantity("std", "angle"),
         ),
@@ -338,10 +311,3 @@ def preset(name: str) -> DriveModel:
     one_of("model", name, PRESETS)
     with as_file(files("pymoo_hdte.drive") / "data" / f"{name}.toml") as path:
         return load_model(path, hs_20_100())
-
-
-def _numbers(table: Fields, field: str) -> tuple[float, ...]:
-    raw = table.take(field, "a list of numbers")
-    if not isinstance(raw, Sequence) or isinstance(raw, str):
-        raise InvalidInput(field, raw, "a list of numbers")
-    return tuple(real_number(f"{field}[{index}]", value) for index, value in enumerate(raw))

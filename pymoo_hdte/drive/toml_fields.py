@@ -89,6 +89,15 @@ class Fields:
         """Return a dimensionless finite number within ``limits`` (see `checks.real_number`)."""
         return real_number(self._name(field), self.take(field, "a finite number"), **limits)
 
+    def numbers(self, field: str) -> tuple[float, ...]:
+        """Return a list of finite numbers."""
+        raw = self.take(field, "a list of numbers")
+        if not isinstance(raw, list):
+            raise InvalidInput(self._name(field), raw, "a list of numbers")
+        return tuple(
+            real_number(f"{self._name(field)}[{index}]", value) for index, value in enumerate(raw)
+        )
+
     def quantity(self, field: str, kind: str, **limits: float) -> float:
         """Return a quantity in SI units, given as ``{ value = ..., unit = "..." }``."""
         units = UNITS[kind]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from typing import Any
 
 from pymoo_hdte.drive.datasheet import DataSheet
 from pymoo_hdte.drive.model import DriveModel
+from pymoo_hdte.drive.model_file import model_tables, sheet_table
 
 
 def model_toml(model: DriveModel) -> str:
@@ -14,74 +16,29 @@ def model_toml(model: DriveModel) -> str:
 
     Its values are in SI units, with all their digits.
     """
-    error = model.kinematic_error
-    top = {
-        "name": model.name,
-        "description": model.description,
-        "provenance": model.provenance,
-    }
-    kinematic_error = {
-        "orders": list(error.orders),
-        "amplitudes": list(error.amplitudes),
-        "phases": list(error.phases),
-        "reading": error.reading,
-        "std": _quantity(error.std, "rad"),
-    }
-    parts = [
-        _fields(top),
-        _table("[kinematic_error]", kinematic_error),
-        *(_table("[[effect]]", effect.to_dict()) for effect in model.effects),
-    ]
-    return "\n".join(parts)
+    return _document(model_tables(model)["model"])
 
 
 def sheet_toml(sheet: DataSheet) -> str:
     """Return a data sheet as the text that `load_datasheet` reads back exactly, in SI units."""
-    teeth = {
-        "flexspline": sheet.flexspline_teeth,
-        "circular_spline": sheet.circular_spline_teeth,
-    }
-    rated = {
-        "input_speed": _quantity(sheet.input_speed, "rad/s"),
-        "load_torque": _quantity(sheet.load_torque, "N.m"),
-    }
-    units = {"static_error": "rad", "stiffness": "N.m/rad"} | {
-        f"{port}_inertia": "kg.m2" for port in ("input", "output")
-    }
-    nominal = {
-        field: _quantity(value, units.get(field, "N.m.s/rad"))
-        for field, value in vars(sheet.nominal).items()
-    }
-    mesh = {
-        "error_influence": sheet.mesh.error_influence,
-        "teeth_in_mesh": sheet.mesh.teeth_in_mesh,
-        "pitch_diameter": _quantity(sheet.mesh.pitch_diameter, "m"),
-        "pressure_angle": _quantity(sheet.mesh.pressure_angle, "rad"),
-    }
-    sources = [
-        {
-            "component": source.component,
-            "symbol": source.symbol,
-            "description": source.description,
-            "class": source.error_class,
-            "mean": _quantity(source.mean, "m"),
-            "std": _quantity(source.std, "m"),
-        }
-        for source in sheet.error_sources
-    ]
-    parts = [
-        _fields({"name": sheet.name, "source": sheet.source}),
-        _table("[teeth]", teeth),
-        _table("[rated]", rated),
-        _table("[nominal]", nominal),
-        _table("[mesh]", mesh),
-        *(_table("[[error_source]]", source) for source in sources),
-    ]
+    return _document(sheet_table(sheet))
+
+
+def _document(table: Mapping[str, Any]) -> str:
+    """Return a table as TOML: first its plain fields, then the tables in it."""
+    plain = {name: value for name, value in table.items() if not _holds_tables(value)}
+    parts = [_fields(plain)]
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            parts.append(_table(f"[{name}]", value))
+        elif _holds_tables(value):
+            parts.extend(_table(f"[[{name}]]", row) for row in value)
     return "\n".join(parts)
 
 
-def _quantity(value: float, unit: str) -> dict[str, object]:
-    return {"value": value, "unit": unit}
+def _holds_tables(value: object) -> bool:
+    rows = value if isinstance(value, list) else [value]
+    return any(isinstance(row, Mapping) for row in rows)
 
 
 def _table(heading: str, fields: Mapping[str, object]) -> str:

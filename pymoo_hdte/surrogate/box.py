@@ -14,6 +14,9 @@ from pymoo_hdte.checks import InvalidInput, finite_array
 # Points computed from the bounds themselves miss them by a few roundings; those are let in.
 _EDGE = 1e-12
 
+LARGEST = 1e150
+"""What may be squared and is still finite: the limit of bounds and coefficients."""
+
 
 class ExtrapolationError(InvalidInput):
     """A point lies outside the box on which a polynomial was built.
@@ -36,7 +39,8 @@ class Box:
     Raises
     ------
     InvalidInput
-        If names repeat or are no words, or bounds are not finite, in order and of length d.
+        If names repeat or are no words, or bounds are not finite, in order and of length d, or
+        beyond +-1e150.
 
     Attributes
     ----------
@@ -57,6 +61,9 @@ class Box:
         for name, low, high in zip(names, lower, upper, strict=True):
             if not low < high:
                 raise InvalidInput(f"upper[{name!r}]", float(high), f"above lower = {low!s}")
+            if 0.5 * high - 0.5 * low == 0.0 or max(-low, high) > LARGEST:
+                allowed = f"apart by more than the smallest number, within +-{LARGEST:g}"
+                raise InvalidInput(f"bounds of {name!r}", (float(low), float(high)), allowed)
         object.__setattr__(self, "names", names)
         arrays = {
             "lower": lower,

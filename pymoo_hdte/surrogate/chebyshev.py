@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, whole_number
-from pymoo_hdte.surrogate.box import Box
-from pymoo_hdte.surrogate.storage import read_archive, write_archive
+from pymoo_hdte.surrogate.box import LARGEST, Box
+from pymoo_hdte.surrogate.surrogate_file import read_surrogate, write_surrogate
 from pymoo_hdte.surrogate.tensor import (
     TensorPolynomial,
     chebyshev_nodes,
@@ -41,8 +41,8 @@ class ChebyshevSurrogate:
     Raises
     ------
     InvalidInput
-        If the coefficients are not finite, have another number of axes than the box has
-        variables, or an axis is empty; or if the provenance is no JSON.
+        If the coefficients are not finite or beyond +-1e150, have another number of axes than the
+        box has variables, or an axis is empty; or if the provenance is no JSON.
     """
 
     def __init__(
@@ -51,6 +51,9 @@ class ChebyshevSurrogate:
         array = finite_array("coefficients", coefficients, (None,) * len(box))
         if array.size == 0:
             raise InvalidInput("shape of coefficients", array.shape, "at least 1 on every axis")
+        largest = float(np.abs(array).max())
+        if largest > LARGEST:
+            raise InvalidInput("largest coefficient", largest, f"at most {LARGEST:g}")
         self.box = box
         self.polynomial = TensorPolynomial(array[None])
         self._derivatives = self.polynomial.derivatives(range(len(box)))
@@ -139,15 +142,16 @@ class ChebyshevSurrogate:
         return self._derivatives(self.box.to_cube(points).T).T / self.box.half_width
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the surrogate to ``path`` as an npz file, replacing it in one step."""
-        header = {
-            "names": self.box.names,
-            "lower": self.box.lower.tolist(),
-            "upper": self.box.upper.tolist(),
-            "orders": self.orders,
-            "provenance": self.provenance,
-        }
-        write_archive(path, header, self.coefficients)
+        """Write the surrogate to ``path``, replacing it in one step (``docs/file_format.md``).
+
+        Raises
+        ------
+        InvalidInput
+            If it is too large for a file: more than half a million coefficients.
+        OSError
+            If the file cannot be written.
+        """
+        write_surrogate(path, self.box, self.coefficients, self.provenance)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> ChebyshevSurrogate:
@@ -167,22 +171,9 @@ class ChebyshevSurrogate:
         InvalidInput
             If the file is damaged, incomplete, of another format or of a later version.
         OSError
-            If the file cannot be opened.
+            If the file cannot be read.
         """
-        header, coefficients = read_archive(path)
-        missing = {"names", "lower", "upper", "orders", "provenance"} - header.keys()
-        if missing:
-            raise InvalidInput("header of the file", sorted(header), f"also {sorted(missing)}")
-        surrogate = cls(
-            Box(header["names"], header["lower"], header["upper"]),
-            coefficients,
-            header["provenance"],
-        )
-        if list(surrogate.orders) != header["orders"]:
-            raise InvalidInput(
-                "orders of the coefficients", surrogate.orders, f"as stated: {header['orders']}"
-            )
-        return surrogate
+        return cls(*read_surrogate(path))
 
 
 def _as_json(provenance: Mapping[str, Any] | None) -> str:
