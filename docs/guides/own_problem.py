@@ -24,12 +24,12 @@ from pymoo_hdte.checks import InvalidInput
 # ---------
 #
 # Two bars carry a load of 100 kN. The left one is fixed 4 m beside the load, the right one 1 m. Choose their cross sections and the height of
-# the joint such that both the volume and the largest stress are small. No stress may exceed 100 MPa, and the right bar shall be at
-# least as thick as the left one (after Deb, *Multi-objective optimization using evolutionary algorithms*, Wiley 2001, Section 8.3, where the
-# second constraint is missing).
+# the joint such that both the volume and the largest stress are small. No stress may exceed 100 MPa. (The problem is that of Palli, Azarm,
+# McCluskey and Sundararajan, Journal of Mechanical Design 120, 1998, as Deb states it in *Multi-objective optimization using evolutionary
+# algorithms*, Wiley 2001.)
 #
 # ``X`` holds all particles of a generation, shape (n, 3). Fill ``out["F"]`` with (n, 2) objectives, all to be minimised, and ``out["G"]`` with
-# (n, 2) constraints, which hold where they are at most 0. Variables may differ in size by any factor; the swarms step in shares of the
+# (n, 1) constraints, which hold where they are at most 0. Variables may differ in size by any factor; the swarms step in shares of the
 # bounds.
 
 
@@ -38,7 +38,7 @@ class TwoBarTruss(Problem):
 
     def __init__(self):
         super().__init__(
-            n_var=3, n_obj=2, n_ieq_constr=2, xl=[1e-5, 1e-5, 1.0], xu=[0.01, 0.01, 3.0]
+            n_var=3, n_obj=2, n_ieq_constr=1, xl=[1e-5, 1e-5, 1.0], xu=[0.01, 0.01, 3.0]
         )
 
     def _evaluate(self, X, out, *args, **kwargs):
@@ -49,7 +49,7 @@ class TwoBarTruss(Problem):
         )
         volume = left * left_length + right * right_length
         out["F"] = np.column_stack([volume, stress])
-        out["G"] = np.column_stack([stress / 1e5 - 1.0, left / right - 1.0])
+        out["G"] = stress[:, np.newaxis] / 1e5 - 1.0
 
 
 truss = TwoBarTruss()
