@@ -10,6 +10,7 @@ The two files here describe an invented drive of ratio 81; their values are plau
 :doc:`/examples`. Copy them and put your own numbers in.
 """
 
+import sys
 import tempfile
 from pathlib import Path
 
@@ -33,7 +34,7 @@ from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import accuracy, latin_hypercube
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
-EXAMPLES = Path(__file__).parents[1] / "examples"
+EXAMPLES = Path(sys.argv[0]).resolve().parents[1] / "examples"  # in a notebook: your folder
 
 # %%
 # The data sheet

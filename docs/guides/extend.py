@@ -246,79 +246,34 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 #    Experiment("stiffer", "What a stiffer drive would gain"),
 #
 # and from then on ``python -m experiments stiffer`` runs it, stores its tables as CSV and its figures as PNG, and shows it on the page
-# ``index.html``. The folder is not part of the installed package; in a copy of the repository it is there.
-
-ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT))
-
-from experiments.campaign import Campaign, Run
-from experiments.registry import Context
-from experiments.result import Column, Finding, Picture, Result, Table
-from experiments.store import load, save
-
-# %%
+# ``index.html``. The folder is no part of the installed package; in a copy of the repository it is there.
+#
 # Long work is cut into *jobs*. A job holds all its settings, its seed included, and names itself by them. The campaign runs jobs on as many
-# processes or machines as the user allows, keeps every finished one on disk, and does not run it again.
+# processes or machines as the user allows, keeps every finished one on disk, and does not run it again. This is a whole experiment,
+# ``docs/examples/stiffer.py``:
+#
+# .. literalinclude:: ../examples/stiffer.py
+#    :language: python
+#
+# To try it without the line in the registry, all it takes is a folder and a campaign in this process:
 
+HERE = Path(sys.argv[0]).resolve().parent  # in a notebook: the folder docs/guides
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
-@dataclass(frozen=True)
-class StifferDrive:
-    """Moments of the nominal design with a multiple of its stiffness."""
-
-    factor: float
-
-    @property
-    def key(self):
-        """All settings in one name."""
-        return f"stiffer_{self.factor:g}"
-
-    def execute(self):
-        """Return columns, values (n, columns) and the seconds it took (none worth to tell)."""
-        problem = RobustDTE()
-        design = problem.nominal * [self.factor, 1.0, 1.0, 1.0]
-        moments = problem.evaluate(design[np.newaxis])
-        return Run(("mean", "std"), moments, 0.0)
-
-
-def run(context):
-    """Compare designs of rising stiffness."""
-    jobs = [StifferDrive(factor) for factor in (0.8, 0.9, 1.0, 1.1, 1.2)]
-    runs = context.campaign.run(jobs, "stiffer")
-    rows = [(job.factor, *one.values[0]) for job, one in zip(jobs, runs, strict=True)]
-    factors, means, stds = np.array(rows).T
-    fig, ax = plt.subplots(figsize=(6.5, 3.5), layout="constrained")
-    ax.errorbar(factors, means, yerr=stds, fmt="o", capsize=4)
-    ax.set(xlabel="stiffness / nominal stiffness", ylabel="DTE, mean ± std [arcsec]")
-    better = bool(means[-1] < means[2])
-    table = Table(
-        name="moments",
-        title="Stiffness and DTE",
-        columns=(Column("stiffness"), Column("mean", "arcsec"), Column("std", "arcsec")),
-        rows=tuple(rows),
-        findings=(Finding(better, "A stiffer drive has a smaller mean DTE.", check=True),),
-    )
-    caption = "Mean and standard deviation of the DTE."
-    return Result(
-        title="What a stiffer drive would gain",
-        command="python -m experiments stiffer",
-        paragraphs=(f"Only the stiffness changes, K = {preset('calibrated').nominal[1]:g} N.m/rad.",),
-        tables=(table,),
-        pictures=(Picture("stiffness", caption, fig),),
-    )
-
-
-# %%
-# Without the registry line, a folder and a campaign in this process do:
+from experiments.campaign import Campaign
+from experiments.registry import Context
+from experiments.store import load, save
+from stiffer import run
 
 with tempfile.TemporaryDirectory() as folder:
     out = Path(folder)
-    context = Context(seeds=1, out=out, campaign=Campaign(out))
-    save(out, "stiffer", run(context))
+    save(out, "stiffer", run(Context(seeds=1, out=out, campaign=Campaign(out))))
     (table,) = load(out, "stiffer").tables
-    print(" | ".join(column.heading for column in table.columns))
-    for row in table.rows:
-        cells = zip(table.columns, row, strict=True)
-        print(" | ".join(column.show(cell) for column, cell in cells))
-    print([finding.sentence for finding in table.findings if finding.agrees])
-    print(sorted(path.name for path in (out / "stiffer").iterdir()))
+    stored = sorted(path.name for path in (out / "stiffer").iterdir())
+print(" | ".join(column.heading for column in table.columns))
+for row in table.rows:
+    cells = zip(table.columns, row, strict=True)
+    print(" | ".join(column.show(cell) for column, cell in cells))
+print([finding.sentence for finding in table.findings if finding.agrees])
+print(stored)
 plt.show()
