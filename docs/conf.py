@@ -25,6 +25,8 @@ exclude_patterns = ["guides"]
 html_theme = "furo"
 html_title = f"pymoo_hdte {version}"
 html_math_renderer = "mathml"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_show_sphinx = False
 
 # Docstrings put names in single backticks; one that is no public name stays plain code.

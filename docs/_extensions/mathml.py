@@ -22,5 +22,5 @@ def _inline(writer: Any, node: nodes.math) -> None:
 
 def _display(writer: Any, node: nodes.math_block) -> None:
     formula = tex2mathml(node.astext(), as_block=True)
-    writer.body.append(writer.starttag(node, "div", CLASS="math") + formula + "</div>\n")
+    writer.body.append(writer.starttag(node, "div", CLASS="formula") + formula + "</div>\n")
     raise nodes.SkipNode

@@ -2,9 +2,10 @@ r"""
 Mathematics: exact moments
 ==========================
 
-A robust design needs the mean and the standard deviation of a response over its scatter, for every design anew. If the response is a
-Chebyshev polynomial and the scatter is independent, both are polynomials of the design, so nothing has to be sampled. This page derives
-them and holds each step against a quadrature that knows nothing of it.
+A robust design needs the mean and the standard deviation of a response over its scatter, for every
+design anew. If the response is a Chebyshev polynomial and the scatter is independent, both are
+polynomials of the design, so nothing has to be sampled. This page derives them and holds each step
+against a quadrature that knows nothing of it.
 """
 
 import matplotlib.pyplot as plt
@@ -28,15 +29,17 @@ from pymoo_hdte.surrogate import (
 # The surrogate
 # -------------
 #
-# Let :math:`z_j = (x_j - m_j) / h_j` map the interval of variable :math:`x_j` to :math:`[-1, 1]`. The surrogate is
+# Let :math:`z_j = (x_j - m_j) / h_j` map the interval of variable :math:`x_j` to :math:`[-1, 1]`.
+# The surrogate is
 #
 # .. math::
 #
 #    f(x) = \sum_i c_i \prod_j T_{i_j}(z_j) , \quad i_j = 0, \ldots, k
 #
-# with the Chebyshev polynomials :math:`T_n(\cos \varphi) = \cos n \varphi` (paper, Eqs. 14-25). Its coefficients are those of the
-# interpolation at the :math:`(k + 1)^d` roots of :math:`T_{k+1}` in every variable. Here is one of three variables: a noise that no designer
-# chooses, and two that scatter around a design.
+# with the Chebyshev polynomials :math:`T_n(\cos \varphi) = \cos n \varphi` (paper, Eqs. 14-25). Its
+# coefficients are those of the interpolation at the :math:`(k + 1)^d` roots of :math:`T_{k+1}` in
+# every variable. Here is one of three variables: a noise that no designer chooses, and two that
+# scatter around a design.
 
 
 def response(points):
@@ -47,7 +50,8 @@ def response(points):
 
 noise = TruncatedNormal(mean=2.0, std=0.3)
 band = UniformBand(0.10)
-box = Box(("noise", "x", "y"), [*noise.support[:1], 0.4, 0.4], [*noise.support[1:], 1.6, 1.6])
+low, high = noise.support
+box = Box(("noise", "x", "y"), [low, 0.4, 0.4], [high, 1.6, 1.6])
 surrogate = ChebyshevSurrogate.fit(response, box, order=4)
 designs = Box(("x", "y"), [0.5, 0.5], [1.4, 1.4])
 moments = ExactMoments(surrogate, [noise, band, band], designs)
@@ -62,16 +66,19 @@ moments = ExactMoments(surrogate, [noise, band, band], designs)
 #
 #    \mathrm{E} f = \sum_i c_i \prod_j \mathrm{E} \, T_{i_j}(Z_j) .
 #
-# **Uniform band.** Around the design :math:`u` a variable is :math:`u (1 + t s)` with :math:`s` uniform in :math:`[-1, 1]`; hence
-# :math:`Z = a + b s` with :math:`a = (u - m) / h` and :math:`b = u t / h`. The integral of a Chebyshev polynomial is
-# (Mason and Handscomb, *Chebyshev Polynomials*, 2003, Section 2.4)
+# **Uniform band.** Around the design :math:`u` a variable is :math:`u (1 + t s)` with :math:`s`
+# uniform in :math:`[-1, 1]`; hence :math:`Z = a + b s` with :math:`a = (u - m) / h` and
+# :math:`b = u t / h`. The integral of a Chebyshev polynomial is (Mason and Handscomb, *Chebyshev
+# Polynomials*, 2003, Section 2.4)
 #
 # .. math::
 #
-#    S_n = \int T_n \, \mathrm{d} z = \frac{1}{2} \left( \frac{T_{n+1}}{n + 1} - \frac{T_{n-1}}{n - 1} \right) , \quad n \ge 2 ,
+#    S_n = \int T_n \, \mathrm{d} z = \frac{1}{2} \left( \frac{T_{n+1}}{n + 1} - \frac{T_{n-1}}{n -
+#    1} \right) , \quad n \ge 2 ,
 #
-# and therefore :math:`\mathrm{E} \, T_n(Z) = \left( S_n(a + b) - S_n(a - b) \right) / 2 b`, a polynomial of degree :math:`n` in
-# :math:`u`. The package takes a Gauss-Legendre rule instead, which is exact for polynomials too. Both agree:
+# and therefore :math:`\mathrm{E} \, T_n(Z) = \left( S_n(a + b) - S_n(a - b) \right) / 2 b`, a
+# polynomial of degree :math:`n` in :math:`u`. The package takes a Gauss-Legendre rule instead,
+# which is exact for polynomials too. Both agree:
 
 
 def chebyshev(n, z):
@@ -93,14 +100,16 @@ for n in (2, 3, 4):
     print(f"E T_{n}: closed form {closed:.12f}, Gauss-Legendre {gauss:.12f}")
 
 # %%
-# **Truncated normal.** Cut at :math:`c` standard deviations, the standard variable :math:`z` has odd moments of zero and even ones by partial
-# integration,
+# **Truncated normal.** Cut at :math:`c` standard deviations, the standard variable :math:`z` has
+# odd moments of zero and even ones by partial integration,
 #
 # .. math::
 #
-#    \mu_n = (n - 1) \, \mu_{n-2} - \frac{2 \, c^{n-1} \varphi(c)}{2 \Phi(c) - 1} , \quad \mu_0 = 1 .
+#    \mu_n = (n - 1) \, \mu_{n-2} - \frac{2 \, c^{n-1} \varphi(c)}{2 \Phi(c) - 1} , \quad \mu_0 = 1
+#    .
 #
-# The package integrates with 128 nodes and more, the density being in the weights, which is exact to rounding:
+# The package integrates with 128 nodes and more, the density being in the weights, which is exact
+# to rounding:
 
 values, weights = noise.quadrature(8)
 z, cut = (values - noise.mean) / noise.std, noise.cut
@@ -114,10 +123,12 @@ print(f"standard deviation {noise.truncated_std / noise.std:.4f} of that before 
 # The variance
 # ------------
 #
-# In principle the second moment is as simple, since :math:`T_m T_n = (T_{m+n} + T_{|m-n|}) / 2`. But the difference
-# :math:`\mathrm{E} f^2 - (\mathrm{E} f)^2` of two large numbers loses the digits of a small variance. The package integrates the variables
-# out one after the other. With some of them gone, what is left is a polynomial with random coefficients :math:`C`. When variable :math:`j` goes,
-# each new coefficient is :math:`C' = \sum_n T_n(Z_j) C_n`, and by the laws of total mean and total covariance
+# In principle the second moment is as simple, since :math:`T_m T_n = (T_{m+n} + T_{|m-n|}) / 2`.
+# But the difference :math:`\mathrm{E} f^2 - (\mathrm{E} f)^2` of two large numbers loses the digits
+# of a small variance. The package integrates the variables out one after the other. With some of
+# them gone, what is left is a polynomial with random coefficients :math:`C`. When variable
+# :math:`j` goes, each new coefficient is :math:`C' = \sum_n T_n(Z_j) C_n`, and by the laws of total
+# mean and total covariance
 #
 # .. math::
 #
@@ -125,8 +136,8 @@ print(f"standard deviation {noise.truncated_std / noise.std:.4f} of that before 
 #
 # .. math::
 #
-#    \mathrm{Cov} \, C' = \sum_{m,n} \mathrm{E} (T_m T_n) \, \mathrm{Cov} (C_m, C_n)
-#    + \sum_{m,n} \mathrm{Cov} (T_m, T_n) \, \mathrm{E} \, C_m \, \mathrm{E} \, C_n^\top .
+#    \mathrm{Cov} \, C' = \sum_{m,n} \mathrm{E} (T_m T_n) \, \mathrm{Cov} (C_m, C_n) + \sum_{m,n}
+#    \mathrm{Cov} (T_m, T_n) \, \mathrm{E} \, C_m \, \mathrm{E} \, C_n^\top .
 #
 # Nothing large is subtracted. When no variable is left, the mean and the variance of :math:`f` are.
 #
@@ -158,10 +169,11 @@ print(f"variance exact {std**2:.9f}, quadrature {variance_by_quad:.9f}")
 # As functions of the design
 # --------------------------
 #
-# The mean is a polynomial of degree :math:`k` in each design variable, and the variance is one of degree :math:`2 k`. Both are determined by their
-# values on a Chebyshev grid of :math:`2 k + 1` designs in each variable. They are computed there once, and their series are summed for any
-# design. Derivatives of the series are the exact gradients of :math:`\mathrm{E} f`; that of the standard deviation is
-# :math:`\nabla \sigma = \nabla \sigma^2 / 2 \sigma`.
+# The mean is a polynomial of degree :math:`k` in each design variable, and the variance is one of
+# degree :math:`2 k`. Both are determined by their values on a Chebyshev grid of :math:`2 k + 1`
+# designs in each variable. They are computed there once, and their series are summed for any
+# design. Derivatives of the series are the exact gradients of :math:`\mathrm{E} f`; that of the
+# standard deviation is :math:`\nabla \sigma = \nabla \sigma^2 / 2 \sigma`.
 #
 # What does sampling cost? Its error falls with the root of the number of samples:
 
@@ -174,7 +186,9 @@ for size in sizes:
 
 fig, ax = plt.subplots(figsize=(6.5, 3.8), layout="constrained")
 ax.loglog(sizes, np.sqrt(np.mean(np.square(errors), axis=1)), "o-", label="sampled, 8 seeds")
-ax.loglog(sizes, 1.0 / np.sqrt(2.0 * sizes), "k--", lw=1, label="$1 / \\sqrt{2 n}$ of a normal response")
+ax.loglog(
+    sizes, 1.0 / np.sqrt(2.0 * sizes), "k--", lw=1, label="$1 / \\sqrt{2 n}$ of a normal response"
+)
 ax.axvline(1000, color="0.7", lw=1)
 ax.annotate("paper", (1050, 0.13), color="0.4")
 ax.set(xlabel="number of samples n", ylabel="relative error of the standard deviation")
@@ -185,17 +199,18 @@ plt.show()
 # A tolerance that is a variable
 # ------------------------------
 #
-# If the tolerance :math:`t` is designed too, the second moment is no polynomial of low degree in all variables. A polynomial chaos expansion
-# helps (Xiu and Karniadakis, SIAM Journal on Scientific Computing 24, 2002). At a given :math:`(u, t)` every :math:`T_n(a + b s)` is a
-# polynomial in :math:`s`, and is written in Legendre polynomials that are orthonormal for uniform :math:`s`,
+# If the tolerance :math:`t` is designed too, the second moment is no polynomial of low degree in
+# all variables. A polynomial chaos expansion helps (Xiu and Karniadakis, SIAM Journal on Scientific
+# Computing 24, 2002). At a given :math:`(u, t)` every :math:`T_n(a + b s)` is a polynomial in
+# :math:`s`, and is written in Legendre polynomials that are orthonormal for uniform :math:`s`,
 #
 # .. math::
 #
-#    T_n(a + b s) = \sum_{l=0}^{n} q_{nl} \sqrt{2 l + 1} \, P_l(s) , \quad
-#    q_{nl} = \frac{1}{2} \int_{-1}^{1} T_n(a + b s) \sqrt{2 l + 1} \, P_l(s) \, \mathrm{d} s .
+#    T_n(a + b s) = \sum_{l=0}^{n} q_{nl} \sqrt{2 l + 1} \, P_l(s) , \quad q_{nl} = \frac{1}{2}
+#    \int_{-1}^{1} T_n(a + b s) \sqrt{2 l + 1} \, P_l(s) \, \mathrm{d} s .
 #
-# The noise gets polynomials that are orthonormal under its density. Then :math:`f = \sum_r g_r \Psi_r` with orthonormal :math:`\Psi_r`, and
-# without any further integral
+# The noise gets polynomials that are orthonormal under its density. Then
+# :math:`f = \sum_r g_r \Psi_r` with orthonormal :math:`\Psi_r`, and without any further integral
 #
 # .. math::
 #
@@ -213,7 +228,8 @@ print(f"std  {std:.12f} and {std_of_both:.12f}")
 # A closed form from end to end
 # -----------------------------
 #
-# ``RobustToy`` is a problem whose moments can be written down. It goes through the surrogate and the moments like the drive:
+# ``RobustToy`` is a problem whose moments can be written down. It goes through the surrogate and
+# the moments like the drive:
 
 toy = RobustToy()
 X = np.random.default_rng(1).uniform(toy.xl, toy.xu, (1000, toy.n_var))
@@ -225,8 +241,9 @@ print(f"largest relative error over 1000 designs is below 1e-12: {largest < 1e-1
 # What is exact, and what is not
 # ------------------------------
 #
-# The moments of the surrogate are exact. The surrogate is not the response: its own error is left, and only more nodes remove it. Here the mean
-# of the response itself by quadrature, at several orders:
+# The moments of the surrogate are exact. The surrogate is not the response: its own error is left,
+# and only more nodes remove it. Here the mean of the response itself by quadrature, at several
+# orders:
 
 
 def mean_of_response():

@@ -2,8 +2,9 @@
 Extend the package
 ==================
 
-Five things that people add: a law, an effect of a drive, a port, a part of an algorithm and an experiment. Each is a small class or function
-of your own that the package accepts; none needs a change in it. What does need one is said where it stands.
+Five things that people add: a law, an effect of a drive, a port, a part of an algorithm and an
+experiment. Each is a small class or function of your own that the package accepts; none needs a
+change in it. What does need one is said where it stands.
 """
 
 import sys
@@ -29,13 +30,15 @@ from pymoo_hdte.problems import RobustDTE
 # A law
 # -----
 #
-# A *law* says with which torque (or force) a place answers to the motion there. It is any object with ``orders`` and ``respond``: the protocol
-# ``pymoo_hdte.drive.laws.Law``. ``respond`` gets the motion at the port as a ``PortState``, arrays of one shape, and returns torque and
-# both derivatives, which Newton's method needs. Laws that depend on no angle inherit ``Aperiodic``; those that vary with one inherit
-# ``Periodic`` and name their order, so that solvers keep its harmonics.
+# A *law* says with which torque (or force) a place answers to the motion there. It is any object
+# with ``orders`` and ``respond``: the protocol ``pymoo_hdte.drive.laws.Law``. ``respond`` gets the
+# motion at the port as a ``PortState``, arrays of one shape, and returns torque and both
+# derivatives, which Newton's method needs. Laws that depend on no angle inherit ``Aperiodic``;
+# those that vary with one inherit ``Periodic`` and name their order, so that solvers keep its
+# harmonics.
 #
-# Here is the drag of a lubricant whose molecules jump over energy barriers (Eyring, Journal of Chemical Physics 4, 1936): proportional to the
-# speed when slow, to its logarithm when fast.
+# Here is the drag of a lubricant whose molecules jump over energy barriers (Eyring, Journal of
+# Chemical Physics 4, 1936): proportional to the speed when slow, to its logarithm when fast.
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,8 @@ class EyringDrag(Aperiodic):
 # At a port of a mechanism
 # ------------------------
 #
-# A ``Mechanism`` takes any law at any of its ports. A flywheel turns at 30 rad/s and is slowed down by the
-# drag alone. With the small-speed limit of the law its speed would fall exponentially.
+# A ``Mechanism`` takes any law at any of its ports. A flywheel turns at 30 rad/s and is slowed down
+# by the drag alone. With the small-speed limit of the law its speed would fall exponentially.
 
 drag = EyringDrag(level=0.02, knee=5.0)
 flywheel = Mechanism({"angle": Believed(0.01)}, [Port("bearing", {"angle": 1.0})])
@@ -88,9 +91,10 @@ plt.show()
 # An effect of a drive
 # --------------------
 #
-# A drive model is a data sheet with *effects*. An effect changes the coefficients of the equations of motion, and every solver follows. It has a
-# ``name``, ``apply`` and ``to_dict`` (the protocol ``Effect``). This one puts the law at the input of the drive; ports of a drive are
-# ``input``, ``mesh`` and ``output``. ``LawAtPort`` does the same for the laws that the package lists.
+# A drive model is a data sheet with *effects*. An effect changes the coefficients of the equations
+# of motion, and every solver follows. It has a ``name``, ``apply`` and ``to_dict`` (the protocol
+# ``Effect``). This one puts the law at the input of the drive; ports of a drive are ``input``,
+# ``mesh`` and ``output``. ``LawAtPort`` does the same for the laws that the package lists.
 
 
 @dataclass(frozen=True)
@@ -134,15 +138,18 @@ mean, std = RobustDTE(scenario, order=1).evaluate(scenario.nominal[np.newaxis, 1
 print(f"robust problem on it: mean {mean:.1f}, std {std:.1f} arcsec")
 
 # %%
-# Two things need a change in the package. Model files name only the effects of ``pymoo_hdte.drive.effects.EFFECT_NAMES``: for yours in a TOML
-# file, add the law to ``port_effects.LAWS``. And a verdict of ``pymoo-hdte discrepancy`` names only what it has a candidate for: add one to
-# ``pymoo_hdte/discrepancy/friction_candidates.py`` for drives, to ``pymoo_hdte/measured/candidates.py`` for other machines.
+# Two things need a change in the package. Model files name only the effects of
+# ``pymoo_hdte.drive.effects.EFFECT_NAMES``: for yours in a TOML file, add the law to
+# ``port_effects.LAWS``. And a verdict of ``pymoo-hdte discrepancy`` names only what it has a
+# candidate for: add one to ``pymoo_hdte/discrepancy/friction_candidates.py`` for drives, to
+# ``pymoo_hdte/measured/candidates.py`` for other machines.
 #
 # A port
 # ------
 #
-# The ports of a drive are fixed, those of a mechanism are yours. A port is a place where parts move against each other: its motion is a sum of
-# coordinates. Here a motor drives a load through a belt of ratio 4. The belt is one port, and each bearing is another.
+# The ports of a drive are fixed, those of a mechanism are yours. A port is a place where parts move
+# against each other: its motion is a sum of coordinates. Here a motor drives a load through a belt
+# of ratio 4. The belt is one port, and each bearing is another.
 
 belt_drive = Mechanism(
     inertias={"motor": Believed(2e-4), "load": Believed(5e-3)},
@@ -176,9 +183,10 @@ print(f"belt: expected {frequency:.1f} Hz, {crossings / 2 / 0.5:.0f} Hz counted 
 # A part of an algorithm
 # ----------------------
 #
-# An ``ElitistSwarm`` is made of moves, a mutation and a truncation. A *move* is a callable that returns the steps of some particles. The swarm
-# gives more particles to a move the more of them survive, so that a bad move costs little. Use the random generator that is handed in, and
-# nothing else random: then runs repeat to the last bit.
+# An ``ElitistSwarm`` is made of moves, a mutation and a truncation. A *move* is a callable that
+# returns the steps of some particles. The swarm gives more particles to a move the more of them
+# survive, so that a bad move costs little. Use the random generator that is handed in, and nothing
+# else random: then runs repeat to the last bit.
 
 
 class BareBones:
@@ -191,8 +199,9 @@ class BareBones:
 
 
 # %%
-# A *truncation* takes objectives and a size, and returns which rows stay. The default keeps the set evenly spread; here crowding distance of
-# NSGA-II takes its place, and beside it a random choice, to see what the part is worth.
+# A *truncation* takes objectives and a size, and returns which rows stay. The default keeps the set
+# evenly spread; here crowding distance of NSGA-II takes its place, and beside it a random choice,
+# to see what the part is worth.
 
 
 def random_rows(F, size):
@@ -217,8 +226,8 @@ for name, make in swarms.items():
     print(f"{name:24} median IGD of 3 seeds {np.median(found):.4f}")
 
 # %%
-# The paper's family is made of parts too: a ``ParticleSwarm`` takes a rule for the inertia weight and a hierarchy. This rule is a constant weight,
-# to be compared with the paper's entropy weight.
+# The paper's family is made of parts too: a ``ParticleSwarm`` takes a rule for the inertia weight
+# and a hierarchy. This rule is a constant weight, to be compared with the paper's entropy weight.
 
 
 class ConstantWeight:
@@ -238,32 +247,37 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 # An experiment
 # -------------
 #
-# An experiment is a module in the folder ``experiments`` with a function ``run(context)`` that returns a ``Result``: paragraphs, tables, figures.
-# It is listed with one line in ``experiments/registry.py``,
+# An experiment is a module in the folder ``experiments`` with a function ``run(context)`` that
+# returns a ``Result``: paragraphs, tables, figures. It is listed with one line in
+# ``experiments/registry.py``,
 #
 # .. code-block:: python
 #
 #    Experiment("stiffer", "What a stiffer drive would gain"),
 #
-# and from then on ``python -m experiments stiffer`` runs it, stores its tables as CSV and its figures as PNG, and shows it on the page
-# ``index.html``. The folder is no part of the installed package; in a copy of the repository it is there.
+# and from then on ``python -m experiments stiffer`` runs it, stores its tables as CSV and its
+# figures as PNG, and shows it on the page ``index.html``. The folder is no part of the installed
+# package; in a copy of the repository it is there.
 #
-# Long work is cut into *jobs*. A job holds all its settings, its seed included, and names itself by them. The campaign runs jobs on as many
-# processes or machines as the user allows, keeps every finished one on disk, and does not run it again. This is a whole experiment,
+# Long work is cut into *jobs*. A job holds all its settings, its seed included, and names itself by
+# them. The campaign runs jobs on as many processes or machines as the user allows, keeps every
+# finished one on disk, and does not run it again. This is a whole experiment,
 # ``docs/examples/stiffer.py``:
 #
 # .. literalinclude:: ../examples/stiffer.py
 #    :language: python
 #
-# To try it without the line in the registry, all it takes is a folder and a campaign in this process:
+# To try it without the line in the registry, all it takes is a folder and a campaign in this
+# process:
 
 HERE = Path(sys.argv[0]).resolve().parent  # in a notebook: the folder docs/guides
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
+from stiffer import run
+
 from experiments.campaign import Campaign
 from experiments.registry import Context
 from experiments.store import load, save
-from stiffer import run
 
 with tempfile.TemporaryDirectory() as folder:
     out = Path(folder)

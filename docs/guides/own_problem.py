@@ -2,9 +2,10 @@
 Use the swarms on your own problem
 ==================================
 
-The algorithms of this package know nothing of drives. They take any pymoo problem with real variables, finite bounds and two
-objectives or more, constrained or not. ``ElitistSwarm`` is the one to use: it has nothing to tune. ``AMPMOPSO`` is the paper's algorithm
-as printed, for those who compare with it.
+The algorithms of this package know nothing of drives. They take any pymoo problem with real
+variables, finite bounds and two objectives or more, constrained or not. ``ElitistSwarm`` is the one
+to use: it has nothing to tune. ``AMPMOPSO`` is the paper's algorithm as printed, for those who
+compare with it.
 """
 
 import pickle
@@ -23,14 +24,15 @@ from pymoo_hdte.checks import InvalidInput
 # A problem
 # ---------
 #
-# Two bars carry a load of 100 kN. The left one is fixed 4 m beside the load, the right one 1 m. Choose their cross sections and the height of
-# the joint such that both the volume and the largest stress are small. No stress may exceed 100 MPa. (The problem is that of Palli, Azarm,
-# McCluskey and Sundararajan, Journal of Mechanical Design 120, 1998, as Deb states it in *Multi-objective optimization using evolutionary
-# algorithms*, Wiley 2001.)
+# Two bars carry a load of 100 kN. The left one is fixed 4 m beside the load, the right one 1 m.
+# Choose their cross sections and the height of the joint such that both the volume and the largest
+# stress are small. No stress may exceed 100 MPa. (The problem is that of Palli, Azarm, McCluskey
+# and Sundararajan, Journal of Mechanical Design 120, 1998, as Deb states it in *Multi-objective
+# optimization using evolutionary algorithms*, Wiley 2001.)
 #
-# ``X`` holds all particles of a generation, shape (n, 3). Fill ``out["F"]`` with (n, 2) objectives, all to be minimised, and ``out["G"]`` with
-# (n, 1) constraints, which hold where they are at most 0. Variables may differ in size by any factor; the swarms step in shares of the
-# bounds.
+# ``X`` holds all particles of a generation, shape (n, 3). Fill ``out["F"]`` with (n, 2) objectives,
+# all to be minimised, and ``out["G"]`` with (n, 1) constraints, which hold where they are at most
+# 0. Variables may differ in size by any factor; the swarms step in shares of the bounds.
 
 
 class TwoBarTruss(Problem):
@@ -60,8 +62,8 @@ print(f"volume {volume.min():.4f} to {volume.max():.4f} m3")
 
 # %%
 # The front has a closed form to hold that against. With equal stress s in both bars the volume is
-# (20 (16 + h²) + 80 (1 + h²)) / (h s), which is smallest at h² = (20·16 + 80) / 100 = 4, where it is 400 / s. This holds as long as a cross
-# section is not at its bound.
+# (20 (16 + h²) + 80 (1 + h²)) / (h s), which is smallest at h² = (20·16 + 80) / 100 = 4, where it
+# is 400 / s. This holds as long as a cross section is not at its bound.
 
 exact = 400.0 / stress
 inside = result.X[:, :2].max(axis=1) < 0.0099
@@ -80,8 +82,8 @@ plt.show()
 # Three objectives
 # ----------------
 #
-# Nothing has to be set for more objectives. On DTLZ2 the true front is an eighth of the unit sphere, so the objectives of every solution
-# should have length 1.
+# Nothing has to be set for more objectives. On DTLZ2 the true front is an eighth of the unit
+# sphere, so the objectives of every solution should have length 1.
 
 result = minimize(get_problem("dtlz2"), ElitistSwarm(), ("n_gen", 150), seed=1)
 length = np.linalg.norm(result.F, axis=1)
@@ -97,9 +99,10 @@ plt.show()
 # How long a run has
 # ------------------
 #
-# ``ElitistSwarm`` follows no schedule: stop it or go on whenever you like. ``AMPMOPSO`` and its ablations make smaller steps towards the
-# end, so that they must know the number of generations G_max. ``("n_gen", n)`` and ``("n_eval", n)`` tell it. Any other termination does not,
-# and is refused:
+# ``ElitistSwarm`` follows no schedule: stop it or go on whenever you like. ``AMPMOPSO`` and its
+# ablations make smaller steps towards the end, so that they must know the number of generations
+# G_max. ``("n_gen", n)`` and ``("n_eval", n)`` tell it. Any other termination does not, and is
+# refused:
 
 try:
     minimize(truss, AMPMOPSO(), get_termination("time", 1), seed=1)
@@ -116,8 +119,9 @@ print(f"the archive holds {len(result.F)} solutions")
 # Ask and tell
 # ------------
 #
-# Where something else computes the objectives, such as a test rig or a cluster, drive the algorithm yourself. ``ask`` gives the particles and
-# evaluates nothing. Evaluate them as you like, in their order, and ``tell``.
+# Where something else computes the objectives, such as a test rig or a cluster, drive the algorithm
+# yourself. ``ask`` gives the particles and evaluates nothing. Evaluate them as you like, in their
+# order, and ``tell``.
 
 algorithm = ElitistSwarm(pop_size=40)
 algorithm.setup(truss, termination=("n_gen", 60), seed=3)
@@ -138,8 +142,8 @@ print("ask and tell gives the same front:", np.array_equal(by_hand.F, whole.F))
 # Stop and go on
 # --------------
 #
-# An algorithm can be pickled between any two generations. A run that goes on from the file equals one that was never interrupted, to the last
-# bit, in another process too.
+# An algorithm can be pickled between any two generations. A run that goes on from the file equals
+# one that was never interrupted, to the last bit, in another process too.
 
 algorithm = ElitistSwarm(pop_size=40)
 algorithm.setup(truss, termination=("n_gen", 60), seed=3)
@@ -157,9 +161,10 @@ print("resumed equals uninterrupted:", np.array_equal(resumed.result().F, whole.
 # Bounds and first positions
 # --------------------------
 #
-# A particle that leaves the box is put back on its border, which finds optima on bounds quickly. First positions are random in the box;
-# ``sampling`` takes your own, for instance the outcome of an earlier run. A problem without finite bounds, with integers or with one objective
-# is refused, and so is a misspelt argument.
+# A particle that leaves the box is put back on its border, which finds optima on bounds quickly.
+# First positions are random in the box; ``sampling`` takes your own, for instance the outcome of an
+# earlier run. A problem without finite bounds, with integers or with one objective is refused, and
+# so is a misspelt argument.
 
 first = ElitistSwarm(pop_size=len(whole.X), sampling=whole.X)
 better = minimize(truss, first, ("n_gen", 60), seed=4)

@@ -2,9 +2,10 @@ r"""
 Mathematics: steady states without time stepping
 ================================================
 
-The transmission error in steady state repeats with the turns of the drive, so that it is a sum of harmonics. Solving for the harmonics costs a
-few small linear systems, where integration from rest costs seconds. This page derives the equations, solves them by hand and holds them
-against ``scipy.integrate.solve_ivp``.
+The transmission error in steady state repeats with the turns of the drive, so that it is a sum of
+harmonics. Solving for the harmonics costs a few small linear systems, where integration from rest
+costs seconds. This page derives the equations, solves them by hand and holds them against
+``scipy.integrate.solve_ivp``.
 """
 
 from dataclasses import replace
@@ -32,44 +33,55 @@ from pymoo_hdte.units import ARCSEC
 #
 # .. math::
 #
-#    J_\mathrm{in} \ddot\theta_\mathrm{in} + B_\mathrm{in} \dot\theta_\mathrm{in} + M / N = T_\mathrm{in} ,
+#    J_\mathrm{in} {\ddot\theta}_\mathrm{in} + B_\mathrm{in} {\dot\theta}_\mathrm{in} + M / N =
+#    T_\mathrm{in} ,
 #
 # .. math::
 #
-#    J_\mathrm{out} \ddot\theta_\mathrm{out} + B_\mathrm{out} \dot\theta_\mathrm{out} - M = - T_\mathrm{L} ,
+#    J_\mathrm{out} {\ddot\theta}_\mathrm{out} + B_\mathrm{out} {\dot\theta}_\mathrm{out} - M = -
+#    T_\mathrm{L} ,
 #
 # .. math::
 #
-#    M = k \, d + c \, \dot d , \quad d = \theta_\mathrm{in} / N - \theta_\mathrm{out} - \theta_\mathrm{s}(\theta_\mathrm{in}) , \quad
-#    k = K \left( 1 + \kappa \cos (2 \theta_\mathrm{in} + \psi) \right) .
+#    M = k \, d + c \, \dot d , \quad d = \theta_\mathrm{in} / N - \theta_\mathrm{out} -
+#    \theta_\mathrm{s}(\theta_\mathrm{in}) , \quad k = K \left( 1 + \kappa \cos (2
+#    \theta_\mathrm{in} + \psi) \right) .
 #
-# The transmission error is :math:`\theta_\mathrm{d} = \theta_\mathrm{in} / N - \theta_\mathrm{out} = \theta_\mathrm{s} + d`. In steady state
-# :math:`\theta_\mathrm{in} = \Omega t` but for a small fluctuation, which is neglected in the arguments of :math:`\theta_\mathrm{s}` and
-# :math:`k` (its effect is measured at the end). Everything is then a sum of orders :math:`o`, cycles per input turn:
+# The transmission error is
+# :math:`\theta_\mathrm{d} = \theta_\mathrm{in} / N - \theta_\mathrm{out} = \theta_\mathrm{s} + d`.
+# In steady state :math:`\theta_\mathrm{in} = \Omega t` but for a small fluctuation, which is
+# neglected in the arguments of :math:`\theta_\mathrm{s}` and :math:`k` (its effect is measured at
+# the end). Everything is then a sum of orders :math:`o`, cycles per input turn:
 # :math:`x(t) = \mathrm{Re} \sum_o x_o \, e^{i o \Omega t}`.
 #
-# For one order with :math:`\omega = o \Omega \ne 0` the first two equations give the angles that the mesh torque :math:`M_o` moves the two inertias
-# by, and their difference is
+# For one order with :math:`\omega = o \Omega \ne 0` the first two equations give the angles that
+# the mesh torque :math:`M_o` moves the two inertias by, and their difference is
 #
 # .. math::
 #
-#    \theta_{\mathrm{d}, o} = - G_o M_o , \quad
-#    G_o = \frac{1}{N^2 (i \omega B_\mathrm{in} - \omega^2 J_\mathrm{in})} + \frac{1}{i \omega B_\mathrm{out} - \omega^2 J_\mathrm{out}} .
+#    \theta_{\mathrm{d}, o} = - G_o M_o , \quad G_o = \frac{1}{N^2 (i \omega B_\mathrm{in} -
+#    \omega^2 J_\mathrm{in})} + \frac{1}{i \omega B_\mathrm{out} - \omega^2 J_\mathrm{out}} .
 #
-# With :math:`P_o = 1 / G_o` and :math:`\theta_\mathrm{d} = s + d` this is :math:`M_o + P_o d_o = - P_o s_o`. For order 0 nothing holds the
-# inertias back, :math:`P_0 = 0`, and the mesh torque is what the output needs, :math:`T = T_\mathrm{L} + B_\mathrm{out} \Omega / N`.
+# With :math:`P_o = 1 / G_o` and :math:`\theta_\mathrm{d} = s + d` this is
+# :math:`M_o + P_o d_o = - P_o s_o`. For order 0 nothing holds the inertias back, :math:`P_0 = 0`,
+# and the mesh torque is what the output needs,
+# :math:`T = T_\mathrm{L} + B_\mathrm{out} \Omega / N`.
 #
 # **Constant stiffness.** :math:`M_o = Z_o d_o` with :math:`Z_o = K + i \omega c`, so that
-# :math:`\theta_{\mathrm{d}, o} = H_o s_o`, :math:`H_o = Z_o G_o / (1 + Z_o G_o)`: a transfer function (``transfer_function``).
+# :math:`\theta_{\mathrm{d}, o} = H_o s_o`, :math:`H_o = Z_o G_o / (1 + Z_o G_o)`: a transfer
+# function (``transfer_function``).
 #
-# **Varying stiffness.** The product of :math:`\cos (2 \Omega t + \psi)` and order :math:`o` makes orders :math:`o \pm 2`. For every order
+# **Varying stiffness.** The product of :math:`\cos (2 \Omega t + \psi)` and order :math:`o` makes
+# orders :math:`o \pm 2`. For every order
 #
 # .. math::
 #
-#    (P_o + K + i \omega c) \, d_o + \frac{K \kappa}{2} \left( e^{i \psi} d_{o-2} + e^{-i \psi} d_{o+2} \right) = - P_o s_o + T \, [o = 0] .
+#    (P_o + K + i \omega c) \, d_o + \frac{K \kappa}{2} \left( e^{i \psi} d_{o-2} + e^{-i \psi}
+#    d_{o+2} \right) = - P_o s_o + T \, [o = 0] .
 #
-# This is Hill's method (Hill, Acta Mathematica 8, 1886; Nayfeh and Mook, *Nonlinear Oscillations*, 1979, Chapter 5). Orders that differ by 2 form
-# one linear system, cut off where its outermost harmonics have died out.
+# This is Hill's method (Hill, Acta Mathematica 8, 1886; Nayfeh and Mook, *Nonlinear Oscillations*,
+# 1979, Chapter 5). Orders that differ by 2 form one linear system, cut off where its outermost
+# harmonics have died out.
 #
 # By hand
 # -------
@@ -127,8 +139,9 @@ print(f"package  {steady.peak_to_peak(ratio)[0] / ARCSEC:.3f} arcsec")
 # Held against an integrator
 # --------------------------
 #
-# Start the differential equations on the solution, with the input angle prescribed as above, and integrate over ten input turns. If the harmonics solve
-# the equations, the path stays on them. The state is :math:`(\dot\theta_\mathrm{in}, \theta_\mathrm{d}, \dot\theta_\mathrm{d})`.
+# Start the differential equations on the solution, with the input angle prescribed as above, and
+# integrate over ten input turns. If the harmonics solve the equations, the path stays on them. The
+# state is :math:`({\dot\theta}_\mathrm{in}, \theta_\mathrm{d}, {\dot\theta}_\mathrm{d})`.
 
 moving = orders != 0.0
 mesh_torque = -np.array([impedance(order) for order in orders]) * (static + torsion)
@@ -168,10 +181,16 @@ print(f"largest distance after {turns:.0f} turns is below 1e-6 of the DTE: "
 fig, ax = plt.subplots(figsize=(7.0, 3.6), layout="constrained")
 few = speed * time < 6.0 * np.pi
 turn = speed * time[few] / (2.0 * np.pi)
-ax.plot(turn, signal(static, speed * time[few]) / ARCSEC, color="0.7", label="static error")
-ax.plot(turn, signal(error, speed * time[few]) / ARCSEC, label="harmonics")
-ax.plot(turn[::12], run.y[1][few][::12] / ARCSEC, "o", ms=3.5, fillstyle="none", label="solve_ivp")
-ax.set(xlabel="input turns", ylabel="transmission error [arcsec]")
+level = error[~moving].sum().real
+curves = {
+    "static error": signal(static, speed * time),
+    "harmonics": signal(error, speed * time) - level,
+}
+for name, curve in curves.items():
+    ax.plot(turn, curve[few] / ARCSEC, label=name)
+path = (run.y[1][few] - level) / ARCSEC
+ax.plot(turn[::12], path[::12], "o", ms=3.5, fillstyle="none", label="solve_ivp")
+ax.set(xlabel="input turns", ylabel="error less its mean [arcsec]")
 ax.legend(loc="upper right")
 plt.show()
 
@@ -179,13 +198,16 @@ plt.show()
 # When there is no steady state
 # -----------------------------
 #
-# A varying stiffness can feed energy into the drive. Hill's method has an answer even then, but no drive ever gets there. The package therefore asks
-# first whether small disturbances die out: over one period of the stiffness a disturbance is multiplied by the monodromy matrix, and all its
+# A varying stiffness can feed energy into the drive. Hill's method has an answer even then, but no
+# drive ever gets there. The package therefore asks first whether small disturbances die out: over
+# one period of the stiffness a disturbance is multiplied by the monodromy matrix, and all its
 # eigenvalues, the Floquet multipliers, must lie in the unit circle.
 #
-# For an undamped oscillator of frequency :math:`\omega_0` (Mathieu's equation) the main zone of instability lies where the stiffness varies
-# twice per oscillation, here :math:`2 \Omega = 2 \omega_0`, and to first order in :math:`\kappa` its borders are at
-# :math:`\Omega / \omega_0 = 1 \pm \kappa / 4` (Nayfeh and Mook, Section 5.3). A drive with next to no damping shows it:
+# For an undamped oscillator of frequency :math:`\omega_0` (Mathieu's equation) the main zone of
+# instability lies where the stiffness varies twice per oscillation, here
+# :math:`2 \Omega = 2 \omega_0`, and to first order in :math:`\kappa` its borders are at
+# :math:`\Omega / \omega_0 = 1 \pm \kappa / 4` (Nayfeh and Mook, Section 5.3). A drive with next to
+# no damping shows it:
 
 calm = replace(
     preset("published"),
@@ -215,15 +237,18 @@ plt.show()
 # Further laws, and the input angle itself
 # ----------------------------------------
 #
-# Friction, play and hysteresis are no linear functions of the torsion, and in truth :math:`\theta_\mathrm{s}` and :math:`k` depend on the input
-# angle that itself fluctuates. ``harmonic_balance`` follows both. It works over the input angle :math:`\alpha` instead of time, which makes all
-# orders exact harmonics. The unknowns are the harmonics of the torsion and of half the squared speed, since
-# :math:`\ddot\alpha = \mathrm{d} (\dot\alpha^2 / 2) / \mathrm{d} \alpha`. In every step the laws are evaluated on a grid over :math:`\alpha`, their
-# torques are transformed into harmonics (Cameron and Griffin, Journal of Applied Mechanics 56, 1989), and Newton's method brings the sum of
-# torques to zero, harmonic by harmonic.
+# Friction, play and hysteresis are no linear functions of the torsion, and in truth
+# :math:`\theta_\mathrm{s}` and :math:`k` depend on the input angle that itself fluctuates.
+# ``harmonic_balance`` follows both. It works over the input angle :math:`\alpha` instead of time,
+# which makes all orders exact harmonics. The unknowns are the harmonics of the torsion and of half
+# the squared speed, since
+# :math:`{\ddot\alpha} = \mathrm{d} ({\dot\alpha}^2 / 2) / \mathrm{d} \alpha`. In every step the
+# laws are evaluated on a grid over :math:`\alpha`, their torques are transformed into harmonics
+# (Cameron and Griffin, Journal of Applied Mechanics 56, 1989), and Newton's method brings the sum
+# of torques to zero, harmonic by harmonic.
 #
-# Orders such as 2 and 2.02 do not close over one input turn. Their beat gets an angle of its own, so that the grid is a torus of two
-# angles and no record of many turns is needed.
+# Orders such as 2 and 2.02 do not close over one input turn. Their beat gets an angle of its own,
+# so that the grid is a torus of two angles and no record of many turns is needed.
 
 balance = harmonic_balance(coefficients)
 hill_dte = steady.peak_to_peak(ratio)[0] / ARCSEC

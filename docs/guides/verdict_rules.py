@@ -2,8 +2,9 @@ r"""
 Mathematics: the rules of a verdict
 ===================================
 
-``pymoo-hdte discrepancy`` says of a model and of measurements whether something is missing, and what. This page says by which rules, and
-shows the statistics behind them. Every threshold below is read from the code that uses it.
+``pymoo-hdte discrepancy`` says of a model and of measurements whether something is missing, and
+what. This page says by which rules, and shows the statistics behind them. Every threshold below is
+read from the code that uses it.
 """
 
 import matplotlib.pyplot as plt
@@ -21,22 +22,25 @@ from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port, Record
 # Residuals in units of their noise
 # ---------------------------------
 #
-# Records become *features*, such as amplitudes and phases of the order lines of a drive, or the spectrum of the force balance of another
-# machine. Prediction minus feature, divided by the noise (*whitened*, so that correlations of the noise are taken out), gives residuals
-# :math:`r` that are independent and of unit variance if the model is right. The misfit is
+# Records become *features*, such as amplitudes and phases of the order lines of a drive, or the
+# spectrum of the force balance of another machine. Prediction minus feature, divided by the noise
+# (*whitened*, so that correlations of the noise are taken out), gives residuals :math:`r` that are
+# independent and of unit variance if the model is right. The misfit is
 #
 # .. math::
 #
 #    \chi^2 = \sum_n r_n^2 .
 #
-# Base parameters are fitted first, within the tolerances in which they are believed; a fit never leaves these. A right model then leaves
-# :math:`\chi^2` near its degrees of freedom :math:`\nu` (residuals less fitted parameters), with standard deviation :math:`\sqrt{2 \nu}`.
+# Base parameters are fitted first, within the tolerances in which they are believed; a fit never
+# leaves these. A right model then leaves :math:`\chi^2` near its degrees of freedom :math:`\nu`
+# (residuals less fitted parameters), with standard deviation :math:`\sqrt{2 \nu}`.
 #
 # Is anything missing?
 # --------------------
 #
-# The model is adequate if :math:`\chi^2 / \nu \le 1 + 4 \sqrt{2 / \nu}`, four standard deviations, and no known effect would reduce
-# :math:`\chi^2` by a given gain; a single line may be lost among a thousand features.
+# The model is adequate if :math:`\chi^2 / \nu \le 1 + 4 \sqrt{2 / \nu}`, four standard deviations,
+# and no known effect would reduce :math:`\chi^2` by a given gain; a single line may be lost among a
+# thousand features.
 
 for freedom in (100, 1400):
     limit = rival.adequate(freedom)
@@ -45,8 +49,9 @@ for freedom in (100, 1400):
 print(f"gain that speaks against an adequate model: {naming.GAIN:g}")
 
 # %%
-# An effect that adds a signal of :math:`\lambda` to the sum of squares (:math:`\lambda` = features times signal to noise, squared) makes
-# :math:`\chi^2` non-central. From the sizes at which it passes the limit one sees what a campaign can detect at all:
+# An effect that adds a signal of :math:`\lambda` to the sum of squares (:math:`\lambda` = features
+# times signal to noise, squared) makes :math:`\chi^2` non-central. From the sizes at which it
+# passes the limit one sees what a campaign can detect at all:
 
 freedom = 400
 limit = rival.adequate(freedom)
@@ -66,25 +71,29 @@ plt.show()
 # Which effect?
 # -------------
 #
-# *Screening* asks, to first order, how much each candidate could remove: its signature less what the base parameters can imitate of it. The best
-# few are fitted jointly with the base, without linearisation. Sets of effects are then compared by two numbers.
+# *Screening* asks, to first order, how much each candidate could remove: its signature less what
+# the base parameters can imitate of it. The best few are fitted jointly with the base, without
+# linearisation. Sets of effects are then compared by two numbers.
 #
-# The **Bayesian information criterion** (Schwarz, Annals of Statistics 6, 1978), with :math:`p` fitted unknowns and :math:`n` residuals,
+# The **Bayesian information criterion** (Schwarz, Annals of Statistics 6, 1978), with :math:`p`
+# fitted unknowns and :math:`n` residuals,
 #
 # .. math::
 #
 #    \mathrm{BIC} = \chi^2 + p \ln n ,
 #
-# ranks them; the smallest is chosen. The **evidence** decides whether the data can tell two of them apart. It is minus twice the logarithm of the
-# probability of the data under a model, by Laplace's approximation (MacKay, Neural Computation 4, 1992),
+# ranks them; the smallest is chosen. The **evidence** decides whether the data can tell two of them
+# apart. It is minus twice the logarithm of the probability of the data under a model, by Laplace's
+# approximation (MacKay, Neural Computation 4, 1992),
 #
 # .. math::
 #
 #    E = \chi^2 + \ln \det \left( I + W J^\top J \, W / 12 \right) ,
 #
-# with the derivatives :math:`J` of the residuals and the widths :math:`W` between the bounds of the parameters. It stands for a normal prior with the
-# variance :math:`w^2 / 12` of a uniform one. What no record determines costs nothing. For a linear model with one unknown the integral can
-# be done by brute force:
+# with the derivatives :math:`J` of the residuals and the widths :math:`W` between the bounds of the
+# parameters. It stands for a normal prior with the variance :math:`w^2 / 12` of a uniform one. What
+# no record determines costs nothing. For a linear model with one unknown the integral can be done
+# by brute force:
 
 signature = np.array([1.0, 2.0, 3.0])
 data = np.array([1.9, 4.2, 5.7])
@@ -112,15 +121,17 @@ integral = quad(probability, best - 8.0, best + 8.0)[0]
 print(f"evidence {found.evidence:.3f}, by integration {-2.0 * np.log(integral):.3f}")
 
 # %%
-# The difference is the prior at the best value, which the package leaves out: within its tolerance every value is as good as any other. As a rule,
-# a distance of 10 in twice the logarithm is very strong (Kass and Raftery, Journal of the American Statistical Association 90, 1995).
+# The difference is the prior at the best value, which the package leaves out: within its tolerance
+# every value is as good as any other. As a rule, a distance of 10 in twice the logarithm is very
+# strong (Kass and Raftery, Journal of the American Statistical Association 90, 1995).
 #
 # When is it named?
 # -----------------
 #
-# A set of effects *explains* the misfit of the base if it gains enough in BIC, and if it fits down to the noise or removes most of the excess
-# :math:`\chi^2 - \nu`: of the whole, and of each part of the data by itself. An effect whose form is certain, such as a sensor's zero,
-# must do better than a friction curve whose form is only ever close.
+# A set of effects *explains* the misfit of the base if it gains enough in BIC, and if it fits down
+# to the noise or removes most of the excess :math:`\chi^2 - \nu`: of the whole, and of each part of
+# the data by itself. An effect whose form is certain, such as a sensor's zero, must do better than
+# a friction curve whose form is only ever close.
 
 print(f"gain of BIC at least                       {rival.BIC_GAIN:g}")
 print(f"share of the excess removed at least       {rival.SHARE:g}")
@@ -145,8 +156,9 @@ print(f"  or, of forms not exact, if they leave    {rival.ALIKE:g} times as much
 #    * - ``unlisted``
 #      - It does not, and the best set does not explain the misfit either.
 #    * - ``class``
-#      - A set explains it, and another set of as many effects that explains it too lies within the distances above. Where even the
-#        chosen form leaves more than noise, that of the evidence is stretched by :math:`\chi^2 / \nu`.
+#      - A set explains it, and another set of as many effects that explains it too lies within the
+#        distances above. Where even the chosen form leaves more than noise, that of the evidence is
+#        stretched by :math:`\chi^2 / \nu`.
 #    * - ``named``
 #      - A set explains it, and no other comes near.
 #    * - ``parameter``
@@ -164,9 +176,10 @@ print(", ".join(naming.STATUSES))
 #
 #    C = \left( J^\top J / \max(\chi^2 / \nu, 1) + 12 \, W^{-2} \right)^{-1} .
 #
-# What the model leaves beyond noise counts as noise (Birge, Physical Review 40, 1932), and bounds count as the variance of a uniform
-# distribution, so that a value that no record determines is as uncertain as it is believed to be. For the line above the interval is that of
-# ordinary least squares, since the bounds are wide:
+# What the model leaves beyond noise counts as noise (Birge, Physical Review 40, 1932), and bounds
+# count as the variance of a uniform distribution, so that a value that no record determines is as
+# uncertain as it is believed to be. For the line above the interval is that of ordinary least
+# squares, since the bounds are wide:
 
 sigma = float(np.sqrt(found.covariance[0, 0]))
 residual_variance = max(found.chi_square / 2.0, 1.0)
@@ -204,7 +217,8 @@ for friction in (0.0, 0.3):
     print(f"friction {friction:g} N.m: chi-square / nu of the base {ratio:.3g}, {verdict.status}")
 
 # %%
-# All that was fitted, best first. ``gain`` is that of BIC over the base, ``share`` the part of the excess that is removed.
+# All that was fitted, best first. ``gain`` is that of BIC over the base, ``share`` the part of the
+# excess that is removed.
 
 base_bic = verdict.base.chi_square + len(verdict.base.values) * np.log(len(verdict.base.residuals))
 print(f"{'set':58}{'gain':>10}{'share':>9}{'evidence':>12}")
@@ -214,7 +228,8 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
     print(f"{mark} {one.label:56}{gain:10.0f}{one.share:9.4f}{one.fit.evidence:12.0f}")
 
 # %%
-# Of another machine than a drive, no model meets the noise of its sensors. There all of this is measured in units of the *rest*, which is what the two
-# best effects leave, and three rules are added (``pymoo_hdte.measured.investigate``): a named effect removes at least half of the power of the
-# misfit beyond the noise of the sensors; of models that leave about as much, the one with the fewest unknowns is named; and a rival that merely
-# contains the named law is no other explanation.
+# Of another machine than a drive, no model meets the noise of its sensors. There all of this is
+# measured in units of the *rest*, which is what the two best effects leave, and three rules are
+# added (``pymoo_hdte.measured.investigate``): a named effect removes at least half of the power of
+# the misfit beyond the noise of the sensors; of models that leave about as much, the one with the
+# fewest unknowns is named; and a rival that merely contains the named law is no other explanation.
