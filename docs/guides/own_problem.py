@@ -99,10 +99,10 @@ plt.show()
 # How long a run has
 # ------------------
 #
-# ``ElitistSwarm`` follows no schedule: stop it or go on whenever you like. ``AMPMOPSO`` and its
-# ablations make smaller steps towards the end, so that they must know the number of generations
-# G_max. ``("n_gen", n)`` and ``("n_eval", n)`` tell it. Any other termination does not, and is
-# refused:
+# ``ElitistSwarm`` follows no schedule: stop it or go on whenever you like. ``AMPMOPSO`` makes
+# smaller steps towards the end of a run, so that it must know the number of generations G_max, as
+# must all of its family. ``("n_gen", n)`` and ``("n_eval", n)`` tell it. A limit of time does not,
+# and is refused:
 
 try:
     minimize(truss, AMPMOPSO(), get_termination("time", 1), seed=1)

@@ -12,9 +12,12 @@ the series.
 It is an ordinary pymoo ``Problem`` with two objectives, four real variables and no constraint. Its
 true Pareto front is known, and an evaluation costs microseconds: it stands on a polynomial
 surrogate, whose moments are exact (:ref:`how <sphx_glr_auto_guides_exact_moments.py>`).
+
+The drive behind it is ``calibrated``: the equations of the paper with three effects added, whose
+values were fitted to published statistics. As printed, the equations do not give the published DTE.
 """
 
-import time
+import timeit
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -197,8 +200,7 @@ sampled = RobustDTE(moments="sample", n_samples=1000, sample_seed=1)
 X = np.random.default_rng(1).uniform(problem.xl, problem.xu, (100, 4))
 seconds = {}
 for name, one in (("exact", problem), ("sample", sampled)):
-    begin = time.perf_counter()
     F = one.evaluate(X)
-    seconds[name] = time.perf_counter() - begin
+    seconds[name] = min(timeit.repeat(lambda one=one: one.evaluate(X), number=1, repeat=5))
     print(f"{name:6} first design: mean {F[0, 0]:.3f}, std {F[0, 1]:.3f} arcsec")
 print(f"exact is more than 20 times as fast: {seconds['sample'] > 20 * seconds['exact']}")

@@ -33,17 +33,17 @@ from pymoo_hdte.units import ARCSEC
 #
 # .. math::
 #
-#    J_\mathrm{in} {\ddot\theta}_\mathrm{in} + B_\mathrm{in} {\dot\theta}_\mathrm{in} + M / N =
-#    T_\mathrm{in} ,
+#    J_\mathrm{in} \theta_\mathrm{in}^{\prime\prime} + B_\mathrm{in} \theta_\mathrm{in}^\prime + M /
+#    N = T_\mathrm{in} ,
 #
 # .. math::
 #
-#    J_\mathrm{out} {\ddot\theta}_\mathrm{out} + B_\mathrm{out} {\dot\theta}_\mathrm{out} - M = -
-#    T_\mathrm{L} ,
+#    J_\mathrm{out} \theta_\mathrm{out}^{\prime\prime} + B_\mathrm{out} \theta_\mathrm{out}^\prime -
+#    M = - T_\mathrm{L} ,
 #
 # .. math::
 #
-#    M = k \, d + c \, \dot d , \quad d = \theta_\mathrm{in} / N - \theta_\mathrm{out} -
+#    M = k \, d + c \, d^\prime , \quad d = \theta_\mathrm{in} / N - \theta_\mathrm{out} -
 #    \theta_\mathrm{s}(\theta_\mathrm{in}) , \quad k = K \left( 1 + \kappa \cos (2
 #    \theta_\mathrm{in} + \psi) \right) .
 #
@@ -141,7 +141,7 @@ print(f"package  {steady.peak_to_peak(ratio)[0] / ARCSEC:.3f} arcsec")
 #
 # Start the differential equations on the solution, with the input angle prescribed as above, and
 # integrate over ten input turns. If the harmonics solve the equations, the path stays on them. The
-# state is :math:`({\dot\theta}_\mathrm{in}, \theta_\mathrm{d}, {\dot\theta}_\mathrm{d})`.
+# state is :math:`(\theta_\mathrm{in}^\prime, \theta_\mathrm{d}, \theta_\mathrm{d}^\prime)`.
 
 moving = orders != 0.0
 mesh_torque = -np.array([impedance(order) for order in orders]) * (static + torsion)
@@ -242,10 +242,10 @@ plt.show()
 # ``harmonic_balance`` follows both. It works over the input angle :math:`\alpha` instead of time,
 # which makes all orders exact harmonics. The unknowns are the harmonics of the torsion and of half
 # the squared speed, since
-# :math:`{\ddot\alpha} = \mathrm{d} ({\dot\alpha}^2 / 2) / \mathrm{d} \alpha`. In every step the
-# laws are evaluated on a grid over :math:`\alpha`, their torques are transformed into harmonics
-# (Cameron and Griffin, Journal of Applied Mechanics 56, 1989), and Newton's method brings the sum
-# of torques to zero, harmonic by harmonic.
+# :math:`\alpha^{\prime\prime} = \mathrm{d} (\alpha^{\prime 2} / 2) / \mathrm{d} \alpha`. In every
+# step the laws are evaluated on a grid over :math:`\alpha`, their torques are transformed into
+# harmonics (Cameron and Griffin, Journal of Applied Mechanics 56, 1989), and Newton's method brings
+# the sum of torques to zero, harmonic by harmonic.
 #
 # Orders such as 2 and 2.02 do not close over one input turn. Their beat gets an angle of its own,
 # so that the grid is a torus of two angles and no record of many turns is needed.

@@ -80,7 +80,7 @@ plt.show()
 #
 # .. math::
 #
-#    \mathrm{BIC} = \chi^2 + p \ln n ,
+#    \mathrm{BIC} = \chi^2 + p \, \ln \, n ,
 #
 # ranks them; the smallest is chosen. The **evidence** decides whether the data can tell two of them
 # apart. It is minus twice the logarithm of the probability of the data under a model, by Laplace's
@@ -88,7 +88,7 @@ plt.show()
 #
 # .. math::
 #
-#    E = \chi^2 + \ln \det \left( I + W J^\top J \, W / 12 \right) ,
+#    E = \chi^2 + \ln \, \det \left( I + W J^\top J \, W / 12 \right) ,
 #
 # with the derivatives :math:`J` of the residuals and the widths :math:`W` between the bounds of the
 # parameters. It stands for a normal prior with the variance :math:`w^2 / 12` of a uniform one. What
