@@ -1,0 +1,16 @@
+"""Order of the guides, from use to mathematics; a guide that is not listed is an error."""
+
+ORDER = (
+    "robust_study.py",
+    "drive_data_sheet.py",
+    "own_problem.py",
+    "extend.py",
+    "exact_moments.py",
+    "steady_state.py",
+    "verdict_rules.py",
+)
+
+
+def place(file_name: str) -> int:
+    """Return the place of a guide."""
+    return ORDER.index(file_name)

@@ -1,0 +1,58 @@
+"""Sphinx: ``python -m sphinx -W --keep-going -b html docs build/docs``. Nothing is fetched."""
+
+import sys
+from importlib import import_module
+from pathlib import Path
+
+from numpydoc.xref import DEFAULT_LINKS
+
+import pymoo_hdte
+
+sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
+
+project = "pymoo_hdte"
+author = copyright = "The pymoo_hdte developers"
+version = release = pymoo_hdte.__version__
+
+extensions = [
+    "mathml",
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "sphinx_gallery.gen_gallery",
+]
+exclude_patterns = ["guides"]
+html_theme = "furo"
+html_title = f"pymoo_hdte {version}"
+html_math_renderer = "mathml"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sphinx = False
+
+# Docstrings put names in single backticks; one that is no public name stays plain code.
+default_role = "py:obj"
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+numpydoc_show_class_members = False
+# Types are links where they are ours; the manuals of Python and numpy would have to be fetched.
+DEFAULT_LINKS.clear()
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"
+numpydoc_xref_aliases = {
+    name: f"pymoo_hdte.{package}.{name}"
+    for package in ("drive", "surrogate", "problems", "algorithms", "mechanism", "measured")
+    for name in import_module(f"pymoo_hdte.{package}").__all__
+} | {"InvalidInput": "pymoo_hdte.checks.InvalidInput"}
+
+sphinx_gallery_conf = {
+    "examples_dirs": "guides",
+    "gallery_dirs": "auto_guides",
+    "filename_pattern": r"\.py$",
+    "within_subsection_order": "guide_order.place",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "show_memory": False,
+    "show_signature": False,
+    "min_reported_time": 1e9,
+    "write_computation_times": False,
+}

@@ -1,0 +1,293 @@
+"""
+Extend the package
+==================
+
+Five things that people add: a law, an effect of a drive, a port, a part of an algorithm and an
+experiment. Each is a small class or function of your own that the package accepts; none needs a
+change in it. What does need one is said where it stands.
+"""
+
+import sys
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from pymoo.indicators.igd import IGD
+from pymoo.optimize import minimize
+
+from pymoo_hdte.algorithms import ElitistSwarm, EntropyWeight, Flat, LinearDecrease, ParticleSwarm
+from pymoo_hdte.algorithms.crowding import least_crowded
+from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange
+from pymoo_hdte.drive import harmonic_balance, preset, simulate
+from pymoo_hdte.drive.laws import Aperiodic, Response
+from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.simulation import simulate as simulate_mechanism
+from pymoo_hdte.problems import RobustDTE
+
+# %%
+# A law
+# -----
+#
+# A *law* says with which torque (or force) a place answers to the motion there. It is any object
+# with ``orders`` and ``respond``: the protocol ``pymoo_hdte.drive.laws.Law``. ``respond`` gets the
+# motion at the port as a ``PortState``, arrays of one shape, and returns torque and both
+# derivatives, which Newton's method needs. Laws that depend on no angle inherit ``Aperiodic``;
+# those that vary with one inherit ``Periodic`` and name their order, so that solvers keep its
+# harmonics.
+#
+# Here is the drag of a lubricant whose molecules jump over energy barriers (Eyring, Journal of
+# Chemical Physics 4, 1936): proportional to the speed when slow, to its logarithm when fast.
+
+
+@dataclass(frozen=True)
+class EyringDrag(Aperiodic):
+    """T = level asinh(speed / knee); N.m and rad/s, or N and m/s."""
+
+    level: float
+    knee: float
+
+    def respond(self, state):
+        """Return torque and tangents."""
+        share = state.speed / self.knee
+        return Response(
+            self.level * np.arcsinh(share), damping=self.level / self.knee / np.hypot(1.0, share)
+        )
+
+
+# %%
+# At a port of a mechanism
+# ------------------------
+#
+# A ``Mechanism`` takes any law at any of its ports. A flywheel turns at 30 rad/s and is slowed down
+# by the drag alone. With the small-speed limit of the law its speed would fall exponentially.
+
+drag = EyringDrag(level=0.02, knee=5.0)
+flywheel = Mechanism({"angle": Believed(0.01)}, [Port("bearing", {"angle": 1.0})])
+time = np.arange(0.0, 8.0, 0.01)
+idle = Record("coasting down", "train", time, {})
+course = simulate_mechanism(
+    flywheel, idle, [LawAt("eyring_drag", "bearing", drag)], start={"angle": (0.0, 30.0)}
+)
+
+# %%
+# Energy is a check that needs no second solver: what the flywheel loses is the work of the drag.
+
+speed = course.speed["angle"]
+lost = 0.5 * 0.01 * (speed[0] ** 2 - speed**2)
+power = 0.02 * np.arcsinh(speed / 5.0) * speed
+work = np.concatenate([[0.0], np.cumsum(0.5 * (power[1:] + power[:-1]) * 0.01)])
+print(f"energy balance to {np.abs(work / lost[-1] - lost / lost[-1]).max():.0e}")
+
+fig, ax = plt.subplots(figsize=(6.5, 3.5), layout="constrained")
+ax.semilogy(time, speed, label="Eyring's drag")
+ax.semilogy(time, 30.0 * np.exp(-0.02 / 5.0 / 0.01 * time), "--", label="its small-speed limit")
+ax.set(xlabel="time [s]", ylabel="speed [rad/s]")
+ax.legend()
+plt.show()
+
+# %%
+# An effect of a drive
+# --------------------
+#
+# A drive model is a data sheet with *effects*. An effect changes the coefficients of the equations
+# of motion, and every solver follows. It has a ``name``, ``apply`` and ``to_dict`` (the protocol
+# ``Effect``). This one puts the law at the input of the drive; ports of a drive are ``input``,
+# ``mesh`` and ``output``. ``LawAtPort`` does the same for the laws that the package lists.
+
+
+@dataclass(frozen=True)
+class LubricantDrag:
+    """Eyring's drag in the bearings of the input."""
+
+    law: EyringDrag
+    name = "lubricant_drag"
+    port = "input"
+
+    def apply(self, coefficients):
+        """Return the coefficients with the law at its port."""
+        return replace(coefficients, laws=(*coefficients.laws, (self.port, self.law)))
+
+    def to_dict(self):
+        """Return what makes the effect, as a record beside results."""
+        return {"name": self.name, "port": self.port, **vars(self.law)}
+
+
+calm = preset("published")
+draggy = replace(calm, name="draggy", effects=(LubricantDrag(EyringDrag(0.05, 20.0)),))
+design = calm.nominal
+
+motor = []
+for model in (calm, draggy):
+    balance = harmonic_balance(model.coefficients(design[np.newaxis]))
+    motor.append(balance.motor_torque[0, 0].real)
+expected = 0.05 * np.arcsinh(calm.sheet.input_speed / 20.0)
+print(f"mean motor torque {motor[0]:.4f} N.m, with the drag {motor[1]:.4f} N.m")
+print(f"difference {motor[1] - motor[0]:.4f} N.m, in closed form {expected:.4f} N.m")
+
+# %%
+# The integrator knows it too, and so does the robust problem: the drag is now part of the drive.
+
+steady = draggy.dte_arcsec(design[np.newaxis])[0]
+integrated = simulate(draggy, design, ramp=0.2, settle=0.3).dte_arcsec()
+print(f"DTE: steady state {steady:.3f}, integrated {integrated:.3f} arcsec")
+scenario = replace(preset("calibrated"), name="calibrated_draggy")
+scenario = replace(scenario, effects=(*scenario.effects, *draggy.effects))
+mean, std = RobustDTE(scenario, order=1).evaluate(scenario.nominal[np.newaxis, 1:])[0]
+print(f"robust problem on it: mean {mean:.1f}, std {std:.1f} arcsec")
+
+# %%
+# Two things need a change in the package. Model files name only the effects of
+# ``pymoo_hdte.drive.effects.EFFECT_NAMES``: for yours in a TOML file, add the law to
+# ``port_effects.LAWS``. And a verdict of ``pymoo-hdte discrepancy`` names only what it has a
+# candidate for: add one to ``pymoo_hdte/discrepancy/friction_candidates.py`` for drives, to
+# ``pymoo_hdte/measured/candidates.py`` for other machines.
+#
+# A port
+# ------
+#
+# The ports of a drive are fixed, those of a mechanism are yours. A port is a place where parts move
+# against each other: its motion is a sum of coordinates. Here a motor drives a load through a belt
+# of ratio 4. The belt is one port, and each bearing is another.
+
+belt_drive = Mechanism(
+    inertias={"motor": Believed(2e-4), "load": Believed(5e-3)},
+    ports=[
+        Port("belt", {"motor": 0.25, "load": -1.0}, Believed(40.0), Believed(0.01)),
+        Port("motor_bearing", {"motor": 1.0}, damping=Believed(1e-4)),
+        Port("load_bearing", {"load": 1.0}, damping=Believed(2e-3)),
+    ],
+    inputs=[Input("torque", {"motor": 1.0})],
+)
+time = np.arange(0.0, 1.5, 0.001)
+step = Record("step", "train", time, {"torque": np.where(time < 0.1, 0.0, 0.05)})
+plain = simulate_mechanism(belt_drive, step)
+with_drag = simulate_mechanism(
+    belt_drive, step, [LawAt("eyring_drag", "load_bearing", EyringDrag(0.02, 1.0))]
+)
+for name, course in (("plain", plain), ("with drag", with_drag)):
+    print(f"{name:9} speed of the load after 1.5 s: {course.speed['load'][-1]:.2f} rad/s")
+
+# %%
+# The torsional frequency is the root of K (1/J_load + ratio²/J_motor), here with little damping:
+
+frequency = np.sqrt(40.0 * (1.0 / 5e-3 + 0.25**2 / 2e-4)) / (2.0 * np.pi)
+stretch = 0.25 * plain.position["motor"] - plain.position["load"]
+ringing = stretch[(time >= 0.1) & (time < 0.6)]
+ringing = ringing - ringing.mean()
+crossings = np.count_nonzero(ringing[1:] * ringing[:-1] < 0.0)
+print(f"belt: expected {frequency:.1f} Hz, {crossings / 2 / 0.5:.0f} Hz counted in half a second")
+
+# %%
+# A part of an algorithm
+# ----------------------
+#
+# An ``ElitistSwarm`` is made of moves, a mutation and a truncation. A *move* is a callable that
+# returns the steps of some particles. The swarm gives more particles to a move the more of them
+# survive, so that a bad move costs little. Use the random generator that is handed in, and nothing
+# else random: then runs repeat to the last bit.
+
+
+class BareBones:
+    """A normal step around the middle of particle and leader (Kennedy 2003)."""
+
+    def __call__(self, X, leaders, swarm, random_state):
+        """Return the steps (n, d)."""
+        normal = random_state.standard_normal(X.shape)
+        return 0.5 * (leaders - X) + np.abs(leaders - X) * normal
+
+
+# %%
+# A *truncation* takes objectives and a size, and returns which rows stay. The default keeps the set
+# evenly spread; here crowding distance of NSGA-II takes its place, and beside it a random choice,
+# to see what the part is worth.
+
+
+def random_rows(F, size):
+    """Keep rows at random, always the same ones."""
+    return np.sort(np.random.default_rng(0).permutation(len(F))[:size])
+
+
+problem = RobustDTE("resonant")
+front = problem.pareto_front()
+igd = IGD(front, zero_to_one=True, ideal=front.min(axis=0), nadir=front.max(axis=0))
+swarms = {
+    "as it is": lambda: ElitistSwarm(),
+    "bare bones alone": lambda: ElitistSwarm(moves=[BareBones()]),
+    "bare bones as a fourth": lambda: ElitistSwarm(
+        moves=[Attraction(), Exchange(), Difference(), BareBones()]
+    ),
+    "crowding distance": lambda: ElitistSwarm(truncation=least_crowded),
+    "random truncation": lambda: ElitistSwarm(truncation=random_rows),
+}
+for name, make in swarms.items():
+    found = [igd(minimize(problem, make(), ("n_gen", 40), seed=seed).F) for seed in (1, 2, 3)]
+    print(f"{name:24} median IGD of 3 seeds {np.median(found):.4f}")
+
+# %%
+# The paper's family is made of parts too: a ``ParticleSwarm`` takes a rule for the inertia weight
+# and a hierarchy. This rule is a constant weight, to be compared with the paper's entropy weight.
+
+
+class ConstantWeight:
+    """The same weight at all times."""
+
+    def __call__(self, progress, front):
+        """Return the weight."""
+        return 0.5
+
+
+for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
+    swarm = ParticleSwarm(rule, Flat(), pop_size=100, archive_size=50)
+    value = igd(minimize(problem, swarm, ("n_gen", 40), seed=1).F)
+    print(f"{type(rule).__name__:15} IGD {value:.4f}")
+
+# %%
+# An experiment
+# -------------
+#
+# An experiment is a module in the folder ``experiments`` with a function ``run(context)`` that
+# returns a ``Result``: paragraphs, tables, figures. It is listed with one line in
+# ``experiments/registry.py``,
+#
+# .. code-block:: python
+#
+#    Experiment("stiffer", "What a stiffer drive would gain"),
+#
+# and from then on ``python -m experiments stiffer`` runs it, stores its tables as CSV and its
+# figures as PNG, and shows it on the page ``index.html``. The folder is no part of the installed
+# package; in a copy of the repository it is there.
+#
+# Long work is cut into *jobs*. A job holds all its settings, its seed included, and names itself by
+# them. The campaign runs jobs on as many processes or machines as the user allows, keeps every
+# finished one on disk, and does not run it again. This is a whole experiment,
+# ``docs/examples/stiffer.py``:
+#
+# .. literalinclude:: ../examples/stiffer.py
+#    :language: python
+#
+# To try it without the line in the registry, all it takes is a folder and a campaign in this
+# process:
+
+HERE = Path(sys.argv[0]).resolve().parent  # in a notebook: the folder docs/guides
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
+
+from stiffer import run
+
+from experiments.campaign import Campaign
+from experiments.registry import Context
+from experiments.store import load, save
+
+with tempfile.TemporaryDirectory() as folder:
+    out = Path(folder)
+    save(out, "stiffer", run(Context(seeds=1, out=out, campaign=Campaign(out))))
+    (table,) = load(out, "stiffer").tables
+    stored = sorted(path.name for path in (out / "stiffer").iterdir())
+print(" | ".join(column.heading for column in table.columns))
+for row in table.rows:
+    cells = zip(table.columns, row, strict=True)
+    print(" | ".join(column.show(cell) for column, cell in cells))
+print([finding.sentence for finding in table.findings if finding.agrees])
+print(stored)
+plt.show()

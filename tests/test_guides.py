@@ -1,0 +1,189 @@
+"""Every guide of the documentation runs as a user would run it, and prints what it claims."""
+
+import importlib
+import inspect
+import os
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from pymoo_hdte.discrepancy import excess, rival
+from pymoo_hdte.drive import hs_20_100
+from pymoo_hdte.measured.investigate import MAIN_SHARE
+from pymoo_hdte.surrogate import TruncatedNormal
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+GUIDES = {path.stem: path for path in (DOCS / "guides").glob("*.py")}
+PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (DOCS / "reference").glob("*.md")}
+NOISE = TruncatedNormal(0.0, 1.0)
+NUMBER = r"(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
+
+
+@cache
+def output_of(guide):
+    """Return what a guide prints in a process of its own, in which a warning is an error."""
+    done = subprocess.run(
+        [
+            sys.executable, "-W", "error",
+            # pymoo 0.6.2 imports scipy.spatial.ckdtree, a private path of SciPy.
+            "-W", "ignore:Please import `cKDTree`:DeprecationWarning",
+            GUIDES[guide],
+        ],
+        env=os.environ | {"MPLBACKEND": "Agg"}, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout
+
+
+def numbers_of(guide, pattern):
+    """Return the numbers in the place of each # of a line, a list for each such line."""
+    expression = re.escape(pattern).replace(r"\#", NUMBER)
+    found = re.findall(expression, output_of(guide))
+    assert found, f"{guide} prints no line like {pattern!r}"
+    return [[float(one) for one in ([line] if isinstance(line, str) else line)] for line in found]
+
+
+def texts_of(guide):
+    """Return the text of a guide in one line."""
+    return " ".join(re.sub(r"^# ?", "", GUIDES[guide].read_text(), flags=re.M).split())
+
+
+@pytest.mark.parametrize("guide", sorted(GUIDES))
+def test_guide_runs_and_its_checks_hold(guide):
+    lines = output_of(guide).splitlines()
+    assert lines
+    assert not [line for line in lines if line.endswith("False")]
+
+
+@pytest.mark.parametrize(
+    ("guide", "pattern", "tolerance"),
+    [
+        ("exact_moments", "closed form #, Gauss-Legendre #", 1e-11),
+        ("exact_moments", "recurrence #, rule #", 1e-9),
+        ("exact_moments", "exact #, quadrature #", 2e-9),
+        ("exact_moments", "mean # and #", 1e-11),
+        ("exact_moments", "std  # and #", 1e-11),
+        ("steady_state", "by hand  # arcsec\npackage  # arcsec", 1e-3),
+        ("steady_state", "harmonic balance      # arcsec\nintegrated from rest  # arcsec", 5e-3),
+        ("extend", "difference # N.m, in closed form # N.m", 1e-4),
+        ("extend", "steady state #, integrated # arcsec", 5e-3),
+        ("extend", "expected # Hz, # Hz counted", 1.0),
+        ("robust_study", "smallest mean # arcsec\ntrue front    # arcsec", 1e-4),
+        ("drive_data_sheet", "model #, surrogate # arcsec", 0.1),
+        ("verdict_rules", "standard deviation #, ordinary least squares #", 2e-4),
+        ("verdict_rules", "evidence #, by integration #", 0.1),
+    ],
+)  # fmt: skip
+def test_two_ways_to_one_number_agree(guide, pattern, tolerance):
+    for first, second in numbers_of(guide, pattern):
+        assert abs(first - second) <= tolerance
+
+
+def test_algorithms_of_the_study_find_the_front():
+    values = numbers_of("robust_study", "points  IGD #  HV #")
+    (best,) = numbers_of("robust_study", "1001 points, hypervolume #")
+    assert len(values) == 3
+    for igd, hypervolume in values:
+        assert igd < 0.02
+        assert 0.95 * best[0] < hypervolume < best[0]
+
+
+def test_members_of_the_family_are_as_the_study_says():
+    printed = numbers_of("robust_study", "# variables, # objectives, # points")
+    assert [row[:2] for row in printed] == [[4, 2]] * 3 + [[5, 3]]
+    # "``pareto_front()`` and ``pareto_set()`` hold 1000 points or more"
+    assert min(row[2] for row in printed) >= 1000
+
+
+def test_the_invented_drive_does_what_its_guide_says():
+    assert "ratio 81\n" in output_of("drive_data_sheet")
+    assert "wrong.toml.nominal.stiffness is 11000.0, allowed: " in output_of("drive_data_sheet")
+    (third,), (fifth,) = (
+        numbers_of("drive_data_sheet", f"order {order}: RMSE # arcsec") for order in (3, 5)
+    )
+    assert fifth[0] < 0.5 * third[0]
+    (((before, _),), ((after, _),)) = (
+        numbers_of("drive_data_sheet", f"{name} mean #, std # arcsec")
+        for name in ("nominal ", "balanced")
+    )
+    assert after < before
+
+
+def test_own_problems_meet_their_closed_forms():
+    ((n, length),) = numbers_of("own_problem", "# solutions, median length #")
+    assert n == 100
+    assert length == pytest.approx(1.0, abs=0.01)
+    assert "termination is 'TimeBasedTermination', allowed: ('n_gen', n)" in output_of(
+        "own_problem"
+    )
+
+
+def test_parts_of_the_swarm_differ_as_the_guide_says():
+    found = dict(re.findall(r"(.+?) +median IGD of 3 seeds (.+)", output_of("extend")))
+    assert len(found) == 5
+    assert float(found.pop("random truncation")) > 5.0 * max(map(float, found.values()))
+
+
+def test_tongue_of_instability_lies_where_mathieu_has_it():
+    ((low, high),) = numbers_of("steady_state", "unstable from # to #,")
+    assert low == pytest.approx(0.95, abs=0.005)
+    assert high == pytest.approx(1.05, abs=0.005)
+
+
+def test_verdicts_of_the_guide():
+    text = output_of("verdict_rules")
+    assert re.search(r"friction 0 N\.m: .* adequate\n", text)
+    assert re.search(r"friction 0\.3 N\.m: .* named\n", text)
+    assert re.search(r"^\* coulomb_friction:bearing ", text, flags=re.M)
+
+
+@pytest.mark.parametrize(
+    ("guide", "words", "value", "stated"),
+    [
+        ("verdict_rules", "four standard deviations", excess.DEVIATIONS, 4.0),
+        ("verdict_rules", "a distance of 10", rival.VERY_STRONG, 10.0),
+        ("verdict_rules", "removes at least half of the power", MAIN_SHARE, 0.5),
+        ("exact_moments", "128 nodes and more", len(NOISE.quadrature(0)[0]), 128),
+        ("robust_study", "101 turns of a motor", hs_20_100().ratio, 101.0),
+    ],
+)  # fmt: skip
+def test_text_states_what_the_code_has(guide, words, value, stated):
+    assert words in texts_of(guide)
+    assert value == stated
+
+
+def test_site_shows_every_guide():
+    front, order = (
+        (DOCS / name).read_text(encoding="utf-8")
+        for name in ("index.md", "_extensions/guide_order.py")
+    )
+    assert len(GUIDES) >= 7
+    for name in GUIDES:
+        assert f"(auto_guides/{name})" in front
+        assert f'"{name}.py"' in order
+
+
+def test_reference_holds_every_public_name():
+    """Classes and functions are found by automodule; constants need a line of their own."""
+    for page in sorted(set(PAGES) - {"index", "extending"}):
+        assert f".. automodule:: pymoo_hdte.{page}\n   :members:\n" in PAGES[page]
+        assert f"\n{page}\n" in PAGES["index"]
+        module = importlib.import_module(f"pymoo_hdte.{page}")
+        for name in getattr(module, "__all__", ()):
+            public = getattr(module, name)
+            if not (inspect.isclass(public) or inspect.isroutine(public)):
+                line = rf"^\.\. autodata:: pymoo_hdte\.{page}\.\w+\.{name}$"
+                assert re.search(line, PAGES[page], flags=re.M)
+    packages = {path.parent.name for path in (ROOT / "pymoo_hdte").glob("*/__init__.py")}
+    assert packages <= set(PAGES)
+
+
+def test_gate_builds_the_site_as_its_front_page_says():
+    front, gate = (path.read_text() for path in (DOCS / "index.md", ROOT / ".ci" / "run"))
+    for command in re.findall(r"^(?:pip|python) .*", front, flags=re.M):
+        assert f".venv/bin/{command}\n" in gate
