@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-
 MOST_SHOWN = 200
 """Characters of a field or value in a message; a damaged file may hold a million."""
 

@@ -1,9 +1,16 @@
 """Input that nobody means to give: what the fuzz campaign found, each with its clear refusal."""
 
+import re
+from functools import cache
+
 import numpy as np
 import pytest
+from quick_campaigns import CONDITIONS
+from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.checks import InvalidInput, finite_array, whole_number
+from pymoo_hdte.discrepancy import read_campaign, write_campaign
+from pymoo_hdte.discrepancy.virtual_rig import draw_rig, run_campaign
 from pymoo_hdte.drive import load_datasheet
 from pymoo_hdte.identification import error_statistics, read_no_load_runs
 from pymoo_hdte.problems.duty_cycle import OperatingCondition, load_conditions, shares
@@ -88,3 +95,20 @@ def test_a_single_error_is_not_asked_for_its_independence(rng):
     statistics = error_statistics(rng.normal(7.0, 0.5, (8, 1, 3)), ["e13"])
     assert statistics.advice() == ()
     assert "independence" in error_statistics(rng.normal(7.0, 0.5, (8, 2, 3)), "ab").advice()[-1]
+
+
+@cache
+def small_campaign():
+    """A campaign of three running records and a sweep."""
+    rng = np.random.default_rng(1)
+    return run_campaign(draw_rig(BELIEVED, (), rng), BELIEVED, RIG, rng, CONDITIONS[4:7])
+
+
+@pytest.mark.parametrize("value", ["[[0.7]]", "[0.7]", "[]", "[true]", "[" * 200 + "]" * 200])
+@pytest.mark.parametrize("key", ["angle_noise_arcsec", "static_error_orders", "sample_rate_Hz"])
+def test_lists_in_the_place_of_numbers_are_refused(tmp_path, key, value):
+    write_campaign(small_campaign(), tmp_path / "rig")
+    path = tmp_path / "rig" / "campaign.toml"
+    path.write_text(re.sub(rf"\n{key} = .*", f"\n{key} = {value}", path.read_text(), count=1))
+    with pytest.raises(InvalidInput, match=r"campaign\.toml, line \d+: "):
+        read_campaign(tmp_path / "rig")
