@@ -99,7 +99,8 @@ def _parser() -> argparse.ArgumentParser:
     extent.add_argument(
         "--full",
         action="store_true",
-        help="run the long campaign behind an experiment (calibration, blind, peers, swarm_parts) "
+        help="run the long campaign behind an experiment (calibration, blind, peers, swarm_parts, "
+        "reliability) "
         "instead of reading its committed outcome",
     )
     extent.add_argument(

@@ -44,7 +44,7 @@ class DaskKillJob:
     def execute(self) -> Run:
         """Count as `KillJob`; a run that loses a worker has to come to its end all the same."""
         rng = np.random.default_rng([SEED, 1, self.block])
-        counts = dict.fromkeys(COUNTS, 0)
+        begin, counts = time.perf_counter(), dict.fromkeys(COUNTS, 0)
         with tempfile.TemporaryDirectory(prefix="kill-") as top, ExitStack() as stack:
             cluster = _Cluster(Path(top), stack)
             for number in range(self.kills // 2):
@@ -56,7 +56,8 @@ class DaskKillJob:
                 judge(folder, _run(cluster, folder, PATIENCE), counts)
                 timer.join()
                 counts["kills"] += 1
-        return Run(COUNTS, np.array([list(counts.values())], dtype=float), 0.0)
+        values = np.array([list(counts.values())], dtype=float)
+        return Run(COUNTS, values, time.perf_counter() - begin)
 
 
 def _run(cluster: _Cluster, folder: Path, moment: float) -> int | None:

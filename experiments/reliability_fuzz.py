@@ -13,6 +13,7 @@ import select
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
 import zlib
 from collections.abc import Iterator
@@ -36,6 +37,7 @@ MOST_MEMORY = 8 * 2**30
 """Address space of the process that reads, so that none takes the machine with it."""
 START_SECONDS = 120.0
 """For imports, and to make the original."""
+READY = "ready"
 ROOT = Path(__file__).parents[1]
 
 
@@ -54,14 +56,19 @@ class FuzzJob:
 
     def execute(self) -> Run:
         """Return number and outcome of every input."""
+        begin = time.perf_counter()
         outcomes: list[int] = []
+        end = self.first + self.count
         while len(outcomes) < self.count:
-            outcomes += _outcomes_of_one_process(
-                self.kind, self.first + len(outcomes), self.first + self.count
+            block = (self.kind, str(self.first + len(outcomes)), str(end))
+            outcomes += outcomes_of_process(
+                [sys.executable, "-m", __name__, *block],
+                self.count - len(outcomes),
+                KINDS[self.kind].seconds,
             )
         numbers = np.arange(self.first, self.first + self.count)
         values = np.column_stack([numbers, outcomes]).astype(float)
-        return Run(("number", "outcome"), values, 0.0)
+        return Run(("number", "outcome"), values, time.perf_counter() - begin)
 
 
 def outcome(kind: str, number: int) -> tuple[int, str]:
@@ -89,42 +96,46 @@ def _read(kind: str, folder: Path) -> tuple[int, str]:
     return ACCEPTED, "read"
 
 
-def _outcomes_of_one_process(kind: str, first: int, end: int) -> list[int]:
-    """Return the outcomes of one or more inputs, until the process ends by itself or by us."""
-    command = [sys.executable, "-m", __name__, kind, str(first), str(end)]
+def outcomes_of_process(command: list[str], count: int, seconds: float) -> list[int]:
+    """Return the outcomes that a process prints, at least one, until it ends by itself or by us.
+
+    It prints a line when it is ready, then a line for each of ``count`` inputs, each within so many
+    seconds; the input at which it does not is `HUNG` or `CRASHED`, and the last one returned.
+    """
     outcomes: list[int] = []
-    with _process(command) as process:
-        assert process.stdout is not None
+    with _process(command) as output:
         limit, text = START_SECONDS, b""
         while True:
-            ready, _, _ = select.select([process.stdout], [], [], limit)
+            ready, _, _ = select.select([output], [], [], limit)
             if not ready:
                 return [*outcomes, HUNG]
-            part = os.read(process.stdout.fileno(), 65536)
+            part = os.read(output, 65536)
             if not part:
-                return outcomes if len(outcomes) == end - first else [*outcomes, CRASHED]
+                return outcomes if len(outcomes) == count else [*outcomes, CRASHED]
             text += part
             # A line that is half here is counted when its end comes.
-            outcomes = [int(line) for line in text.split(b"\n")[:-1] if line != b"ready"]
-            limit = KINDS[kind].seconds
+            outcomes = [int(line) for line in text.split(b"\n")[:-1] if line != READY.encode()]
+            limit = seconds
 
 
 @contextmanager
-def _process(command: list[str]) -> Iterator[subprocess.Popen[bytes]]:
-    with subprocess.Popen(
-        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-    ) as process:
+def _process(command: list[str]) -> Iterator[int]:
+    """Give the file descriptor of the output of a process, which is killed in the end."""
+    reading, writing = os.pipe()
+    with subprocess.Popen(command, cwd=ROOT, stdout=writing, stderr=subprocess.DEVNULL) as process:
+        os.close(writing)
         try:
-            yield process
+            yield reading
         finally:
             process.kill()
+            os.close(reading)
 
 
 def _serve(kind: str, first: int, end: int) -> None:
     """Print a line for every input as soon as its outcome is known."""
     resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, MOST_MEMORY))
     KINDS[kind].original()
-    print("ready", flush=True)
+    print(READY, flush=True)
     for number in range(first, end):
         print(outcome(kind, number)[0], flush=True)
 

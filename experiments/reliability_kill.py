@@ -57,7 +57,7 @@ class KillJob:
     def execute(self) -> Run:
         """Count kills, runs that came to their end, and what must not happen."""
         rng = np.random.default_rng([SEED, self.block])
-        counts = dict.fromkeys(COUNTS, 0)
+        begin, counts = time.perf_counter(), dict.fromkeys(COUNTS, 0)
         with tempfile.TemporaryDirectory(prefix="kill-") as top:
             folder = Path(top) / "0"
             while counts["kills"] < self.kills:
@@ -70,7 +70,8 @@ class KillJob:
                 if ended == 0:
                     folder = Path(top) / str(counts["finished"])
             judge(folder, self._killed(folder, str(STEPS**2), PATIENCE), counts)
-        return Run(COUNTS, np.array([list(counts.values())], dtype=float), 0.0)
+        values = np.array([list(counts.values())], dtype=float)
+        return Run(COUNTS, values, time.perf_counter() - begin)
 
     def _killed(self, folder: Path, step: str, moment: float) -> int | None:
         options = ("--workers", str(self.workers), "--out", str(folder))

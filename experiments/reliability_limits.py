@@ -19,11 +19,10 @@ from experiments.reliability_kill import (
     EXPERIMENT,
     PATIENCE,
     ROOT,
-    SEED,
     reference,
     steady,
-    whole,
     visible,
+    whole,
 )
 from experiments.reliability_mutations import put
 
@@ -66,11 +65,12 @@ class MemoryJob:
         """Return the exit code; in the parts, which differ from run to run, the peak in bytes."""
         with tempfile.TemporaryDirectory(prefix="memory-") as top:
             arguments = [self.name, *self.options, "--workers", "1", "--out", top]
-            process = subprocess.Popen(_experiment(*arguments), **_QUIET)
+            process = _started(_experiment(*arguments))
             _, status, usage = os.wait4(process.pid, 0)
         code = os.waitstatus_to_exitcode(status)
+        values = np.array([[float(code)]])
         # Linux counts kB.
-        return Run(("code",), np.array([[float(code)]]), usage.ru_utime, (1024.0 * usage.ru_maxrss,))
+        return Run(("code",), values, usage.ru_utime, (1024.0 * usage.ru_maxrss,))
 
 
 def full_disk_of_experiments() -> Iterator[bool]:
@@ -125,7 +125,7 @@ def two_at_once() -> Iterator[bool]:
     for _ in range(3):
         with tempfile.TemporaryDirectory(prefix="twice-") as top:
             command = _experiment(*EXPERIMENT, "--workers", "1", "--out", top)
-            both = [subprocess.Popen(command, **_QUIET) for _ in range(2)]
+            both = [_started(command) for _ in range(2)]
             codes = [process.wait(PATIENCE) for process in both]
             yield codes == [0, 0] and steady(Path(top)) == reference().files
 
@@ -135,9 +135,7 @@ def two_reports_at_once() -> Iterator[bool]:
     with _oscillator() as folder:
         for _ in range(3):
             with tempfile.TemporaryDirectory(prefix="twice-") as top:
-                both = [
-                    subprocess.Popen(_report(folder, Path(top) / "out"), **_QUIET) for _ in range(2)
-                ]
+                both = [_started(_report(folder, Path(top) / "out")) for _ in range(2)]
                 codes = sorted(process.wait(PATIENCE) for process in both)
                 names = [path.name for path in Path(top).iterdir()]
                 whole_report = all(whole(path) for path in visible(Path(top) / "out"))
@@ -151,7 +149,11 @@ LIMITS: dict[str, Callable[[], Iterator[bool]]] = {
     "two experiments at once": two_at_once,
     "two reports at once": two_reports_at_once,
 }
-_QUIET = {"cwd": ROOT, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+
+
+def _started(command: list[str]) -> subprocess.Popen[bytes]:
+    quiet = subprocess.DEVNULL
+    return subprocess.Popen(command, cwd=ROOT, stdout=quiet, stderr=quiet)
 
 
 def _experiment(*arguments: str) -> list[str]:

@@ -10,8 +10,10 @@ import io
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.reliability_text import BYTES, TEXTS, encoded, pick
 
@@ -67,7 +69,8 @@ def _mutate(files: Files, name: str, rng: np.random.Generator) -> str:
     content = files[name]
     where = rng.choice([*SHARES, "text"], p=[*SHARES.values(), 1.0 - sum(SHARES.values())])
     if where == "folder" or not isinstance(content, bytes):
-        replacement = pick((None, Folder(), Link(name), Link("nowhere"), Link("."), *files), rng)
+        choices = (None, Folder(), Link(name), Link("nowhere"), Link("."), *files)
+        replacement: Folder | Link | str | None = pick(choices, rng)
         if replacement is None:
             del files[name]
         elif isinstance(replacement, str):
@@ -104,8 +107,7 @@ def _text_of(name: str, content: bytes) -> str | None:
             return gzip.decompress(content).decode()
         if name.endswith(".npz"):
             with np.load(io.BytesIO(content)) as arrays:
-                assert arrays["coefficients"].dtype == float
-                return str(arrays["header"])
+                return str(arrays["header"]) if arrays["coefficients"].ndim else None
         if not name.endswith(".mat"):
             return content.decode()
     return None
@@ -115,13 +117,13 @@ def _packed(name: str, raw: bytes) -> bytes:
     return gzip.compress(raw, compresslevel=1, mtime=0) if name.endswith(".gz") else raw
 
 
-def _archive(header: str, array: np.ndarray) -> bytes:
+def _archive(header: str, array: NDArray[Any]) -> bytes:
     packed = io.BytesIO()
     np.savez(packed, header=np.array(header), coefficients=array)
     return packed.getvalue()
 
 
-def _strange_array(rng: np.random.Generator) -> np.ndarray:
+def _strange_array(rng: np.random.Generator) -> NDArray[Any]:
     strange = (
         *(np.full((2, 2), np.nan), np.ones((3, 3), complex), np.array([["a", "b"], ["c", "d"]])),
         *(np.empty((0, 2)), np.array(1.0), np.array([[None]], dtype=object), np.ones((2, 2), bool)),

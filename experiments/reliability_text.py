@@ -9,13 +9,14 @@ from typing import TypeVar
 import numpy as np
 
 Item = TypeVar("Item")
-Lines = list[str]
+FULL_WIDTH = "\N{FULLWIDTH DIGIT ONE}\N{FULLWIDTH DIGIT TWO}"
 
 WORDS = (
     *("nan", "-nan", "inf", "-inf", "1e999", "-1e999", "-0", "0", "0.0", "1e-320", "1e308"),
-    *("-1e308", "1e15", "-1", "9" * 400, "9" * 5000, "true", "false", "text", "", " ", "٣", "１２"),
-    *("1_000", "0x10", "1,5", "1.5.2", "'1'", '"1"', "[1]", "[]", "{}", "{ value = 1 }", "1+1j"),
-    *("2020-01-01", "None", "1e3", "0.5", "2", "1" + "0" * 30, "½", "\N{MINUS SIGN}5"),
+    *("-1e308", "1e15", "-1", "9" * 400, "9" * 5000, "true", "false", "text", "", " ", "٣"),
+    *(FULL_WIDTH, "1_000", "0x10", "1,5", "1.5.2", "'1'", '"1"', "[1]", "[]", "{}", "1+1j"),
+    *("{ value = 1 }", "2020-01-01", "None", "1e3", "0.5", "2", "1" + "0" * 30, "½"),
+    "\N{MINUS SIGN}5",
 )
 """In the place of a number."""
 UNITS = ("rad", "deg", "arcsec", "m", "mm", "um", "N.m", "N/m", "N.m/rad", "kg.m2", "r/min", "")
@@ -35,7 +36,7 @@ LONGEST = 1_000_000
 
 def pick(items: Sequence[Item], rng: np.random.Generator) -> Item:
     """Return one of the items."""
-    return items[rng.integers(len(items))]
+    return items[int(rng.integers(len(items)))]
 
 
 def _replaced(
@@ -53,18 +54,18 @@ def _replaced(
 
 
 def number_replaced(text: str, rng: np.random.Generator) -> str:
-    """A word in the place of a number."""
+    """Put a word in the place of a number."""
     return _replaced(NUMBER, text, rng, lambda _: pick(WORDS, rng))
 
 
 def number_scaled(text: str, rng: np.random.Generator) -> str:
-    """Another unit, another sign, another size."""
+    """Change a number to another unit, sign or size."""
     factors = (-1.0, 1e-3, 1e3, 0.5, 2.0, 60.0, 0.9, 1.1, 1.0 + 1e-9, 1e-300, 1e300)
     return _replaced(NUMBER, text, rng, lambda old: repr(float(old) * pick(factors, rng)))
 
 
 def quoted_replaced(text: str, rng: np.random.Generator) -> str:
-    """A unit, a name or a path in the place of another."""
+    """Put a unit, a name or a path in the place of another."""
     others = QUOTED.findall(text) or ['""']
 
     def change(_: str) -> str:
@@ -75,28 +76,31 @@ def quoted_replaced(text: str, rng: np.random.Generator) -> str:
 
 
 def path_replaced(text: str, rng: np.random.Generator) -> str:
-    """A file elsewhere."""
+    """Name a file elsewhere."""
     return _replaced(FILE, text, rng, lambda _: f'"{pick(PATHS, rng)}"')
 
 
 def key_renamed(text: str, rng: np.random.Generator) -> str:
-    """A key that is another one, misspelt, dotted or strange."""
+    """Make a key another one, misspelt, dotted or strange."""
     others = KEY.findall(text) or ["key"]
     strange = ("x", "a.b.c", '""', '"ключ"', "1", ".".join("a" * 1200))
     return _replaced(
-        KEY, text, rng, lambda old: pick((pick(others, rng), old[:-1] + "q", pick(strange, rng)), rng)
+        KEY,
+        text,
+        rng,
+        lambda old: pick((pick(others, rng), old[:-1] + "q", pick(strange, rng)), rng),
     )
 
 
 def value_nested(text: str, rng: np.random.Generator) -> str:
-    """A value in brackets or braces, a few or very many."""
+    """Put a value in brackets or braces, a few or very many."""
     depth = int(pick((1, 2, 50, DEEPEST), rng))
     opening, closing = pick((("[", "]"), ("{a=", "}")), rng)
     return _replaced(VALUE, text, rng, lambda old: opening * depth + old + closing * depth)
 
 
 def header_changed(text: str, rng: np.random.Generator) -> str:
-    """A table of another name, an array of it, or the same twice."""
+    """Give a table another name, make it an array, or double it."""
     others = HEADER.findall(text) or ["[table]"]
 
     def change(old: str) -> str:
@@ -108,14 +112,14 @@ def header_changed(text: str, rng: np.random.Generator) -> str:
 
 
 def lines_deleted(text: str, rng: np.random.Generator) -> str:
-    """Some lines fewer."""
+    """Leave out some lines."""
     lines = text.split("\n")
     start = int(rng.integers(len(lines)))
     return "\n".join(lines[:start] + lines[start + int(pick((1, 2, 10, 10**6), rng)) :])
 
 
 def lines_doubled(text: str, rng: np.random.Generator) -> str:
-    """Some lines twice."""
+    """Write some lines twice."""
     lines = text.split("\n")
     start = int(rng.integers(len(lines)))
     end = start + int(pick((1, 2, 10), rng))
@@ -123,7 +127,7 @@ def lines_doubled(text: str, rng: np.random.Generator) -> str:
 
 
 def lines_swapped(text: str, rng: np.random.Generator) -> str:
-    """Two lines in each other's place."""
+    """Swap two lines."""
     lines = text.split("\n")
     one, other = rng.integers(len(lines), size=2)
     lines[one], lines[other] = lines[other], lines[one]
@@ -131,15 +135,26 @@ def lines_swapped(text: str, rng: np.random.Generator) -> str:
 
 
 def line_strange(text: str, rng: np.random.Generator) -> str:
-    """A line that does not belong here."""
+    """Add a line that does not belong here."""
     lines = text.split("\n")
-    strange = ("#", " ", ",,,,", "x" * LONGEST, "1," * (LONGEST // 2), "\t", '"', "'''", "=", "\ufeff")
+    strange = (
+        "#",
+        " ",
+        ",,,,",
+        "x" * LONGEST,
+        "1," * (LONGEST // 2),
+        "\t",
+        '"',
+        "'''",
+        "=",
+        "\ufeff",
+    )
     lines.insert(int(rng.integers(len(lines) + 1)), pick(strange, rng))
     return "\n".join(lines)
 
 
 def cells_changed(text: str, rng: np.random.Generator) -> str:
-    """One line with a cell fewer, more, or elsewhere."""
+    """Give one line a cell fewer, more, or elsewhere."""
     lines = text.split("\n")
     rows = [index for index, line in enumerate(lines) if "," in line]
     if rows:
@@ -149,7 +164,7 @@ def cells_changed(text: str, rng: np.random.Generator) -> str:
 
 
 def column_changed(text: str, rng: np.random.Generator) -> str:
-    """All lines with a cell fewer, more, or elsewhere, the same in each."""
+    """Give all lines a cell fewer, more, or elsewhere, the same in each."""
     seed = int(rng.integers(2**32))
     return "\n".join(
         ",".join(_rearranged(line.split(","), np.random.default_rng(seed))) if "," in line else line
@@ -158,7 +173,7 @@ def column_changed(text: str, rng: np.random.Generator) -> str:
 
 
 def column_replaced(text: str, rng: np.random.Generator) -> str:
-    """One word in a whole column below the header, or each of its numbers scaled."""
+    """Put one word in a whole column below the header."""
     lines = text.split("\n")
     word = pick(WORDS, rng)
     at = int(rng.integers(lines[0].count(",") + 1))
@@ -183,19 +198,19 @@ def _rearranged(cells: list[str], rng: np.random.Generator) -> list[str]:
 
 
 def spaces_added(text: str, rng: np.random.Generator) -> str:
-    """Blank lines and spaces at the ends of lines, which do no harm anywhere."""
+    """Add blank lines and spaces at the ends of lines, which do no harm."""
     return re.sub("\n", lambda _: pick(("\n", "\n\n", " \n"), rng), text[:3000]) + text[3000:]
 
 
 def encoded(text: str, rng: np.random.Generator) -> bytes:
-    """The text in another encoding or with the ends of lines of another system."""
+    """Encode the text in another way, or end its lines as another system does."""
     ends = pick(("\n", "\n", "\r\n", "\r"), rng)
     encoding = pick(("utf-16", "utf-16-le", "utf-8-sig", "utf-32", "cp037", "utf-8"), rng)
     return text.replace("\n", ends).encode(encoding, "replace")
 
 
 def bits_flipped(content: bytes, rng: np.random.Generator) -> bytes:
-    """A few bits the other way."""
+    """Flip a few bits."""
     changed = bytearray(content)
     for at in rng.integers(len(content), size=int(pick((1, 1, 4, 64), rng))) if content else ():
         changed[at] ^= 1 << int(rng.integers(8))
@@ -203,36 +218,36 @@ def bits_flipped(content: bytes, rng: np.random.Generator) -> bytes:
 
 
 def cut_off(content: bytes, rng: np.random.Generator) -> bytes:
-    """The beginning alone."""
+    """Keep the beginning alone."""
     return content[: int(rng.integers(len(content) + 1))]
 
 
 def part_deleted(content: bytes, rng: np.random.Generator) -> bytes:
-    """A part missing in the middle."""
+    """Leave out a part in the middle."""
     start, end = sorted(rng.integers(len(content) + 1, size=2).tolist())
     return content[:start] + content[end:]
 
 
 def part_doubled(content: bytes, rng: np.random.Generator) -> bytes:
-    """A part twice."""
+    """Write a part twice."""
     start, end = sorted(rng.integers(len(content) + 1, size=2).tolist())
     return content[:end] + content[start:]
 
 
 def part_zeroed(content: bytes, rng: np.random.Generator) -> bytes:
-    """A part full of NUL, as file systems leave it behind after a loss of power."""
+    """Fill a part with NUL, as file systems do after a loss of power."""
     start, end = sorted(rng.integers(len(content) + 1, size=2).tolist())
     return content[:start] + bytes(end - start) + content[end:]
 
 
 def noise_inserted(content: bytes, rng: np.random.Generator) -> bytes:
-    """Random bytes in between."""
+    """Put random bytes in between."""
     at = int(rng.integers(len(content) + 1))
     return content[:at] + rng.bytes(int(pick((1, 16, 4096), rng))) + content[at:]
 
 
 def emptied(content: bytes, rng: np.random.Generator) -> bytes:
-    """Nothing at all."""
+    """Leave nothing at all."""
     return b""
 
 
