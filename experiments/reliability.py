@@ -71,8 +71,8 @@ FULL = Extent(
     kills={ONE_WORKER: 120, TWO_WORKERS: 120, DASK: 60},
     limits=tuple(LIMITS),
     experiments=(
-        *(("table7",), ("table8",), ("sensitivity",), ("crosscheck",), ("dte_map",)),
-        *(("calibration",), ("blind",), ("kinova",)),
+        *(("table7",), ("table8",), ("sensitivity",), ("crosscheck",), ("calibration",)),
+        *(("blind",), ("emps",), ("kinova",)),
     ),
 )
 QUICK = Extent(
