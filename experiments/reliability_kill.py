@@ -60,7 +60,8 @@ class KillJob:
         begin, counts = time.perf_counter(), dict.fromkeys(COUNTS, 0)
         with tempfile.TemporaryDirectory(prefix="kill-") as top:
             folder = Path(top) / "0"
-            while counts["kills"] < self.kills:
+            # A run that fails whenever it is resumed must not keep us here for ever.
+            while counts["kills"] + counts["failed"] + counts["orphaned"] < self.kills:
                 if rng.random() < 0.5:
                     moment = rng.uniform(0.0, 1.1 * reference().seconds)
                     ended = self._killed(folder, str(STEPS**2), moment)
