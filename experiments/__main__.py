@@ -19,7 +19,7 @@ from experiments.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
 
 FAILED = 1
-"""Exit code where the workers fail."""
+"""Exit code where the workers or the disk fail."""
 INTERRUPTED = 130
 """Exit code that a shell expects of a program ended by Ctrl-C."""
 
@@ -36,6 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--quick is for {_small_versions()}")
     try:
         options.out.mkdir(parents=True, exist_ok=True)
+        if not os.access(options.out, os.W_OK | os.X_OK):
+            parser.error(f"--out {options.out} cannot be written to")
         executor = make_executor(options.workers, options.dask)
     except OSError as error:
         parser.error(f"--out {options.out} cannot be made a folder: {error.strerror}")
@@ -63,7 +65,8 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
             print(f"\n{message}", file=sys.stderr)
             write_report(context.out, notice=message)
             return INTERRUPTED
-        except (BrokenExecutor, WorkerLost, WrongWorker) as error:
+        except (BrokenExecutor, WorkerLost, WrongWorker, OSError) as error:
+            # An OSError is a full disk, or a folder that is no longer there.
             notes = getattr(error, "__notes__", [])
             print("\n" + "\n".join([f"{experiment.name}: {error}", *notes]), file=sys.stderr)
             return FAILED
@@ -96,7 +99,8 @@ def _parser() -> argparse.ArgumentParser:
     extent.add_argument(
         "--full",
         action="store_true",
-        help="run the long campaign behind an experiment (calibration, blind, peers, swarm_parts) "
+        help="run the long campaign behind an experiment (calibration, blind, peers, swarm_parts, "
+        "reliability) "
         "instead of reading its committed outcome",
     )
     extent.add_argument(

@@ -91,6 +91,12 @@ EXPERIMENTS = (
         by_default=False,
         has_small_version=True,
     ),
+    Experiment(
+        "reliability",
+        "Ten thousand wrong inputs, kills at any moment, full disks, memory",
+        by_default=False,
+        has_small_version=True,
+    ),
     Experiment("benchmark", "Speed ratios and agreement with integration", by_default=False),
     Experiment("reference_front", "The true fronts, computed anew and compared", by_default=False),
 )

@@ -47,8 +47,12 @@ def write_atomically(path: Path, content: bytes) -> None:
     """Write a file that is either complete or not there, whenever the program is interrupted."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_bytes(content)
-    os.replace(temporary, path)
+    try:
+        temporary.write_bytes(content)
+        os.replace(temporary, path)
+    finally:
+        # A full disk leaves a part behind, which would keep it full.
+        temporary.unlink(missing_ok=True)
 
 
 def csv_bytes(heading: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:

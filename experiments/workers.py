@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+import os
 import pickle
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -60,7 +62,17 @@ def make_executor(workers: int, dask: str | None = None) -> Executor | None:
         return None
     # Forked children would inherit the threads of numerical libraries in an undefined state.
     spawn = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, spawn)
+    return ProcessPoolExecutor(workers, spawn, initializer=_end_with_the_parent)
+
+
+def _end_with_the_parent() -> None:
+    # A parent that is killed cannot end its workers, and these would wait for work for ever.
+    def wait() -> None:
+        if parent := multiprocessing.parent_process():
+            parent.join()
+            os._exit(1)
+
+    Thread(target=wait, daemon=True).start()
 
 
 def _dask_executor(address: str) -> Executor:

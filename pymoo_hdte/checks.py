@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+MOST_SHOWN = 200
+"""Characters of a field or value in a message; a damaged file may hold a million."""
+
 
 class InvalidInput(ValueError):
     """A value that a user supplied is not allowed; the message says which, and what is.
@@ -25,13 +28,25 @@ class InvalidInput(ValueError):
     """
 
     def __init__(self, field: str, value: Any, allowed: str) -> None:
-        super().__init__(f"{field} is {value!r}, allowed: {allowed}")
+        super().__init__(f"{_short(field)} is {_short(_shown(value))}, allowed: {allowed}")
         self.field = field
         self.value = value
         self.allowed = allowed
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.field, self.value, self.allowed)
+
+
+def _shown(value: Any) -> str:
+    try:
+        return repr(value).replace("\n", " ")
+    except (RecursionError, ValueError):
+        # Nested too deeply, or a whole number of more digits than Python prints.
+        return f"a {type(value).__name__} too large to print"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}... ({len(text)} characters)"
 
 
 def whole_number(field: str, value: Any, at_least: int) -> int:

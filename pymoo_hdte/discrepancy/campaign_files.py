@@ -202,7 +202,11 @@ def _build(kind: type[Checked], names: Names, table: Fields, place: str, **known
 def _si(raw: Any, field: str, factor: float) -> Any:
     """Return a number or a tuple of numbers in SI units; whole numbers without unit stay whole."""
     if isinstance(raw, list):
-        return tuple(_si(item, field, factor) for item in raw)
+        return tuple(_number_in_si(item, field, factor) for item in raw)
+    return _number_in_si(raw, field, factor)
+
+
+def _number_in_si(raw: Any, field: str, factor: float) -> float:
     number = real_number(field, raw) * factor
     return raw if isinstance(raw, int) and factor == 1.0 else number
 

@@ -102,7 +102,8 @@ def check_noise(
 def _scatters(channels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the standard deviation of the noise of each channel's rows, or more."""
     # Third differences of white noise have 1 + 9 + 9 + 1 times its variance.
-    return np.array([np.sqrt(np.mean(np.diff(rows, 3) ** 2) / 20.0) for rows in channels])
+    with np.errstate(over="ignore"):
+        return np.array([np.sqrt(np.mean(np.diff(rows, 3) ** 2) / 20.0) for rows in channels])
 
 
 def check_running(record: RunningRecord, believed: Believed, rig: Rig, largest_load: float) -> None:

@@ -40,6 +40,8 @@ class ErrorSource:
     std: float
 
     def __post_init__(self) -> None:
+        if not isinstance(self.symbol, str) or not self.symbol:
+            raise InvalidInput("symbol", self.symbol, "a word")
         one_of(f"error class of {self.symbol}", self.error_class, ERROR_CLASSES)
         real_number(f"mean of {self.symbol}", self.mean, at_least=0.0)
         real_number(f"std of {self.symbol}", self.std, at_least=0.0)

@@ -139,5 +139,6 @@ def read_toml(path: Path) -> Fields:
     try:
         with path.open("rb") as file:
             return Fields(tomllib.load(file), path.name)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
+        # Beside what is no TOML: too many digits for Python, and brackets nested too deeply.
         raise InvalidInput(str(path), str(error), "valid TOML") from None

@@ -109,7 +109,7 @@ class ErrorStatistics:
                 f"({self.correlation[i, j]:+.2f}): draw the errors jointly with the measured "
                 "correlation matrix."
             )
-        if self.independent:
+        if self.independent and len(self.symbols) > 1:
             limit = detectable_correlation(len(self.values), len(self.symbols))
             sentences.append(
                 f"No correlation is significant, but {len(self.values)} prototypes show none "

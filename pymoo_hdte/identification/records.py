@@ -37,6 +37,9 @@ MICROMETRES = "_um"
 
 KEY = ("prototype", "repeat")
 
+LARGEST = 1e15
+"""In any unit of the columns; beyond it nobody measures, and the squares of a fit overflow."""
+
 Record = TypeVar("Record")
 
 
@@ -254,9 +257,10 @@ def _rows(
 
 def _number(field: str, cell: str) -> float:
     try:
-        return real_number(field, float(cell))
+        number = real_number(field, float(cell))
     except ValueError:
         raise InvalidInput(field, cell, "a finite number") from None
+    return real_number(field, number, at_least=-LARGEST, at_most=LARGEST)
 
 
 def _counted(field: str, value: float) -> int:

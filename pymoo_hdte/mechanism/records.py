@@ -59,6 +59,8 @@ class Record:
         channels: Mapping[str, ArrayLike],
         noise: Mapping[str, float] | None = None,
     ) -> None:
+        if not isinstance(name, str):
+            raise InvalidInput("name of a record", name, "a text")
         one_of(f"role of record {name}", role, ROLES)
         moments = finite_array(f"time of record {name}", time, (None,))
         if len(moments) < FEWEST_SAMPLES:
@@ -74,12 +76,15 @@ class Record:
                 float(steps[worst]),
                 f"{step:g} s within {_JITTER:.0%}, as the mean of the record",
             )
+        for what, given in (("channels", channels), ("noise", {} if noise is None else noise)):
+            if not isinstance(given, Mapping):
+                raise InvalidInput(f"{what} of record {name}", given, "a mapping by name")
         n = len(moments)
         checked = {
             channel: finite_array(f"channel {channel} of record {name}", values, (n,))
             for channel, values in channels.items()
         }
-        known = dict(noise or {})
+        known = {} if noise is None else dict(noise)
         for channel, deviation in known.items():
             one_of(f"noise of record {name}", channel, tuple(checked))
             real_number(f"noise of channel {channel} of record {name}", deviation, above=0.0)

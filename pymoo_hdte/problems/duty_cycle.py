@@ -17,6 +17,8 @@ from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 COLUMNS = ("speed_rpm", "load_Nm", "weight")
 """Columns of a file of operating conditions, in any order."""
+LARGEST_WEIGHT = 1e15
+"""So that sums of weights are finite."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class OperatingCondition:
     load_torque : float
         N.m at the output, at least 0.
     weight : float
-        Above 0; only the ratios of the weights of a duty cycle matter.
+        Above 0, at most `LARGEST_WEIGHT`; only the ratios of the weights of a duty cycle matter.
 
     Raises
     ------
@@ -46,7 +48,7 @@ class OperatingCondition:
         values = {
             "input_speed": real_number("input_speed", self.input_speed, above=0.0),
             "load_torque": real_number("load_torque", self.load_torque, at_least=0.0),
-            "weight": real_number("weight", self.weight, above=0.0),
+            "weight": real_number("weight", self.weight, above=0.0, at_most=LARGEST_WEIGHT),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -162,7 +164,11 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         raise InvalidInput(path.name, str(error), "CSV text in UTF-8") from None
     for number, line in enumerate(text.splitlines(), start=1):
         if line.strip() and not line.lstrip().startswith("#"):
-            cells = next(csv.reader([line]))
+            try:
+                cells = next(csv.reader([line]))
+            except csv.Error as error:
+                place = f"{path.name}, line {number}"
+                raise InvalidInput(place, str(error), "cells separated by commas") from None
             lines.append((number, [cell.strip() for cell in cells]))
     return lines or [(1, [])]
 
@@ -180,5 +186,5 @@ def _condition(place: str, header: list[str], cells: list[str]) -> OperatingCond
     # Checked before the change of units, so that an error shows what the file says.
     speed = real_number(f"{place}: speed_rpm", values["speed_rpm"], above=0.0)
     load = real_number(f"{place}: load_Nm", values["load_Nm"], at_least=0.0)
-    weight = real_number(f"{place}: weight", values["weight"], above=0.0)
+    weight = real_number(f"{place}: weight", values["weight"], above=0.0, at_most=LARGEST_WEIGHT)
     return OperatingCondition(speed * REVOLUTION_PER_MINUTE, load, weight)
