@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.callback import Callback
 from pymoo.optimize import minimize
+from tqdm import tqdm
 
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
@@ -46,6 +49,18 @@ class Settings:
     conditions: tuple[OperatingCondition, ...] | None
     evaluations: int
     seed: int
+
+
+class Progress(Callback):
+    """Moves a bar of tqdm on to the evaluations made so far."""
+
+    def __init__(self, bar: tqdm) -> None:
+        super().__init__()
+        self.bar = bar
+
+    def notify(self, algorithm: Algorithm) -> None:
+        """Follow the algorithm."""
+        self.bar.update(algorithm.evaluator.n_eval - self.bar.n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +136,9 @@ class DesignStudy:
         return float(difference.mean()), float(difference.std(ddof=1) / len(difference) ** 0.5)
 
 
-def design_study(model: DriveModel, preference: str, settings: Settings) -> DesignStudy:
+def design_study(
+    model: DriveModel, preference: str, settings: Settings, callback: Callback | None = None
+) -> DesignStudy:
     """Optimise a drive and choose a design.
 
     Parameters
@@ -130,6 +147,8 @@ def design_study(model: DriveModel, preference: str, settings: Settings) -> Desi
     preference : str
         One of `PREFERENCES`.
     settings : Settings
+    callback : pymoo.core.callback.Callback, optional
+        Told of every generation.
 
     Raises
     ------
@@ -150,6 +169,7 @@ def design_study(model: DriveModel, preference: str, settings: Settings) -> Desi
         ElitistSwarm(pop_size=POPULATION),
         ("n_eval", settings.evaluations),
         seed=settings.seed,
+        callback=callback,
     )
     order = np.argsort(result.F[:, 0], kind="stable")
     designs, front = result.X[order], result.F[order]

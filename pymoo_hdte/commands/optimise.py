@@ -50,8 +50,15 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
+    from tqdm import tqdm
+
     from pymoo_hdte.checks import one_of, whole_number
-    from pymoo_hdte.commands.design_study import POPULATION, Settings, design_study
+    from pymoo_hdte.commands.design_study import (
+        POPULATION,
+        Progress,
+        Settings,
+        design_study,
+    )
     from pymoo_hdte.commands.optimum_report import check_optimum_folder, write_optimum_report
     from pymoo_hdte.decision import PREFERENCES
     from pymoo_hdte.problems import load_conditions
@@ -69,7 +76,10 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     )
     model = read_drive(options)
     say("fitting the surrogate to the drive model, and optimising")
-    study = design_study(model, preference, settings)
+    # Without a terminal, or if quiet, there is no bar.
+    silent = True if options.quiet else None
+    with tqdm(total=settings.evaluations, unit="design", leave=False, disable=silent) as bar:
+        study = design_study(model, preference, settings, Progress(bar))
     say("writing the report")
     document = write_optimum_report(study, options.out)
     lines = [*document["sentences"], *document["limits"], f"Report: {options.out / PAGE_FILE}"]

@@ -63,7 +63,7 @@ class StribeckFriction(Aperiodic):
 
 @dataclass(frozen=True)
 class NonlinearDrag(Aperiodic):
-    """T = coefficient speed |speed|; N.m.s2/rad2."""
+    """T = coefficient ``speed |speed|``; N.m.s2/rad2."""
 
     coefficient: float
 

@@ -49,8 +49,9 @@ class HardeningStiffness(Aperiodic):
 class SoftWindup(Aperiodic):
     """T = -softening K torsion g(d / torsion): K is lower by this share near zero torsion.
 
-    g(x) = x / (1 + |x|^p)^(1/p) with p the ``sharpness``: from a gradual winding up to the straight
-    pieces of catalogues (K1 below K2 below K3). ``torsion``, rad, is where the drive has wound up.
+    ``g(x) = x / (1 + |x|^p)^(1/p)`` with p the ``sharpness``: from a gradual winding up to the
+    straight pieces of catalogues (K1 below K2 below K3). ``torsion``, rad, is where the drive has
+    wound up.
     """
 
     softening: float

@@ -1,19 +1,19 @@
 """Named effects that are a law at a port, or an addition to the kinematics.
 
-=============================  ===============  ====================================================
-name                           port             law
-=============================  ===============  ====================================================
-``hardening_stiffness``        mesh             `HardeningStiffness`
-``soft_windup``                mesh             `SoftWindup`
-``backlash``                   mesh             `DeadZone`
-``clearance_variation``        mesh             `PeriodicClearance`
-``hysteresis``                 mesh             `MaxwellSlip`
-``coulomb_friction``           input, output    `CoulombFriction`
-``stribeck_friction``          input, output    `StribeckFriction`
+===============================  =============  ====================
+name                             port           law
+===============================  =============  ====================
+``hardening_stiffness``          mesh           `HardeningStiffness`
+``soft_windup``                  mesh           `SoftWindup`
+``backlash``                     mesh           `DeadZone`
+``clearance_variation``          mesh           `PeriodicClearance`
+``hysteresis``                   mesh           `MaxwellSlip`
+``coulomb_friction``             input, output  `CoulombFriction`
+``stribeck_friction``            input, output  `StribeckFriction`
 ``position_dependent_friction``  input, output  `PeriodicFriction`
-``nonlinear_drag``             input, output    `NonlinearDrag`
-``torque_ripple``              input            `PeriodicTorque`
-=============================  ===============  ====================================================
+``nonlinear_drag``               input, output  `NonlinearDrag`
+``torque_ripple``                input          `PeriodicTorque`
+===============================  =============  ====================
 
 `KinematicErrorLine` adds an order to theta_s, `KinematicReaction` the torque that Eq. (9) lacks.
 """

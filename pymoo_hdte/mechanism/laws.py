@@ -27,7 +27,7 @@ class ConstantForce(Aperiodic):
 
 @dataclass(frozen=True)
 class DirectionalFriction(Aperiodic):
-    """T = level + viscous |speed| while it moves: half the difference of the two directions.
+    """T = level + viscous ``|speed|`` while it moves: half the difference of the two directions.
 
     ``level`` in N or N.m, ``viscous`` in force per speed. What the directions have in common is
     Coulomb's friction and the port's damping.
