@@ -12,6 +12,7 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from experiments.campaign import Campaign
+from experiments.machine import usable_cores
 from experiments.registry import EXPERIMENTS, Context, Experiment
 from experiments.report import write_report
 from experiments.store import save
@@ -89,7 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--workers",
         type=_positive,
-        default=_usable_cores(),
+        default=usable_cores(),
         help="processes (default: as many as there are cores to use)",
     )
     parser.add_argument(
@@ -112,13 +113,6 @@ def _parser() -> argparse.ArgumentParser:
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"
     )
     return parser
-
-
-def _usable_cores() -> int:
-    # A scheduler or taskset may leave this process fewer cores than the machine has.
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _positive(text: str) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -14,10 +13,13 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.evaluator import Evaluator
 from tqdm import tqdm
 
+from experiments.benchmark_parts import ratios_of_parts
+from experiments.machine import machine_table
 from experiments.models import model_sentences
 from experiments.registry import Context
 from experiments.result import Column, Finding, Result, Table
 from experiments.runs import robust_problem
+from experiments.timing import Ratio, best_time, ratio_table
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
 from pymoo_hdte.drive import PARAMETERS, PRESETS, DriveModel, harmonic_balance, preset, simulate
 from pymoo_hdte.drive.time_domain import ANGLES, METHODS
@@ -37,28 +39,10 @@ leaves out and the harmonic balance does not."""
 RESONANT = ("calibrated", "resonant")
 
 
-@dataclass(frozen=True)
-class Ratio:
-    """One measured ratio of two times, with what it should reach and whether it does."""
-
-    what: str
-    slow: str
-    slow_seconds: float
-    fast: str
-    fast_seconds: float
-    target: str
-    reached: bool
-
-    @property
-    def value(self) -> float:
-        """Slow over fast."""
-        return self.slow_seconds / self.fast_seconds
-
-
 def run(context: Context) -> Result:
     """Measure all ratios and the agreement; minutes, on one core."""
     agreement = tuple(_agreement())
-    ratios = [*_moments(), *_steady_state(), *_algorithms()]
+    ratios = [*_moments(), *_steady_state(), *_algorithms(), *ratios_of_parts()]
     return Result(
         title="Benchmark: speed ratios and agreement with integration",
         command="python -m experiments benchmark",
@@ -67,18 +51,8 @@ def run(context: Context) -> Result:
             "run mean anything.",
             *model_sentences("calibrated", "resonant"),
         ),
-        tables=(_ratio_table(ratios), _agreement_table(agreement)),
+        tables=(ratio_table(ratios), machine_table(), _agreement_table(agreement)),
     )
-
-
-def best_time(function: Callable[[], object], repeats: int) -> float:
-    """Return the least wall time in seconds of several calls."""
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        function()
-        times.append(time.perf_counter() - begin)
-    return min(times)
 
 
 def _moments() -> Iterator[Ratio]:
@@ -216,29 +190,6 @@ def _largest(found: list[float], expected: NDArray[np.float64]) -> float:
 def _random_designs(model: DriveModel, n: int) -> NDArray[np.float64]:
     box = robust_problem(model.name).surrogate.box
     return np.random.default_rng(2).uniform(box.lower, box.upper, (n, len(PARAMETERS)))
-
-
-def _ratio_table(ratios: list[Ratio]) -> Table:
-    rows = tuple(
-        (r.what, r.slow, 1e3 * r.slow_seconds, r.fast, 1e3 * r.fast_seconds, r.value, r.target)
-        for r in ratios
-    )
-    findings = tuple(
-        Finding(r.reached, f"{r.what}: {r.slow} over {r.fast} is {r.value:.3g}; {r.target}.", True)
-        for r in ratios
-        if r.target
-    )
-    columns = (
-        Column("what"),
-        Column("slow side"),
-        Column("time", "ms", 3, "slow side"),
-        Column("fast side"),
-        Column("time", "ms", 3, "fast side"),
-        Column("ratio", "", 3),
-        Column("wanted"),
-    )
-    title = "Ratios of times"
-    return Table("ratios", title, columns, rows, findings=findings, wall_times=True)
 
 
 def _agreement_table(rows: tuple[tuple[str, str, float, float], ...]) -> Table:

@@ -1,0 +1,46 @@
+"""The benchmark's arithmetic and its facts on the machine; its times are no business of tests."""
+
+import time
+
+import pytest
+
+from experiments.machine import machine_table, usable_cores
+from experiments.timing import Ratio, best_time, ratio_table
+
+
+def test_the_best_of_several_times_is_taken():
+    pauses = iter([0.03, 0.001, 0.03])
+    assert 0.001 <= best_time(lambda: time.sleep(next(pauses)), 3) < 0.03
+
+
+def test_a_ratio_says_whether_it_is_reached():
+    slow = Ratio("a", "old", 3.0, "new", 0.5, "at least 3", True)
+    free = Ratio("b", "old", 1.0, "new", 2.0, "", True)
+    table = ratio_table([slow, free])
+    assert [row[5] for row in table.rows] == [6.0, 0.5]
+    assert [row[2] for row in table.rows] == [3000.0, 1000.0]
+    (finding,) = table.findings
+    assert finding.agrees
+    assert "6; at least 3" in finding.sentence
+    assert table.wall_times
+
+
+def test_the_machine_is_described():
+    facts = dict(machine_table().rows)
+    assert facts["cores this process may use"] == str(usable_cores())
+    assert float(facts["memory"].split()[0]) > 0.1
+    assert "numpy" in facts["versions"]
+    assert all(facts.values())
+
+
+def test_cores_are_those_the_scheduler_leaves(monkeypatch):
+    monkeypatch.setattr("os.sched_getaffinity", lambda pid: {1, 5, 6}, raising=False)
+    assert usable_cores() == 3
+    monkeypatch.delattr("os.sched_getaffinity")
+    monkeypatch.setattr("os.cpu_count", lambda: None)
+    assert usable_cores() == 1
+
+
+@pytest.mark.parametrize("seconds", [1e-9, 1.0])
+def test_ratios_have_no_unit(seconds):
+    assert Ratio("a", "x", 2.0 * seconds, "y", seconds, "", True).value == pytest.approx(2.0)
