@@ -8,6 +8,7 @@ that what hangs or crashes the interpreter is seen from outside and the block go
 from __future__ import annotations
 
 import os
+import re
 import resource
 import select
 import subprocess
@@ -38,6 +39,7 @@ MOST_MEMORY = 8 * 2**30
 START_SECONDS = 120.0
 """For imports, and to make the original."""
 READY = "ready"
+OUTCOME_LINE = rb"(?m)^outcome (\d+)\n"
 ROOT = Path(__file__).parents[1]
 
 
@@ -99,7 +101,7 @@ def _read(kind: str, folder: Path) -> tuple[int, str]:
 def outcomes_of_process(command: list[str], count: int, seconds: float) -> list[int]:
     """Return the outcomes that a process prints, at least one, until it ends by itself or by us.
 
-    It prints a line when it is ready, then a line for each of ``count`` inputs, each within so many
+    It prints a line when it is ready, then a line ``outcome N`` for each of ``count`` inputs, each within so many
     seconds; the input at which it does not is `HUNG` or `CRASHED`, and the last one returned.
     """
     outcomes: list[int] = []
@@ -113,8 +115,8 @@ def outcomes_of_process(command: list[str], count: int, seconds: float) -> list[
             if not part:
                 return outcomes if len(outcomes) == count else [*outcomes, CRASHED]
             text += part
-            # A line that is half here is counted when its end comes.
-            outcomes = [int(line) for line in text.split(b"\n")[:-1] if line != READY.encode()]
+            # A line that is half here is counted when its end comes; libraries print lines too.
+            outcomes = [int(found) for found in re.findall(OUTCOME_LINE, text)]
             limit = seconds
 
 
@@ -137,7 +139,7 @@ def _serve(kind: str, first: int, end: int) -> None:
     KINDS[kind].original()
     print(READY, flush=True)
     for number in range(first, end):
-        print(outcome(kind, number)[0], flush=True)
+        print(f"outcome {outcome(kind, number)[0]}", flush=True)
 
 
 if __name__ == "__main__":

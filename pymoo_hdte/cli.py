@@ -26,7 +26,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run what the command line asks for; return the exit code."""
     options = _parser().parse_args(arguments)
     try:
-        outcome = options.command.run(options, _silent if options.quiet else _say)
+        # A log wants errors, not progress.
+        told = sys.stderr.isatty() and not options.quiet
+        outcome = options.command.run(options, _say if told else _silent)
     except (InvalidInput, ArithmeticError, OSError) as error:
         print(f"pymoo-hdte: error: {_message(error)}", file=sys.stderr)
         return MISTAKE

@@ -109,16 +109,18 @@ def test_help_has_an_example_and_the_exit_codes(command, capsys):
     assert "Exit codes: 0" in printed
 
 
-def test_progress_goes_to_stderr_alone(monkeypatch, capsys):
+def test_progress_goes_to_a_terminal_alone(monkeypatch, capsys):
     def tells(campaign, out, data, say):
         say("reading the records")
         return DOCUMENT
 
     monkeypatch.setattr(discrepancy, "_analysed", tells)
-    assert run("--json") == 0
-    printed = capsys.readouterr()
-    assert json.loads(printed.out) == DOCUMENT
-    assert printed.err == "reading the records ...\n"
+    for terminal, told in ((True, "reading the records ...\n"), (False, "")):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda terminal=terminal: terminal)
+        assert run("--json") == 0
+        printed = capsys.readouterr()
+        assert json.loads(printed.out) == DOCUMENT
+        assert printed.err == told
 
 
 def test_help_waits_for_nothing_heavy():

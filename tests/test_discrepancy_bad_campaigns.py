@@ -142,6 +142,10 @@ FAULTS = {
     "noise in mN.m": (toml("torque_noise_Nm = 0.003", "torque_noise_Nm = 3"), "line 23: rig.input"),
     "sign of motor": (column(ROW, "input_torque_Nm", np.negative), f"{ROW}, .*input_torque"),
     "sign of load": (column(ROW, "output_torque_Nm", np.negative), f"{ROW}, .*output_torque"),
+    "one wild sample": (
+        column(ROW, "output_torque_Nm", lambda values: np.r_[1e9, values[1:]]),
+        f"{ROW}, .*mean of output_torque",
+    ),
     "sign swept": (column(SWEEP, "output_torque_Nm", np.negative), f"{SWEEP}, .*backwards"),
     "dead input": (column(ROW, "input_angle_rad", dead), f"{ROW}, .*input_angle"),
     "dead output": (column(ROW, "output_angle_rad", dead), f"{ROW}, .*output_angle"),

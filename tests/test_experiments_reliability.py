@@ -108,12 +108,14 @@ def test_whatever_is_no_clear_error_fails(fault, words, monkeypatch):
     [
         ("time.sleep(60)", [REFUSED, ACCEPTED, HUNG]),
         ("os.abort()", [REFUSED, ACCEPTED, CRASHED]),
-        ("print(0)", [REFUSED, ACCEPTED, REFUSED]),
-        ("sys.stdout.write('1')", [REFUSED, ACCEPTED, CRASHED]),
+        ("print('outcome 0')", [REFUSED, ACCEPTED, REFUSED]),
+        ("print(' ** On entry to DLASCL')", [REFUSED, ACCEPTED, CRASHED]),
+        ("sys.stdout.write('outcome 1')", [REFUSED, ACCEPTED, CRASHED]),
     ],
 )
 def test_a_hang_or_a_crash_is_seen_from_outside(then, expected):
-    script = f"import os, sys, time; print('ready'); print(0); print(1, flush=True); {then}"
+    told = "print('ready'); print('outcome 0'); print('outcome 1', flush=True)"
+    script = f"import os, sys, time; {told}; {then}"
     assert outcomes_of_process([sys.executable, "-c", script], 3, 2.0) == expected
 
 
