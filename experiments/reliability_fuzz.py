@@ -101,8 +101,9 @@ def _read(kind: str, folder: Path) -> tuple[int, str]:
 def outcomes_of_process(command: list[str], count: int, seconds: float) -> list[int]:
     """Return the outcomes that a process prints, at least one, until it ends by itself or by us.
 
-    It prints a line when it is ready, then a line ``outcome N`` for each of ``count`` inputs, each within so many
-    seconds; the input at which it does not is `HUNG` or `CRASHED`, and the last one returned.
+    It prints a line when it is ready, then a line ``outcome N`` for each of ``count`` inputs, each
+    within so many seconds; the input at which it does not is `HUNG` or `CRASHED`, and the last one
+    returned.
     """
     outcomes: list[int] = []
     with _process(command) as output:
