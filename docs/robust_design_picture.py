@@ -10,6 +10,7 @@ from scipy.stats import gaussian_kde
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
+from pymoo_hdte.surrogate import TruncatedNormal
 
 PICTURE = Path(__file__).with_name("robust_design.png")
 DATA_SHEET, CHOSEN = "#D55E00", "#0072B2"
@@ -44,8 +45,8 @@ def draw(target: Path = PICTURE) -> None:
 def of_built_drives(problem: RobustDTE, design: np.ndarray) -> np.ndarray:
     """Return the DTE of random drives of one design, by the drive model, shape (DRIVES,)."""
     rng = np.random.default_rng(1)
-    theta_s, std = problem.model.nominal[0], problem.model.kinematic_error.std
-    scatter = theta_s + std * np.clip(rng.standard_normal(DRIVES), -3.0, 3.0)
+    error = problem.model.kinematic_error
+    scatter = TruncatedNormal(problem.model.nominal[0], error.std).sample(rng, DRIVES)
     parts = design * rng.uniform(0.95, 1.05, (DRIVES, 4))
     return problem.model.dte_arcsec(np.column_stack([scatter, parts]))
 

@@ -94,7 +94,6 @@ EXPERIMENTS = (
     Experiment(
         "reliability",
         "Ten thousand wrong inputs, kills at any moment, full disks, memory",
-        by_default=False,
         has_small_version=True,
     ),
     Experiment("benchmark", "Speed ratios and agreement with integration", by_default=False),

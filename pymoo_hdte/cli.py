@@ -29,16 +29,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # A log wants errors, not progress.
         told = sys.stderr.isatty() and not options.quiet
         outcome = options.command.run(options, _say if told else _silent)
+        if options.json:
+            _print(json.dumps(outcome.document, indent=1, ensure_ascii=False))
+        elif not options.quiet:
+            _print(outcome.summary)
     except (InvalidInput, ArithmeticError, OSError) as error:
         print(f"pymoo-hdte: error: {_message(error)}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt:
         print("pymoo-hdte: interrupted, nothing was written", file=sys.stderr)
         return INTERRUPTED
-    if options.json:
-        print(json.dumps(outcome.document, indent=1, ensure_ascii=False))
-    elif not options.quiet:
-        print(outcome.summary)
     return 0
 
 
@@ -65,6 +65,12 @@ def _parser() -> argparse.ArgumentParser:
         output.add_argument("--json", action="store_true", help="print the result as JSON")
         output.add_argument("--quiet", action="store_true", help="print nothing but errors")
     return parser
+
+
+def _print(text: str) -> None:
+    """Print to stdout, whatever characters it can show, and meet its errors here."""
+    encoding = sys.stdout.encoding or "utf-8"
+    print(text.encode(encoding, "replace").decode(encoding), flush=True)
 
 
 def _say(what: str) -> None:

@@ -1,8 +1,10 @@
 """The command line: exit codes, what is printed where, nothing half-written."""
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -121,6 +123,27 @@ def test_progress_goes_to_a_terminal_alone(monkeypatch, capsys):
         printed = capsys.readouterr()
         assert json.loads(printed.out) == DOCUMENT
         assert printed.err == told
+
+
+def test_what_a_terminal_cannot_show_is_replaced():
+    code = "from pymoo_hdte import cli; cli._print('K 2·10⁻⁴')"
+    options = {"env": os.environ | {"PYTHONIOENCODING": "latin-1"}, "capture_output": True}
+    done = subprocess.run([sys.executable, "-c", code], check=True, **options)
+    assert done.stdout == "K 2·10??\n".encode("latin-1")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_full_disk_behind_stdout_is_one_line():
+    code = (
+        "import sys; from pymoo_hdte import cli; from pymoo_hdte.commands import discrepancy;"
+        "discrepancy._analysed = lambda *a: {'a': 1};"
+        "discrepancy._summary = lambda *a: 'found';"
+        "sys.exit(cli.main(['discrepancy', 'x', '--out', 'y']))"
+    )
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-c", code], stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode in (cli.MISTAKE, 120)
+    assert b"Traceback" not in done.stderr
 
 
 def test_help_waits_for_nothing_heavy():

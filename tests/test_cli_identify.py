@@ -5,6 +5,8 @@ import shutil
 
 import numpy as np
 import pytest
+from scipy.stats import linregress
+from scipy.stats import t as student
 
 from pymoo_hdte import cli
 from pymoo_hdte.drive import hs_20_100, load_datasheet
@@ -133,6 +135,63 @@ def test_one_prototype_says_nothing_of_the_scatter(copied, tmp_path, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["parameters"]["B_out"]["std_between_prototypes"] is None
     assert "says nothing of the scatter of B_out" in found["limits"][0]
+
+
+def test_intervals_by_hand(copied, tmp_path, capsys):
+    """The line of a run, the repeats of a prototype, the prototypes of a series."""
+    for path in copied.iterdir():
+        if path.name != "no_load_output.csv":
+            path.unlink()
+    path = copied / "no_load_output.csv"
+    header, *rows = path.read_text().splitlines()
+    for keys in (["1,1,"], ["1,1,", "1,2,", "1,3,"], [f"{p},1," for p in range(1, 7)]):
+        kept = [row for row in rows if row.startswith(tuple(keys))]
+        path.write_text("\n".join([header, *kept]) + "\n")
+        assert identify(copied, "--out", tmp_path / "out", "--json") == 0
+        found = json.loads(capsys.readouterr().out)["parameters"]["B_out"]
+        numbers = np.array([row.split(",")[2:] for row in kept], dtype=float)
+        x, y = numbers.reshape(len(keys), -1, 2).transpose(2, 0, 1)
+        fits = [
+            linregress(speed * REVOLUTION_PER_MINUTE, torque)
+            for speed, torque in zip(x, y, strict=True)
+        ]
+        slopes = np.array([fit.slope for fit in fits])
+        error, freedom = fits[0].stderr, x.shape[1] - 2
+        if len(keys) > 1:
+            error, freedom = slopes.std(ddof=1) / len(keys) ** 0.5, len(keys) - 1
+        half = student.ppf(0.975, freedom) * error
+        expected = [slopes.mean() - half, slopes.mean() + half]
+        assert found["interval95"] == pytest.approx(expected, rel=1e-9)
+
+
+def test_hysteresis_of_a_loop_by_hand(copied, tmp_path, capsys):
+    for path in copied.iterdir():
+        path.unlink()
+    branches = (np.linspace(0, 40, 41), np.linspace(40, -40, 81)[1:], np.linspace(-40, 0, 41)[1:])
+    shifts = (0.0, 5.0, -5.0)
+    torque = np.concatenate(branches)
+    torsion = np.concatenate([10.0 * b + s for b, s in zip(branches, shifts, strict=True)])
+    rows = [f"1,1,{t!r},{a!r}" for t, a in zip(torque.tolist(), torsion.tolist(), strict=True)]
+    header = "prototype,repeat,torque_Nm,torsion_arcsec"
+    (copied / "torsion_loops.csv").write_text("\n".join([header, *rows]) + "\n")
+    assert identify(copied, "--out", tmp_path / "out", "--json") == 0
+    (loop,) = json.loads(capsys.readouterr().out)["torsion_loops"]
+    assert loop["hysteresis_width_arcsec"] == pytest.approx(10.0, rel=1e-6)
+    area = np.trapezoid(torque, torsion * ARCSEC)
+    assert loop["lost_energy_J"] == pytest.approx(area, rel=1e-12)
+    assert area > 0.0
+
+
+def test_copies_of_one_prototype_are_suspected(copied, tmp_path, capsys):
+    for path in copied.iterdir():
+        if path.name != "no_load_output.csv":
+            path.unlink()
+    path = copied / "no_load_output.csv"
+    header, *rows = path.read_text().splitlines()
+    first = [row for row in rows if row.startswith("1,1,")]
+    path.write_text("\n".join([header, *first, *(f"2{row[1:]}" for row in first)]) + "\n")
+    assert identify(copied, "--out", tmp_path / "out") == 0
+    assert "copies of one another" in capsys.readouterr().out
 
 
 def test_negative_damping_is_said_and_left_out_of_the_sheet(copied, tmp_path, capsys):

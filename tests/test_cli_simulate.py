@@ -75,6 +75,12 @@ def test_without_options_the_rated_condition(tmp_path, capsys):
     assert any("differs" in one for one in found["limits"]) is False
 
 
+def test_slow_motion_has_its_turn_too(tmp_path, capsys):
+    assert simulate("hs_20_100", "--speed", 20, "--out", tmp_path / "out", "--json") == 0
+    dte = json.loads(capsys.readouterr().out)["dte_arcsec"]
+    assert dte["integrated"] == pytest.approx(dte["steady_state"], rel=1e-3)
+
+
 def test_a_resonance_nearby_is_said(tmp_path, capsys):
     assert simulate("hs_20_100", "--speed", 2500, "--out", tmp_path / "out") == 0
     printed = capsys.readouterr().out
@@ -101,6 +107,8 @@ def test_files_of_a_drive_are_taken(tmp_path):
         (("--speed", "0"), "--speed is 0.0"),
         (("--speed", "inf"), "--speed is inf"),
         (("--load", "-3"), "--load is -3.0"),
+        (("--load", "1e300"), "--load is 1e+300"),
+        (("--speed", "1e6"), "--speed is 1000000.0"),
     ],
 )
 def test_a_mistake_is_one_line_and_leaves_nothing(options, words, tmp_path, capsys):

@@ -111,9 +111,9 @@ print(f"static error of 2000 prototypes: mean {static.mean():.1f}, std {static.s
 # --------------
 #
 # ``kinematic_error`` holds the shape of theta_s as sines of the input angle. Only the ratios of the
-# ``amplitudes`` count, since their sum is scaled to the static error of the data sheet. Take orders
-# and phases from a slow record without load; if you have none, take the orders above. ``std`` is
-# the scatter of theta_s from drive to drive.
+# ``amplitudes`` count, since the wave they add up to is scaled to the static error of the data
+# sheet. Take orders and phases from a slow record without load; if you have none, take the orders
+# above. ``std`` is the scatter of theta_s from drive to drive.
 #
 # Each ``effect`` is something that the printed equations do not hold. A model needs none. Three
 # matter for most drives: ``load_inertia`` (a link on the output, which brings the torsional

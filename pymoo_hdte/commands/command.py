@@ -5,7 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
+
+from pymoo_hdte.reports.folder import PAGE_FILE
 
 Say = Callable[[str], None]
 """Tells the user what is being done."""
@@ -16,6 +19,12 @@ class Outcome(NamedTuple):
 
     document: dict[str, Any]
     summary: str
+
+
+def outcome_of(document: dict[str, Any], out: Path) -> Outcome:
+    """Return what a command found whose document has sentences and limits, with its page's path."""
+    lines = [*document["sentences"], *document["limits"], f"Report: {out / PAGE_FILE}"]
+    return Outcome(document, "\n".join(lines))
 
 
 @dataclass(frozen=True)

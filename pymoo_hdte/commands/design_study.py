@@ -72,16 +72,21 @@ class Check:
     mean, std : float
         Of the DTE, arcsec: the surrogate's exact moments, corrected by what surrogate and model
         differ in on the same drives (a control variate).
-    mean_error : float
-        Standard error of ``mean``, arcsec.
-    sample : ndarray, shape (CHECKED_DRIVES,)
-        DTE of these drives by the model, arcsec.
+    std_error : float
+        Standard error of ``std``, arcsec, to first order.
+    difference : ndarray, shape (CHECKED_DRIVES,)
+        DTE of these drives by the model less that by the surrogate, arcsec.
     """
 
     mean: float
     std: float
-    mean_error: float
-    sample: Values
+    std_error: float
+    difference: Values
+
+    @property
+    def mean_error(self) -> float:
+        """Standard error of ``mean``, arcsec."""
+        return _error_of_mean(self.difference)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +137,13 @@ class DesignStudy:
     @property
     def gain(self) -> tuple[float, float]:
         """How far the mean falls by the model itself, arcsec, and the standard error of that."""
-        difference = self.initial_check.sample - self.optimum_check.sample
-        return float(difference.mean()), float(difference.std(ddof=1) / len(difference) ** 0.5)
+        before, after = self.initial_check, self.optimum_check
+        return before.mean - after.mean, _error_of_mean(before.difference - after.difference)
+
+    @property
+    def promised(self) -> float:
+        """How far the mean falls by the surrogate, arcsec."""
+        return float(self.initial[0] - self.objectives[0])
 
 
 def design_study(
@@ -169,7 +179,7 @@ def design_study(
         ElitistSwarm(pop_size=POPULATION),
         ("n_eval", settings.evaluations),
         seed=settings.seed,
-        callback=callback,
+        callback=callback or Callback(),
     )
     order = np.argsort(result.F[:, 0], kind="stable")
     designs, front = result.X[order], result.F[order]
@@ -205,9 +215,20 @@ def _check(
     by_surrogate = problem.surrogate(drives)
     mean, std = problem.evaluate(design[None])[0]
     difference = by_model - by_surrogate
+    corrected = float(std * by_model.std() / by_surrogate.std())
+    # Half the difference of two relative variances is the influence of a drive on log std.
+    influence = 0.5 * (_relative_square(by_model) - _relative_square(by_surrogate))
     return Check(
         mean=float(mean + difference.mean()),
-        std=float(std * by_model.std() / by_surrogate.std()),
-        mean_error=float(difference.std(ddof=1) / CHECKED_DRIVES**0.5),
-        sample=by_model,
+        std=corrected,
+        std_error=corrected * _error_of_mean(influence),
+        difference=difference,
     )
+
+
+def _relative_square(values: Values) -> Values:
+    return (values - values.mean()) ** 2 / values.var()
+
+
+def _error_of_mean(values: Values) -> float:
+    return float(values.std(ddof=1) / len(values) ** 0.5)

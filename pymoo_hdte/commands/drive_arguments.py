@@ -25,8 +25,8 @@ def add_drive_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def read_drive(options: argparse.Namespace) -> DriveModel:
-    """Return the drive that the options name.
+def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]]:
+    """Return the drive that the options name, and what to know of it, in sentences.
 
     Raises
     ------
@@ -35,12 +35,24 @@ def read_drive(options: argparse.Namespace) -> DriveModel:
     OSError
         If one cannot be read.
     """
-    from pymoo_hdte.drive import PRESETS, load_model, preset
+    from pymoo_hdte.drive import PRESETS, hs_20_100, load_model, preset
 
-    sheet = read_sheet(options.datasheet)
-    if options.model in PRESETS:
-        return replace(preset(options.model), sheet=sheet)
-    return load_model(Path(options.model), sheet)
+    sheet, own = read_sheet(options.datasheet), hs_20_100()
+    if options.model not in PRESETS:
+        return load_model(Path(options.model), sheet), ()
+    model = replace(preset(options.model), sheet=sheet)
+    teeth = (sheet.flexspline_teeth, sheet.circular_spline_teeth)
+    same = (sheet.name, teeth, sheet.nominal.static_error) == (
+        own.name,
+        (own.flexspline_teeth, own.circular_spline_teeth),
+        own.nominal.static_error,
+    )
+    if same:
+        return model, ()
+    return model, (
+        f"Effects, order lines and scatter of theta_s are those of the model {model.name!r}, made "
+        f"for the {own.name}; they need not hold for {sheet.name}. Measure them, or give --model.",
+    )
 
 
 def read_sheet(named: str) -> DataSheet:
@@ -48,16 +60,3 @@ def read_sheet(named: str) -> DataSheet:
     from pymoo_hdte.drive import hs_20_100, load_datasheet
 
     return hs_20_100() if named == BUILT_IN_SHEET else load_datasheet(Path(named))
-
-
-def borrowed(model: DriveModel) -> tuple[str, ...]:
-    """Say, in a sentence or none, what a preset lends to another drive than its own."""
-    from pymoo_hdte.drive import PRESETS, hs_20_100
-
-    if model.name not in PRESETS or model.sheet.nominal == hs_20_100().nominal:
-        return ()
-    return (
-        f"Effects, order lines and scatter of theta_s are those of the model {model.name!r}, made "
-        f"for the HS-20-100; they need not hold for {model.sheet.name}. Measure them, or give "
-        "--model.",
-    )

@@ -134,7 +134,7 @@ def identification(folder: Path) -> Identification:
         "B_out": {key: bearing_damping(run) for key, run in runs.get(OUTPUT, {}).items()},
     }
     return Identification(
-        folder=folder.name or str(folder),
+        folder=folder.resolve().name or str(folder),
         parameters=tuple(Parameter(name, found) for name, found in fits.items() if found),
         loops=loops,
         errors=error_statistics(*read_error_measurements(folder / ERRORS))

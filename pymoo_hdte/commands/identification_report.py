@@ -32,6 +32,7 @@ _NOMINAL = {
 }
 """Where a data sheet holds each parameter."""
 _MICROMETRE = 1e-6
+_TOO_EQUAL = 1e-3
 
 
 def check_identification_folder(out: Path) -> None:
@@ -185,8 +186,24 @@ def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
     single = [one.name for one in found.parameters if one.series is None]
     if single:
         said.append(f"One prototype says nothing of the scatter of {', '.join(single)}.")
+    for one in found.parameters:
+        error = max(fit.slope_error for fit in one.fits.values())
+        if one.series is not None and one.series.between.std < _TOO_EQUAL * error:
+            said.append(
+                f"The prototypes agree on {one.name} far better than one record can tell it: are "
+                "they copies of one another?"
+            )
     if found.errors is not None:
         said += found.errors.advice()
+        if sheet is not None:
+            said.append(
+                "The errors go into the list of the data sheet. Its theta_s, and the DTE with it, "
+                "stay as they were: sample_static_error tells what theta_s would be."
+            )
+        samples = zip(found.errors.symbols, found.errors.samples, strict=True)
+        negative = [symbol for symbol, sample in samples if sample.mean < 0.0]
+        if negative:
+            said.append(f"A data sheet takes no negative mean, so it lacks {', '.join(negative)}.")
         if sheet is not None:
             known = {source.symbol for source in sheet.error_sources}
             strange = [symbol for symbol in found.errors.symbols if symbol not in known]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pymoo_hdte.commands.command import Command, Outcome, Say
+from pymoo_hdte.commands.command import Command, Outcome, Say, outcome_of
 from pymoo_hdte.commands.drive_arguments import BUILT_IN_SHEET
 
 _DETAILS = """example:
@@ -39,14 +39,12 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         check_identification_folder,
         write_identification_report,
     )
-    from pymoo_hdte.reports.folder import PAGE_FILE
 
     check_identification_folder(options.out)
     sheet = read_sheet(options.datasheet) if options.datasheet else None
     say("reading the records and fitting")
-    document = write_identification_report(identification(options.records), sheet, options.out)
-    lines = [*document["sentences"], *document["limits"], f"Report: {options.out / PAGE_FILE}"]
-    return Outcome(document, "\n".join(lines))
+    found = identification(options.records)
+    return outcome_of(write_identification_report(found, sheet, options.out), options.out)
 
 
 IDENTIFY = Command(

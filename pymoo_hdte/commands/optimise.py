@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pymoo_hdte.commands.command import Command, Outcome, Say
+from pymoo_hdte.commands.command import Command, Outcome, Say, outcome_of
 from pymoo_hdte.commands.drive_arguments import DRIVE_DETAILS, add_drive_arguments, read_drive
 
 _DETAILS = f"""example:
@@ -41,7 +41,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--order", type=int, default=3, help="of the surrogate (default 3)")
     parser.add_argument(
-        "--evaluations", type=int, default=20_000, help="of the swarm (default 20000)"
+        "--evaluations", type=int, default=20_000, help="of the swarm, in hundreds (default 20000)"
     )
     parser.add_argument("--seed", type=int, default=1, help="of the random numbers (default 1)")
     parser.add_argument(
@@ -62,28 +62,27 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.commands.optimum_report import check_optimum_folder, write_optimum_report
     from pymoo_hdte.decision import PREFERENCES
     from pymoo_hdte.problems import load_conditions
-    from pymoo_hdte.reports.folder import PAGE_FILE
 
     check_optimum_folder(options.out)
     preference = one_of("--preference", options.preference, tuple(PREFERENCES))
+    evaluations = whole_number("--evaluations", options.evaluations, POPULATION)
     settings = Settings(
         tolerance=options.tolerance,
         box=options.box,
         order=options.order,
         conditions=load_conditions(options.cycle) if options.cycle else None,
-        evaluations=whole_number("--evaluations", options.evaluations, POPULATION),
+        evaluations=evaluations // POPULATION * POPULATION,
         seed=whole_number("--seed", options.seed, 0),
     )
-    model = read_drive(options)
+    model, notes = read_drive(options)
     say("fitting the surrogate to the drive model, and optimising")
     # Without a terminal, or if quiet, there is no bar.
     silent = True if options.quiet else None
     with tqdm(total=settings.evaluations, unit="design", leave=False, disable=silent) as bar:
         study = design_study(model, preference, settings, Progress(bar))
     say("writing the report")
-    document = write_optimum_report(study, options.out)
-    lines = [*document["sentences"], *document["limits"], f"Report: {options.out / PAGE_FILE}"]
-    return Outcome(document, "\n".join(lines))
+    document = write_optimum_report(study, notes, options.out)
+    return outcome_of(document, options.out)
 
 
 OPTIMISE = Command(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pymoo_hdte import __version__
-from pymoo_hdte.commands.design_study import CHECKED_DRIVES, POPULATION, DesignStudy
-from pymoo_hdte.commands.drive_arguments import borrowed
+from pymoo_hdte.commands.design_study import CHECKED_DRIVES, POPULATION, Check, DesignStudy
 from pymoo_hdte.decision import tolerance_band
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
@@ -34,8 +34,10 @@ def check_optimum_folder(out: Path) -> None:
     check_folder(out, FILES)
 
 
-def write_optimum_report(study: DesignStudy, out: Path) -> dict[str, Any]:
+def write_optimum_report(study: DesignStudy, notes: Sequence[str], out: Path) -> dict[str, Any]:
     """Write a folder with all of `FILES` or, after an error, none; return the document.
+
+    ``notes`` are sentences on the drive that belong to the limits of the result.
 
     Raises
     ------
@@ -45,7 +47,7 @@ def write_optimum_report(study: DesignStudy, out: Path) -> dict[str, Any]:
         If it cannot be written.
     """
     check_optimum_folder(out)
-    document = optimum_document(study)
+    document = optimum_document(study, notes)
     optimum = optimum_model(study)
     write_folder(
         out,
@@ -75,7 +77,7 @@ def optimum_model(study: DesignStudy) -> DriveModel:
     return replace(model, sheet=replace(model.sheet, nominal=nominal, source=source))
 
 
-def optimum_document(study: DesignStudy) -> dict[str, Any]:
+def optimum_document(study: DesignStudy, notes: Sequence[str]) -> dict[str, Any]:
     """Return what ``optimum.json`` holds; designs in SI, moments of the DTE in arcsec."""
     problem, settings = study.problem, study.settings
     lower, upper = tolerance_band(study.design, settings.tolerance)
@@ -85,7 +87,7 @@ def optimum_document(study: DesignStudy) -> dict[str, Any]:
         "version": 1,
         "made_by": f"pymoo_hdte {__version__}",
         "sentences": sentences(study),
-        "limits": limits(study),
+        "limits": limits(study, notes),
         "preference": study.preference,
         "designs": {
             word: {
@@ -109,7 +111,7 @@ def optimum_document(study: DesignStudy) -> dict[str, Any]:
             "standard_error_arcsec": gain_error,
         },
         "sources_of_scatter": dict(
-            zip(study.sources.names, study.sources.total.tolist(), strict=True)
+            zip(study.sources.names, study.sources.first.tolist(), strict=True)
         ),
         "settings": {
             "algorithm": "ElitistSwarm",
@@ -131,11 +133,12 @@ def _design(study: DesignStudy, row: int) -> dict[str, Any]:
     )
 
 
-def _checked(check: Any) -> dict[str, float]:
+def _checked(check: Check) -> dict[str, float]:
     return {
         "mean_dte_arcsec": check.mean,
         "std_dte_arcsec": check.std,
         "standard_error_of_mean_arcsec": check.mean_error,
+        "standard_error_of_std_arcsec": check.std_error,
     }
 
 
@@ -147,33 +150,50 @@ def sentences(study: DesignStudy) -> list[str]:
         f"{name} {number(float(value), 4)} {problem.units[name]} ({change:+.1f} %)"
         for name, value, change in zip(problem.var_names, study.design, changes, strict=True)
     ]
-    before, after = study.initial_check, study.optimum_check
     gain, error = study.gain
-    promised = float(study.initial[0] - study.objectives[0])
+    before, after = study.initial_check, study.optimum_check
     return [
         f"Take {', '.join(parts)}.",
-        f"The mean DTE falls from {study.initial[0]:.2f} to {study.objectives[0]:.2f} arcsec, the "
-        f"standard deviation from {study.initial[1]:.2f} to {study.objectives[1]:.2f}.",
-        f"These are values of the surrogate. By the drive model itself, on {CHECKED_DRIVES} random "
-        f"drives, the mean falls by {gain:.2f} ± {2.0 * error:.2f} arcsec instead of "
-        f"{promised:.2f}, the standard deviation from {before.std:.2f} to {after.std:.2f}.",
+        f"{_moved('The mean DTE', *_pair(study, 0))} arcsec, "
+        f"{_moved('the standard deviation', *_pair(study, 1))}.",
+        f"These are values of the surrogate. By the drive model itself the mean "
+        f"{'falls' if gain > 0.0 else 'rises'} by {abs(gain):.2f} ± {2.0 * error:.2f} arcsec "
+        f"(two standard errors) instead of falling by {study.promised:.2f}, and "
+        f"{_moved('the standard deviation', before.std, after.std)}.",
     ]
 
 
-def limits(study: DesignStudy) -> list[str]:
-    """Say what a reader should know before quoting the result."""
-    found = list(borrowed(study.problem.model))
-    share = 1.0 - float(study.objectives[0] / study.initial[0])
-    if share < _WORTHLESS:
+def _pair(study: DesignStudy, objective: int) -> tuple[float, float]:
+    return float(study.initial[objective]), float(study.objectives[objective])
+
+
+def _moved(what: str, before: float, after: float) -> str:
+    return f"{what} {'falls' if after < before else 'rises'} from {before:.2f} to {after:.2f}"
+
+
+def limits(study: DesignStudy, notes: Sequence[str]) -> list[str]:
+    """Say what a reader should know before quoting the result; ``notes`` are of the drive."""
+    found = list(notes)
+    gain, error = study.gain
+    after = study.optimum_check
+    share = gain / study.initial_check.mean
+    if gain <= 2.0 * error:
+        found.append("The drive model does not confirm a lower mean: do not build this design.")
+    elif share < _WORTHLESS:
         found.append(
             f"The mean improves by {100.0 * share:.1f} %: this model has next to nothing to gain "
             "by these design variables."
         )
-    off = abs(study.optimum_check.mean - float(study.objectives[0]))
-    if off > 0.5 * abs(float(study.initial[0] - study.objectives[0])):
+    if abs(study.promised - gain) > 0.5 * abs(study.promised):
         found.append(
-            f"The surrogate is off by {off:.2f} arcsec at the chosen design, which is more than "
-            "half of what is gained; a higher --order is sharper."
+            f"The surrogate is off by {abs(study.promised - gain):.2f} arcsec in what is gained, "
+            "more than half of it; a higher --order is sharper."
+        )
+    off = abs(after.std - float(study.objectives[1]))
+    if off > max(0.5 * abs(float(study.initial[1] - study.objectives[1])), 2.0 * after.std_error):
+        found.append(
+            f"The surrogate is off by {off:.2f} arcsec in the standard deviation of the chosen "
+            "design, more than half of what is gained; a higher --order is sharper."
         )
     return found
 

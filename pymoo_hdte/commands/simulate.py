@@ -5,8 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pymoo_hdte.commands.command import Command, Outcome, Say
+from pymoo_hdte.commands.command import Command, Outcome, Say, outcome_of
 from pymoo_hdte.commands.drive_arguments import DRIVE_DETAILS, add_drive_arguments, read_drive
+
+FASTEST_INPUT = 50_000.0
+"""r/min; no strain wave gear turns as fast."""
+LARGEST_LOAD = 1e6
+"""N.m; none bears as much."""
 
 _DETAILS = f"""example:
   pymoo-hdte simulate hs_20_100 --speed 1500 --load 20 --out reports/at-1500
@@ -38,20 +43,19 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         check_simulation_folder,
         write_simulation_report,
     )
-    from pymoo_hdte.reports.folder import PAGE_FILE
     from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
     check_simulation_folder(options.out)
-    model = read_drive(options)
+    model, notes = read_drive(options)
     speed, load = model.sheet.input_speed, model.sheet.load_torque
     if options.speed is not None:
-        speed = real_number("--speed", options.speed, above=0.0) * REVOLUTION_PER_MINUTE
+        given = real_number("--speed", options.speed, above=0.0, at_most=FASTEST_INPUT)
+        speed = given * REVOLUTION_PER_MINUTE
     if options.load is not None:
-        load = real_number("--load", options.load, at_least=0.0)
+        load = real_number("--load", options.load, at_least=0.0, at_most=LARGEST_LOAD)
     say("integrating the equations of motion, and the steady state over all speeds")
-    document = write_simulation_report(simulation(model.at(speed, load)), options.out)
-    lines = [*document["sentences"], *document["limits"], f"Report: {options.out / PAGE_FILE}"]
-    return Outcome(document, "\n".join(lines))
+    found = simulation(model.at(speed, load))
+    return outcome_of(write_simulation_report(found, notes, options.out), options.out)
 
 
 SIMULATE = Command(

@@ -20,6 +20,10 @@ from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 FASTEST = 2.0
 """End of the speeds that are looked at, as a multiple of the condition's."""
 SPEEDS = 80
+SETTLE = 1.5
+"""s."""
+TURNS_TO_SETTLE = 0.02
+"""Of the output: at low speed the record needs as much before it begins."""
 
 Values = NDArray[np.float64]
 
@@ -74,11 +78,12 @@ def simulation(model: DriveModel) -> Simulation:
         If the integrator or the harmonic balance gives up.
     """
     spectrum = model.steady_state(model.nominal[None])
+    turn = 2.0 * np.pi * model.sheet.ratio / model.sheet.input_speed
     fastest = FASTEST * model.sheet.input_speed / REVOLUTION_PER_MINUTE
     speeds = np.linspace(0.0, fastest, SPEEDS + 1)[1:]
     return Simulation(
         model=model,
-        run=simulate(model, model.nominal),
+        run=simulate(model, model.nominal, settle=max(SETTLE, TURNS_TO_SETTLE * turn)),
         steady=float(spectrum.peak_to_peak(model.sheet.ratio)[0] / ARCSEC),
         lines={
             order: float(amplitude[0] / ARCSEC)

@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from pymoo_hdte import __version__
-from pymoo_hdte.commands.drive_arguments import borrowed
 from pymoo_hdte.commands.simulation import FASTEST, Simulation
 from pymoo_hdte.drive.speed_load_map import neighbouring_resonances
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
@@ -38,8 +37,10 @@ def check_simulation_folder(out: Path) -> None:
     check_folder(out, FILES)
 
 
-def write_simulation_report(found: Simulation, out: Path) -> dict[str, Any]:
+def write_simulation_report(found: Simulation, notes: Sequence[str], out: Path) -> dict[str, Any]:
     """Write a folder with all of `FILES` or, after an error, none; return the document.
+
+    ``notes`` are sentences on the drive that belong to the limits of the result.
 
     Raises
     ------
@@ -49,7 +50,7 @@ def write_simulation_report(found: Simulation, out: Path) -> dict[str, Any]:
         If it cannot be written.
     """
     check_simulation_folder(out)
-    document = simulation_document(found)
+    document = simulation_document(found, notes)
     run = found.run
     turn = (run.time, run.input_angle, run.input_speed, run.transmission_error / ARCSEC)
     columns = ("time_s", "input_angle_rad", "input_speed_rad_s", "transmission_error_arcsec")
@@ -69,14 +70,14 @@ def write_simulation_report(found: Simulation, out: Path) -> dict[str, Any]:
     return document
 
 
-def simulation_document(found: Simulation) -> dict[str, Any]:
+def simulation_document(found: Simulation, notes: Sequence[str]) -> dict[str, Any]:
     """Return what ``simulation.json`` holds."""
     return {
         "format": "pymoo_hdte simulation",
         "version": 1,
         "made_by": f"pymoo_hdte {__version__}",
         "sentences": sentences(found),
-        "limits": limits(found),
+        "limits": limits(found, notes),
         "input_speed_r_min": found.speed,
         "load_torque_Nm": found.model.sheet.load_torque,
         "dte_arcsec": {"steady_state": found.steady, "integrated": found.run.dte_arcsec()},
@@ -112,9 +113,9 @@ def sentences(found: Simulation) -> list[str]:
     ]
 
 
-def limits(found: Simulation) -> list[str]:
-    """Say what a reader should know before quoting the result."""
-    said = list(borrowed(found.model))
+def limits(found: Simulation, notes: Sequence[str]) -> list[str]:
+    """Say what a reader should know before quoting the result; ``notes`` are of the drive."""
+    said = list(notes)
     near = [o for o, speed in found.resonances if abs(found.speed / speed - 1.0) < _NEAR]
     if near:
         orders = ", ".join(f"{order:g}" for order in near)

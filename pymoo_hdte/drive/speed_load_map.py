@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
 from pymoo_hdte.drive.model import DriveModel
-from pymoo_hdte.drive.stability import UnstableDrive
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 _PROMINENCE = 0.02
@@ -128,7 +127,7 @@ def speed_load_map(
         there = model.at(float(speeds[column]) * REVOLUTION_PER_MINUTE, float(loads[row]))
         try:
             dte[row, column] = there.dte_arcsec(model.nominal[None])[0]
-        except UnstableDrive:
-            # Left NaN: motion that grows has no peak-to-peak.
+        except ArithmeticError:
+            # Left NaN: motion that grows, or is not found, has no peak-to-peak.
             continue
     return SpeedLoadMap(model, speeds, loads, dte)

@@ -157,7 +157,8 @@ def simulate(
         atol=atol,
     )
     if not solution.success:
-        raise ArithmeticError(f"{method} gave up at t = {solution.t[-1]:g} s: {solution.message}")
+        reached = f"t = {solution.t[-1]:g} s" if len(solution.t) else "the start"
+        raise ArithmeticError(f"{method} gave up at {reached}: {solution.message}")
     input_angle, input_speed, transmission_error = solution.y[:3]
     if angle == "prescribed":
         input_angle = np.array([start_up.angle(time) for time in times])

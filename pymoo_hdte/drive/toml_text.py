@@ -60,5 +60,5 @@ def _value(value: object) -> str:
         return str(value)
     if isinstance(value, float):
         return repr(float(value))
-    # JSON escapes what TOML must have escaped, and in the same way.
-    return json.dumps(value, ensure_ascii=False)
+    # JSON escapes in the same way all that TOML must have escaped, but for DEL.
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

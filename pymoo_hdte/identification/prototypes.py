@@ -71,7 +71,7 @@ class NormalSample:
     @property
     def cv_percent(self) -> float:
         """Coefficient of variation, per cent of the mean's size (Table 3)."""
-        return 100.0 * self.std / abs(self.mean)
+        return 100.0 * self.std / abs(self.mean) if self.mean else float("inf")
 
     def mean_interval(self, level: float = 0.95) -> tuple[float, float]:
         """Return the confidence interval of the mean, by Student's t.

@@ -30,8 +30,10 @@ def check_folder(out: Path, always: Collection[str], sometimes: Collection[str] 
     OSError
         If it cannot be written.
     """
-    allowed = "a folder that is new, empty or an earlier report"
-    if out.is_symlink() or (out.exists() and not out.is_dir()):
+    allowed = "a folder that is new, empty or an earlier report, but not the one you are in"
+    dangling = any(one.is_symlink() and not one.exists() for one in out.absolute().parents)
+    folder = out.is_dir() or not out.exists()
+    if dangling or out.is_symlink() or not folder or out.resolve() == Path.cwd():
         raise InvalidInput("folder of the report", str(out), allowed)
     if out.is_dir():
         present = {path.name for path in out.iterdir()}
@@ -45,7 +47,10 @@ def check_folder(out: Path, always: Collection[str], sometimes: Collection[str] 
 
 
 def write_folder(out: Path, files: dict[str, str]) -> None:
-    """Write files to a draft beside ``out`` and put that in its place."""
+    """Write files to a draft beside ``out`` and put that in its place.
+
+    Killed between the two renames, it leaves an earlier report in a hidden folder beside ``out``.
+    """
     out.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".report-", dir=out.parent) as workshop:
         draft = Path(workshop) / "report"

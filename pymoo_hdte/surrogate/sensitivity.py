@@ -36,10 +36,11 @@ class SobolIndices:
     mean, variance : float
         Of the output, in its unit and the square of that.
     first : ndarray, shape (d,)
-        First-order indices: the share of the variance that is due to one input alone.
+        First-order indices: the share of the variance that is due to one input alone. The
+        variance would be less by it, on average, if the input were known.
     total : ndarray, shape (d,)
-        Total indices: the share in which an input takes part, with interactions. The variance
-        would be less by this share, on average, if the input were known.
+        Total indices: the share in which an input takes part, with interactions. It is what would
+        be left of the variance, on average, if all other inputs were known.
 
     Notes
     -----
