@@ -8,7 +8,6 @@ same file, and that of the seconds, in the results folder.
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 
 from experiments.blind_cases import SCORING_SEED, Case, cases
 from experiments.blind_data import (
@@ -31,12 +30,13 @@ from experiments.blind_tables import (
     tools_table,
 )
 from experiments.campaign import Campaign
+from experiments.committed import committed_file
 from experiments.registry import Context
 from experiments.result import Picture, Result
 from experiments.store import TIMES, write_atomically
 
-COMMITTED = Path(__file__).parent / "data" / "blind.csv"
-COMMITTED_SECONDS = Path(__file__).parent / "data" / "blind_seconds.csv"
+OUTCOMES = "blind.csv"
+SECONDS = "blind_seconds.csv"
 
 SETTING = (
     "A virtual rig of the HS-20-100 hides nothing, one effect, two, an effect that the workflow "
@@ -120,12 +120,10 @@ def _campaign(context: Context) -> list[Outcome]:
         chosen = [case for case in cases() if (case.kind == "detection") == limits]
         outcomes += score_cases(chosen, context.campaign, title)
         target, seconds = context.out / "blind", context.out / TIMES / "blind"
-        write_atomically(target / COMMITTED.name, format_outcomes(outcomes).encode())
-        write_atomically(seconds / COMMITTED_SECONDS.name, format_seconds(outcomes).encode())
+        write_atomically(target / OUTCOMES, format_outcomes(outcomes).encode())
+        write_atomically(seconds / SECONDS, format_seconds(outcomes).encode())
     return outcomes
 
 
 def _committed() -> list[Outcome]:
-    if not COMMITTED.is_file():
-        raise RuntimeError(f"no {COMMITTED.name} yet: run python -m experiments blind --full")
-    return read_outcomes(COMMITTED, COMMITTED_SECONDS)
+    return read_outcomes(*(committed_file(name, "blind") for name in (OUTCOMES, SECONDS)))

@@ -5,10 +5,6 @@ Seconds stand in a file of their own, because they differ from run to run.
 
 from __future__ import annotations
 
-import csv
-import datetime
-import io
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,9 +14,10 @@ from experiments.blind_cases import Case
 from experiments.blind_codes import ERROR, NAMES, PORTS, STATUSES, word, words_of_set
 from experiments.blind_scoring import NUMBERS, PARTS, RIVALS
 from experiments.campaign import Run
-from experiments.provenance import environment
+from experiments.committed import read_origin, read_rows, table_with_origin
 from pymoo_hdte.discrepancy.gap import Gap
 from pymoo_hdte.discrepancy.naming import EXPLAINED
+from pymoo_hdte.reports.csv_text import csv_text
 
 CONFIDENT = ("named", "parameter")
 """Statuses that leave no choice."""
@@ -200,41 +197,28 @@ def outcome(case: Case, run: Run) -> Outcome:
 
 def format_outcomes(outcomes: Sequence[Outcome]) -> str:
     """Return the CSV text of outcomes, with seed, date and versions in a first comment line."""
-    header = {
-        "seed": sorted({one.case.root for one in outcomes}),
-        "date": datetime.date.today().isoformat(),
-        **environment(),
-    }
-    text = io.StringIO()
-    text.write(f"# {json.dumps(header)}\n")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*_CASE, *_WORDS, *NUMBERS])
+    rows = []
     for one in outcomes:
         words = [one.status, " ".join(one.chosen), " ".join(one.equivalents)]
         answers = [one.answers.get(name, "") for name in RIVALS]
         numbers = [f"{one.numbers[n]:.6g}" if n in one.numbers else "" for n in NUMBERS]
-        writer.writerow([*_identity(one.case), *words, int(one.truth_in_class), *answers, *numbers])
-    return text.getvalue()
+        rows.append([*_identity(one.case), *words, int(one.truth_in_class), *answers, *numbers])
+    seeds = sorted({one.case.root for one in outcomes})
+    return table_with_origin([*_CASE, *_WORDS, *NUMBERS], rows, seed=seeds)
 
 
 def format_seconds(outcomes: Sequence[Outcome]) -> str:
     """Return the CSV text of the seconds of outcomes."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*_CASE, *PARTS])
+    rows = []
     for one in outcomes:
         seconds = [f"{second:.3g}" for second in one.seconds]
-        writer.writerow([*_identity(one.case), *seconds, *[""] * (len(PARTS) - len(seconds))])
-    return text.getvalue()
+        rows.append([*_identity(one.case), *seconds, *[""] * (len(PARTS) - len(seconds))])
+    return csv_text([*_CASE, *PARTS], rows)
 
 
 def read_outcomes(path: Path, seconds_path: Path) -> list[Outcome]:
     """Read what `format_outcomes` and `format_seconds` wrote."""
-    with path.open(newline="", encoding="utf-8") as file:
-        (root,) = json.loads(file.readline().removeprefix("#"))["seed"]
-        rows = list(csv.DictReader(file))
-    with seconds_path.open(newline="", encoding="utf-8") as file:
-        times = list(csv.DictReader(file))
+    (root,) = read_origin(path)["seed"]
     return [
         Outcome(
             case=_case(row, root),
@@ -246,7 +230,7 @@ def read_outcomes(path: Path, seconds_path: Path) -> list[Outcome]:
             numbers={name: float(row[name]) for name in NUMBERS if row[name]},
             seconds=tuple(float(time[part]) for part in PARTS if time[part]),
         )
-        for row, time in zip(rows, times, strict=True)
+        for row, time in zip(read_rows(path), read_rows(seconds_path), strict=True)
     ]
 
 

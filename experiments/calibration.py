@@ -8,12 +8,12 @@ leaves the same file in the results folder.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.calibration_data import Outcome, collect, format_outcomes, gap, read_outcomes
+from experiments.committed import committed_file
 from experiments.figures import BLUE, GREY, ORANGE, grid
 from experiments.fitting import BUDGETS, Bootstrap, Fit
 from experiments.ladder import NARROW, ladder
@@ -31,7 +31,7 @@ from experiments.store import write_atomically
 from experiments.trade_off import WIDTHS
 from pymoo_hdte.drive import preset
 
-COMMITTED = Path(__file__).parent / "data" / "calibration.csv"
+OUTCOMES = "calibration.csv"
 SEEDS = {"table8": (1, 2), "table5": (1,)}
 """Seeds of the fits, by direction; four numbers need no second look."""
 REPLICATES = 20
@@ -59,7 +59,11 @@ SETTING = (
 
 def run(context: Context) -> Result:
     """Fit or read the ladder, and hold every rung against what it was not fitted to."""
-    outcomes = _campaign(context) if context.full else read_outcomes(COMMITTED)
+    outcomes = (
+        _campaign(context)
+        if context.full
+        else read_outcomes(committed_file(OUTCOMES, "calibration"))
+    )
     best = best_rungs(outcomes, "table8")[0]
     return Result(
         title="Calibration: what the printed equations lack",
@@ -108,7 +112,7 @@ def _campaign(context: Context) -> list[Outcome]:
         for number in range(REPLICATES)
     ]
     outcomes += collect(replicates, context.campaign.run(replicates, "bootstrap"))
-    target = context.out / "calibration" / COMMITTED.name
+    target = context.out / "calibration" / OUTCOMES
     write_atomically(target, format_outcomes(outcomes).encode())
     return outcomes
 

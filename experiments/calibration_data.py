@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import datetime
-import io
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from experiments.campaign import Run
+from experiments.committed import read_rows, table_with_origin
 from experiments.fitting import Bootstrap, Fit
 from experiments.ladder import EFFECTS, Candidate, ladder
 from experiments.predictions import PUBLISHED
-from experiments.provenance import environment
 from experiments.trade_off import TRAITS
 
 _IDENTITY = ("kind", "direction", "candidate", "seed", "budget", "chi_square")
@@ -73,26 +69,19 @@ def collect(jobs: Sequence[Fit | Bootstrap], runs: Sequence[Run]) -> list[Outcom
 def format_outcomes(outcomes: Sequence[Outcome]) -> str:
     """Return the CSV text of outcomes, with date and versions in a first comment line."""
     parameters = list(Candidate(EFFECTS, "peak_to_peak", "R1").bounds)
-    header = {"date": datetime.date.today().isoformat(), **environment()}
-    text = io.StringIO()
-    text.write(f"# {json.dumps(header)}\n")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*_IDENTITY, *parameters, *PUBLISHED, *TRAITS])
+    rows = []
     for one in outcomes:
         identity = (one.kind, one.direction, one.candidate.name, one.seed, one.budget)
         numbers = [one.chi_square, *(one.parameters.get(name) for name in parameters)]
         numbers += [one.predictions[name] for name in PUBLISHED]
         numbers += [one.traits[name] for name in TRAITS]
-        writer.writerow([*identity, *("" if n is None else f"{n:.7g}" for n in numbers)])
-    return text.getvalue()
+        rows.append([*identity, *("" if n is None else f"{n:.7g}" for n in numbers)])
+    return table_with_origin([*_IDENTITY, *parameters, *PUBLISHED, *TRAITS], rows)
 
 
 def read_outcomes(path: Path) -> list[Outcome]:
     """Read what `format_outcomes` wrote."""
     rungs = {rung.name: rung for rung in ladder()}
-    with path.open(newline="", encoding="utf-8") as file:
-        file.readline()
-        rows = list(csv.DictReader(file))
     return [
         Outcome(
             kind=row["kind"],
@@ -105,5 +94,5 @@ def read_outcomes(path: Path) -> list[Outcome]:
             predictions={name: float(row[name]) for name in PUBLISHED},
             traits={name: float(row[name]) for name in TRAITS},
         )
-        for row in rows
+        for row in read_rows(path)
     ]

@@ -27,8 +27,9 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from experiments.provenance import environment, fingerprint
-from experiments.store import TIMES, csv_bytes, write_atomically
+from experiments.store import TIMES, write_atomically
 from experiments.workers import WorkerLost, WrongWorker, arithmetic, interrupts_held_off
+from pymoo_hdte.reports.csv_text import csv_text
 
 SOURCE = "source or versions"
 ONE_JOB = Lock()
@@ -134,7 +135,8 @@ class Campaign:
         times = "".join(f"{seconds!r}\n" for seconds in (run.seconds, *run.parts))
         write_atomically(self._time_path(job), times.encode())
         # The values come last: their file is the sign that the job is finished.
-        write_atomically(self._path(job), csv_bytes(run.columns, run.values.tolist()))
+        table = csv_text(run.columns, run.values.tolist())
+        write_atomically(self._path(job), table.encode())
 
     def _read(self, job: Job) -> Run:
         with self._path(job).open(newline="") as file:

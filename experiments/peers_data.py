@@ -5,10 +5,6 @@ Seconds stand in a file of their own, because they differ from run to run.
 
 from __future__ import annotations
 
-import csv
-import datetime
-import io
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -21,15 +17,16 @@ from numpy.typing import NDArray
 
 from experiments.benchmark_fronts import front_of
 from experiments.campaign import Campaign, Run
+from experiments.committed import committed_file, read_rows, table_with_origin
 from experiments.contest.job import EVALUATIONS, SPENT, ContestRun
 from experiments.contest.peers import EVERYONE
 from experiments.contest.problems import BENCHMARKS
 from experiments.indicators import Indicators, IndicatorsAgainst
-from experiments.provenance import environment
 from experiments.registry import Context
 from experiments.store import TIMES, write_atomically
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
+from pymoo_hdte.reports.csv_text import csv_text
 
 _KEY = ("problem", "algorithm", "evaluations", "seed")
 
@@ -101,29 +98,19 @@ def scores_for(
     scores = contest_scores(
         context.campaign, list(BENCHMARKS), algorithms, budgets, range(1, seeds + 1)
     )
-    values, seconds = _files(context.out / name, context.out / TIMES / name, name)
-    write_atomically(values, format_scores(scores).encode())
-    write_atomically(seconds, format_seconds(scores).encode())
+    values, seconds = _files(name)
+    write_atomically(context.out / name / values, format_scores(scores).encode())
+    write_atomically(context.out / TIMES / name / seconds, format_seconds(scores).encode())
     return scores
 
 
 def committed_scores(name: str) -> Scores:
-    """Return the scores of the last full run of an experiment.
-
-    Raises
-    ------
-    RuntimeError
-        If none is committed.
-    """
-    folder = Path(__file__).parent / "data"
-    values, seconds = _files(folder, folder, name)
-    if not values.is_file():
-        raise RuntimeError(f"no {values.name} yet: run python -m experiments {name} --full")
-    return read_scores(values, seconds)
+    """Return the scores of the last full run of an experiment; errors as `committed_file`."""
+    return read_scores(*(committed_file(file, name) for file in _files(name)))
 
 
-def _files(values: Path, seconds: Path, name: str) -> tuple[Path, Path]:
-    return values / f"{name}.csv", seconds / f"{name}_seconds.csv"
+def _files(name: str) -> tuple[str, str]:
+    return f"{name}.csv", f"{name}_seconds.csv"
 
 
 def contest_scores(
@@ -203,35 +190,28 @@ def _rounded(value: float) -> float:
 
 def format_scores(scores: Scores) -> str:
     """Return the CSV text of the scores, with date and versions in a first comment line."""
-    header = {"date": datetime.date.today().isoformat(), **environment()}
-    text = io.StringIO()
-    text.write(f"# {json.dumps(header)}\n")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*_KEY, SPENT, *MEASURES])
+    rows = []
     axes = (scores.problems, scores.algorithms, scores.budgets, scores.seeds)
     for place in np.ndindex(*scores.spent.shape):
         if scores.spent[place]:
             key = [axis[i] for axis, i in zip(axes, place, strict=True)]
             row = [f"{value:.{DIGITS}g}" for value in scores.values[(slice(None), *place)]]
-            writer.writerow([*key, scores.spent[place], *row])
-    return text.getvalue()
+            rows.append([*key, scores.spent[place], *row])
+    return table_with_origin([*_KEY, SPENT, *MEASURES], rows)
 
 
 def format_seconds(scores: Scores) -> str:
     """Return the CSV text of the seconds."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["problem", *scores.algorithms])
-    for problem, row in zip(scores.problems, scores.seconds, strict=True):
-        writer.writerow([problem, *(f"{value:.3g}" for value in row)])
-    return text.getvalue()
+    rows = (
+        [problem, *(f"{value:.3g}" for value in row)]
+        for problem, row in zip(scores.problems, scores.seconds, strict=True)
+    )
+    return csv_text(["problem", *scores.algorithms], rows)
 
 
 def read_scores(path: Path, seconds_path: Path) -> Scores:
     """Read what `format_scores` and `format_seconds` wrote."""
-    with path.open(newline="", encoding="utf-8") as file:
-        file.readline()
-        rows = list(csv.DictReader(file))
+    rows = read_rows(path)
     problems, algorithms = (_in_order(rows, name) for name in _KEY[:2])
     budgets, seeds = (tuple(sorted({int(row[name]) for row in rows})) for name in _KEY[2:])
     shape = (len(problems), len(algorithms), len(budgets), len(seeds))
@@ -245,8 +225,7 @@ def read_scores(path: Path, seconds_path: Path) -> Scores:
         )
         values[(slice(None), *place)] = [float(row[name]) for name in MEASURES]
         spent[place] = int(row[SPENT])
-    with seconds_path.open(newline="", encoding="utf-8") as file:
-        by_problem = {row["problem"]: row for row in csv.DictReader(file)}
+    by_problem = {row["problem"]: row for row in read_rows(seconds_path)}
     seconds = np.array([[float(by_problem[p][a]) for a in algorithms] for p in problems])
     return Scores(problems, algorithms, budgets, seeds, values, spent, seconds)
 

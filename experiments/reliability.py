@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from experiments.campaign import Campaign
+from experiments.committed import committed_file
 from experiments.registry import Context
 from experiments.reliability_dask import DaskKillJob
 from experiments.reliability_data import (
@@ -36,7 +36,6 @@ from experiments.reliability_limits import LIMITS, LimitJob, MemoryJob
 from experiments.result import Column, Finding, Result, Table
 from experiments.store import TIMES, write_atomically
 
-DATA = Path(__file__).parent / "data"
 TALLIES, PEAKS = "reliability.csv", "reliability_memory.csv"
 
 BLOCK, BLOCK_OF_COMMANDS = 250, 25
@@ -157,9 +156,8 @@ def _killed(campaign: Campaign, what: str, kills: int) -> Tally:
 
 
 def _committed() -> tuple[list[Tally], list[Peak]]:
-    if not (DATA / TALLIES).is_file():
-        raise RuntimeError(f"no {TALLIES} yet: run python -m experiments reliability --full")
-    return read_tallies(DATA / TALLIES), read_peaks(DATA / PEAKS)
+    tallies, peaks = (committed_file(name, "reliability") for name in (TALLIES, PEAKS))
+    return read_tallies(tallies), read_peaks(peaks)
 
 
 def _inputs_table(tallies: list[Tally]) -> Table:

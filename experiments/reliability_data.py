@@ -5,21 +5,17 @@ Memory and seconds stand in a file of their own, because they differ from run to
 
 from __future__ import annotations
 
-import csv
-import datetime
-import io
-import json
 from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
-from typing import Any
 
 from scipy.stats import binomtest
 
 from experiments.campaign import Run
-from experiments.provenance import environment
+from experiments.committed import read_rows, table_with_origin
 from experiments.reliability_fuzz import ACCEPTED, REFUSED
 from experiments.reliability_limits import LimitJob, MemoryJob
+from pymoo_hdte.reports.csv_text import csv_text
 
 FUZZ, KILL, LIMIT = "fuzz", "kill", "limit"
 LEVEL = 0.95
@@ -104,28 +100,20 @@ def peak(job: MemoryJob, run: Run) -> Peak:
 
 def format_tallies(tallies: Iterable[Tally]) -> str:
     """Return the CSV text of tallies, with date and versions in a first comment line."""
-    header = {"date": datetime.date.today().isoformat(), **environment()}
-    return f"# {json.dumps(header)}\n" + _table(Tally, tallies)
+    return table_with_origin(_columns(Tally), map(astuple, tallies))
 
 
 def format_peaks(peaks: Iterable[Peak]) -> str:
     """Return the CSV text of peaks."""
-    return _table(Peak, peaks)
+    return csv_text(_columns(Peak), map(astuple, peaks))
 
 
-def _table(kind: type[Tally] | type[Peak], rows: Iterable[Any]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([field.name for field in fields(kind)])
-    writer.writerows(astuple(row) for row in rows)
-    return text.getvalue()
+def _columns(kind: type[Tally] | type[Peak]) -> list[str]:
+    return [field.name for field in fields(kind)]
 
 
 def read_tallies(path: Path) -> list[Tally]:
     """Read what `format_tallies` wrote."""
-    with path.open(newline="", encoding="utf-8") as file:
-        file.readline()
-        rows = list(csv.DictReader(file))
     return [
         Tally(
             part=row["part"],
@@ -136,12 +124,13 @@ def read_tallies(path: Path) -> list[Tally]:
             failed=int(row["failed"]),
             failing=row["failing"],
         )
-        for row in rows
+        for row in read_rows(path)
     ]
 
 
 def read_peaks(path: Path) -> list[Peak]:
     """Read what `format_peaks` wrote."""
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    return [Peak(row["experiment"], float(row["memory"]), float(row["seconds"])) for row in rows]
+    return [
+        Peak(row["experiment"], float(row["memory"]), float(row["seconds"]))
+        for row in read_rows(path)
+    ]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import os
-from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.provenance import report_fingerprint
 from experiments.result import Column, Finding, Picture, Result, Table
+from pymoo_hdte.reports.csv_text import csv_text
 
 RESULT = "result.json"
 TIMES = "times"
@@ -55,15 +54,6 @@ def write_atomically(path: Path, content: bytes) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def csv_bytes(heading: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
-    """Write CSV in which every float keeps all its digits."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(heading)
-    writer.writerows([[repr(c) if isinstance(c, float) else c for c in row] for row in rows])
-    return text.getvalue().encode()
-
-
 def save(out: Path, name: str, result: Result) -> None:
     """Store ``result`` of the experiment ``name`` under ``out``.
 
@@ -75,7 +65,7 @@ def save(out: Path, name: str, result: Result) -> None:
     for folder, tables in ((out / name, steady), (out / TIMES / name, timed)):
         for table in tables:
             heading = [column.heading for column in table.columns]
-            content = csv_bytes(heading, table.rows)
+            content = csv_text(heading, table.rows).encode()
             write_atomically(folder / f"{table.name}.csv", content)
     for picture in result.pictures:
         write_atomically(out / name / f"{picture.name}.png", png_bytes(picture))

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from experiments import calibration
-from experiments.calibration import COMMITTED, best_rungs
+from experiments.calibration import OUTCOMES, best_rungs
 from experiments.calibration_data import Outcome, format_outcomes, gap, read_outcomes
 from experiments.campaign import Campaign
+from experiments.committed import committed_file
 from experiments.fitting import Budget, Fit, _refine, _residuals, outcome_row
 from experiments.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate, ladder
 from experiments.predictions import (
@@ -123,7 +124,7 @@ def test_traits_of_the_printed_model_show_no_trade_off():
 
 
 def test_the_committed_ladder_is_what_its_parameters_predict():
-    best = best_rungs(read_outcomes(COMMITTED), "table8")
+    best = best_rungs(read_outcomes(committed_file(OUTCOMES, "calibration")), "table8")
     assert len(best) == len(ladder())
     for one in (best[0], best[3]):
         model = one.candidate.model(one.parameters)
@@ -151,7 +152,7 @@ def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
     monkeypatch.setattr(calibration, "BUDGETS", dict.fromkeys(FITS, budget))
     context = Context(1, tmp_path, Campaign(tmp_path), full=True)
     first = calibration.run(context)
-    written = tmp_path / "calibration" / COMMITTED.name
+    written = tmp_path / "calibration" / OUTCOMES
     outcomes = read_outcomes(written)
     kinds = [(one.kind, one.direction) for one in outcomes]
     assert kinds == [("fit", "table8"), ("fit", "table5"), *2 * [("bootstrap", "table8")]]

@@ -1,5 +1,6 @@
 """Blind campaigns: what a case hides and nothing else, scores of verdicts, exact intervals."""
 
+import shutil
 from dataclasses import replace
 from functools import partial
 
@@ -10,7 +11,7 @@ from virtual_rig_cases import BELIEVED as SHARED_DRIVE
 from virtual_rig_cases import RIG as SHARED_RIG
 from virtual_rig_cases import SHORT
 
-from experiments import blind, blind_cases, blind_scoring
+from experiments import blind, blind_cases, blind_scoring, committed
 from experiments.blind_cases import BELIEVED, OUT_OF_TOLERANCE, RIG, Case, cases
 from experiments.blind_codes import NAMES, code_of_set, words_of_set
 from experiments.blind_data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
@@ -18,6 +19,7 @@ from experiments.blind_limits import size_at
 from experiments.blind_scoring import COLUMNS, BlindJob, bias_scores, truly_moved, verdict_scores
 from experiments.blind_targets import judge_median, judge_rate, median, rate
 from experiments.campaign import Campaign, Run
+from experiments.committed import committed_file
 from experiments.registry import Context
 from pymoo_hdte.discrepancy.data import Data, start_parameters
 from pymoo_hdte.discrepancy.features import measure
@@ -338,8 +340,9 @@ def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
     assert [one.case for one in found] == MADE_UP
     assert [one.status for one in found] == ["named", "named", "error", *["named"] * 3]
     assert found[1].seconds == (1.0, 2.0, 3.0, 4.0)
-    monkeypatch.setattr(blind, "COMMITTED", files[0])
-    monkeypatch.setattr(blind, "COMMITTED_SECONDS", files[1])
+    for file in files:
+        shutil.copy(file, tmp_path)
+    monkeypatch.setattr(committed, "DATA", tmp_path)
     quick = blind.run(replace(context, full=False))
     for table, other in zip(quick.tables, first.tables, strict=True):
         assert [row[0] for row in table.rows] == [row[0] for row in other.rows]
@@ -364,9 +367,8 @@ def test_a_job_names_itself_by_all_that_it_does():
 
 
 def test_the_committed_outcomes_are_those_of_the_committed_cases():
-    if not blind.COMMITTED.is_file():
-        pytest.skip("the scoring run has not been committed")
-    found = read_outcomes(blind.COMMITTED, blind.COMMITTED_SECONDS)
+    files = (committed_file(name, "blind") for name in (blind.OUTCOMES, blind.SECONDS))
+    found = read_outcomes(*files)
     # Detection limits come last, and may be missing.
     assert [one.case for one in found] == cases()[: len(found)]
     assert {one.case.kind for one in found} >= {"none", "single", "unlisted", "pair"}

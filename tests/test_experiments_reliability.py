@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import reliability, reliability_kill
+from experiments import committed, reliability, reliability_kill
 from experiments.__main__ import main
 from experiments.campaign import Campaign, Run
 from experiments.registry import Context
@@ -141,7 +141,7 @@ def test_an_outcome_survives_its_files_and_makes_the_tables(tmp_path, monkeypatc
     (tmp_path / "reliability_memory.csv").write_text(format_peaks(peaks))
     assert read_tallies(tmp_path / "reliability.csv") == tallies
     assert read_peaks(tmp_path / "reliability_memory.csv") == peaks
-    monkeypatch.setattr(reliability, "DATA", tmp_path)
+    monkeypatch.setattr(committed, "DATA", tmp_path)
     result = reliability.run(Context(1, tmp_path, Campaign(tmp_path)))
     agrees = {table.name: table.findings[0].agrees for table in result.tables}
     assert agrees == {"inputs": False, "kills": True, "limits": True, "memory": True}
@@ -149,8 +149,8 @@ def test_an_outcome_survives_its_files_and_makes_the_tables(tmp_path, monkeypatc
 
 
 def test_without_an_outcome_the_report_says_what_to_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(reliability, "DATA", tmp_path)
-    with pytest.raises(RuntimeError, match="reliability --full"):
+    monkeypatch.setattr(committed, "DATA", tmp_path)
+    with pytest.raises(FileNotFoundError, match="reliability --full"):
         reliability.run(Context(1, tmp_path, Campaign(tmp_path)))
 
 

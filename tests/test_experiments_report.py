@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from experiments.report import write_report
 from experiments.result import Column, Finding, Picture, Result, Table, significant
-from experiments.store import csv_bytes, load, png_bytes, save
+from experiments.store import load, png_bytes, save
+from pymoo_hdte.reports.csv_text import csv_text
 
 HOSTILE = "<script>alert('x')</script>"
 
@@ -79,7 +80,7 @@ def test_csv_keeps_every_digit(out):
 
 def test_floats_survive_csv_bit_for_bit():
     values = np.random.default_rng(3).normal(size=(50, 2)) * 10.0 ** np.arange(-25, 25)[:, None]
-    text = csv_bytes(["a", "b"], values.tolist()).decode()
+    text = csv_text(["a", "b"], values.tolist())
     read = [[float(cell) for cell in line.split(",")] for line in text.splitlines()[1:]]
     np.testing.assert_array_equal(read, values)
 

@@ -1,0 +1,50 @@
+"""Outcomes of the long campaigns: CSV files in ``experiments/data``, how they are written and read.
+
+A first comment line holds, as JSON, the date and the versions that made the table.
+"""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.provenance import environment
+from pymoo_hdte.reports.csv_text import csv_text
+
+DATA = Path(__file__).parent / "data"
+
+
+def committed_file(name: str, experiment: str) -> Path:
+    """Return the path of a committed table.
+
+    Raises
+    ------
+    FileNotFoundError
+        If ``experiment`` has not left it there yet.
+    """
+    path = DATA / name
+    if not path.is_file():
+        raise FileNotFoundError(f"no {name} yet: run python -m experiments {experiment} --full")
+    return path
+
+
+def table_with_origin(columns: Sequence[str], rows: Iterable[Iterable[Any]], **further: Any) -> str:
+    """Return the text of a table that says when and by what it was made, and ``further`` facts."""
+    origin = {**further, "date": datetime.date.today().isoformat(), **environment()}
+    return f"# {json.dumps(origin)}\n" + csv_text(columns, rows)
+
+
+def read_origin(path: Path) -> dict[str, Any]:
+    """Return what the first line of a table with an origin says."""
+    with path.open(encoding="utf-8") as file:
+        return dict(json.loads(file.readline().removeprefix("#")))
+
+
+def read_rows(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table, with an origin or without, by column."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("# {")))
