@@ -63,9 +63,11 @@ DASK = "command and workers, Dask"
 FULL = Extent(
     inputs={
         **dict.fromkeys(KINDS, 1000),
-        **{"campaign": 1200, "rig": 1200, "duty cycle": 750, "torsion loops": 750},
+        **{"duty cycle": 750, "torsion loops": 750},
         **{"no-load runs": 750, "error measurements": 750},
         **{"campaign, whole command": 200, "rig, whole command": 400},
+        **{"simulate, whole command": 100, "optimise, whole command": 100},
+        **{"identify, whole command": 200},
     },
     kills={ONE_WORKER: 120, TWO_WORKERS: 120, DASK: 60},
     limits=tuple(LIMITS),

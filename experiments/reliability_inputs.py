@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
-from contextlib import redirect_stderr
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from experiments import reliability_commands as commands
 from experiments import reliability_originals as originals
+from experiments.reliability_commands import Wrong
 from experiments.reliability_mutations import Files
-from pymoo_hdte import cli
-from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
-from pymoo_hdte.discrepancy.report_folder import FILES, PAGE_FILE, VERDICT_FILE
 from pymoo_hdte.drive import UnstableDrive, hs_20_100, load_datasheet, load_model
 from pymoo_hdte.identification import (
     error_statistics,
@@ -30,10 +27,6 @@ from pymoo_hdte.identification.torsion import stiffness
 from pymoo_hdte.measured.rig_files import read_rig, rig_toml
 from pymoo_hdte.problems.duty_cycle import load_conditions, shares
 from pymoo_hdte.surrogate import ChebyshevSurrogate
-
-
-class Wrong(Exception):
-    """Something was accepted that must not be, or left behind."""
 
 
 @dataclass(frozen=True)
@@ -77,26 +70,6 @@ def _read_rig(folder: Path) -> None:
         for name, values in record.channels.items():
             _finite(f"{name} of {record.name}", values)
     rig_toml(rig.title, rig.mechanism, rig.effects, rig.cutoff)
-
-
-def _command(folder: Path) -> None:
-    out, errors = folder.parent / "out", io.StringIO()
-    with redirect_stderr(errors):
-        code = cli.main(["discrepancy", str(folder), "--out", str(out), "--quiet"])
-    written = {path.name for path in out.iterdir()} if out.is_dir() else set()
-    beside = {path.name for path in folder.parent.iterdir()} - {folder.name, out.name}
-    if beside:
-        raise Wrong(f"left beside the report: {beside}")
-    if code == cli.MISTAKE:
-        if written or out.exists():
-            raise Wrong(f"written in spite of code 2: {written}")
-        line = errors.getvalue()
-        if line.count("\n") != 1 or not line.startswith("pymoo-hdte: error: "):
-            raise Wrong(f"not one line: {line[:200]!r}")
-        raise InvalidInput("campaign", None, line.strip())
-    if code != 0 or not {VERDICT_FILE, PAGE_FILE} <= written <= set(FILES):
-        raise Wrong(f"code {code} and {written}")
-    json.loads((out / VERDICT_FILE).read_text(encoding="utf-8"))
 
 
 def _read_datasheet(folder: Path) -> None:
@@ -160,9 +133,12 @@ KINDS = {
         Kind("no-load runs", originals.no_load_files, _read_no_load),
         Kind("error measurements", originals.error_files, _read_errors),
         Kind("surrogate", originals.surrogate_files, _read_surrogate),
-        Kind("campaign, whole command", originals.campaign_files, _command, 300.0),
-        Kind("rig, whole command", originals.rig_files, _command, 300.0),
+        Kind("campaign, whole command", originals.campaign_files, commands.discrepancy, 300.0),
+        Kind("rig, whole command", originals.rig_files, commands.discrepancy, 300.0),
+        Kind("simulate, whole command", originals.drive_files, commands.simulate, 300.0),
+        Kind("optimise, whole command", originals.study_files, commands.optimise, 300.0),
+        Kind("identify, whole command", originals.bench_files, commands.identify, 300.0),
     )
 }
-COMMANDS = tuple(name for name, kind in KINDS.items() if kind.read is _command)
+COMMANDS = tuple(name for name, kind in KINDS.items() if kind.read in commands.COMMANDS)
 """Kinds that go through the whole command line."""

@@ -161,6 +161,16 @@ def duty_cycle_files() -> Files:
     return {"cycle.csv": path.read_bytes()}
 
 
+def drive_files() -> Files:
+    """Return a data sheet and a model."""
+    return datasheet_files() | model_files()
+
+
+def study_files() -> Files:
+    """Return a data sheet, a model and a duty cycle."""
+    return drive_files() | duty_cycle_files()
+
+
 TORQUES = [0, 10, 20, 30, 40, 30, 20, 10, 0, -10, -20, -30, -40, -30, -20, -10, 0]
 
 
@@ -190,6 +200,14 @@ def no_load_files() -> Files:
 def error_files() -> Files:
     """Return measurements of two errors of five prototypes."""
     return _csv("errors.csv", "prototype,repeat,dFp1_um,e13_um", [(3.0, 7.0)])
+
+
+def bench_files() -> Files:
+    """Return all records of prototypes that ``identify`` reads, and a data sheet."""
+    torsion, no_load = torsion_files()["loops.csv"], no_load_files()["runs.csv"]
+    runs = ("no_load_bearing.csv", "no_load_complete.csv", "no_load_output.csv")
+    records = {"torsion_loops.csv": torsion, **dict.fromkeys(runs, no_load)}
+    return records | error_files() | datasheet_files()
 
 
 def surrogate_files() -> Files:

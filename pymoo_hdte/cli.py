@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from pymoo_hdte import __version__
 from pymoo_hdte.checks import InvalidInput
@@ -61,6 +62,9 @@ def _parser() -> argparse.ArgumentParser:
         )
         one.set_defaults(command=command)
         command.add_arguments(one)
+        one.add_argument(
+            "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
+        )
         output = one.add_mutually_exclusive_group()
         output.add_argument("--json", action="store_true", help="print the result as JSON")
         output.add_argument("--quiet", action="store_true", help="print nothing but errors")

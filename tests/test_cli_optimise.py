@@ -79,7 +79,7 @@ def test_limits_to_order_enclose_the_design_by_the_tolerance(document):
 
 def test_the_same_seed_gives_the_same_bytes(written, tmp_path):
     assert optimise("hs_20_100", "--out", tmp_path / "again", "--quiet", *QUICK) == 0
-    for name in optimum_report.FILES:
+    for name in optimum_report.FOLDER.files:
         assert (tmp_path / "again" / name).read_bytes() == (written / name).read_bytes()
 
 

@@ -15,9 +15,10 @@ from virtual_rig_cases import effect
 
 from pymoo_hdte import cli
 from pymoo_hdte.discrepancy import report, workflow, write_campaign
-from pymoo_hdte.discrepancy.report_folder import FILES, VERDICT_FILE
+from pymoo_hdte.discrepancy.report_folder import FOLDER
 from pymoo_hdte.drive import load_datasheet, load_model, simulate
-from pymoo_hdte.reports.folder import PAGE_FILE, write_folder
+from pymoo_hdte.reports import folder as report_folder
+from pymoo_hdte.reports.folder import PAGE_FILE
 
 ROW = "run_2000rpm_40Nm.csv.gz"
 IDLE = "run_2000rpm_00Nm.csv.gz"
@@ -215,20 +216,23 @@ def analysed(clean):
     return workflow.analyse(clean)
 
 
-@pytest.mark.parametrize("stage", ["_page", "_revision", "write_folder"])
-def test_an_interrupted_run_leaves_nothing(stage, folder, analysed, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("module", "stage"), [(report, "_page"), (report, "_revision"), (report_folder, "_write_all")]
+)
+def test_an_interrupted_run_leaves_nothing(
+    module, stage, folder, analysed, tmp_path, monkeypatch, capsys
+):
     def stop(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(workflow, "analyse", lambda campaign: analysed)
-    monkeypatch.setattr(report, stage, stop)
+    monkeypatch.setattr(module, stage, stop)
     assert run(folder, tmp_path / "deep" / "out") == cli.INTERRUPTED
     assert [path.name for path in tmp_path.iterdir()] == ["rig"]
 
 
 def test_interrupted_in_the_last_step_the_earlier_report_stays(tmp_path, monkeypatch):
-    files = {VERDICT_FILE: "{}", PAGE_FILE: "earlier"}
-    write_folder(tmp_path / "out", files)
+    FOLDER.write(tmp_path / "out", "earlier", {}, {})
     moved = Path.replace
 
     def stop(path, target):
@@ -238,7 +242,7 @@ def test_interrupted_in_the_last_step_the_earlier_report_stays(tmp_path, monkeyp
 
     monkeypatch.setattr(Path, "replace", stop)
     with pytest.raises(KeyboardInterrupt):
-        write_folder(tmp_path / "out", files | {PAGE_FILE: "later"})
+        FOLDER.write(tmp_path / "out", "later", {}, {})
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
     assert (tmp_path / "out" / PAGE_FILE).read_text() == "earlier"
 
@@ -277,7 +281,7 @@ def test_twice_the_same_bytes(reported):
         {p.name: p.read_bytes() for p in (reported / n).iterdir()} for n in ("one", "other")
     )
     assert one == other
-    assert one.keys() == set(FILES)
+    assert one.keys() == set(FOLDER.files)
 
 
 def test_the_verdict_holds_what_was_promised(reported):

@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.next_experiment import Proposal
 from pymoo_hdte.discrepancy.optimum import OptimumShift, optimum_shift
 from pymoo_hdte.discrepancy.prove import prove
 from pymoo_hdte.discrepancy.report import write_report
-from pymoo_hdte.discrepancy.report_folder import FILES
+from pymoo_hdte.discrepancy.report_folder import FOLDER
 from pymoo_hdte.discrepancy.report_tables import certainty, gap_sentence, parameter_rows
 from pymoo_hdte.discrepancy.revise import accepted_fit, drive_model, revised_model
 from pymoo_hdte.discrepancy.virtual_rig import run_campaign
@@ -51,7 +51,8 @@ def location(ripple):
 @pytest.fixture(scope="module")
 def written(ripple, location, tmp_path_factory):
     out = tmp_path_factory.mktemp("reports") / "ripple"
-    return write_report(ripple, location, prove(ripple), PROPOSAL, out)
+    write_report(ripple, location, prove(ripple), PROPOSAL, out)
+    return out
 
 
 @pytest.fixture
@@ -77,7 +78,7 @@ def test_page_stands_alone_and_answers(written):
 
 
 def test_verdict_and_model_are_read_back(written, ripple):
-    assert {path.name for path in written.iterdir()} == set(FILES)
+    assert {path.name for path in written.iterdir()} == set(FOLDER.files)
     verdict = json.loads((written / "verdict.json").read_text())
     assert verdict["status"] == "named"
     held_out = verdict["held_out"]
@@ -89,8 +90,9 @@ def test_verdict_and_model_are_read_back(written, ripple):
 
 
 def test_same_analysis_gives_the_same_bytes(written, ripple, location, tmp_path):
-    again = write_report(ripple, location, prove(ripple), PROPOSAL, tmp_path / "again")
-    for name in FILES:
+    again = tmp_path / "again"
+    write_report(ripple, location, prove(ripple), PROPOSAL, again)
+    for name in FOLDER.files:
         assert (again / name).read_bytes() == (written / name).read_bytes()
 
 
@@ -111,7 +113,7 @@ def test_earlier_report_is_replaced_and_nothing_else(written, ripple, location, 
 def test_failure_leaves_the_earlier_report(ripple, location, tmp_path, monkeypatch, quick):
     arguments = (ripple, location, None, PROPOSAL, tmp_path / "out")
     write_report(*arguments)
-    before = {name: (tmp_path / "out" / name).read_bytes() for name in FILES}
+    before = {name: (tmp_path / "out" / name).read_bytes() for name in FOLDER.files}
 
     def fail(*_):
         raise OSError("disk full")
@@ -120,7 +122,7 @@ def test_failure_leaves_the_earlier_report(ripple, location, tmp_path, monkeypat
     with pytest.raises(OSError, match="disk full"):
         write_report(*arguments)
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
-    assert {name: (tmp_path / "out" / name).read_bytes() for name in FILES} == before
+    assert {name: (tmp_path / "out" / name).read_bytes() for name in FOLDER.files} == before
 
 
 def test_words_do_not_promise_what_is_not_there(ripple):

@@ -16,6 +16,7 @@ from experiments import committed, reliability, reliability_kill
 from experiments.__main__ import main
 from experiments.campaign import Campaign, Run
 from experiments.registry import Context
+from experiments.reliability_commands import Wrong
 from experiments.reliability_data import (
     FUZZ,
     KILL,
@@ -38,7 +39,7 @@ from experiments.reliability_fuzz import (
     outcome,
     outcomes_of_process,
 )
-from experiments.reliability_inputs import COMMANDS, KINDS, Wrong
+from experiments.reliability_inputs import COMMANDS, KINDS
 from experiments.reliability_mutations import Link, mutated, put
 from experiments.reliability_text import BYTES, TEXTS
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from pymoo_hdte import __version__
 from pymoo_hdte.reports.folder import PAGE_FILE
 
 Say = Callable[[str], None]
@@ -21,8 +22,19 @@ class Outcome(NamedTuple):
     summary: str
 
 
+def heading(kind: str, sentences: Sequence[str], limits: Sequence[str]) -> dict[str, Any]:
+    """Return how the document of a command begins: what it is, and what it says in words."""
+    return {
+        "format": f"pymoo_hdte {kind}",
+        "version": 1,
+        "made_by": f"pymoo_hdte {__version__}",
+        "sentences": list(sentences),
+        "limits": list(limits),
+    }
+
+
 def outcome_of(document: dict[str, Any], out: Path) -> Outcome:
-    """Return what a command found whose document has sentences and limits, with its page's path."""
+    """Return what a command found whose document begins with a `heading`, and where its page is."""
     lines = [*document["sentences"], *document["limits"], f"Report: {out / PAGE_FILE}"]
     return Outcome(document, "\n".join(lines))
 

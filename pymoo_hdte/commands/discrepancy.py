@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +21,6 @@ Exit codes: 0 a verdict was reached, whatever it is; 2 the input is at fault."""
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("campaign", type=Path, metavar="CAMPAIGN", help="folder of the campaign")
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for verdict and report"
-    )
-    parser.add_argument(
         "--data", type=Path, metavar="DIR", help="folder of the records that rig.toml names"
     )
 
@@ -36,10 +32,10 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
 
 def _analysed(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
     """Analyse a campaign or a rig and write its report; return the verdict's document."""
-    from pymoo_hdte.discrepancy.report_folder import check_report_folder
+    from pymoo_hdte.discrepancy.report_folder import FOLDER
     from pymoo_hdte.measured.rig_files import RIG_FILE
 
-    check_report_folder(out)
+    FOLDER.check(out)
     if (folder / RIG_FILE).is_file() or folder.suffix == ".toml":
         return _of_mechanism(folder, out, data, say)
     if data is not None:
@@ -71,7 +67,6 @@ def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
     from pymoo_hdte.discrepancy.next_experiment import next_experiment
     from pymoo_hdte.discrepancy.prove import prove
     from pymoo_hdte.discrepancy.report import write_report
-    from pymoo_hdte.discrepancy.report_folder import VERDICT_FILE
     from pymoo_hdte.discrepancy.workflow import analyse
 
     say("reading the records")
@@ -84,9 +79,7 @@ def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
         say("proving it on the records that were held out")
         proof = prove(analysis)
         say("choosing the next test and writing the report")
-        written = write_report(analysis, location, proof, next_experiment(analysis), out)
-    document: dict[str, Any] = json.loads((written / VERDICT_FILE).read_text(encoding="utf-8"))
-    return document
+        return write_report(analysis, location, proof, next_experiment(analysis), out)
 
 
 def _summary(document: dict[str, Any], out: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,18 +10,18 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from pymoo_hdte import __version__
+from pymoo_hdte.commands.command import heading
 from pymoo_hdte.commands.identification import UNITS, Identification, Parameter
 from pymoo_hdte.drive import DataSheet
 from pymoo_hdte.drive.toml_text import sheet_toml
 from pymoo_hdte.identification import ErrorStatistics, hysteresis_width, lost_energy
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
-from pymoo_hdte.reports.folder import PAGE_FILE, check_folder, write_folder
+from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.page import number, page
 from pymoo_hdte.units import ARCSEC
 
-DOCUMENT_FILE = "parameters.json"
 SHEET_FILE = "identified_sheet.toml"
+FOLDER = ReportFolder("parameters.json", optional=(SHEET_FILE,))
 
 _NOMINAL = {
     "K": "stiffness",
@@ -35,15 +34,10 @@ _MICROMETRE = 1e-6
 _TOO_EQUAL = 1e-3
 
 
-def check_identification_folder(out: Path) -> None:
-    """Refuse a folder that could not take a report; errors as `check_folder`."""
-    check_folder(out, (PAGE_FILE, DOCUMENT_FILE), (SHEET_FILE,))
-
-
 def write_identification_report(
     found: Identification, sheet: DataSheet | None, out: Path
 ) -> dict[str, Any]:
-    """Write a folder with page, document and data sheet or, after an error, none of them.
+    """Write a report; errors as `ReportFolder.write`.
 
     Parameters
     ----------
@@ -56,23 +50,12 @@ def write_identification_report(
     -------
     dict
         What ``parameters.json`` holds.
-
-    Raises
-    ------
-    InvalidInput
-        If ``out`` holds anything but an earlier report.
-    OSError
-        If it cannot be written.
     """
-    check_identification_folder(out)
     document = identification_document(found, sheet)
-    files = {
-        DOCUMENT_FILE: json.dumps(document, indent=1, ensure_ascii=False) + "\n",
-        PAGE_FILE: _page(found, document),
-    }
+    others = {}
     if sheet is not None:
-        files[SHEET_FILE] = sheet_toml(identified_sheet(found, sheet))
-    write_folder(out, files)
+        others[SHEET_FILE] = sheet_toml(identified_sheet(found, sheet))
+    FOLDER.write(out, _page(found, document), document, others)
     return document
 
 
@@ -102,13 +85,8 @@ def identified_sheet(found: Identification, sheet: DataSheet) -> DataSheet:
 
 def identification_document(found: Identification, sheet: DataSheet | None) -> dict[str, Any]:
     """Return what ``parameters.json`` holds: parameters in SI, errors in micrometres."""
-    return {
-        "format": "pymoo_hdte parameters",
-        "version": 1,
-        "made_by": f"pymoo_hdte {__version__}",
+    return heading("parameters", sentences(found), limits(found, sheet)) | {
         "records": found.folder,
-        "sentences": sentences(found),
-        "limits": limits(found, sheet),
         "parameters": {one.name: _parameter(one) for one in found.parameters},
         "torsion_loops": [
             {

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from pymoo_hdte.commands.command import Command, Outcome, Say, outcome_of
-from pymoo_hdte.commands.drive_arguments import BUILT_IN_SHEET
+from pymoo_hdte.commands.drive_arguments import BUILT_IN_SHEET, read_sheet
 
 _DETAILS = """example:
   pymoo-hdte identify bench/series-1 --out reports/series-1
@@ -27,20 +27,13 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--datasheet", metavar="DATASHEET", help=f"TOML file, or {BUILT_IN_SHEET}, to be filled in"
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
-    )
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
-    from pymoo_hdte.commands.drive_arguments import read_sheet
     from pymoo_hdte.commands.identification import identification
-    from pymoo_hdte.commands.identification_report import (
-        check_identification_folder,
-        write_identification_report,
-    )
+    from pymoo_hdte.commands.identification_report import FOLDER, write_identification_report
 
-    check_identification_folder(options.out)
+    FOLDER.check(options.out)
     sheet = read_sheet(options.datasheet) if options.datasheet else None
     say("reading the records and fitting")
     found = identification(options.records)

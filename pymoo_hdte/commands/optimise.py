@@ -44,9 +44,6 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         "--evaluations", type=int, default=20_000, help="of the swarm, in hundreds (default 20000)"
     )
     parser.add_argument("--seed", type=int, default=1, help="of the random numbers (default 1)")
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
-    )
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
@@ -59,11 +56,11 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         Settings,
         design_study,
     )
-    from pymoo_hdte.commands.optimum_report import check_optimum_folder, write_optimum_report
+    from pymoo_hdte.commands.optimum_report import FOLDER, write_optimum_report
     from pymoo_hdte.decision import PREFERENCES
     from pymoo_hdte.problems import load_conditions
 
-    check_optimum_folder(options.out)
+    FOLDER.check(options.out)
     preference = one_of("--preference", options.preference, tuple(PREFERENCES))
     evaluations = whole_number("--evaluations", options.evaluations, POPULATION)
     settings = Settings(

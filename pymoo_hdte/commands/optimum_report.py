@@ -2,63 +2,45 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pymoo_hdte import __version__
+import numpy as np
+
+from pymoo_hdte.commands.command import heading
 from pymoo_hdte.commands.design_study import CHECKED_DRIVES, POPULATION, Check, DesignStudy
 from pymoo_hdte.decision import tolerance_band
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
-from pymoo_hdte.reports.folder import PAGE_FILE, check_folder, write_folder
+from pymoo_hdte.reports.csv_text import csv_text
+from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.front import Front, design_rows, front_svg
 from pymoo_hdte.reports.page import number, page
 
-DOCUMENT_FILE = "optimum.json"
 FRONT_FILE = "front.csv"
 SHEET_FILE = "optimum_sheet.toml"
 MODEL_FILE = "optimum_model.toml"
-FILES = (PAGE_FILE, DOCUMENT_FILE, FRONT_FILE, SHEET_FILE, MODEL_FILE)
+FOLDER = ReportFolder("optimum.json", (FRONT_FILE, SHEET_FILE, MODEL_FILE))
 
 _WORTHLESS = 0.02
 """Share of the mean below which a gain is hardly worth a change of design."""
 
 
-def check_optimum_folder(out: Path) -> None:
-    """Refuse a folder that could not take a report; errors as `check_folder`."""
-    check_folder(out, FILES)
-
-
 def write_optimum_report(study: DesignStudy, notes: Sequence[str], out: Path) -> dict[str, Any]:
-    """Write a folder with all of `FILES` or, after an error, none; return the document.
+    """Write a report and return its document; errors as `ReportFolder.write`.
 
     ``notes`` are sentences on the drive that belong to the limits of the result.
-
-    Raises
-    ------
-    InvalidInput
-        If ``out`` holds anything but an earlier report.
-    OSError
-        If it cannot be written.
     """
-    check_optimum_folder(out)
     document = optimum_document(study, notes)
     optimum = optimum_model(study)
-    write_folder(
-        out,
-        {
-            DOCUMENT_FILE: json.dumps(document, indent=1, ensure_ascii=False) + "\n",
-            PAGE_FILE: _page(study, document),
-            FRONT_FILE: _front_csv(study),
-            SHEET_FILE: sheet_toml(optimum.sheet),
-            MODEL_FILE: model_toml(optimum),
-        },
-    )
+    others = {
+        FRONT_FILE: _front_csv(study),
+        SHEET_FILE: sheet_toml(optimum.sheet),
+        MODEL_FILE: model_toml(optimum),
+    }
+    FOLDER.write(out, _page(study, document), document, others)
     return document
 
 
@@ -82,12 +64,7 @@ def optimum_document(study: DesignStudy, notes: Sequence[str]) -> dict[str, Any]
     problem, settings = study.problem, study.settings
     lower, upper = tolerance_band(study.design, settings.tolerance)
     gain, gain_error = study.gain
-    return {
-        "format": "pymoo_hdte optimum",
-        "version": 1,
-        "made_by": f"pymoo_hdte {__version__}",
-        "sentences": sentences(study),
-        "limits": limits(study, notes),
+    return heading("optimum", sentences(study), limits(study, notes)) | {
         "preference": study.preference,
         "designs": {
             word: {
@@ -201,12 +178,8 @@ def limits(study: DesignStudy, notes: Sequence[str]) -> list[str]:
 def _front_csv(study: DesignStudy) -> str:
     problem = study.problem
     names = [f"{name} [{problem.units[name]}]" for name in problem.var_names]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([*problem.obj_names, *names])
-    for objectives, design in zip(study.front.tolist(), study.designs.tolist(), strict=True):
-        writer.writerow([*objectives, *design])
-    return text.getvalue()
+    rows = np.column_stack([study.front, study.designs])
+    return csv_text([*problem.obj_names, *names], rows.tolist())
 
 
 def _page(study: DesignStudy, document: dict[str, Any]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from pymoo_hdte.commands.command import Command, Outcome, Say, outcome_of
 from pymoo_hdte.commands.drive_arguments import DRIVE_DETAILS, add_drive_arguments, read_drive
@@ -31,21 +30,15 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--load", type=float, metavar="N_M", help="torque at the output, N.m (default: rated)"
     )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
-    )
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.checks import real_number
     from pymoo_hdte.commands.simulation import simulation
-    from pymoo_hdte.commands.simulation_report import (
-        check_simulation_folder,
-        write_simulation_report,
-    )
+    from pymoo_hdte.commands.simulation_report import FOLDER, write_simulation_report
     from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
-    check_simulation_folder(options.out)
+    FOLDER.check(options.out)
     model, notes = read_drive(options)
     speed, load = model.sheet.input_speed, model.sheet.load_torque
     if options.speed is not None:

@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from pymoo_hdte import __version__
+from pymoo_hdte.commands.command import heading
 from pymoo_hdte.commands.simulation import FASTEST, Simulation
 from pymoo_hdte.drive.speed_load_map import neighbouring_resonances
+from pymoo_hdte.reports.csv_text import csv_text
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
-from pymoo_hdte.reports.folder import PAGE_FILE, check_folder, write_folder
+from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.page import number, page
 from pymoo_hdte.units import ARCSEC
 
-DOCUMENT_FILE = "simulation.json"
 TURN_FILE = "transmission_error.csv"
 LINES_FILE = "order_lines.csv"
 SPEEDS_FILE = "speeds.csv"
-FILES = (PAGE_FILE, DOCUMENT_FILE, TURN_FILE, LINES_FILE, SPEEDS_FILE)
+FOLDER = ReportFolder("simulation.json", (TURN_FILE, LINES_FILE, SPEEDS_FILE))
 
 _NEAR = 0.15
 """A resonance this close to the speed, as a share, is worth a word."""
@@ -32,52 +31,28 @@ _SMALL = 1e-3
 """Lines below this share of the largest are left out of figure and table."""
 
 
-def check_simulation_folder(out: Path) -> None:
-    """Refuse a folder that could not take a report; errors as `check_folder`."""
-    check_folder(out, FILES)
-
-
 def write_simulation_report(found: Simulation, notes: Sequence[str], out: Path) -> dict[str, Any]:
-    """Write a folder with all of `FILES` or, after an error, none; return the document.
+    """Write a report and return its document; errors as `ReportFolder.write`.
 
     ``notes`` are sentences on the drive that belong to the limits of the result.
-
-    Raises
-    ------
-    InvalidInput
-        If ``out`` holds anything but an earlier report.
-    OSError
-        If it cannot be written.
     """
-    check_simulation_folder(out)
     document = simulation_document(found, notes)
     run = found.run
-    turn = (run.time, run.input_angle, run.input_speed, run.transmission_error / ARCSEC)
+    turn = [run.time, run.input_angle, run.input_speed, run.transmission_error / ARCSEC]
     columns = ("time_s", "input_angle_rad", "input_speed_rad_s", "transmission_error_arcsec")
-    write_folder(
-        out,
-        {
-            DOCUMENT_FILE: json.dumps(document, indent=1, ensure_ascii=False) + "\n",
-            PAGE_FILE: _page(found, document),
-            TURN_FILE: _csv(columns, zip(*(values.tolist() for values in turn), strict=True)),
-            LINES_FILE: _csv(("order", "amplitude_arcsec"), found.lines.items()),
-            SPEEDS_FILE: _csv(
-                ("input_speed_r_min", "dte_arcsec"),
-                zip(found.speeds.speeds.tolist(), found.speeds.dte[0].tolist(), strict=True),
-            ),
-        },
-    )
+    speeds = np.column_stack([found.speeds.speeds, found.speeds.dte[0]])
+    others = {
+        TURN_FILE: csv_text(columns, np.column_stack(turn).tolist()),
+        LINES_FILE: csv_text(("order", "amplitude_arcsec"), found.lines.items()),
+        SPEEDS_FILE: csv_text(("input_speed_r_min", "dte_arcsec"), speeds.tolist()),
+    }
+    FOLDER.write(out, _page(found, document), document, others)
     return document
 
 
 def simulation_document(found: Simulation, notes: Sequence[str]) -> dict[str, Any]:
     """Return what ``simulation.json`` holds."""
-    return {
-        "format": "pymoo_hdte simulation",
-        "version": 1,
-        "made_by": f"pymoo_hdte {__version__}",
-        "sentences": sentences(found),
-        "limits": limits(found, notes),
+    return heading("simulation", sentences(found), limits(found, notes)) | {
         "input_speed_r_min": found.speed,
         "load_torque_Nm": found.model.sheet.load_torque,
         "dte_arcsec": {"steady_state": found.steady, "integrated": found.run.dte_arcsec()},
@@ -141,11 +116,6 @@ def _moving(found: Simulation) -> dict[float, float]:
     lines = {order: size for order, size in found.lines.items() if order}
     least = _SMALL * max(lines.values(), default=0.0)
     return {order: size for order, size in lines.items() if size >= least}
-
-
-def _csv(columns: Sequence[str], rows: Iterable[Sequence[float]]) -> str:
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
-    return "\n".join(lines) + "\n"
 
 
 def _page(found: Simulation, document: dict[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from pymoo_hdte.discrepancy.report_figures import (
     optimum_fronts,
     overlay,
 )
-from pymoo_hdte.discrepancy.report_folder import VERDICT_FILE, check_report_folder
+from pymoo_hdte.discrepancy.report_folder import FOLDER
 from pymoo_hdte.discrepancy.report_tables import (
     STATUSES,
     certainty,
@@ -43,7 +42,6 @@ from pymoo_hdte.discrepancy.verdict_file import verdict_document
 from pymoo_hdte.discrepancy.workflow import Analysis
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.reports.figures import data_uri
-from pymoo_hdte.reports.folder import PAGE_FILE, write_folder
 from pymoo_hdte.reports.page import page
 
 
@@ -53,8 +51,8 @@ def write_report(
     proof: Proof | None,
     proposal: Proposal,
     out: str | Path,
-) -> Path:
-    """Write a folder with all of `report_folder.FILES` or, after an error, none; return its path.
+) -> dict[str, Any]:
+    """Write a report and return the verdict's document; errors as `ReportFolder.write`.
 
     Parameters
     ----------
@@ -66,16 +64,7 @@ def write_report(
     out : str or Path
         New, empty, or an earlier report, which is replaced. Without a revised model, for a drive
         that a data sheet cannot hold, its two files are missing and the verdict says why.
-
-    Raises
-    ------
-    InvalidInput
-        If ``out`` holds anything else.
-    OSError
-        If it cannot be written.
     """
-    out = Path(out)
-    check_report_folder(out)
     document = verdict_document(
         analysis, location, None if proof is None else proof.as_dict(), proposal
     )
@@ -84,9 +73,8 @@ def write_report(
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
     html = _page(analysis, location, proof, document, shift)
-    verdict = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    write_folder(out, {VERDICT_FILE: verdict, PAGE_FILE: html, **model_files})
-    return out
+    FOLDER.write(Path(out), html, document, model_files)
+    return document
 
 
 def _revision(analysis: Analysis) -> tuple[dict[str, str], OptimumShift]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.report_folder import VERDICT_FILE, check_report_folder
+from pymoo_hdte.discrepancy.report_folder import FOLDER
 from pymoo_hdte.discrepancy.report_tables import STATUSES
 from pymoo_hdte.discrepancy.revise import MODEL_FILE
 from pymoo_hdte.measured.figures import gaps as gaps_figure
@@ -20,7 +19,6 @@ from pymoo_hdte.measured.prove import MeasuredGap, fitted_mechanism, prove_measu
 from pymoo_hdte.measured.rig_files import rig_toml
 from pymoo_hdte.measured.verdict_document import measured_document
 from pymoo_hdte.reports.figures import data_uri
-from pymoo_hdte.reports.folder import PAGE_FILE, write_folder
 from pymoo_hdte.reports.page import page
 
 _SIZES = 5
@@ -28,7 +26,7 @@ _SIZES = 5
 
 
 def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict[str, Any]:
-    """Write a folder with verdict, revised model and report; return the verdict's document.
+    """Write a report and return the verdict's document; errors as `ReportFolder.write`.
 
     Parameters
     ----------
@@ -36,15 +34,7 @@ def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict
     finding : Finding
     out : str or Path
         New, empty, or an earlier report, which is replaced.
-
-    Raises
-    ------
-    InvalidInput
-        If ``out`` holds anything else.
-    OSError
-        If it cannot be written.
     """
-    check_report_folder(Path(out))
     gaps = prove_measured(finding)
     document = measured_document(title, finding, gaps, next_test(finding))
     document["revised_model"] = {"file": MODEL_FILE}
@@ -55,9 +45,7 @@ def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict
         (*finding.data.known, *accepted.effects),  # type: ignore[arg-type]
         finding.cutoff,
     )
-    verdict = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    html = _page(finding, document, gaps)
-    write_folder(Path(out), {VERDICT_FILE: verdict, PAGE_FILE: html, MODEL_FILE: model})
+    FOLDER.write(Path(out), _page(finding, document, gaps), document, {MODEL_FILE: model})
     return document
 
 

@@ -3,50 +3,104 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import tempfile
-from collections.abc import Collection
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
 
 PAGE_FILE = "report.html"
 
 
-def check_folder(out: Path, always: Collection[str], sometimes: Collection[str] = ()) -> None:
-    """Refuse a folder that could not take a report, before anybody waits for one.
+@dataclass(frozen=True)
+class ReportFolder:
+    """What the folder of one kind of report holds, and by what an earlier one is known.
 
-    Parameters
+    Attributes
     ----------
-    out : Path
-        New, empty, or an earlier report, which will be replaced.
-    always, sometimes : collection of str
-        Names of the files by which an earlier report is known: all of the first, no others.
-
-    Raises
-    ------
-    InvalidInput
-        If ``out`` holds anything else.
-    OSError
-        If it cannot be written.
+    document : str
+        Name of the JSON file, which stands beside `PAGE_FILE`.
+    others : tuple of str
+        Names of further files.
+    optional : tuple of str
+        Names of files that may be missing.
     """
-    allowed = "a folder that is new, empty or an earlier report, but not the one you are in"
-    dangling = any(one.is_symlink() and not one.exists() for one in out.absolute().parents)
-    folder = out.is_dir() or not out.exists()
-    if dangling or out.is_symlink() or not folder or out.resolve() == Path.cwd():
-        raise InvalidInput("folder of the report", str(out), allowed)
-    if out.is_dir():
-        present = {path.name for path in out.iterdir()}
-        if present and not set(always) <= present <= {*always, *sometimes}:
+
+    document: str
+    others: tuple[str, ...] = ()
+    optional: tuple[str, ...] = ()
+
+    @property
+    def always(self) -> tuple[str, ...]:
+        """Names of the files without which a folder is no report."""
+        return (PAGE_FILE, self.document, *self.others)
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of all files there can be."""
+        return (*self.always, *self.optional)
+
+    def check(self, out: Path) -> None:
+        """Refuse a folder that could not take a report, before anybody waits for one.
+
+        Parameters
+        ----------
+        out : Path
+            New, empty, or an earlier report, which will be replaced.
+
+        Raises
+        ------
+        InvalidInput
+            If it holds anything else.
+        OSError
+            If it cannot be written.
+        """
+        allowed = "a folder that is new, empty or an earlier report, but not the one you are in"
+        dangling = any(one.is_symlink() and not one.exists() for one in out.absolute().parents)
+        folder = out.is_dir() or not out.exists()
+        if dangling or out.is_symlink() or not folder or out.resolve() == Path.cwd():
             raise InvalidInput("folder of the report", str(out), allowed)
-    parent = next(folder for folder in out.absolute().parents if folder.exists())
-    if not parent.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(parent))
-    if not os.access(parent, os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(parent))
+        if out.is_dir():
+            present = {path.name for path in out.iterdir()}
+            if present and not set(self.always) <= present <= set(self.files):
+                raise InvalidInput("folder of the report", str(out), allowed)
+        parent = next(folder for folder in out.absolute().parents if folder.exists())
+        if not parent.is_dir():
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(parent))
+        if not os.access(parent, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(parent))
+
+    def write(
+        self, out: Path, page: str, document: dict[str, Any], others: Mapping[str, str]
+    ) -> None:
+        """Write all files or, after an error, none.
+
+        Parameters
+        ----------
+        out : Path
+            New, empty, or an earlier report, which is replaced.
+        page : str
+            HTML.
+        document : dict
+            Of plain types and finite numbers.
+        others : mapping of str
+            Texts of the further files, by name.
+
+        Raises
+        ------
+        InvalidInput, OSError
+            As `check`; OSError also for a full disk.
+        """
+        self.check(out)
+        text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        _write_all(out, {self.document: text, PAGE_FILE: page, **others})
 
 
-def write_folder(out: Path, files: dict[str, str]) -> None:
+def _write_all(out: Path, files: Mapping[str, str]) -> None:
     """Write files to a draft beside ``out`` and put that in its place.
 
     Killed between the two renames, it leaves an earlier report in a hidden folder beside ``out``.
