@@ -10,7 +10,6 @@ from scipy.stats import gaussian_kde
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.surrogate import TruncatedNormal
 
 PICTURE = Path(__file__).with_name("robust_design.png")
 DATA_SHEET, CHOSEN = "#D55E00", "#0072B2"
@@ -45,10 +44,9 @@ def draw(target: Path = PICTURE) -> None:
 def of_built_drives(problem: RobustDTE, design: np.ndarray) -> np.ndarray:
     """Return the DTE of random drives of one design, by the drive model, shape (DRIVES,)."""
     rng = np.random.default_rng(1)
-    error = problem.model.kinematic_error
-    scatter = TruncatedNormal(problem.model.nominal[0], error.std).sample(rng, DRIVES)
-    parts = design * rng.uniform(0.95, 1.05, (DRIVES, 4))
-    return problem.model.dte_arcsec(np.column_stack([scatter, parts]))
+    drives = np.column_stack([entry.sample(rng, DRIVES) for entry in problem.inputs])
+    drives[:, 1:] *= design
+    return problem.model.dte_arcsec(drives)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from experiments.published_values import Moments
 from experiments.quadrature import tensor_rule, weighted_moments
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.surrogate import ExactMoments, SampledMoments, TruncatedNormal, UniformBand
+from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
 
 Inputs = Sequence[TruncatedNormal | UniformBand]
 
@@ -43,8 +43,7 @@ def exact_moments(problem: RobustDTE, design: ArrayLike, tolerance: float) -> Mo
 
 def theta_s_of(problem: RobustDTE) -> TruncatedNormal:
     """Return the distribution of theta_s, in rad."""
-    moments = cast(ExactMoments | SampledMoments, problem.moments)
-    return cast(TruncatedNormal, moments.uncertainty.inputs[0])
+    return cast(TruncatedNormal, problem.inputs[0])
 
 
 def scatter_of(problem: RobustDTE, tolerance: float) -> Inputs:

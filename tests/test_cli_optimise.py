@@ -15,7 +15,7 @@ from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
+from pymoo_hdte.surrogate import TruncatedNormal
 
 QUICK = ("--order", "2", "--evaluations", "1000")
 
@@ -128,10 +128,8 @@ class TestCheck:
         assert study.optimum_check.std == pytest.approx(dte.std(), abs=0.1)
 
     def test_standard_errors_are_the_scatter_over_other_random_drives(self):
-        problem, bands = RobustDTE(), [UniformBand(0.05)] * 4
-        error = problem.model.kinematic_error
-        inputs = [TruncatedNormal(problem.model.nominal[0], error.std), *bands]
-        checks = [_check(problem, inputs, problem.nominal, seed) for seed in range(25)]
+        problem = RobustDTE()
+        checks = [_check(problem, problem.nominal, seed) for seed in range(25)]
         means, stds = np.array([(one.mean, one.std) for one in checks]).T
         assert np.mean([one.mean_error for one in checks]) == pytest.approx(means.std(), rel=0.4)
         assert np.mean([one.std_error for one in checks]) == pytest.approx(stds.std(), rel=0.4)

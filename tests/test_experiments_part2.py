@@ -149,7 +149,7 @@ class TestShares:
     def test_halving_theta_s_is_what_quadrature_over_it_says(self):
         problem = robust_problem("calibrated")
         std, falls = falls_when_halved(problem, problem.nominal, 0.0)
-        wide = problem.moments.uncertainty.inputs[0]
+        wide = problem.inputs[0]
         expected = []
         for theta_s in (wide, TruncatedNormal(wide.mean, wide.std / 2.0)):
             values, weights = theta_s.quadrature(8)
@@ -324,7 +324,7 @@ def test_needed_runs_are_the_least_that_reach_the_target():
 @pytest.mark.parametrize("model", ["calibrated", "resonant"])
 def test_chaospy_agrees_on_moments_and_indices(model):
     problem = RobustDTE(model, order=2)
-    twin = chaos(2, problem.moments.uncertainty.inputs[0].cut)
+    twin = chaos(2, problem.inputs[0].cut)
     found = compare(twin, problem, problem.nominal, BAND)
     assert found.moments < 1e-10
     assert found.indices < 1e-10

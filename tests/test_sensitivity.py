@@ -72,7 +72,7 @@ def test_they_agree_with_chaospys_conditional_variances(sizes, tolerance):
 @pytest.mark.parametrize("model", ["resonant", "published"])
 def test_in_five_variables_they_agree_with_chaospys_expansion_coefficients(model):
     problem = RobustDTE(model, order=2)
-    noise, *bands = inputs = problem.moments.uncertainty.inputs
+    noise, *bands = inputs = problem.inputs
     _, expansion, coefficients, _ = fitted_by_chaospy(
         problem.surrogate, noise, problem.nominal, bands[0].tolerance, 2
     )

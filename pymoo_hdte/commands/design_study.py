@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +15,8 @@ from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.problems import OperatingCondition, RobustDTE
-from pymoo_hdte.problems.drive_response import DESIGN_VARIABLES, theta_s_scatter
 from pymoo_hdte.problems.duty_cycle import duty_cycle_dte_arcsec
-from pymoo_hdte.surrogate import SobolIndices, TruncatedNormal, UniformBand, sobol_indices
+from pymoo_hdte.surrogate import SobolIndices, sobol_indices
 
 POPULATION = 100
 CHECKED_DRIVES = 1000
@@ -185,10 +183,8 @@ def design_study(
     designs, front = result.X[order], result.F[order]
     chosen = {word: WeightedUtopia(PREFERENCES[word]).do(front) for word in PREFERENCES}
     design = designs[chosen[preference]]
-    bands = [UniformBand(settings.tolerance) for _ in DESIGN_VARIABLES]
-    inputs: list[TruncatedNormal | UniformBand] = [theta_s_scatter(model), *bands]
     initial_check, optimum_check = (
-        _check(problem, inputs, one, settings.seed) for one in (problem.nominal, design)
+        _check(problem, one, settings.seed) for one in (problem.nominal, design)
     )
     return DesignStudy(
         problem=problem,
@@ -200,16 +196,14 @@ def design_study(
         initial=problem.evaluate(problem.nominal[None])[0],
         initial_check=initial_check,
         optimum_check=optimum_check,
-        sources=sobol_indices(problem.surrogate, inputs, design),
+        sources=sobol_indices(problem.surrogate, problem.inputs, design),
     )
 
 
-def _check(
-    problem: RobustDTE, inputs: Sequence[TruncatedNormal | UniformBand], design: Values, seed: int
-) -> Check:
+def _check(problem: RobustDTE, design: Values, seed: int) -> Check:
     """Judge a design by the model on random drives, the same ones for every design."""
     rng = np.random.default_rng(seed)
-    drives = np.column_stack([entry.sample(rng, CHECKED_DRIVES) for entry in inputs])
+    drives = np.column_stack([entry.sample(rng, CHECKED_DRIVES) for entry in problem.inputs])
     drives[:, 1:] *= design
     by_model = duty_cycle_dte_arcsec(problem.model, problem.conditions, drives)
     by_surrogate = problem.surrogate(drives)

@@ -58,6 +58,8 @@ class RobustDTE(StoredFront, RobustProblem):
     surrogate : ChebyshevSurrogate
         DTE in arcsec over ``PARAMETERS``. Its box is +-35 % (wider if box and tolerance reach
         further) in the four design variables and mean +- 3 std in theta_s.
+    inputs : tuple of TruncatedNormal and UniformBand
+        Scatter of ``PARAMETERS``, of the design variables relative to the design.
     moments : ExactMoments or SampledMoments
         Of the surrogate, over the designs.
     nominal : ndarray, shape (4,)
@@ -105,9 +107,9 @@ class RobustDTE(StoredFront, RobustProblem):
         StoredFront.__init__(self, response.variant, settings)
 
         bands = [UniformBand(tolerance) for _ in DESIGN_VARIABLES]
-        inputs: list[TruncatedNormal | UniformBand] = [response.theta_s, *bands]
+        self.inputs: tuple[TruncatedNormal | UniformBand, ...] = (response.theta_s, *bands)
         self.surrogate = response.surrogate(tolerance)
         scatter = make_moments(
-            moments, self.surrogate, inputs, response.design_box, n_samples, sample_seed
+            moments, self.surrogate, self.inputs, response.design_box, n_samples, sample_seed
         )
         RobustProblem.__init__(self, scatter, OBJECTIVES, UNITS)
