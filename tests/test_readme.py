@@ -3,6 +3,7 @@
 import contextlib
 import csv
 import io
+import json
 import re
 import shlex
 import sys
@@ -12,8 +13,12 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from experiments.campaign import Campaign
+from experiments.comparison import compare
 from experiments.published_values import TABLE_7
+from experiments.registry import Context
 from pymoo_hdte import cli
+from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import latin_hypercube
 
@@ -59,6 +64,11 @@ def test_the_commands_for_a_design_run_one_after_the_other(tmp_path, monkeypatch
     assert len(designs) == 2
     for line in designs:
         assert cli.main(shlex.split(line)[1:]) == 0
+    found = json.loads((tmp_path / "reports" / "optimum" / "optimum.json").read_text())
+    promised = found["initial"]["mean_dte_arcsec"] - found["designs"]["balanced"]["mean_dte_arcsec"]
+    confirmed = found["checked_on_the_model"]["mean_falls_by_arcsec"]
+    words = f"Of the {promised:.1f} arcsec that the surrogate promises for the balanced design"
+    assert f"{words}, the model confirms {confirmed:.1f}." in " ".join(README.split())
     assert (tmp_path / "reports" / "simulation" / "report.html").is_file()
 
 
@@ -129,6 +139,20 @@ class TestNumbersBesideThePaper:
             paper, _ = row(words)
             names = ("AMP-MOPSO", "MOPSO", "NSGA-II")
             assert paper == [getattr(TABLE_7[name], indicator) for name in names]
+
+    def test_comparison_with_fewer_seeds(self, tmp_path):
+        names = ("AMP-MOPSO", "MOPSO", "NSGA-II")
+        comparison = compare(Context(2, tmp_path, Campaign(tmp_path)), names, "small")[0]
+        for words, indicator in (("IGD of AMP-MOPSO", "igd"), ("Spacing of the same", "spacing")):
+            _, ours = row(words)
+            means = [comparison.values(name, indicator).mean() for name in names]
+            assert ours == pytest.approx(means, rel=0.15)
+
+    def test_best_balanced_design_of_the_true_front(self):
+        front = RobustDTE().pareto_front()
+        _, ours = row("best balanced design")
+        best = front[WeightedUtopia(PREFERENCES["balanced"]).do(front)]
+        assert ours == pytest.approx(best, abs=0.01)
 
     def test_rows_have_both_sides(self):
         with io.StringIO(README) as text:

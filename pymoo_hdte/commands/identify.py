@@ -34,7 +34,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.commands.identification_report import FOLDER, write_identification_report
 
     FOLDER.check(options.out)
-    sheet = read_sheet(options.datasheet) if options.datasheet else None
+    sheet = read_sheet(options.datasheet) if options.datasheet is not None else None
     say("reading the records and fitting")
     found = identification(options.records)
     return outcome_of(write_identification_report(found, sheet, options.out), options.out)

@@ -67,7 +67,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
         tolerance=options.tolerance,
         box=options.box,
         order=options.order,
-        conditions=load_conditions(options.cycle) if options.cycle else None,
+        conditions=load_conditions(options.cycle) if options.cycle is not None else None,
         evaluations=evaluations // POPULATION * POPULATION,
         seed=whole_number("--seed", options.seed, 0),
     )
