@@ -1,9 +1,11 @@
-"""Speed of the other parts: surrogate, solvers, sorting, discrepancy workflow, mechanisms."""
+"""Speed of the other parts: imports, surrogate, solvers, sorting, discrepancy workflow."""
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator
+from subprocess import run
 
 import numpy as np
 from moocore import pareto_rank
@@ -22,14 +24,37 @@ from pymoo_hdte.drive import harmonic_balance, preset, simulate
 N_POINTS = 1000
 SORTED = 200
 REPEATS = 5
+OUR_STUDY = (
+    "from pymoo_hdte.algorithms import ElitistSwarm; from pymoo_hdte.problems import RobustDTE; "
+    "from pymoo.optimize import minimize"
+)
+THEIR_STUDY = "from pymoo.algorithms.moo.nsga2 import NSGA2; from pymoo.optimize import minimize"
 
 
 def ratios_of_parts() -> Iterator[Ratio]:
     """Measure one ratio a part."""
+    yield _imports()
     yield _surrogate()
     yield _harmonic_balance()
     yield from _sorting()
     yield _discrepancy()
+
+
+def _imports() -> Ratio:
+    ours, theirs = (_seconds_of(code) for code in (OUR_STUDY, THEIR_STUDY))
+    return Ratio(
+        "imports of a study, from Python's start",
+        "RobustDTE and ElitistSwarm",
+        ours,
+        "minimize and NSGA-II of pymoo",
+        theirs,
+        "less than 2",
+        ours < 2.0 * theirs,
+    )
+
+
+def _seconds_of(code: str) -> float:
+    return best_time(lambda: run([sys.executable, "-c", code], check=True), REPEATS)
 
 
 def _surrogate() -> Ratio:

@@ -83,6 +83,18 @@ def test_the_package_s_name_imports_nothing_else():
     assert done.stdout.split() == ["pymoo_hdte"]
 
 
+def test_problem_and_swarm_load_only_those_parts_of_scipy_that_they_use():
+    """SciPy's signals and statistics alone take longer to load than all of a pymoo study."""
+    code = (
+        "import sys; from pymoo_hdte.algorithms import ElitistSwarm; "
+        "from pymoo_hdte.problems import RobustDTE; print(*sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, timeout=120, capture_output=True, text=True
+    )
+    assert not {"scipy.signal", "scipy.stats", "matplotlib", "chaospy"} & set(done.stdout.split())
+
+
 def test_the_version_is_that_of_the_installed_package():
     assert pymoo_hdte.__version__ == version("pymoo-hdte")
     with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):

@@ -6,8 +6,8 @@ It applies to records. The DTE of a model is the peak-to-peak of the unfiltered 
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 
@@ -48,11 +48,11 @@ def low_pass(
     real_number("sampling_rate", sampling_rate, above=0.0)
     real_number("cutoff", cutoff, above=0.0, below=sampling_rate / 2.0)
     samples = finite_array("signal", signal, (None,))
-    sections = butter(FILTER_ORDER, cutoff, fs=sampling_rate, output="sos")
+    sections = scipy.signal.butter(FILTER_ORDER, cutoff, fs=sampling_rate, output="sos")
     shortest = 3 * (2 * len(sections) + 1) + 1
     if len(samples) < shortest:
         raise InvalidInput("length of signal", len(samples), f"at least {shortest} samples")
-    return sosfiltfilt(sections, samples)
+    return scipy.signal.sosfiltfilt(sections, samples)
 
 
 def measured_dte(

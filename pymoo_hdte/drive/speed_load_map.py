@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from pymoo_hdte.drive.model import DriveModel
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
@@ -46,7 +46,7 @@ class SpeedLoadMap:
     def peaks(self, row: int) -> list[tuple[float, float]]:
         """Return speed and DTE of every peak over speed at the load of that row."""
         dte = self.dte[row]
-        places, found = find_peaks(np.nan_to_num(dte), prominence=0.0)
+        places, found = scipy.signal.find_peaks(np.nan_to_num(dte), prominence=0.0)
         standing_out = found["prominences"] >= _PROMINENCE * dte[places]
         return [(float(self.speeds[i]), float(dte[i])) for i in places[standing_out]]
 

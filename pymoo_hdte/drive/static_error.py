@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import truncnorm
 
 from pymoo_hdte.checks import InvalidInput, one_of, whole_number
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, DataSheet
@@ -121,7 +121,7 @@ def sample_static_error(
     means = np.array([source.mean for source in sheet.error_sources])
     stds = np.array([source.std for source in sheet.error_sources])
     shape = (n_samples, len(means))
-    standard = truncnorm.rvs(-TRUNCATION, TRUNCATION, size=shape, random_state=rng)
+    standard = scipy.stats.truncnorm.rvs(-TRUNCATION, TRUNCATION, size=shape, random_state=rng)
     return StaticErrorSample(sheet, means + stds * standard, rng.uniform(0.0, 2.0 * np.pi, shape))
 
 

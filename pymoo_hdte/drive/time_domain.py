@@ -11,9 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
 from pymoo_hdte.drive.coefficients import Coefficients
@@ -55,7 +54,7 @@ class Run:
 
     def peak_to_peak(self) -> float:
         """Return the peak-to-peak of theta_d over 0 <= input angle <= 2 pi N, in rad."""
-        curve = CubicSpline(self.input_angle, self.transmission_error)
+        curve = scipy.interpolate.CubicSpline(self.input_angle, self.transmission_error)
         end = 2.0 * np.pi * self.ratio
         turning = curve.derivative().roots(extrapolate=False)
         inside = turning[(turning > 0.0) & (turning < end)]
@@ -147,7 +146,7 @@ def simulate(
     # theta_d is of the order of arcseconds and its rate of the order of arcseconds times 100 1/s.
     atol = np.array([1e-8, 1e-6, 1e-4 * ARCSEC, 1e-2 * ARCSEC, *[1e-4 * ARCSEC] * memory])
     atol *= rtol / 1e-8
-    solution = solve_ivp(
+    solution = scipy.integrate.solve_ivp(
         equations_of_motion(coefficients, start_up, prescribed=angle == "prescribed"),
         (0.0, times[-1]),
         start,

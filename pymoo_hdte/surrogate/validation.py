@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import qmc
 
 from pymoo_hdte.checks import InvalidInput, finite_array, whole_number
 from pymoo_hdte.surrogate.box import Box
@@ -41,7 +41,7 @@ def latin_hypercube(
     """
     if not isinstance(random_state, np.random.Generator):
         random_state = np.random.default_rng(whole_number("random_state", random_state, 0))
-    sampler = qmc.LatinHypercube(d=len(box), rng=random_state)
+    sampler = scipy.stats.qmc.LatinHypercube(d=len(box), rng=random_state)
     return box.from_cube(2.0 * sampler.random(whole_number("n", n, 1)) - 1.0)
 
 
