@@ -14,7 +14,7 @@ from pathlib import Path
 from experiments.campaign import Campaign
 from experiments.machine import usable_cores
 from experiments.registry import EXPERIMENTS, Context, Experiment
-from experiments.report import write_report
+from experiments.report import check_page, write_report
 from experiments.store import save
 from experiments.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
@@ -34,11 +34,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     chosen = _chosen(options.name, parser)
     if options.quick and not (options.name and chosen[0].has_small_version):
-        parser.error(f"--quick is for {_small_versions()}")
+        parser.error(f"--quick is for {_names('has_small_version')}")
+    if options.full and options.name and not chosen[0].reads_outcome:
+        parser.error(f"--full is for {_names('reads_outcome')}")
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         if not os.access(options.out, os.W_OK | os.X_OK):
             parser.error(f"--out {options.out} cannot be written to")
+        check_page(options.out)
         executor = make_executor(options.workers, options.dask)
     except OSError as error:
         parser.error(f"--out {options.out} cannot be made a folder: {error.strerror}")
@@ -100,14 +103,13 @@ def _parser() -> argparse.ArgumentParser:
     extent.add_argument(
         "--full",
         action="store_true",
-        help="run the long campaign behind an experiment (calibration, blind, peers, swarm_parts, "
-        "reliability) "
-        "instead of reading its committed outcome",
+        help=f"run the long campaign behind {_names('reads_outcome')} instead of reading its "
+        "committed outcome",
     )
     extent.add_argument(
         "--quick",
         action="store_true",
-        help=f"run a small version of {_small_versions()}, minutes",
+        help=f"run a small version of {_names('has_small_version')}, minutes",
     )
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"
@@ -136,8 +138,9 @@ def _chosen(name: str | None, parser: argparse.ArgumentParser) -> list[Experimen
     return chosen
 
 
-def _small_versions() -> str:
-    return " and ".join(one.name for one in EXPERIMENTS if one.has_small_version)
+def _names(property_: str) -> str:
+    *others, last = [one.name for one in EXPERIMENTS if getattr(one, property_)]
+    return f"{', '.join(others)} and {last}"
 
 
 def _list_of_experiments() -> str:

@@ -30,7 +30,7 @@ from experiments.blind_tables import (
     tools_table,
 )
 from experiments.campaign import Campaign
-from experiments.committed import committed_file
+from experiments.committed import committed_file, stored_outcome
 from experiments.registry import Context
 from experiments.result import Picture, Result
 from experiments.store import TIMES, write_atomically
@@ -68,8 +68,13 @@ def run(context: Context) -> Result:
     outcomes = _campaign(context) if context.full else _committed()
     return Result(
         title="Blind campaigns: what the discrepancy workflow finds",
-        command="python -m experiments blind --full",
-        paragraphs=(SETTING, CHANGED, *_unfinished(outcomes)),
+        command=context.command("blind"),
+        paragraphs=(
+            *stored_outcome(context, "blind", OUTCOMES),
+            SETTING,
+            CHANGED,
+            *_unfinished(outcomes),
+        ),
         tables=(
             must_reach_table(outcomes),
             *times_tables(outcomes),

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.calibration_data import Outcome, collect, format_outcomes, gap, read_outcomes
-from experiments.committed import committed_file
+from experiments.committed import committed_file, stored_outcome
 from experiments.figures import BLUE, GREY, ORANGE, grid
 from experiments.fitting import BUDGETS, Bootstrap, Fit
 from experiments.ladder import NARROW, ladder
@@ -67,8 +67,8 @@ def run(context: Context) -> Result:
     best = best_rungs(outcomes, "table8")[0]
     return Result(
         title="Calibration: what the printed equations lack",
-        command="python -m experiments calibration --full",
-        paragraphs=(SETTING,),
+        command=context.command("calibration"),
+        paragraphs=(*stored_outcome(context, "calibration", OUTCOMES), SETTING),
         tables=(
             _numbers_table(best),
             _ladder_table(outcomes, "table8", "fitted to Table 8 and the box scatter"),

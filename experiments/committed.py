@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.provenance import environment
+from experiments.registry import Context
 from pymoo_hdte.reports.csv_text import csv_text
 
 DATA = Path(__file__).parent / "data"
@@ -42,6 +43,17 @@ def read_origin(path: Path) -> dict[str, Any]:
     """Return what the first line of a table with an origin says."""
     with path.open(encoding="utf-8") as file:
         return dict(json.loads(file.readline().removeprefix("#")))
+
+
+def stored_outcome(context: Context, experiment: str, table: str) -> tuple[str, ...]:
+    """Return a paragraph that says so if the report is made from a committed table."""
+    if context.full or context.quick:
+        return ()
+    made = read_origin(committed_file(table, experiment))["date"]
+    return (
+        f"Not computed in this run: made from the stored outcome of {made}, which "
+        f"python -m experiments {experiment} --full computes anew.",
+    )
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:

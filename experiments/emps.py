@@ -28,6 +28,10 @@ PUBLISHED = {
 }
 """Values of the benchmark's fit and the share within which ours should lie."""
 SOURCE = "Janot, Gautier, Brunot (2019), nonlinearbenchmark.org; its offset is -3.165 N."
+ORIGIN = (
+    "DATA_EMPS.mat and DATA_EMPS_PULSES.mat of the EMPS benchmark (Janot, Gautier, Brunot, 2019) "
+    "at nonlinearbenchmark.org"
+)
 DRAG = 30.0
 """N at the largest speed, hidden in the twins; dry friction of the rig is 20 N."""
 
@@ -36,7 +40,7 @@ def run(context: Context) -> Result:
     """Start from the model without friction; hold verdict, values and proof against the known."""
     one = study("emps", "emps")
     if one is None:
-        return absent(TITLE, "emps", COMMAND)
+        return absent(TITLE, "emps", COMMAND, ORIGIN)
     found = twins(one, "joint", DRAG)
     return Result(
         title=TITLE,

@@ -31,6 +31,7 @@ SOURCE = (
     "lines at 200 and 400 cycles a turn of the joint, 0.033 to 0.048 and 0.022 to 0.036 N.m over "
     "the ten speeds (middles shown), which a fit of every record by itself gives."
 )
+ORIGIN = "the repository HBRS-SDP/joint-friction-model on GitHub, its ten runs at constant speed"
 ORDERS = (200.0, 400.0)
 """Cycles a turn of the joint: twice and four times a turn of the wave generator."""
 DRAG = 4.0
@@ -41,7 +42,7 @@ def run(context: Context) -> Result:
     """Start from the model without friction; hold verdict, orders and limits against the known."""
     one = study("kinova", "kinova_gen3_j7")
     if one is None:
-        return absent(TITLE, "kinova_gen3_j7", COMMAND)
+        return absent(TITLE, "kinova_gen3_j7", COMMAND, ORIGIN)
     found = twins(one, "bearing", DRAG)
     return Result(
         title=TITLE,

@@ -54,12 +54,16 @@ def study(name: str, folder: str) -> Study | None:
     return Study(rig, finding, prove_measured(finding))
 
 
-def absent(title: str, folder: str, command: str) -> Result:
-    """Return a result that says which measurements are missing."""
+def absent(title: str, folder: str, command: str, source: str) -> Result:
+    """Return a result that says which measurements are missing, and where they come from."""
     return Result(
         title=title,
         command=command,
-        paragraphs=(f"Skipped: the measurements are not at {MEASURED / folder}.",),
+        paragraphs=(
+            f"Skipped: the measurements, which are not part of this software, are not at "
+            f"{MEASURED / folder}. They are published: {source}. Put the files there, and run "
+            "the command again.",
+        ),
     )
 
 

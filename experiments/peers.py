@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from experiments.committed import stored_outcome
 from experiments.contest.peers import CONTESTANTS
 from experiments.contest.peers_pymoo import POPULATION
 from experiments.contest.problems import BENCHMARKS
@@ -64,8 +65,8 @@ def run(context: Context) -> Result:
     scores = scores_for(context, "peers", present, FULL, QUICK)
     return Result(
         title="The elitist swarm against its peers",
-        command="python -m experiments peers --full",
-        paragraphs=(SETTING, HELD_OUT, PEERS_NOTE),
+        command=context.command("peers"),
+        paragraphs=(*stored_outcome(context, "peers", "peers.csv"), SETTING, HELD_OUT, PEERS_NOTE),
         tables=(
             must_reach_table(scores),
             *ranks_tables(scores),

@@ -34,6 +34,11 @@ class Context:
     full: bool = False
     quick: bool = False
 
+    def command(self, experiment: str) -> str:
+        """Return what one types to get this extent of an experiment."""
+        option = " --full" if self.full else " --quick" if self.quick else ""
+        return f"python -m experiments {experiment}{option}"
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -43,6 +48,8 @@ class Experiment:
     ----------
     by_default
         Whether it belongs to the set that runs when no name is given.
+    reads_outcome
+        Whether it shows the committed outcome of a long campaign, which ``--full`` runs.
     has_small_version
         Whether it takes ``--quick``.
     """
@@ -50,6 +57,7 @@ class Experiment:
     name: str
     summary: str
     by_default: bool = True
+    reads_outcome: bool = False
     has_small_version: bool = False
 
     def run(self, context: Context) -> Result:
@@ -71,11 +79,14 @@ EXPERIMENTS = (
     Experiment("crosscheck", "chaospy beside ours, and accuracy per model run: is 1024 needed?"),
     Experiment("dte_map", "DTE over input speed and load, with the resonances of each preset"),
     Experiment(
-        "calibration", "Which effects the printed equations lack: a ladder of fitted models"
+        "calibration",
+        "Which effects the printed equations lack: a ladder of fitted models",
+        reads_outcome=True,
     ),
     Experiment(
         "blind",
         "Blind campaigns: what the discrepancy workflow finds of what is hidden",
+        reads_outcome=True,
     ),
     Experiment("emps", "EMPS: friction of a positioning system, measured by others"),
     Experiment("kinova", "Kinova Gen3: friction and ripple of a robot joint, measured by others"),
@@ -83,20 +94,27 @@ EXPERIMENTS = (
         "peers",
         "The elitist swarm against the best algorithms of other libraries",
         by_default=False,
+        reads_outcome=True,
         has_small_version=True,
     ),
     Experiment(
         "swarm_parts",
         "What each part of the elitist swarm is worth",
         by_default=False,
+        reads_outcome=True,
         has_small_version=True,
     ),
     Experiment(
         "reliability",
         "Ten thousand wrong inputs, kills at any moment, full disks, memory",
+        reads_outcome=True,
         has_small_version=True,
     ),
     Experiment("benchmark", "Speed ratios and agreement with integration", by_default=False),
-    Experiment("reference_front", "The true fronts, computed anew and compared", by_default=False),
+    Experiment(
+        "reference_front",
+        "The true fronts, computed anew and compared: 35 minutes",
+        by_default=False,
+    ),
 )
 """In the order in which they run and are reported."""

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from experiments.campaign import Campaign
-from experiments.committed import committed_file
+from experiments.committed import committed_file, stored_outcome
 from experiments.registry import Context
 from experiments.reliability_dask import DaskKillJob
 from experiments.reliability_data import (
@@ -111,8 +111,8 @@ def run(context: Context) -> Result:
         tallies, peaks = _committed()
     return Result(
         title="Reliability: wrong inputs, kills, full disks, memory",
-        command="python -m experiments reliability --full",
-        paragraphs=(SETTING, KILLING),
+        command=context.command("reliability"),
+        paragraphs=(*stored_outcome(context, "reliability", TALLIES), SETTING, KILLING),
         tables=(
             _inputs_table([one for one in tallies if one.part == FUZZ]),
             _kills_table([one for one in tallies if one.part == KILL]),

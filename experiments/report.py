@@ -12,8 +12,24 @@ from experiments.provenance import report_fingerprint
 from experiments.registry import EXPERIMENTS
 from experiments.result import Finding, Table
 from experiments.store import StoredResult, load, write_atomically
+from pymoo_hdte.checks import InvalidInput
 
 PAGE = "index.html"
+_MARK = '<meta name="generator" content="pymoo_hdte experiments">'
+
+
+def check_page(out: Path) -> None:
+    """Refuse a folder whose page is not a report of ours, before anything is written there.
+
+    Raises
+    ------
+    InvalidInput
+        If it would be overwritten.
+    """
+    path = out / PAGE
+    if path.exists() and _MARK not in path.read_text(encoding="utf-8", errors="replace"):
+        allowed = f"a folder without an {PAGE} of somebody else"
+        raise InvalidInput("--out", str(out), allowed)
 
 
 def write_report(out: Path, notice: str = "") -> Path:

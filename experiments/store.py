@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from experiments.provenance import report_fingerprint
-from experiments.result import Column, Finding, Picture, Result, Table
+from experiments.result import Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.reports.csv_text import csv_text
 
 RESULT = "result.json"
@@ -116,7 +117,19 @@ def png_bytes(picture: Picture) -> bytes:
 
 
 def _write_json(path: Path, content: Any) -> None:
-    write_atomically(path, (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())
+    text = json.dumps(_finite(content), indent=1, ensure_ascii=False, allow_nan=False)
+    write_atomically(path, f"{text}\n".encode())
+
+
+def _finite(content: Any) -> Any:
+    """Return the content with what a reader sees in the place of what JSON cannot write."""
+    if isinstance(content, dict):
+        return {name: _finite(entry) for name, entry in content.items()}
+    if isinstance(content, list | tuple):
+        return [_finite(entry) for entry in content]
+    if isinstance(content, float) and not math.isfinite(content):
+        return None if math.isnan(content) else significant(content, 1)
+    return content
 
 
 def _table(entry: dict[str, Any]) -> Table:

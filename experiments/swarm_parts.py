@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.committed import stored_outcome
 from experiments.contest.peers import SWARM_VARIANTS
 from experiments.peers_data import Extent, Scores, scores_for
 from experiments.peers_tables import NAMES, OURS
@@ -33,8 +34,8 @@ def run(context: Context) -> Result:
     scores = scores_for(context, "swarm_parts", [OURS, *SWARM_VARIANTS], FULL, QUICK)
     return Result(
         title="What each part of the elitist swarm is worth",
-        command="python -m experiments swarm_parts --full",
-        paragraphs=(SETTING,),
+        command=context.command("swarm_parts"),
+        paragraphs=(*stored_outcome(context, "swarm_parts", "swarm_parts.csv"), SETTING),
         tables=(_parts_table(scores), _problems_table(scores)),
         notes=(f"{len(scores.seeds)} seeds, {scores.budgets[-1]:,} evaluations.",),
     )

@@ -7,6 +7,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from pymoo_hdte import __version__
 from pymoo_hdte.checks import InvalidInput
@@ -43,8 +44,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as every error here; the usage is for ``--help``."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(MISTAKE, f"{self.prog}: error: {message}; see {self.prog} --help\n")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="pymoo-hdte",
         description="Robust design of harmonic drives, and what a model lacks.",
         epilog="pymoo-hdte COMMAND --help shows options, an example and the files of a command.",

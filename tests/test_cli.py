@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -98,7 +99,8 @@ def test_what_is_missing_is_a_usage_error(options, capsys):
     with pytest.raises(SystemExit) as stopped:
         cli.main(options)
     assert stopped.value.code == 2
-    assert "usage: pymoo-hdte" in capsys.readouterr().err
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.search(r"required: .*; see pymoo-hdte.* --help$", line)
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS, ids=lambda command: command.name)

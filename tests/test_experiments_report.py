@@ -1,13 +1,16 @@
 """Results on disk and the report made of them."""
 
 import csv
+import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from experiments.__main__ import main
 from experiments.report import write_report
 from experiments.result import Column, Finding, Picture, Result, Table, significant
 from experiments.store import load, png_bytes, save
@@ -32,6 +35,7 @@ def example() -> Result:
     rows = (
         (HOSTILE, np.float64(1 / 3), 0.018, np.int64(20)),
         ("none", float("nan"), None, 0),
+        ("all", float("inf"), None, 0),
     )
     findings = (Finding(np.bool_(True), "They agree."), Finding(False, "They differ."))
     times = Table("times", "Wall times", (Column("time", "s"),), ((1.5,),), wall_times=True)
@@ -72,7 +76,7 @@ def test_numbers_keep_their_significant_digits(value, digits, text):
 
 def test_csv_keeps_every_digit(out):
     with (out / "table7" / "quality.csv").open(newline="") as file:
-        heading, first, second = csv.reader(file)
+        heading, first, second, _ = csv.reader(file)
     assert heading == ["algorithm", "IGD mean [arcsec]", "IGD paper [arcsec]", "runs"]
     assert float(first[1]) == 1 / 3
     assert second == ["none", "nan", "", "0"]
@@ -85,12 +89,45 @@ def test_floats_survive_csv_bit_for_bit():
     np.testing.assert_array_equal(read, values)
 
 
+def shown(table):
+    return [
+        [column.show(cell) for column, cell in zip(table.columns, row, strict=True)]
+        for row in table.rows
+    ]
+
+
 def test_a_stored_result_reads_back_as_it_was(out):
     written, read = example(), load(out, "table7")
     for table, again in zip(written.tables, read.tables, strict=True):
-        assert repr(again) == repr(table)
+        assert replace(again, rows=()) == replace(table, rows=())
+        assert again.rows[0] == table.rows[0]
+        assert shown(again) == shown(table)
     assert (read.title, read.notes, read.headline) == ("An example", ("A note.",), "quality")
     assert read.pictures[0].png == png_bytes(written.pictures[0])
+
+
+def test_stored_results_are_json_that_any_reader_takes(out):
+    def refuse(word):
+        raise AssertionError(word)
+
+    stored = json.loads((out / "table7" / "result.json").read_text(), parse_constant=refuse)
+    assert [row[1] for row in stored["tables"][0]["rows"]] == [1 / 3, None, "∞"]
+
+
+def test_a_page_of_somebody_else_is_not_overwritten(tmp_path, capsys):
+    (tmp_path / "index.html").write_text("my page")
+    with pytest.raises(SystemExit) as stopped:
+        main(["table5", "--out", str(tmp_path)])
+    assert stopped.value.code == 2
+    assert "of somebody else" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["index.html"]
+    assert (tmp_path / "index.html").read_text() == "my page"
+
+
+def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):
+    with pytest.raises(SystemExit):
+        main(["table5", "--full", "--out", str(tmp_path / "out")])
+    assert "--full is for calibration, blind, peers" in capsys.readouterr().err
 
 
 def test_wall_times_are_stored_apart_from_what_must_come_out_the_same(out):

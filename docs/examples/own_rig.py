@@ -85,6 +85,8 @@ def show(verdict):
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("usage: own_rig.py FOLDER")
     rig = Path(sys.argv[1])
     rig.mkdir(parents=True, exist_ok=True)
     if any(rig.iterdir()):

@@ -41,6 +41,8 @@ RIG = Rig(
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("usage: virtual_campaign.py FOLDER")
     folder = Path(sys.argv[1])
     if folder.exists() and any(folder.iterdir()):
         sys.exit(f"{folder} is not empty")

@@ -175,7 +175,8 @@ def _speeds_figure(found: Simulation) -> Figure:
             va="top",
             fontsize=8,
         )
-    axis.set_ylim(bottom=0.0)
+    # Above the curve there is room for the words.
+    axis.set_ylim(0.0, 1.5 * float(np.nanmax([found.steady, *found.speeds.dte[0]])))
     axis.set_xlabel("input speed [r/min]")
     axis.set_ylabel("DTE [arcsec]")
     return figure

@@ -128,7 +128,10 @@ def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
         "the variance of the noise."
     ]
     if after > adequate(verdict.degrees_of_freedom):
-        words.append("That is more than noise: its form is not quite right or more is missing.")
+        words.append(
+            "That is more than noise: its form is not quite right or more is missing, and values "
+            "may be off by more than their intervals say."
+        )
     rivals = [
         rival
         for rival in verdict.alternatives
