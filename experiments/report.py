@@ -15,7 +15,7 @@ from experiments.store import StoredResult, load, write_atomically
 from pymoo_hdte.checks import InvalidInput
 
 PAGE = "index.html"
-_MARK = '<meta name="generator" content="pymoo_hdte experiments">'
+_TITLE = "Robust design of a harmonic drive: results"
 
 
 def check_page(out: Path) -> None:
@@ -27,7 +27,7 @@ def check_page(out: Path) -> None:
         If it would be overwritten.
     """
     path = out / PAGE
-    if path.exists() and _MARK not in path.read_text(encoding="utf-8", errors="replace"):
+    if path.exists() and _TITLE not in path.read_text(encoding="utf-8", errors="replace"):
         allowed = f"a folder without an {PAGE} of somebody else"
         raise InvalidInput("--out", str(out), allowed)
 
@@ -59,6 +59,7 @@ def write_report(out: Path, notice: str = "") -> Path:
         ],
         outdated=[result.name for result in results if result.made_by != present],
         notice=notice,
+        title=_TITLE,
         base64=lambda png: base64.b64encode(png).decode(),
         zip=zip,
     )
