@@ -17,6 +17,7 @@ from experiments.registry import Context
 from pymoo_hdte.reports.csv_text import csv_text
 
 DATA = Path(__file__).parent / "data"
+_ORIGIN = "# {"
 
 
 def committed_file(name: str, experiment: str) -> Path:
@@ -40,9 +41,18 @@ def table_with_origin(columns: Sequence[str], rows: Iterable[Iterable[Any]], **f
 
 
 def read_origin(path: Path) -> dict[str, Any]:
-    """Return what the first line of a table with an origin says."""
+    """Return what the first line of a table with an origin says.
+
+    Raises
+    ------
+    OSError
+        If there is no such line.
+    """
     with path.open(encoding="utf-8") as file:
-        return dict(json.loads(file.readline().removeprefix("#")))
+        first = file.readline()
+    if not first.startswith(_ORIGIN):
+        raise OSError(f"{path} does not say in its first line when and by what it was made")
+    return dict(json.loads(first.removeprefix("#")))
 
 
 def stored_outcome(context: Context, experiment: str, table: str) -> tuple[str, ...]:
@@ -59,4 +69,6 @@ def stored_outcome(context: Context, experiment: str, table: str) -> tuple[str, 
 def read_rows(path: Path) -> list[dict[str, str]]:
     """Return the rows of a table, with an origin or without, by column."""
     with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("# {")))
+        if not file.readline().startswith(_ORIGIN):
+            file.seek(0)
+        return list(csv.DictReader(file))

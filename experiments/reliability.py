@@ -30,7 +30,7 @@ from experiments.reliability_data import (
     tally_of_limit,
 )
 from experiments.reliability_fuzz import FuzzJob
-from experiments.reliability_inputs import COMMANDS, KINDS
+from experiments.reliability_inputs import KINDS, THROUGH_COMMANDS
 from experiments.reliability_kill import KillJob
 from experiments.reliability_limits import LIMITS, LimitJob, MemoryJob
 from experiments.result import Column, Finding, Result, Table
@@ -77,7 +77,7 @@ FULL = Extent(
     ),
 )
 QUICK = Extent(
-    inputs={name: 2 if name in COMMANDS else 20 for name in KINDS},
+    inputs={name: 2 if name in THROUGH_COMMANDS else 20 for name in KINDS},
     kills={ONE_WORKER: 2, TWO_WORKERS: 2, DASK: 2},
     limits=("read-only folder", "two experiments at once"),
     experiments=(("table7",),),
@@ -140,7 +140,7 @@ def _campaign(context: Context, extent: Extent) -> tuple[list[Tally], list[Peak]
 
 
 def _fuzzed(campaign: Campaign, kind: str, count: int) -> Tally:
-    block = BLOCK_OF_COMMANDS if kind in COMMANDS else BLOCK
+    block = BLOCK_OF_COMMANDS if kind in THROUGH_COMMANDS else BLOCK
     starts = range(0, count, block)
     jobs = [FuzzJob(kind, start, min(block, count - start)) for start in starts]
     return tally_of_inputs(kind, campaign.run(jobs, kind))

@@ -140,5 +140,5 @@ KINDS = {
         Kind("identify, whole command", originals.bench_files, commands.identify, 300.0),
     )
 }
-COMMANDS = tuple(name for name, kind in KINDS.items() if kind.read in commands.COMMANDS)
+THROUGH_COMMANDS = tuple(name for name, kind in KINDS.items() if kind.read in commands.COMMANDS)
 """Kinds that go through the whole command line."""

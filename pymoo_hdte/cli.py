@@ -48,7 +48,8 @@ class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, as every error here; the usage is for ``--help``."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(MISTAKE, f"{self.prog}: error: {message}; see {self.prog} --help\n")
+        line = " ".join(message.split())
+        self.exit(MISTAKE, f"{self.prog}: error: {line}; see {self.prog} --help\n")
 
 
 def _parser() -> argparse.ArgumentParser:

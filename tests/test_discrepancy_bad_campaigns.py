@@ -17,7 +17,7 @@ from pymoo_hdte import cli
 from pymoo_hdte.discrepancy import report, workflow, write_campaign
 from pymoo_hdte.discrepancy.report_folder import FOLDER
 from pymoo_hdte.drive import load_datasheet, load_model, simulate
-from pymoo_hdte.reports import folder as report_folder
+from pymoo_hdte.reports import folder as reports_folder
 from pymoo_hdte.reports.folder import PAGE_FILE
 
 ROW = "run_2000rpm_40Nm.csv.gz"
@@ -217,7 +217,7 @@ def analysed(clean):
 
 
 @pytest.mark.parametrize(
-    ("module", "stage"), [(report, "_page"), (report, "_revision"), (report_folder, "_write_all")]
+    ("module", "stage"), [(report, "_page"), (report, "_revision"), (reports_folder, "_write_all")]
 )
 def test_an_interrupted_run_leaves_nothing(
     module, stage, folder, analysed, tmp_path, monkeypatch, capsys

@@ -39,11 +39,11 @@ from experiments.reliability_fuzz import (
     outcome,
     outcomes_of_process,
 )
-from experiments.reliability_inputs import COMMANDS, KINDS
+from experiments.reliability_inputs import KINDS, THROUGH_COMMANDS
 from experiments.reliability_mutations import Link, mutated, put
 from experiments.reliability_text import BYTES, TEXTS
 
-LOADERS = [name for name in KINDS if name not in COMMANDS]
+LOADERS = [name for name in KINDS if name not in THROUGH_COMMANDS]
 ROOT = Path(__file__).parents[1]
 
 
@@ -61,7 +61,7 @@ def test_mutated_inputs_are_refused_or_read(kind):
     assert REFUSED in [one for one, _ in found]
 
 
-@pytest.mark.parametrize("kind", COMMANDS)
+@pytest.mark.parametrize("kind", THROUGH_COMMANDS)
 def test_the_whole_command_refuses_in_one_line(kind):
     found = [outcome(kind, number) for number in range(4)]
     assert {OUTCOMES[one] for one, _ in found} <= {"refused", "accepted"}, found

@@ -52,7 +52,7 @@ def write_report(
     proposal: Proposal,
     out: str | Path,
 ) -> dict[str, Any]:
-    """Write a report and return the verdict's document; errors as `ReportFolder.write`.
+    """Write a report with verdict and revised model; return the verdict's document.
 
     Parameters
     ----------
@@ -64,7 +64,20 @@ def write_report(
     out : str or Path
         New, empty, or an earlier report, which is replaced. Without a revised model, for a drive
         that a data sheet cannot hold, its two files are missing and the verdict says why.
+
+    Returns
+    -------
+    dict
+        What ``verdict.json`` holds.
+
+    Raises
+    ------
+    InvalidInput
+        If ``out`` holds anything else.
+    OSError
+        If it cannot be written.
     """
+    FOLDER.check(Path(out))
     document = verdict_document(
         analysis, location, None if proof is None else proof.as_dict(), proposal
     )

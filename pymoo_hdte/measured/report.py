@@ -26,7 +26,7 @@ _SIZES = 5
 
 
 def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict[str, Any]:
-    """Write a report and return the verdict's document; errors as `ReportFolder.write`.
+    """Write a report with verdict and revised model; return the verdict's document.
 
     Parameters
     ----------
@@ -34,7 +34,20 @@ def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict
     finding : Finding
     out : str or Path
         New, empty, or an earlier report, which is replaced.
+
+    Returns
+    -------
+    dict
+        What ``verdict.json`` holds.
+
+    Raises
+    ------
+    InvalidInput
+        If ``out`` holds anything else.
+    OSError
+        If it cannot be written.
     """
+    FOLDER.check(Path(out))
     gaps = prove_measured(finding)
     document = measured_document(title, finding, gaps, next_test(finding))
     document["revised_model"] = {"file": MODEL_FILE}

@@ -75,7 +75,7 @@ class ReportFolder:
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(parent))
 
     def write(
-        self, out: Path, page: str, document: dict[str, Any], others: Mapping[str, str]
+        self, out: Path, page: str, document: dict[str, Any], texts: Mapping[str, str]
     ) -> None:
         """Write all files or, after an error, none.
 
@@ -87,17 +87,25 @@ class ReportFolder:
             HTML.
         document : dict
             Of plain types and finite numbers.
-        others : mapping of str
-            Texts of the further files, by name.
+        texts : mapping of str
+            Contents of the further files, by name.
 
         Raises
         ------
         InvalidInput, OSError
             As `check`; OSError also for a full disk.
+        ArithmeticError
+            If a number of the document is not finite.
         """
         self.check(out)
-        text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        _write_all(out, {self.document: text, PAGE_FILE: page, **others})
+        try:
+            text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        except ValueError as error:
+            raise ArithmeticError(f"a number of {self.document} is not finite") from error
+        contents = {self.document: text, PAGE_FILE: page, **texts}
+        if not set(self.always) <= set(contents) <= set(self.files):
+            raise ValueError(f"files of a report: {sorted(contents)}, allowed: {self.files}")
+        _write_all(out, contents)
 
 
 def _write_all(out: Path, files: Mapping[str, str]) -> None:
