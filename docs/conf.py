@@ -1,4 +1,4 @@
-"""Sphinx: ``python -m sphinx -W --keep-going -b html docs build/docs``. Nothing is fetched."""
+"""Sphinx: ``python -m sphinx -W -b html docs build/docs``. Nothing is fetched."""
 
 import sys
 from importlib import import_module

@@ -20,7 +20,9 @@ from experiments.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
 
 FAILED = 1
-"""Exit code where the workers or the disk fail."""
+"""Exit code where the workers or the disk fail, or a stored outcome is missing."""
+SMALL = [one for one in EXPERIMENTS if one.has_small_version]
+STORED = [one for one in EXPERIMENTS if one.reads_outcome]
 INTERRUPTED = 130
 """Exit code that a shell expects of a program ended by Ctrl-C."""
 
@@ -34,14 +36,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     chosen = _chosen(options.name, parser)
     if options.quick and not (options.name and chosen[0].has_small_version):
-        parser.error(f"--quick is for {_names('has_small_version')}")
+        parser.error(f"--quick is for {_names(SMALL)}")
     if options.full and options.name and not chosen[0].reads_outcome:
-        parser.error(f"--full is for {_names('reads_outcome')}")
+        parser.error(f"--full is for {_names(STORED)}")
+    try:
+        check_page(options.out)
+    except (InvalidInput, OSError) as error:
+        parser.error(str(error))
     try:
         options.out.mkdir(parents=True, exist_ok=True)
         if not os.access(options.out, os.W_OK | os.X_OK):
             parser.error(f"--out {options.out} cannot be written to")
-        check_page(options.out)
         executor = make_executor(options.workers, options.dask)
     except OSError as error:
         parser.error(f"--out {options.out} cannot be made a folder: {error.strerror}")
@@ -70,7 +75,7 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
             write_report(context.out, notice=message)
             return INTERRUPTED
         except (BrokenExecutor, WorkerLost, WrongWorker, OSError) as error:
-            # An OSError is a full disk, or a folder that is no longer there.
+            # An OSError is a full disk, a folder that is no longer there, or no stored outcome.
             notes = getattr(error, "__notes__", [])
             print("\n" + "\n".join([f"{experiment.name}: {error}", *notes]), file=sys.stderr)
             return FAILED
@@ -103,13 +108,13 @@ def _parser() -> argparse.ArgumentParser:
     extent.add_argument(
         "--full",
         action="store_true",
-        help=f"run the long campaign behind {_names('reads_outcome')} instead of reading its "
-        "committed outcome",
+        help=f"run the long campaign behind {_names(STORED)} instead of reading its stored "
+        "outcome; without a name, those of the quick set",
     )
     extent.add_argument(
         "--quick",
         action="store_true",
-        help=f"run a small version of {_names('has_small_version')}, minutes",
+        help=f"run a small version of {_names(SMALL)}, minutes",
     )
     parser.add_argument(
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"
@@ -138,9 +143,8 @@ def _chosen(name: str | None, parser: argparse.ArgumentParser) -> list[Experimen
     return chosen
 
 
-def _names(property_: str) -> str:
-    *others, last = [one.name for one in EXPERIMENTS if getattr(one, property_)]
-    return f"{', '.join(others)} and {last}"
+def _names(experiments: Sequence[Experiment]) -> str:
+    return ", ".join(one.name for one in experiments)
 
 
 def _list_of_experiments() -> str:

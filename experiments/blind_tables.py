@@ -237,9 +237,9 @@ def _judged_table(
 ) -> Table:
     rows = tuple(judged_row(one) for one in judged)
     findings = tuple(
-        Finding(one.verdict == "met", _sentence(one), check=True)
+        Finding(one.met, _sentence(one), check=True)
         for one in judged
-        if one.measured.n
+        if one.verdict in ("met", "missed")
     )
     return Table(name, title, JUDGED_COLUMNS, rows, note=note, findings=findings,
                  wall_times=wall_times)  # fmt: skip
@@ -259,7 +259,7 @@ def _sentence(one: Judged) -> str:
     bound = "at least" if one.at_least else "at most"
     return (
         f"Blind campaigns with {one.cases}, {one.what}: {value} ({low} to {high}, "
-        f"{one.measured.n} cases), required {bound} {significant(one.required, 3)}: {one.verdict}."
+        f"{one.measured.n} cases), required {bound} {significant(one.required, 3)}."
     )
 
 

@@ -60,9 +60,9 @@ def absent(title: str, folder: str, command: str, source: str) -> Result:
         title=title,
         command=command,
         paragraphs=(
-            f"Skipped: the measurements, which are not part of this software, are not at "
-            f"{MEASURED / folder}. They are published: {source}. Put the files there, and run "
-            "the command again.",
+            "Skipped, because the measurements, which are not part of this software, are missing. "
+            f"They are published: {source}. Put the files into {MEASURED / folder} and run the "
+            "command again.",
         ),
     )
 

@@ -25,11 +25,15 @@ def check_page(out: Path) -> None:
     ------
     InvalidInput
         If it would be overwritten.
+    OSError
+        If it cannot be read.
     """
     path = out / PAGE
-    if path.exists() and _TITLE not in path.read_text(encoding="utf-8", errors="replace"):
-        allowed = f"a folder without an {PAGE} of somebody else"
-        raise InvalidInput("--out", str(out), allowed)
+    if not (path.exists() or path.is_symlink()):
+        return
+    ours = path.is_file() and not path.is_symlink()
+    if not ours or f"<title>{_TITLE}</title>" not in path.read_text("utf-8", "replace"):
+        raise InvalidInput("--out", str(out), f"a new folder, or one whose {PAGE} is such a report")
 
 
 def write_report(out: Path, notice: str = "") -> Path:

@@ -17,6 +17,7 @@ from pymoo_hdte.reports.csv_text import csv_text
 RESULT = "result.json"
 TIMES = "times"
 """Folder of wall times: the only results that differ from run to run."""
+_INFINITE = {significant(value, 1): value for value in (math.inf, -math.inf)}
 
 
 @dataclass(frozen=True)
@@ -117,16 +118,16 @@ def png_bytes(picture: Picture) -> bytes:
 
 
 def _write_json(path: Path, content: Any) -> None:
-    text = json.dumps(_finite(content), indent=1, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(_writable(content), indent=1, ensure_ascii=False, allow_nan=False)
     write_atomically(path, f"{text}\n".encode())
 
 
-def _finite(content: Any) -> Any:
-    """Return the content with what a reader sees in the place of what JSON cannot write."""
+def _writable(content: Any) -> Any:
+    """Return the content with None and "∞" in the place of what JSON cannot write."""
     if isinstance(content, dict):
-        return {name: _finite(entry) for name, entry in content.items()}
+        return {name: _writable(entry) for name, entry in content.items()}
     if isinstance(content, list | tuple):
-        return [_finite(entry) for entry in content]
+        return [_writable(entry) for entry in content]
     if isinstance(content, float) and not math.isfinite(content):
         return None if math.isnan(content) else significant(content, 1)
     return content
@@ -137,7 +138,9 @@ def _table(entry: dict[str, Any]) -> Table:
         **entry
         | {
             "columns": tuple(Column(**column) for column in entry["columns"]),
-            "rows": tuple(tuple(row) for row in entry["rows"]),
+            "rows": tuple(
+                tuple(_INFINITE.get(cell, cell) for cell in row) for row in entry["rows"]
+            ),
             "findings": tuple(Finding(**finding) for finding in entry["findings"]),
         }
     )

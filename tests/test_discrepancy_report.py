@@ -110,6 +110,26 @@ def test_earlier_report_is_replaced_and_nothing_else(written, ripple, location, 
     assert (out / "thesis.txt").read_text() == "years of work"
 
 
+def test_a_wrong_folder_is_refused_before_the_work(ripple, location, tmp_path, monkeypatch):
+    monkeypatch.setattr(report, "optimum_shift", None)
+    (tmp_path / "thesis.txt").write_text("years of work")
+    with pytest.raises(InvalidInput, match="folder of the report"):
+        write_report(ripple, location, None, PROPOSAL, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("document", "texts", "error", "words"),
+    [
+        ({"mean": float("nan")}, {}, ArithmeticError, "verdict.json is not finite"),
+        ({}, {"stray.txt": ""}, ValueError, "stray.txt"),
+    ],
+)
+def test_what_is_no_report_is_not_written(document, texts, error, words, tmp_path):
+    with pytest.raises(error, match=words):
+        FOLDER.write(tmp_path / "out", "page", document, texts)
+    assert not list(tmp_path.iterdir())
+
+
 def test_failure_leaves_the_earlier_report(ripple, location, tmp_path, monkeypatch, quick):
     arguments = (ripple, location, None, PROPOSAL, tmp_path / "out")
     write_report(*arguments)

@@ -17,6 +17,7 @@ from experiments.blind_codes import NAMES, code_of_set, words_of_set
 from experiments.blind_data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
 from experiments.blind_limits import size_at
 from experiments.blind_scoring import COLUMNS, BlindJob, bias_scores, truly_moved, verdict_scores
+from experiments.blind_tables import _judged_table
 from experiments.blind_targets import judge_median, judge_rate, median, rate
 from experiments.campaign import Campaign, Run
 from experiments.committed import committed_file
@@ -277,6 +278,18 @@ def test_a_demand_is_missed_only_where_an_exact_test_rejects_it():
     assert above.verdict == "within chance"
     assert judge_median("", "", [1.0] * 20, 2.0).verdict == "missed"
     assert judge_median("", "", [1.0] * 20, 2.0, at_least=False).verdict == "met"
+
+
+def test_a_demand_within_chance_is_neither_said_to_hold_nor_to_fail():
+    demands = [
+        judge_rate("met", "", [True] * 20, 0.95),
+        judge_rate("within", "", [True] * 18 + [False] * 2, 0.95),
+        judge_rate("missed", "", [False] * 20, 0.95),
+        judge_rate("not run", "", [], 0.95),
+    ]
+    table = _judged_table("must_reach", "Must reach", demands, "")
+    assert [row[-1] for row in table.rows] == ["met", "within chance", "missed", "not run"]
+    assert [finding.agrees for finding in table.findings] == [True, False]
 
 
 def _binomial(n, k, p):

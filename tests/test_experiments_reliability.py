@@ -161,6 +161,12 @@ def test_the_full_run_is_as_large_as_it_says():
     assert sum(reliability.FULL.kills.values()) >= 300
 
 
+def test_the_committed_outcome_is_that_of_the_full_run():
+    tallies = read_tallies(committed.DATA / reliability.TALLIES)
+    assert {one.kind: one.trials for one in tallies if one.part == FUZZ} == reliability.FULL.inputs
+    assert [one.kind for one in tallies if one.part == KILL] == list(reliability.FULL.kills)
+
+
 def test_torn_and_differing_files_are_counted(tmp_path, monkeypatch):
     whole = {"a.csv": b"x\n", "b.json": b"{}\n"}
     monkeypatch.setattr(

@@ -10,10 +10,15 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from experiments import committed
 from experiments.__main__ import main
-from experiments.report import write_report
+from experiments.campaign import Campaign
+from experiments.committed import read_origin, read_rows, stored_outcome, table_with_origin
+from experiments.registry import Context
+from experiments.report import check_page, write_report
 from experiments.result import Column, Finding, Picture, Result, Table, significant
 from experiments.store import load, png_bytes, save
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.reports.csv_text import csv_text
 
 HOSTILE = "<script>alert('x')</script>"
@@ -102,6 +107,8 @@ def test_a_stored_result_reads_back_as_it_was(out):
         assert replace(again, rows=()) == replace(table, rows=())
         assert again.rows[0] == table.rows[0]
         assert shown(again) == shown(table)
+        places = range(len(table.columns))
+        assert [again.holds_text(i) for i in places] == [table.holds_text(i) for i in places]
     assert (read.title, read.notes, read.headline) == ("An example", ("A note.",), "quality")
     assert read.pictures[0].png == png_bytes(written.pictures[0])
 
@@ -119,9 +126,37 @@ def test_a_page_of_somebody_else_is_not_overwritten(tmp_path, capsys):
     with pytest.raises(SystemExit) as stopped:
         main(["table5", "--out", str(tmp_path)])
     assert stopped.value.code == 2
-    assert "of somebody else" in capsys.readouterr().err
+    assert "such a report" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["index.html"]
     assert (tmp_path / "index.html").read_text() == "my page"
+
+
+def test_a_page_that_is_no_file_is_not_overwritten(tmp_path):
+    (tmp_path / "index.html").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(InvalidInput, match="such a report"):
+        check_page(tmp_path)
+    (tmp_path / "index.html").unlink()
+    (tmp_path / "index.html").mkdir()
+    with pytest.raises(InvalidInput, match="such a report"):
+        check_page(tmp_path)
+    write_report(tmp_path / "other")
+    check_page(tmp_path / "other")
+
+
+def test_stored_outcomes_say_when_they_were_made(tmp_path, monkeypatch):
+    monkeypatch.setattr(committed, "DATA", tmp_path)
+    text = table_with_origin(["kind", "n"], [["# {x}", 3]], seed=[7])
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    assert read_rows(tmp_path / "a.csv") == [{"kind": "# {x}", "n": "3"}]
+    assert read_origin(tmp_path / "a.csv")["seed"] == [7]
+    context = Context(1, tmp_path, Campaign(tmp_path))
+    (paragraph,) = stored_outcome(context, "blind", "a.csv")
+    assert read_origin(tmp_path / "a.csv")["date"] in paragraph
+    assert stored_outcome(replace(context, full=True), "blind", "a.csv") == ()
+    (tmp_path / "b.csv").write_text(csv_text(["kind"], [["x"]]), encoding="utf-8")
+    assert read_rows(tmp_path / "b.csv") == [{"kind": "x"}]
+    with pytest.raises(OSError, match="does not say"):
+        stored_outcome(context, "blind", "b.csv")
 
 
 def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):

@@ -14,7 +14,8 @@ class MOPSO(ParticleSwarm):
 
     The paper compares with a MOPSO (Table 7) and does not describe it; this one has the archive of
     AMP-MOPSO and none of its strategies: in the line of Coello Coello, Pulido and Lechuga (2004),
-    with crowding in place of their grid and without their mutation. Parameters, errors and choices: see `ParticleSwarm`.
+    with crowding in place of their grid and without their mutation. Parameters, errors and
+    choices: see `ParticleSwarm`.
     """
 
     def __init__(self, pop_size: int = 100, archive_size: int = 50, **kwargs: Any) -> None:

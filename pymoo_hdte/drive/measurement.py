@@ -6,6 +6,8 @@ It applies to records. The DTE of a model is the peak-to-peak of the unfiltered 
 from __future__ import annotations
 
 import numpy as np
+
+# Parts of SciPy load when they are first used: signals and statistics take longer than a study.
 import scipy
 from numpy.typing import ArrayLike, NDArray
 

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+
+# Parts of SciPy load when they are first used: signals and statistics take longer than a study.
 import scipy
 from numpy.typing import ArrayLike, NDArray
 

@@ -10,10 +10,8 @@ from pymoo_hdte.problems.drive_response import (
     DESIGN_VARIABLES,
     OBJECTIVES,
     PAPERS_ORDER,
-    SURROGATE_BOX,
     UNITS,
     DriveResponse,
-    theta_s_scatter,
 )
 from pymoo_hdte.problems.duty_cycle import OperatingCondition
 from pymoo_hdte.problems.reference import StoredFront

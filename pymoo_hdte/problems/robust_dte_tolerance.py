@@ -45,8 +45,9 @@ class RobustDTETolerance(StoredFront, RobustProblem):
     model, order, box, conditions
         As in `RobustDTE`.
     tolerances : tuple of float, length 2
-        Smallest and largest tolerance, relative, above 0 and below 1. At 8 % and the default box the scatter just fills the
-        surrogate's +-35 %, so at each tolerance the problem is `RobustDTE` of that tolerance.
+        Smallest and largest tolerance, relative, above 0 and below 1. At 8 % and the default box
+        the scatter just fills the surrogate's +-35 %, so at each tolerance the problem is
+        `RobustDTE` of that tolerance.
 
     Attributes
     ----------

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+
+# Parts of SciPy load when they are first used: signals and statistics take longer than a study.
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
