@@ -70,7 +70,7 @@ def run(context: Context) -> Result:
         title="Blind campaigns: what the discrepancy workflow finds",
         command=context.command("blind"),
         paragraphs=(
-            *stored_outcome(context, "blind", OUTCOMES),
+            *stored_outcome(context, "blind"),
             SETTING,
             CHANGED,
             *_unfinished(outcomes),

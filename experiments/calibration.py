@@ -68,7 +68,7 @@ def run(context: Context) -> Result:
     return Result(
         title="Calibration: what the printed equations lack",
         command=context.command("calibration"),
-        paragraphs=(*stored_outcome(context, "calibration", OUTCOMES), SETTING),
+        paragraphs=(*stored_outcome(context, "calibration"), SETTING),
         tables=(
             _numbers_table(best),
             _ladder_table(outcomes, "table8", "fitted to Table 8 and the box scatter"),

@@ -55,11 +55,11 @@ def read_origin(path: Path) -> dict[str, Any]:
     return dict(json.loads(first.removeprefix("#")))
 
 
-def stored_outcome(context: Context, experiment: str, table: str) -> tuple[str, ...]:
-    """Return a paragraph that says so if the report is made from a committed table."""
+def stored_outcome(context: Context, experiment: str) -> tuple[str, ...]:
+    """Return a paragraph that says so if the report is made from the experiment's own table."""
     if context.full or context.quick:
         return ()
-    made = read_origin(committed_file(table, experiment))["date"]
+    made = read_origin(committed_file(f"{experiment}.csv", experiment))["date"]
     return (
         f"Not computed in this run: made from the stored outcome of {made}, which "
         f"python -m experiments {experiment} --full computes anew.",

@@ -66,7 +66,7 @@ def run(context: Context) -> Result:
     return Result(
         title="The elitist swarm against its peers",
         command=context.command("peers"),
-        paragraphs=(*stored_outcome(context, "peers", "peers.csv"), SETTING, HELD_OUT, PEERS_NOTE),
+        paragraphs=(*stored_outcome(context, "peers"), SETTING, HELD_OUT, PEERS_NOTE),
         tables=(
             must_reach_table(scores),
             *ranks_tables(scores),

@@ -112,7 +112,7 @@ def run(context: Context) -> Result:
     return Result(
         title="Reliability: wrong inputs, kills, full disks, memory",
         command=context.command("reliability"),
-        paragraphs=(*stored_outcome(context, "reliability", TALLIES), SETTING, KILLING),
+        paragraphs=(*stored_outcome(context, "reliability"), SETTING, KILLING),
         tables=(
             _inputs_table([one for one in tallies if one.part == FUZZ]),
             _kills_table([one for one in tallies if one.part == KILL]),

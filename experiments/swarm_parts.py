@@ -35,7 +35,7 @@ def run(context: Context) -> Result:
     return Result(
         title="What each part of the elitist swarm is worth",
         command=context.command("swarm_parts"),
-        paragraphs=(*stored_outcome(context, "swarm_parts", "swarm_parts.csv"), SETTING),
+        paragraphs=(*stored_outcome(context, "swarm_parts"), SETTING),
         tables=(_parts_table(scores), _problems_table(scores)),
         notes=(f"{len(scores.seeds)} seeds, {scores.budgets[-1]:,} evaluations.",),
     )

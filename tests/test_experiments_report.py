@@ -5,6 +5,7 @@ import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from experiments import committed
 from experiments.__main__ import main
 from experiments.campaign import Campaign
 from experiments.committed import read_origin, read_rows, stored_outcome, table_with_origin
-from experiments.registry import Context
+from experiments.registry import EXPERIMENTS, Context
 from experiments.report import check_page, write_report
 from experiments.result import Column, Finding, Picture, Result, Table, significant
 from experiments.store import load, png_bytes, save
@@ -150,13 +151,19 @@ def test_stored_outcomes_say_when_they_were_made(tmp_path, monkeypatch):
     assert read_rows(tmp_path / "a.csv") == [{"kind": "# {x}", "n": "3"}]
     assert read_origin(tmp_path / "a.csv")["seed"] == [7]
     context = Context(1, tmp_path, Campaign(tmp_path))
-    (paragraph,) = stored_outcome(context, "blind", "a.csv")
+    (paragraph,) = stored_outcome(context, "a")
     assert read_origin(tmp_path / "a.csv")["date"] in paragraph
-    assert stored_outcome(replace(context, full=True), "blind", "a.csv") == ()
+    assert stored_outcome(replace(context, full=True), "a") == ()
     (tmp_path / "b.csv").write_text(csv_text(["kind"], [["x"]]), encoding="utf-8")
     assert read_rows(tmp_path / "b.csv") == [{"kind": "x"}]
     with pytest.raises(OSError, match="does not say"):
-        stored_outcome(context, "blind", "b.csv")
+        stored_outcome(context, "b")
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda one: one.name)
+def test_whatever_reads_a_stored_outcome_says_so(experiment):
+    module = import_module(f"experiments.{experiment.name}")
+    assert hasattr(module, "stored_outcome") == experiment.reads_outcome
 
 
 def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):
