@@ -18,6 +18,7 @@ from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import TruncatedNormal
 
 QUICK = ("--order", "2", "--evaluations", "1000")
+SETTINGS = Settings(0.05, 0.25, 3, None, 1000, 1)
 
 
 def optimise(*arguments):
@@ -29,6 +30,11 @@ def written(tmp_path_factory):
     out = tmp_path_factory.mktemp("optimise") / "report"
     assert optimise("hs_20_100", "--out", out, "--quiet", *QUICK) == 0
     return out
+
+
+@pytest.fixture(scope="module")
+def study():
+    return design_study(preset("calibrated"), "balanced", SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -106,18 +112,15 @@ def test_json_is_the_document(written, capsys, tmp_path, document):
 
 
 class TestCheck:
-    settings = Settings(0.05, 0.25, 3, None, 1000, 1)
-
     def test_where_the_surrogate_is_exact_the_model_confirms_it(self):
         # As printed, the DTE is proportional to theta_s and next to constant in the design.
-        study = design_study(preset("published"), "balanced", self.settings)
+        study = design_study(preset("published"), "balanced", SETTINGS)
         check = study.optimum_check
         assert check.mean == pytest.approx(study.objectives[0], rel=1e-5)
         assert check.std == pytest.approx(study.objectives[1], rel=1e-4)
         assert check.mean_error < 1e-4
 
-    def test_where_it_is_coarse_the_check_agrees_with_quasi_random_runs_of_the_model(self):
-        study = design_study(preset("calibrated"), "balanced", self.settings)
+    def test_where_it_is_coarse_the_check_agrees_with_quasi_random_runs_of_the_model(self, study):
         cube = qmc.Sobol(5, rng=np.random.default_rng(1)).random(2**12)
         mean, std = study.problem.model.nominal[0], study.problem.model.kinematic_error.std
         theta_s = truncnorm(-3.0, 3.0, loc=mean, scale=std).ppf(cube[:, 0])
@@ -134,22 +137,19 @@ class TestCheck:
         assert np.mean([one.mean_error for one in checks]) == pytest.approx(means.std(), rel=0.4)
         assert np.mean([one.std_error for one in checks]) == pytest.approx(stds.std(), rel=0.4)
 
-    def test_a_design_that_the_model_refutes_is_not_to_be_built(self):
-        study = design_study(preset("calibrated"), "balanced", self.settings)
+    def test_a_design_that_the_model_refutes_is_not_to_be_built(self, study):
         worse = replace(study.optimum_check, mean=study.initial_check.mean + 1.0)
         refuted = replace(study, optimum_check=worse)
         assert "the mean rises by 1.00" in optimum_report.sentences(refuted)[2]
         assert any("do not build" in one for one in optimum_report.limits(refuted, ()))
         assert optimum_report.limits(study, ()) == []
 
-    def test_the_gain_is_known_better_than_either_mean(self):
-        study = design_study(preset("calibrated"), "balanced", self.settings)
+    def test_the_gain_is_known_better_than_either_mean(self, study):
         gain, error = study.gain
         assert gain == study.initial_check.mean - study.optimum_check.mean
         assert 0.0 < error < study.initial_check.mean_error + study.optimum_check.mean_error
 
-    def test_sources_are_those_of_the_chosen_design(self):
-        study = design_study(preset("calibrated"), "balanced", self.settings)
+    def test_sources_are_those_of_the_chosen_design(self, study):
         problem, design = study.problem, study.design
         rng = np.random.default_rng(1)
         mean, std = problem.model.nominal[0], problem.model.kinematic_error.std

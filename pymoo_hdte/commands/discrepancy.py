@@ -8,6 +8,7 @@ from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.commands.command import Command, Outcome, Say
+from pymoo_hdte.reports.folder import PAGE_FILE
 
 _DETAILS = """example:
   pymoo-hdte discrepancy campaigns/rig-01 --out reports/rig-01
@@ -92,7 +93,7 @@ def _summary(document: dict[str, Any], out: Path) -> str:
         document["location"]["sentence"],
         *document["limits"],
         f"Next: {in_words(document['next_experiment']['description'])}",
-        f"Report: {out / 'report.html'}",
+        f"Report: {out / PAGE_FILE}",
     ]
     return "\n".join(lines)
 

@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pymoo_hdte.checks import InvalidInput
+
 if TYPE_CHECKING:
     from pymoo_hdte.drive import DataSheet, DriveModel
 
@@ -37,17 +39,11 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
     """
     from pymoo_hdte.drive import PRESETS, hs_20_100, load_model, preset
 
-    sheet, own = read_sheet(options.datasheet), hs_20_100()
+    sheet = read_sheet(options.datasheet)
     if options.model not in PRESETS:
         return load_model(Path(options.model), sheet), ()
-    model = replace(preset(options.model), sheet=sheet)
-    teeth = (sheet.flexspline_teeth, sheet.circular_spline_teeth)
-    same = (sheet.name, teeth, sheet.nominal.static_error) == (
-        own.name,
-        (own.flexspline_teeth, own.circular_spline_teeth),
-        own.nominal.static_error,
-    )
-    if same:
+    model, own = replace(preset(options.model), sheet=sheet), hs_20_100()
+    if _make(sheet) == _make(own):
         return model, ()
     return model, (
         f"Effects, order lines and scatter of theta_s are those of the model {model.name!r}, made "
@@ -55,9 +51,14 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
     )
 
 
+def _make(sheet: DataSheet) -> tuple[object, ...]:
+    """Return by what a preset knows the drive it was made for."""
+    teeth = sheet.flexspline_teeth, sheet.circular_spline_teeth
+    return sheet.name, *teeth, sheet.nominal.static_error
+
+
 def read_sheet(named: str) -> DataSheet:
     """Return the data sheet of that file, or `BUILT_IN_SHEET`; errors as `read_drive`."""
-    from pymoo_hdte.checks import InvalidInput
     from pymoo_hdte.drive import hs_20_100, load_datasheet
 
     if not named:

@@ -32,6 +32,7 @@ _NOMINAL = {
 """Where a data sheet holds each parameter."""
 _MICROMETRE = 1e-6
 _TOO_EQUAL = 1e-3
+"""Scatter over prototypes, as a share of one record's error, that no separate drives show."""
 
 
 def write_identification_report(

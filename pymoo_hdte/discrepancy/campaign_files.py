@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import tempfile
 from collections.abc import Sequence
@@ -28,6 +27,7 @@ from pymoo_hdte.discrepancy.campaign_format import (
 from pymoo_hdte.discrepancy.records import ROLES, RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.toml_lines import toml_with_lines
 from pymoo_hdte.drive.toml_fields import Fields
+from pymoo_hdte.drive.toml_text import toml_string
 
 Checked = TypeVar("Checked", Believed, Rig, RunningRecord | TorsionRecord)
 
@@ -111,8 +111,8 @@ def write_campaign(campaign: Campaign, folder: str | Path) -> None:
 
 def _toml(campaign: Campaign) -> str:
     lines = [
-        f"title = {json.dumps(campaign.title, ensure_ascii=False)}",
-        f"drive = {json.dumps(campaign.drive, ensure_ascii=False)}",
+        f"title = {toml_string(campaign.title)}",
+        f"drive = {toml_string(campaign.drive)}",
         "\n[believed]",
         *_lines(campaign.believed, BELIEVED),
         "\n[rig]",

@@ -49,6 +49,12 @@ def _fields(fields: Mapping[str, object]) -> str:
     return "".join(f"{name} = {_value(value)}\n" for name, value in fields.items())
 
 
+def toml_string(text: str) -> str:
+    """Return a text in quotes, as every TOML reader gives it back."""
+    # JSON escapes in the same way all that TOML must have escaped, but for DEL.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
 def _value(value: object) -> str:
     """Return a text, number, list or table of these in TOML."""
     if isinstance(value, Mapping):
@@ -60,5 +66,4 @@ def _value(value: object) -> str:
         return str(value)
     if isinstance(value, float):
         return repr(float(value))
-    # JSON escapes in the same way all that TOML must have escaped, but for DEL.
-    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return toml_string(str(value))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import tomllib
 from collections.abc import Collection, Mapping, Sequence
@@ -12,6 +11,7 @@ from typing import Any
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.discrepancy.toml_lines import toml_with_lines
 from pymoo_hdte.drive.toml_fields import Fields
+from pymoo_hdte.drive.toml_text import toml_string
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import EFFECTS, OF_READINGS, law_from_values, values_of
 from pymoo_hdte.mechanism.mechanism import NOTHING
@@ -92,8 +92,7 @@ def _value(value: Any) -> str:
         inside = ", ".join(f"{_key(name)} = {_value(one)}" for name, one in value.items())
         return f"{{ {inside} }}"
     if isinstance(value, str):
-        # JSON escapes what TOML must have escaped, and in the same way, but for one character.
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        return toml_string(value)
     return "true" if value is True else repr(float(value))
 
 
