@@ -18,6 +18,7 @@ from experiments.report import check_page, write_report
 from experiments.store import save
 from experiments.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.commands.parser import OneLineParser
 
 FAILED = 1
 """Exit code where the workers or the disk fail, or a stored outcome is missing."""
@@ -84,7 +85,7 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = OneLineParser(
         prog="python -m experiments",
         description="Reproduce the tables and figures of the paper and write a report.",
         epilog=_list_of_experiments(),

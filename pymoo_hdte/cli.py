@@ -7,19 +7,17 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from pymoo_hdte import __version__
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.commands.discrepancy import DISCREPANCY
 from pymoo_hdte.commands.identify import IDENTIFY
 from pymoo_hdte.commands.optimise import OPTIMISE
+from pymoo_hdte.commands.parser import MISTAKE, OneLineParser
 from pymoo_hdte.commands.simulate import SIMULATE
 
 COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, DISCREPANCY)
 """In the order of the help."""
-MISTAKE = 2
-"""Exit code for input that the user can correct, as argparse has it."""
 INTERRUPTED = 130
 """Exit code that a shell expects of a program ended by Ctrl-C."""
 
@@ -44,16 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, as every error here; the usage is for ``--help``."""
-
-    def error(self, message: str) -> NoReturn:
-        line = " ".join(message.split())
-        self.exit(MISTAKE, f"{self.prog}: error: {line}; see {self.prog} --help\n")
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = OneLineParser(
         prog="pymoo-hdte",
         description="Robust design of harmonic drives, and what a model lacks.",
         epilog="pymoo-hdte COMMAND --help shows options, an example and the files of a command.",
