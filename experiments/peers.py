@@ -16,15 +16,14 @@ from experiments.contest.peers import CONTESTANTS
 from experiments.contest.peers_pymoo import POPULATION
 from experiments.contest.problems import BENCHMARKS
 from experiments.peers_data import FINAL_SIZE, Extent, Scores, scores_for
+from experiments.peers_rivals import must_reach_table, nearest_rival_table, rivals_table
 from experiments.peers_tables import (
     NAMES,
     OURS,
     median_values,
     medians_tables,
-    must_reach_table,
     ranks_tables,
     reductions_table,
-    rivals_table,
     smaller_is_better,
     times_table,
     tuning_table,
@@ -55,7 +54,8 @@ PEERS_NOTE = (
     "MOPSO-CD (pymoo) and NSPSO (pygmo) know no constraints: the first is judged by the feasible "
     "part of what it offers, the second does not run there and ranks last. pymoo's MOPSO-CD and "
     "CMOPSO truncate their archives with generators without a seed; here these are seeded. Random "
-    "search offers the non-dominated of all it drew."
+    "search offers the non-dominated of all it drew. SMS-EMOA selects by the hypervolume itself: "
+    "where several have found the front, its points lie where that measure counts them most."
 )
 
 
@@ -71,6 +71,7 @@ def run(context: Context) -> Result:
             must_reach_table(scores),
             *ranks_tables(scores),
             rivals_table(scores),
+            nearest_rival_table(scores),
             reductions_table(scores),
             tuning_table(scores),
             *medians_tables(scores),

@@ -20,7 +20,8 @@ from experiments.peers_data import (
     format_seconds,
     read_scores,
 )
-from experiments.peers_tables import FAITHFUL, OURS, must_reach_table, ranks_tables
+from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table
+from experiments.peers_tables import OURS, ranks_tables
 from experiments.registry import Context
 from pymoo_hdte.checks import InvalidInput
 
@@ -153,6 +154,23 @@ def test_ranks_come_with_intervals_that_hold_them(rng):
     for row in table.rows:
         low, high = map(float, row[2].split(".."))
         assert low - 0.06 <= row[1] <= high + 0.06
+
+
+def test_the_nearest_rival_is_shown_worst_problem_first(rng):
+    scores = planted(rng, [2.0, 3.0, 80.0, 1.0])
+    held_out = scores.rows(False)
+    # Ours wins one problem, and loses one by 0.5 rather than by about 0.01.
+    scores.values[2, held_out[1], 0] = 1.0
+    scores.values[2, held_out[3], 0] -= 0.5
+    table = nearest_rival_table(scores)
+    assert table.columns[2].name == "SMS-EMOA"
+    assert table.rows[0][0] == PROBLEMS[held_out[3]]
+    assert table.rows[-1][0] == PROBLEMS[held_out[1]]
+    for _, ours, rival, gain, *_ in table.rows:
+        assert gain == ours - rival
+    lost = len(held_out) - 1
+    slight = sum(0.0 < rival - ours < 0.01 * rival for _, ours, rival, *_ in table.rows)
+    assert f"on {lost} of {len(held_out)} held-out problems, on {slight} of" in table.note
 
 
 # --- ablation -----------------------------------------------------------------------------------
