@@ -88,7 +88,8 @@ def _faithful_row(scores: Scores, evaluations: int) -> tuple[Cell, ...]:
             greater = "greater" if smaller_is_better(indicator) else "less"
             p = mannwhitneyu(runs[ours], runs[faithful], alternative=greater).pvalue
             if p < SIGNIFICANT / 2:
-                worse.append(f"{problem} ({NAMES[indicator]})")
+                middle, theirs = np.median(runs[ours]), np.median(runs[faithful])
+                worse.append(f"{problem} ({NAMES[indicator]}, {_percent(middle, theirs)})")
     return (
         f"never worse than {FAITHFUL} beyond the noise",
         evaluations,
@@ -96,6 +97,10 @@ def _faithful_row(scores: Scores, evaluations: int) -> tuple[Cell, ...]:
         None,
         _yes(not worse),
     )
+
+
+def _percent(value: float, reference: float) -> str:
+    return f"{significant(100.0 * abs(value / reference - 1.0), 2)} %"
 
 
 def _moved_row(scores: Scores, evaluations: int) -> tuple[Cell, ...]:
@@ -121,7 +126,7 @@ def rivals_table(scores: Scores) -> Table:
     columns = [Column("rival"), Column("evaluations")]
     for name in ("IGD", "hypervolume"):
         columns += [
-            Column("p, Wilcoxon with Holm", digits=2, group=name),
+            Column("p", digits=2, group=name),
             *(Column(word, group=name) for word in ("better", "worse")),
             *(Column(word, group=f"{name}, single problems") for word in ("win", "tie", "loss")),
         ]
@@ -144,8 +149,9 @@ def rivals_table(scores: Scores) -> Table:
         f"{OURS} against every rival on the held-out problems",
         tuple(columns),
         tuple(tuple(row) for _, row in sorted(rows.items(), key=lambda item: item[0][1])),
-        note="Better and worse compare medians. Win and loss are problems on which the runs differ "
-        "beyond chance (Mann-Whitney, Holm over all problems and rivals), so a tie is no equality.",
+        note="p is Wilcoxon's over the problems, after Holm. Better and worse compare medians. Win "
+        "and loss are problems on which the runs differ beyond chance (Mann-Whitney, Holm over all "
+        "problems and rivals), so a tie is no equality.",
     )
 
 

@@ -93,14 +93,12 @@ EXPERIMENTS = (
     Experiment(
         "peers",
         "The elitist swarm against the best algorithms of other libraries",
-        by_default=False,
         reads_outcome=True,
         has_small_version=True,
     ),
     Experiment(
         "swarm_parts",
         "What each part of the elitist swarm is worth",
-        by_default=False,
         reads_outcome=True,
         has_small_version=True,
     ),

@@ -46,6 +46,7 @@ def _parts_table(scores: Scores) -> Table:
     rng = np.random.default_rng(1)
     columns = [Column("variant")]
     rows: list[list[float | str]] = [[name] for name in scores.algorithms[1:]]
+    shown = np.zeros(len(rows), dtype=bool)
     for group, tuning in (("tuning problems", True), ("held-out problems", False)):
         columns += [
             Column("cost", "", 3, group),
@@ -55,6 +56,7 @@ def _parts_table(scores: Scores) -> Table:
         ]
         runs = scores.of("igd", scores.budgets[-1], tuning=tuning)
         cost, low, high = costs(runs, rng)
+        shown |= low[1:] > 1.0
         middle = medians(runs, smaller_is_better=True)
         for variant, row in enumerate(rows, start=1):
             interval = f"{low[variant]:.3f}..{high[variant]:.3f}"
@@ -62,13 +64,15 @@ def _parts_table(scores: Scores) -> Table:
             better = int(np.sum(middle[:, variant] < middle[:, 0]))
             row += [float(cost[variant]), interval, worse, better]
     order = np.argsort([-float(row[1]) for row in rows], kind="stable")
+    doubtful = [scores.algorithms[1 + i] for i in order if not shown[i]]
     return Table(
         "parts",
         f"Cost of leaving out, simplifying or adding a part, in {NAMES['igd']}",
         tuple(columns),
         tuple(tuple(rows[i]) for i in order),
         note=f"{len(scores.rows(True))} tuning and {len(scores.rows(False))} held-out problems; "
-        "worse and better count medians.",
+        "worse and better count medians. Not worse beyond chance on either group: "
+        f"{', '.join(doubtful) or 'none'}.",
     )
 
 

@@ -13,10 +13,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from experiments import swarm_parts
 from experiments.campaign import Campaign
 from experiments.comparison import objectives, true_front
+from experiments.peers_data import committed_scores
+from experiments.peers_rivals import must_reach_table, nearest_rival_table
+from experiments.peers_tables import NAMES, median_values, smaller_is_better
 from experiments.published_values import TABLE_7
 from experiments.quality import TrueFront
+from experiments.ranks import average_ranks
+from experiments.registry import Context
 from experiments.runs import OptimisationRun
 from pymoo_hdte import cli
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
@@ -164,3 +170,39 @@ class TestNumbersBesideThePaper:
         with io.StringIO(README) as text:
             rows = [line for line in csv.reader(text, delimiter="|") if len(line) == 5]
         assert all(cell.strip() for line in rows for cell in line[2:4])
+
+
+class TestNumbersOfThePeers:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def scores(cls):
+        return committed_scores("peers")
+
+    def test_average_ranks(self, scores):
+        head = next(line for line in README.splitlines() if line.startswith("| | IGD "))
+        names = {shown: measure for measure, shown in NAMES.items()}
+        measures = [names[cell.strip()] for cell in head.split("|")[2:-1]]
+        table = README[README.index(head) :].split("\n\n")[0].splitlines()[2:]
+        assert len(table) == 5
+        for line in table:
+            name, *cells = (cell.strip(" `") for cell in line.split("|")[1:-1])
+            for measure, cell in zip(measures, cells, strict=True):
+                better = smaller_is_better(measure)
+                medians = [median_values(scores, measure, n, tuning=False) for n in scores.budgets]
+                ranks = [average_ranks(one, smaller_is_better=better) for one in medians]
+                place = scores.algorithms.index(name)
+                assert cell == ", ".join(f"{rank[place]:.2f}" for rank in ranks)
+
+    def test_what_is_met_and_what_is_not(self, scores):
+        rows = {(row[0], row[1]): row for row in must_reach_table(scores).rows}
+        beaten = "better than every peer beyond chance, "
+        for case in [("IGD", 10_000), ("IGD", 25_000), ("hypervolume", 10_000)]:
+            assert rows[beaten + case[0], case[1]][-1] == "yes"
+        assert rows[beaten + "hypervolume", 25_000][3].startswith("not: SMS-EMOA (p = 0.10, ")
+        assert "(not beyond chance, p = 0.10)" in README
+        assert nearest_rival_table(scores).rows[0][0] == "WFG9"
+
+    def test_exchange_is_worth_most(self, tmp_path):
+        table = swarm_parts.run(Context(20, tmp_path, Campaign(tmp_path))).tables[0]
+        assert table.rows[0][0] == "without exchange"
+        assert max(row[5] for row in table.rows) == table.rows[0][5]

@@ -31,7 +31,7 @@ class ElitistSwarm(Swarm):
 
     It is what was left of ideas for AMP-MOPSO, whose results it does not borrow, when those that
     gained nothing were taken out, inertia among them; ``python -m experiments swarm_parts`` tells
-    what each part is worth.
+    what each part is worth, which for some is nothing beyond chance.
 
     Parameters
     ----------
