@@ -16,7 +16,12 @@ from experiments.contest.peers import CONTESTANTS
 from experiments.contest.peers_pymoo import POPULATION
 from experiments.contest.problems import BENCHMARKS
 from experiments.peers_data import FINAL_SIZE, Extent, Scores, scores_for
-from experiments.peers_rivals import must_reach_table, nearest_rival_table, rivals_table
+from experiments.peers_rivals import (
+    must_reach_table,
+    nearest_rival_table,
+    rivals_table,
+    subsets_table,
+)
 from experiments.peers_tables import (
     NAMES,
     OURS,
@@ -54,8 +59,10 @@ PEERS_NOTE = (
     "MOPSO-CD (pymoo) and NSPSO (pygmo) know no constraints: the first is judged by the feasible "
     "part of what it offers, the second does not run there and ranks last. pymoo's MOPSO-CD and "
     "CMOPSO truncate their archives with generators without a seed; here these are seeded. Random "
-    "search offers the non-dominated of all it drew. SMS-EMOA selects by the hypervolume itself: "
-    "where several have found the front, its points lie where that measure counts them most."
+    "search offers the non-dominated of all it drew. OMOPSO's archive has jMetalPy's epsilon of "
+    "0.0075 in objectives as they are, which leaves it two solutions of the welded beam. SMS-EMOA "
+    "selects by the hypervolume itself: where several have found the front, its points lie where "
+    "that measure counts them most."
 )
 
 
@@ -70,6 +77,7 @@ def run(context: Context) -> Result:
         tables=(
             must_reach_table(scores),
             *ranks_tables(scores),
+            subsets_table(scores),
             rivals_table(scores),
             nearest_rival_table(scores),
             reductions_table(scores),

@@ -20,7 +20,7 @@ from experiments.peers_data import (
     format_seconds,
     read_scores,
 )
-from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table
+from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table, subsets_table
 from experiments.peers_tables import OURS, ranks_tables
 from experiments.registry import Context
 from pymoo_hdte.checks import InvalidInput
@@ -146,7 +146,7 @@ def test_worse_than_the_faithful_version_on_one_problem_is_found(rng):
     met, row = demands(scores)[f"never worse than {FAITHFUL} beyond the noise"]
     assert met == "no"
     ours, faithful = np.median(scores.of("igd", 10_000)[4, :2], axis=-1)
-    assert row[2] == f"worse on {PROBLEMS[4]} (IGD, {100 * (ours / faithful - 1):.0f} %)"
+    assert row[2] == f"worse on {PROBLEMS[4]} (IGD, +{100 * (ours / faithful - 1):.0f} %)"
 
 
 def test_ranks_come_with_intervals_that_hold_them(rng):
@@ -155,6 +155,25 @@ def test_ranks_come_with_intervals_that_hold_them(rng):
     for row in table.rows:
         low, high = map(float, row[2].split(".."))
         assert low - 0.06 <= row[1] <= high + 0.06
+
+
+def test_a_change_that_has_no_percentage_is_told_without(rng):
+    scores = planted(rng, [1.0, 3.0, 2.0, 1.5])
+    scores.values[0, 4, 0] = np.inf
+    _, row = demands(scores)[f"never worse than {FAITHFUL} beyond the noise"]
+    assert row[2] == f"worse on {PROBLEMS[4]} (IGD)"
+
+
+def test_ranks_without_a_family_are_those_of_the_others(rng):
+    scores = planted(rng, [1.0, 4.0, 3.0, 2.0])
+    # Ours is the worst on WFG alone.
+    wfg = [name.startswith("WFG") for name in PROBLEMS]
+    scores.values[0, wfg, 0] = 1.0
+    every, without = subsets_table(scores).rows[:2]
+    assert without[:6] == ("without WFG", 5, 10_000, 1.0, "SMS-EMOA", 2.0)
+    assert every[:4] == ("all", 14, 10_000, (9 * 4.0 + 5 * 1.0) / 14)
+    # Five problems that all agree have p = 2 / 2^5 before Holm.
+    assert without[6] == "0 of 3"
 
 
 def test_the_nearest_rival_is_shown_worst_problem_first(rng):

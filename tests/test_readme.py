@@ -17,7 +17,7 @@ from experiments import swarm_parts
 from experiments.campaign import Campaign
 from experiments.comparison import objectives, true_front
 from experiments.peers_data import committed_scores
-from experiments.peers_rivals import must_reach_table, nearest_rival_table
+from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table, subsets_table
 from experiments.peers_tables import NAMES, median_values, smaller_is_better
 from experiments.published_values import TABLE_7
 from experiments.quality import TrueFront
@@ -31,6 +31,7 @@ from pymoo_hdte.surrogate import latin_hypercube
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+WORDS = " ".join(README.replace("`", "").split())
 SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 COMMANDS = re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
 
@@ -193,16 +194,37 @@ class TestNumbersOfThePeers:
                 place = scores.algorithms.index(name)
                 assert cell == ", ".join(f"{rank[place]:.2f}" for rank in ranks)
 
-    def test_what_is_met_and_what_is_not(self, scores):
+    def test_what_is_beaten_and_what_is_not(self, scores):
         rows = {(row[0], row[1]): row for row in must_reach_table(scores).rows}
         beaten = "better than every peer beyond chance, "
         for case in [("IGD", 10_000), ("IGD", 25_000), ("hypervolume", 10_000)]:
             assert rows[beaten + case[0], case[1]][-1] == "yes"
-        assert rows[beaten + "hypervolume", 25_000][3].startswith("not: SMS-EMOA (p = 0.10, ")
-        assert "(not beyond chance, p = 0.10)" in README
-        assert nearest_rival_table(scores).rows[0][0] == "WFG9"
+        missed = rows[beaten + "hypervolume", 25_000][3]
+        assert missed == "not: SMS-EMOA (p = 0.10, 15:9)"
+        assert (
+            "larger hypervolume on 15, the smaller on 9, which is within chance (p = 0.10)" in WORDS
+        )
+        faithful = f"never worse than {FAITHFUL} beyond the noise"
+        worse = rows[faithful, 10_000][2]
+        assert re.findall(r"ZDT\d", worse) == ["ZDT2", "ZDT1", "ZDT2"]
+        assert max(map(float, re.findall(r"([\d.]+) %", worse))) < 2.0
+        assert rows[faithful, 25_000][-1] == "yes"
 
-    def test_exchange_is_worth_most(self, tmp_path):
+    def test_where_the_best_rival_is_ahead(self, scores):
+        rows = nearest_rival_table(scores).rows
+        assert rows[0][0] == "WFG9"
+        robust = [(gain, rival) for name, _, rival, gain, *_ in rows if "RobustDTE" in name]
+        assert len(robust) == 4
+        assert all(-0.0055 * rival < gain < 0.0 for gain, rival in robust)
+
+    def test_ranks_without_wfg(self, scores):
+        rows = [row for row in subsets_table(scores).rows if row[0] == "without WFG"]
+        assert all(row[3] < row[5] for row in rows)
+        assert [row[8] for row in rows] == ["SMS-EMOA", "SMS-EMOA"]
+        assert f"SMS-EMOA leads with {rows[-1][9]:.2f} against {rows[-1][7]:.2f}" in WORDS
+
+    def test_parts_that_are_shown_to_help(self, tmp_path):
         table = swarm_parts.run(Context(20, tmp_path, Campaign(tmp_path))).tables[0]
-        assert table.rows[0][0] == "without exchange"
-        assert max(row[5] for row in table.rows) == table.rows[0][5]
+        shown = table.note.rpartition(": ")[2]
+        assert shown == "without exchange, equal shares of moves, with constant inertia."
+        assert "the exchange of components and the shares by success are shown to help" in WORDS

@@ -30,8 +30,8 @@ class ElitistSwarm(Swarm):
     schedule: a run may be stopped or continued at any generation.
 
     It is what was left of ideas for AMP-MOPSO, whose results it does not borrow, when those that
-    gained nothing were taken out, inertia among them; ``python -m experiments swarm_parts`` tells
-    what each part is worth, which for some is nothing beyond chance.
+    seemed to gain nothing in tuning were taken out, inertia among them. Not every part that stayed
+    is shown to help: ``python -m experiments swarm_parts`` tells what each is worth.
 
     Parameters
     ----------
