@@ -59,19 +59,26 @@ def must_reach_table(scores: Scores) -> Table:
 def _place_row(scores: Scores, indicator: str, evaluations: int, place: int) -> tuple[Cell, ...]:
     better = smaller_is_better(indicator)
     values = median_values(scores, indicator, evaluations, tuning=False)
-    ranks = dict(
-        zip(scores.algorithms, average_ranks(values, smaller_is_better=better), strict=True)
-    )
-    ours = ranks.pop(OURS)
-    reached = 1 + sum(rank < ours for rank in ranks.values())
-    best = min(ranks, key=lambda name: ranks[name])
+    ranks = average_ranks(values, smaller_is_better=better)
+    ours, best, rank = _ours_and_best(scores.algorithms, ranks)
+    reached = 1 + int(np.sum(ranks < ours))
     return (
         f"place {place}{' or better' if place > 1 else ''} by average rank, {NAMES[indicator]}",
         evaluations,
         f"place {reached} of {len(scores.algorithms)}, rank {ours:.2f}",
-        f"{best}, rank {ranks[best]:.2f}",
+        f"{best}, rank {rank:.2f}",
         _yes(reached <= place),
     )
+
+
+def _ours_and_best(
+    algorithms: Sequence[str], values: NDArray[np.float64]
+) -> tuple[float, str, float]:
+    """Return our value, and which rival has the smallest and how small; shape (algorithms,)."""
+    rivals = dict(zip(algorithms, values.tolist(), strict=True))
+    ours = rivals.pop(OURS)
+    best = min(rivals, key=lambda name: rivals[name])
+    return ours, best, rivals[best]
 
 
 def _beyond_chance_row(scores: Scores, indicator: str, evaluations: int) -> tuple[Cell, ...]:
@@ -79,8 +86,8 @@ def _beyond_chance_row(scores: Scores, indicator: str, evaluations: int) -> tupl
     tests = rival_tests(scores.algorithms, values, indicator)
     unbeaten = [
         f"{test.rival} (p = {significant(test.p, 2)}, {test.better}:{test.worse})"
-        for test, done in zip(tests, beaten(tests), strict=True)
-        if not done
+        for test in tests
+        if not test.beaten
     ]
     return (
         f"better than every peer beyond chance, {NAMES[indicator]}",
@@ -120,14 +127,12 @@ def _change(value: float, reference: float) -> str:
 
 def _moved_row(scores: Scores, evaluations: int) -> tuple[Cell, ...]:
     row = median_values(scores, "igd", evaluations)[scores.problems.index("ZDT4-moved")]
-    values = dict(zip(scores.algorithms, row.tolist(), strict=True))
-    ours = values.pop(OURS)
-    best = min(values, key=lambda name: values[name])
+    ours, best, value = _ours_and_best(scores.algorithms, row)
     return (
         f"median IGD on moved ZDT4 below {MOVED_ZDT4_IGD}",
         evaluations,
         significant(ours, 2),
-        f"{best}, {significant(values[best], 2)}",
+        f"{best}, {significant(value, 2)}",
         _yes(ours < MOVED_ZDT4_IGD),
     )
 
@@ -202,12 +207,10 @@ def subsets_table(scores: Scores) -> Table:
 def _standing(
     algorithms: Sequence[str], medians: NDArray[np.float64], indicator: str
 ) -> list[Cell]:
-    ranks = average_ranks(medians, smaller_is_better=smaller_is_better(indicator)).tolist()
-    rivals = {name: rank for name, rank in zip(algorithms, ranks, strict=True) if name != OURS}
-    best = min(rivals, key=lambda name: rivals[name])
-    won = beaten(rival_tests(algorithms, medians, indicator))
-    ours = ranks[list(algorithms).index(OURS)]
-    return [ours, best, rivals[best], f"{sum(won)} of {len(won)}"]
+    ranks = average_ranks(medians, smaller_is_better=smaller_is_better(indicator))
+    tests = rival_tests(algorithms, medians, indicator)
+    won = sum(test.beaten for test in tests)
+    return [*_ours_and_best(algorithms, ranks), f"{won} of {len(tests)}"]
 
 
 def nearest_rival_table(scores: Scores) -> Table:
@@ -216,9 +219,8 @@ def nearest_rival_table(scores: Scores) -> Table:
     volumes = median_values(scores, "hypervolume", evaluations, tuning=False)
     distances = median_values(scores, "igd", evaluations, tuning=False)
     ranks = average_ranks(volumes, smaller_is_better=False)
-    ours = scores.algorithms.index(OURS)
-    rival = min((i for i in range(len(ranks)) if i != ours), key=lambda i: ranks[i])
-    pair, name = [ours, rival], scores.algorithms[rival]
+    _, name, _ = _ours_and_best(scores.algorithms, ranks)
+    pair = ours, rival = [scores.algorithms.index(one) for one in (OURS, name)]
     problems = [scores.problems[row] for row in scores.rows(False)]
     gains = volumes[:, ours] - volumes[:, rival]
     slight = (gains < 0.0) & (-gains < SLIGHT * volumes[:, rival])
@@ -250,8 +252,3 @@ def rival_tests(
     # Ratios of distances mean the same on all problems, differences of hypervolumes do as well.
     compared = np.log(medians) if better else medians
     return holm_against(OURS, algorithms, compared, smaller_is_better=better)
-
-
-def beaten(tests: Sequence[RivalTest]) -> list[bool]:
-    """Say of every rival whether ours is better beyond chance."""
-    return [test.ahead and test.p < SIGNIFICANT for test in tests]

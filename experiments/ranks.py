@@ -48,6 +48,11 @@ class RivalTest(NamedTuple):
     worse: int
     ahead: bool
 
+    @property
+    def beaten(self) -> bool:
+        """Whether the control is better than this rival beyond chance."""
+        return self.ahead and self.p < SIGNIFICANT
+
 
 class WinTieLoss(NamedTuple):
     """On how many problems a control beats a rival significantly, does not differ, or loses."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.committed import stored_outcome
 from experiments.contest.peers import SWARM_VARIANTS
 from experiments.peers_data import Extent, Scores, scores_for
-from experiments.peers_rivals import beaten, rival_tests
+from experiments.peers_rivals import rival_tests
 from experiments.peers_tables import NAMES, OURS
 from experiments.ranks import medians
 from experiments.registry import Context
@@ -62,7 +62,7 @@ def _parts_table(scores: Scores) -> Table:
             interval = f"{low[variant]:.3f}..{high[variant]:.3f}"
             row += [float(cost[variant]), interval, test.better, test.worse, test.p]
         # What counts is said of the last group, the held-out one.
-        shown = [test.rival for test, won in zip(tests, beaten(tests), strict=True) if won]
+        shown = [test.rival for test in tests if test.beaten]
     order = np.argsort(-cost[1:], kind="stable")
     return Table(
         "parts",
