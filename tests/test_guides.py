@@ -126,8 +126,7 @@ def test_own_problems_meet_their_closed_forms():
 def test_parts_of_the_swarm_differ_as_the_guide_says():
     found = dict(re.findall(r"(.+?) +median IGD of 3 seeds (.+)", output_of("extend")))
     assert len(found) == 5
-    # Of twelve seeds none is less than three times as far with random truncation.
-    assert float(found.pop("random truncation")) > 3.0 * max(map(float, found.values()))
+    assert float(found.pop("random truncation")) > 5.0 * max(map(float, found.values()))
 
 
 def test_tongue_of_instability_lies_where_mathieu_has_it():
