@@ -295,7 +295,6 @@ def test_pymoo_s_runners_evaluate_for_our_swarms(swarm):
 
 
 def test_joblib_evaluates_for_our_swarms():
-    pytest.importorskip("joblib")
     swarm = ElitistSwarm(pop_size=10)
     parallel = OneByOne(elementwise_runner=JoblibParallelization(n_jobs=2, prefer="threads"))
     found, expected = (minimize(one, swarm, ("n_gen", 3), seed=1) for one in (parallel, OneByOne()))
