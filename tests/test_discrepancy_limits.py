@@ -2,16 +2,20 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from quick_campaigns import quick_campaign
 
 from pymoo_hdte.discrepancy.data import Data
 from pymoo_hdte.discrepancy.features import measure
 from pymoo_hdte.discrepancy.limits import limits
+from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.workflow import Analysis
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0]
+FREEDOM = 2000
 
 
 @pytest.fixture(scope="module")
@@ -23,11 +27,17 @@ def campaign():
     return replace(clean, running=(replace(turned, **angles), *clean.running[1:]))
 
 
-def said(campaign, fitted=None, orders=ORDERS):
+def said(campaign, fitted=None, orders=ORDERS, chosen=None):
     """Return all limits of a campaign of which some records, by default all, were fitted."""
     features = measure(campaign, fitted or campaign.train, orders)
     data = Data(campaign, features, (), campaign.torsion)
-    return limits(Analysis(campaign, data, None, ()))
+    return limits(Analysis(campaign, data, Verdict("", None, chosen, (), (), FREEDOM), ()))
+
+
+def ripple(order, misfit):
+    """A ripple that leaves ``misfit`` times the variance of the noise."""
+    fit = SimpleNamespace(chi_square=misfit * FREEDOM)
+    return SimpleNamespace(fit=fit, candidates=(SimpleNamespace(order=order),))
 
 
 def trained(campaign, keep):
@@ -55,6 +65,16 @@ CASES = {
         r"Neither fitted nor predicted.*: run_2000rpm_40Nm[,.]",
     ),
 }
+
+
+def test_a_harmonic_that_the_fastest_record_cannot_show_is_told_where_misfit_is_left(campaign):
+    fastest = max(campaign.running, key=lambda record: abs(record.input_speed))
+    highest = 0.9 * np.pi * fastest.sample_rate / abs(fastest.input_speed)
+    (sentence,) = said(campaign, chosen=ripple(0.51 * highest, 2.0))
+    assert f"Order {1.02 * highest:.4g}, the second harmonic of order" in sentence
+    assert said(campaign, chosen=ripple(0.49 * highest, 2.0)) == []
+    assert said(campaign, chosen=ripple(0.51 * highest, 1.0)) == []
+    assert said(campaign, chosen=ripple(None, 2.0)) == []
 
 
 @pytest.mark.parametrize("case", CASES)

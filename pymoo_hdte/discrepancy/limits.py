@@ -1,4 +1,4 @@
-"""What a campaign cannot tell, whatever the verdict: conditions that no fitted record varies."""
+"""What a campaign cannot tell: conditions that no fitted record varies, lines that none shows."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.discrepancy.rival import adequate
+from pymoo_hdte.discrepancy.workflow import Analysis, highest_order
 
 _SAME_SPEED = 1.1
 """Ratio of the largest to the smallest speed up to which records run at one speed."""
@@ -24,7 +25,7 @@ def limits(analysis: Analysis) -> list[str]:
     analysis : Analysis
         Of `workflow.analyse`.
     """
-    return [*_unproven(analysis), *_unvaried(analysis), *_unseen(analysis)]
+    return [*_unproven(analysis), *_unvaried(analysis), *_unseen(analysis), *_too_high(analysis)]
 
 
 def _unproven(analysis: Analysis) -> list[str]:
@@ -82,6 +83,21 @@ def _unseen(analysis: Analysis) -> list[str]:
         return []
     named = ", ".join(f"{order:.4g}" for order in unseen)
     return [f"The records do not resolve the believed static error of order {named}."]
+
+
+def _too_high(analysis: Analysis) -> list[str]:
+    verdict, highest = analysis.verdict, highest_order(analysis.campaign)
+    freedom = verdict.degrees_of_freedom
+    if verdict.chosen is None or verdict.chosen.fit.chi_square <= freedom * adequate(freedom):
+        return []
+    orders = [one.order for one in verdict.chosen.candidates if one.order is not None]
+    return [
+        f"Order {2.0 * order:.4g}, the second harmonic of order {order:.4g}, lies above the "
+        f"highest that every record shows, {highest:.3g}: what is left may be that, and a harmonic "
+        "left out shifts the values of the effect."
+        for order in orders
+        if 2.0 * order > highest
+    ]
 
 
 def _unresolved(wanted: Sequence[float], orders: Sequence[float], near: float) -> list[float]:

@@ -26,6 +26,7 @@ FEWEST_RECORDS = 3
 """Below this no effect could be told from the base parameters."""
 _SEPARATION = 0.9
 """Least distance of two order lines, in cycles per output turn."""
+_BELOW_NYQUIST = 0.9
 _MOST_LINES = 4
 _LINE_CHANCE = 1e-6
 _SECOND_CHANCE = 0.01
@@ -80,7 +81,7 @@ def expected_orders(campaign: Campaign) -> list[float]:
     wanted = [1.0 / believed.ratio, 2.0 / believed.ratio, *lines]
     wanted += [one + other for place, one in enumerate(lines) for other in lines[place:]]
     wanted += [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
-    return _apart(wanted, campaign, HIGHEST_ORDER)
+    return _apart(wanted, campaign)
 
 
 @threadpool_limits.wrap(limits=1)
@@ -102,7 +103,7 @@ def analyse(campaign: Campaign) -> Analysis:
     features = measure(campaign, campaign.train, expected)
     unexpected = unexpected_orders(features, ratio, campaign.rig)
     if unexpected:
-        orders = _apart([*expected, *unexpected], campaign, HIGHEST_ORDER)
+        orders = _apart([*expected, *unexpected], campaign)
         features = measure(campaign, campaign.train, orders)
     data = training_data(campaign, features)
     base = fit(data)
@@ -161,12 +162,16 @@ def _flanks_held(features: Features) -> NDArray[np.bool_]:
     return np.asarray(load > np.maximum(swing, LEAST_LOAD))
 
 
-def _apart(wanted: list[float], campaign: Campaign, highest: float) -> list[float]:
+def highest_order(campaign: Campaign) -> float:
+    """Return the highest order that every record of a campaign shows, cycles per input turn."""
+    nyquist = [np.pi * record.sample_rate / abs(record.input_speed) for record in campaign.running]
+    return float(min(HIGHEST_ORDER, _BELOW_NYQUIST * min(nyquist)))
+
+
+def _apart(wanted: list[float], campaign: Campaign) -> list[float]:
     """Return orders, the first ones first served, that every record can tell apart."""
     least = _SEPARATION / campaign.believed.ratio
-    for record in campaign.running:
-        nyquist = np.pi * record.sample_rate / abs(record.input_speed)
-        highest = min(highest, 0.9 * nyquist)
+    highest = highest_order(campaign)
     kept: list[float] = []
     for order in wanted:
         if order <= highest and all(abs(order - other) >= least for other in kept):
