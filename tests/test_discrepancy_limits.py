@@ -27,17 +27,17 @@ def campaign():
     return replace(clean, running=(replace(turned, **angles), *clean.running[1:]))
 
 
-def said(campaign, fitted=None, orders=ORDERS, chosen=None):
+def said(campaign, fitted=None, orders=ORDERS, chosen=None, status="named"):
     """Return all limits of a campaign of which some records, by default all, were fitted."""
     features = measure(campaign, fitted or campaign.train, orders)
     data = Data(campaign, features, (), campaign.torsion)
-    return limits(Analysis(campaign, data, Verdict("", None, chosen, (), (), FREEDOM), ()))
+    return limits(Analysis(campaign, data, Verdict(status, None, chosen, (), (), FREEDOM), ()))
 
 
-def ripple(order, misfit):
-    """A ripple that leaves ``misfit`` times the variance of the noise."""
+def periodic(misfit, *orders):
+    """Effects of some orders that leave ``misfit`` times the variance of the noise."""
     fit = SimpleNamespace(chi_square=misfit * FREEDOM)
-    return SimpleNamespace(fit=fit, candidates=(SimpleNamespace(order=order),))
+    return SimpleNamespace(fit=fit, candidates=[SimpleNamespace(order=one) for one in orders])
 
 
 def trained(campaign, keep):
@@ -67,14 +67,34 @@ CASES = {
 }
 
 
-def test_a_harmonic_that_the_fastest_record_cannot_show_is_told_where_misfit_is_left(campaign):
-    fastest = max(campaign.running, key=lambda record: abs(record.input_speed))
-    highest = 0.9 * np.pi * fastest.sample_rate / abs(fastest.input_speed)
-    (sentence,) = said(campaign, chosen=ripple(0.51 * highest, 2.0))
-    assert f"Order {1.02 * highest:.4g}, the second harmonic of order" in sentence
-    assert said(campaign, chosen=ripple(0.49 * highest, 2.0)) == []
-    assert said(campaign, chosen=ripple(0.51 * highest, 1.0)) == []
-    assert said(campaign, chosen=ripple(None, 2.0)) == []
+def nyquist_order(record):
+    return np.pi * record.sample_rate / abs(record.input_speed)
+
+
+def test_a_harmonic_that_is_not_looked_at_is_told_where_misfit_is_left(campaign):
+    highest = 0.9 * min(map(nyquist_order, campaign.running))
+    assert highest < 14.0
+    above, below = 0.501 * highest, 0.499 * highest
+    (sentence,) = said(campaign, chosen=periodic(1.2, above, None, above, below))
+    assert f"Order {2.0 * above:.4g}, the second harmonic of order {above:.4g}, is not" in sentence
+    assert f"below order {highest:.3g}." in sentence
+    assert "the values of the effect" in sentence
+    (sentence,) = said(campaign, chosen=periodic(1.2, above), status="unlisted")
+    assert "the values of the effect" not in sentence
+    # Four standard deviations of chi-square: 1.126 times the noise.
+    assert said(campaign, chosen=periodic(1.12, above)) == []
+    assert said(campaign, chosen=periodic(1.13, above)) != []
+
+
+def test_no_rate_of_sampling_shows_order_14(campaign):
+    fast = [record for record in campaign.running if nyquist_order(record) > 20.0]
+    fast = replace(campaign, running=tuple(fast))
+    quiet = said(fast, chosen=periodic(1.0, 7.0))
+    (sentence,) = set(said(fast, chosen=periodic(1.2, 7.0, 6.99))) - set(quiet)
+    assert "Order 14, the second harmonic of order 7" in sentence
+    # Where somebody expects that line, it is looked at.
+    expected = [*ORDERS, 14.0]
+    assert said(fast, orders=expected, chosen=periodic(1.2, 7.0)) == said(fast, orders=expected)
 
 
 @pytest.mark.parametrize("case", CASES)

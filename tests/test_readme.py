@@ -93,8 +93,8 @@ def test_the_campaign_to_try_holds_the_effect_that_is_named(tmp_path, monkeypatc
     printed = capsys.readouterr().out
     assert "hidden is HiddenEffect(name='torque_ripple'" in printed
     assert "named: torque_ripple at the input" in printed
-    # Its hidden second harmonic, which the rates of the records do not show.
-    assert "Order 14, the second harmonic of order 7, lies above" in printed
+    # The hidden ripple has a second harmonic that the workflow cannot find.
+    assert "Order 14, the second harmonic of order 7, is not looked at" in printed
 
 
 @pytest.fixture(scope="module")

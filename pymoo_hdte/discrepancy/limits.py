@@ -1,4 +1,4 @@
-"""What a campaign cannot tell: conditions that no fitted record varies, lines that none shows."""
+"""What a campaign cannot tell: conditions that no record varies, lines that are not looked at."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.rival import adequate
+from pymoo_hdte.discrepancy.candidate import harmonics_among
+from pymoo_hdte.discrepancy.naming import EXPLAINED
 from pymoo_hdte.discrepancy.workflow import Analysis, highest_order
 
 _SAME_SPEED = 1.1
@@ -87,16 +88,17 @@ def _unseen(analysis: Analysis) -> list[str]:
 
 def _too_high(analysis: Analysis) -> list[str]:
     verdict, highest = analysis.verdict, highest_order(analysis.campaign)
-    freedom = verdict.degrees_of_freedom
-    if verdict.chosen is None or verdict.chosen.fit.chi_square <= freedom * adequate(freedom):
+    if verdict.chosen is None or not verdict.leaves_more_than_noise:
         return []
-    orders = [one.order for one in verdict.chosen.candidates if one.order is not None]
+    seen = analysis.data.features.orders.tolist()
+    orders = {one.order for one in verdict.chosen.candidates if one.order is not None}
+    values = ", which may shift the values of the effect" if verdict.status in EXPLAINED else ""
+    # A line that nobody expects is searched strictly below the highest order.
     return [
-        f"Order {2.0 * order:.4g}, the second harmonic of order {order:.4g}, lies above the "
-        f"highest that every record shows, {highest:.3g}: what is left may be that, and a harmonic "
-        "left out shifts the values of the effect."
-        for order in orders
-        if 2.0 * order > highest
+        f"Order {2.0 * order:.4g}, the second harmonic of order {order:.4g}, is not looked at: "
+        f"lines are searched below order {highest:.3g}. What is left may be that harmonic{values}."
+        for order in sorted(orders)
+        if 2.0 * order >= highest and harmonics_among(seen, order, 2) == 1
     ]
 
 

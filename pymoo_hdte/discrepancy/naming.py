@@ -72,6 +72,12 @@ class Verdict:
     equivalent: tuple[Rival, ...]
     degrees_of_freedom: int
 
+    @property
+    def leaves_more_than_noise(self) -> bool:
+        """Whether the chosen effects do not explain the data down to the noise."""
+        limit = adequate(self.degrees_of_freedom) * self.degrees_of_freedom
+        return self.chosen is not None and self.chosen.fit.chi_square > limit
+
 
 def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict on a fitted base."""

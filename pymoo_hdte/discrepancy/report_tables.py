@@ -127,7 +127,7 @@ def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
         f"It explains {share} of the misfit that is not noise; what is left has {after:.3g} times "
         "the variance of the noise."
     ]
-    if after > adequate(verdict.degrees_of_freedom):
+    if verdict.leaves_more_than_noise:
         words.append(
             "That is more than noise: its form is not quite right or more is missing, and values "
             "may be off by more than their intervals say."

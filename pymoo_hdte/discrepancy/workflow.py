@@ -27,6 +27,7 @@ FEWEST_RECORDS = 3
 _SEPARATION = 0.9
 """Least distance of two order lines, in cycles per output turn."""
 _BELOW_NYQUIST = 0.9
+"""Share of the lowest Nyquist order: closer to it, rows hardly tell sine from cosine."""
 _MOST_LINES = 4
 _LINE_CHANCE = 1e-6
 _SECOND_CHANCE = 0.01
@@ -163,7 +164,7 @@ def _flanks_held(features: Features) -> NDArray[np.bool_]:
 
 
 def highest_order(campaign: Campaign) -> float:
-    """Return the highest order that every record of a campaign shows, cycles per input turn."""
+    """Return the order up to which lines of a campaign are looked at, cycles per input turn."""
     nyquist = [np.pi * record.sample_rate / abs(record.input_speed) for record in campaign.running]
     return float(min(HIGHEST_ORDER, _BELOW_NYQUIST * min(nyquist)))
 
