@@ -232,7 +232,7 @@ def test_the_committed_outcome_is_whole_and_makes_the_report(tmp_path, experimen
 
 
 def test_the_committed_scores_are_those_of_the_swarms_as_they_are(tmp_path):
-    # Taking away exchange, difference, mutation or shares by success, or adding inertia, shows here.
+    # Taking away exchange, difference, mutation or shares by success, or adding inertia, shows.
     problems, swarms = ["WFG4", "ZDT1-moved", "ZDT6-moved"], [OURS, FAITHFUL]
     seeds = range(1, 4)
     stored = committed_scores("peers")
