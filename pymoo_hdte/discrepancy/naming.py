@@ -19,8 +19,8 @@ from pymoo_hdte.discrepancy.evidence import Evidence
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.rival import (
     Rival,
-    adequate,
     alike,
+    down_to_noise,
     explains,
     fit_all,
     refined,
@@ -75,8 +75,8 @@ class Verdict:
     @property
     def leaves_more_than_noise(self) -> bool:
         """Whether the chosen effects do not explain the data down to the noise."""
-        limit = adequate(self.degrees_of_freedom) * self.degrees_of_freedom
-        return self.chosen is not None and self.chosen.fit.chi_square > limit
+        chosen = self.chosen
+        return chosen is not None and not down_to_noise(chosen.fit, self.degrees_of_freedom)
 
 
 def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
@@ -85,7 +85,7 @@ def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     screened = screen(data, base, candidates)
     excess = base.chi_square - freedom
-    if base.chi_square <= adequate(freedom) * freedom and screened[0].reduction < GAIN:
+    if down_to_noise(base, freedom) and screened[0].reduction < GAIN:
         return Verdict("adequate", base, None, (), (), freedom)
     singles = _fit_best(data, base, screened, excess)
     if not explains(data, singles[0], base, freedom):

@@ -107,6 +107,11 @@ def adequate(freedom: int) -> float:
     return float(1.0 + DEVIATIONS * np.sqrt(2.0 / freedom))
 
 
+def down_to_noise(fitted: Fit, freedom: int) -> bool:
+    """Tell whether a fit is `adequate`."""
+    return fitted.chi_square <= adequate(freedom) * freedom
+
+
 def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     """Tell which parts of the data, of those that contradict the base, a fit plainly misses too.
 

@@ -19,8 +19,8 @@ from pymoo_hdte.discrepancy.rival import (
     PART_SHARE,
     SHARE,
     Rival,
-    adequate,
     alike,
+    down_to_noise,
     explains,
     fit_all,
     refined,
@@ -75,7 +75,7 @@ def with_second(
 
 def _second_could_count(data: Evidence, single: Rival, freedom: int) -> bool:
     """Tell whether a second effect beside this one could be earned at all."""
-    if single.fit.chi_square <= adequate(freedom) * freedom:
+    if down_to_noise(single.fit, freedom):
         return False
     return single.exact or bool(data.excess(single.fit).significant.any())
 

@@ -17,7 +17,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.candidate import Candidate
 from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.naming import EXPLAINED, FITTED, OF_ONE_NAME, Verdict, judge
-from pymoo_hdte.discrepancy.rival import SHARE, Rival, adequate, fit_all, rival, varied
+from pymoo_hdte.discrepancy.rival import SHARE, Rival, down_to_noise, fit_all, rival, varied
 from pymoo_hdte.discrepancy.screening import screen
 from pymoo_hdte.measured.candidates import CONTAINED, mechanism_candidates
 from pymoo_hdte.measured.data import MeasuredData, measured_data, usual_cutoff
@@ -190,7 +190,7 @@ def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]
     Which these are depends on the noise; after a few rounds it no longer does.
     """
     freedom = len(base.residuals) - len(base.values)
-    if base.chi_square <= adequate(freedom) * freedom:
+    if down_to_noise(base, freedom):
         return sensors
     data = sensors.with_rest(base.residuals)
     for _ in range(_ROUNDS):
