@@ -8,7 +8,7 @@ import numpy as np
 
 from experiments.choices import BAND, MODEL, TRUE_FRONT, Choice
 from experiments.published_values import TABLE_6, TABLE_9
-from experiments.result import Cell, Column, Finding, Table, significant
+from experiments.result import Cell, Column, Finding, Table, signed_percent, significant
 from experiments.runs import robust_problem
 from pymoo_hdte.decision import deviation_degree, tolerance_band
 
@@ -109,9 +109,3 @@ def _optima_finding(choices: Sequence[Choice]) -> Finding:
         bool(np.abs(percent).max() <= ALIKE_PERCENT),
         f"The optima differ from the paper's in {', '.join(shifts)} ({names}).",
     )
-
-
-def signed_percent(values: Sequence[float]) -> str:
-    """List percentages with their signs."""
-    shown = [f"{'+' if value > 0 else ''}{significant(float(value), 2)}" for value in values]
-    return f"{', '.join(shown)} %"

@@ -25,15 +25,15 @@ from experiments.peers_rivals import (
 from experiments.peers_tables import (
     NAMES,
     OURS,
+    median_ranks,
     median_values,
     medians_tables,
     ranks_tables,
     reductions_table,
-    smaller_is_better,
     times_table,
     tuning_table,
 )
-from experiments.ranks import average_ranks, nemenyi_difference, problem_ranks
+from experiments.ranks import nemenyi_difference, problem_ranks
 from experiments.ranks_figures import critical_difference_plot, rank_heatmap
 from experiments.registry import Context
 from experiments.result import Picture, Result
@@ -131,9 +131,8 @@ def _pictures(scores: Scores) -> list[Picture]:
     evaluations = scores.budgets[-1]
     pictures = []
     for indicator in ("igd", "hypervolume"):
-        values = median_values(scores, indicator, evaluations, tuning=False)
-        ranks = average_ranks(values, smaller_is_better=smaller_is_better(indicator))
-        difference = nemenyi_difference(len(ranks), len(values))
+        ranks = median_ranks(scores, indicator, evaluations, tuning=False)
+        difference = nemenyi_difference(len(ranks), len(scores.rows(False)))
         pictures.append(
             Picture(
                 f"difference_{indicator}",

@@ -11,9 +11,9 @@ from scipy.stats import mannwhitneyu
 from experiments.comparison import SIGNIFICANT
 from experiments.contest.problems import BENCHMARKS
 from experiments.peers_data import Scores
-from experiments.peers_tables import NAMES, OURS, median_values, smaller_is_better
+from experiments.peers_tables import NAMES, OURS, median_ranks, median_values, smaller_is_better
 from experiments.ranks import RivalTest, average_ranks, holm_against, win_tie_loss
-from experiments.result import Cell, Column, Table, significant
+from experiments.result import Cell, Column, Table, signed_percent, significant
 
 FAITHFUL = "AMP-MOPSO"
 SUBSETS: dict[str, tuple[str, ...]] = {
@@ -57,9 +57,7 @@ def must_reach_table(scores: Scores) -> Table:
 
 
 def _place_row(scores: Scores, indicator: str, evaluations: int, place: int) -> tuple[Cell, ...]:
-    better = smaller_is_better(indicator)
-    values = median_values(scores, indicator, evaluations, tuning=False)
-    ranks = average_ranks(values, smaller_is_better=better)
+    ranks = median_ranks(scores, indicator, evaluations, tuning=False)
     ours, best, rank = _ours_and_best(scores.algorithms, ranks)
     reached = 1 + int(np.sum(ranks < ours))
     return (
@@ -121,8 +119,7 @@ def _change(value: float, reference: float) -> str:
     """Say how far a median lies from another, where that can be said in per cent."""
     if not (np.isfinite([value, reference]).all() and reference):
         return ""
-    percent = 100.0 * (value / reference - 1.0)
-    return f", {'+' if percent > 0.0 else ''}{significant(percent, 2)} %"
+    return f", {signed_percent([100.0 * (value / reference - 1.0)])}"
 
 
 def _moved_row(scores: Scores, evaluations: int) -> tuple[Cell, ...]:

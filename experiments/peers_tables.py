@@ -35,6 +35,14 @@ def median_values(
     return medians(values, smaller_is_better=smaller_is_better(indicator))
 
 
+def median_ranks(
+    scores: Scores, indicator: str, evaluations: int, *, tuning: bool
+) -> NDArray[np.float64]:
+    """Return average ranks of the medians over the seeds, shape (algorithms,)."""
+    values = median_values(scores, indicator, evaluations, tuning=tuning)
+    return average_ranks(values, smaller_is_better=smaller_is_better(indicator))
+
+
 def ranks_tables(scores: Scores) -> list[Table]:
     """Return average ranks of every algorithm, with what the seeds leave open, for each budget."""
     rng = np.random.default_rng(1)
@@ -72,10 +80,7 @@ def _ranks_table(scores: Scores, evaluations: int, rng: np.random.Generator) -> 
 def tuning_table(scores: Scores) -> Table:
     """Average ranks on the problems that our algorithm was tuned on, which prove nothing."""
     ranks = {
-        (evaluations, indicator): average_ranks(
-            median_values(scores, indicator, evaluations, tuning=True),
-            smaller_is_better=smaller_is_better(indicator),
-        )
+        (evaluations, indicator): median_ranks(scores, indicator, evaluations, tuning=True)
         for evaluations in scores.budgets
         for indicator in NAMES
     }
@@ -97,8 +102,7 @@ def reductions_table(scores: Scores) -> Table:
             rule = "by crowding" if measure.endswith("_crowding") else "evenly"
             name = NAMES[measure.removesuffix("_crowding")]
             columns.append(Column(rule, "", 3, f"{name}, {evaluations:,}"))
-            values = median_values(scores, measure, evaluations, tuning=False)
-            ranks.append(average_ranks(values, smaller_is_better=smaller_is_better(measure)))
+            ranks.append(median_ranks(scores, measure, evaluations, tuning=False))
     order = np.argsort(ranks[0], kind="stable")
     return Table(
         "reductions",

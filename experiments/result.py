@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -132,6 +133,12 @@ def significant(value: float, digits: int) -> str:
     if not -5 <= exponent <= 6:
         return f"{value:.{digits - 1}e}".replace("-", MINUS)
     return f"{value:.{max(0, digits - 1 - exponent)}f}".replace("-", MINUS)
+
+
+def signed_percent(values: Iterable[float]) -> str:
+    """List percentages with their signs."""
+    shown = [f"{'+' if value > 0 else ''}{significant(float(value), 2)}" for value in values]
+    return f"{', '.join(shown)} %"
 
 
 def _plain(cell: Any) -> Cell:

@@ -24,13 +24,21 @@ from experiments.design_tables import (
     deviation_table,
     influence_note,
     optima_table,
-    signed_percent,
 )
 from experiments.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
 from experiments.models import model_sentences
 from experiments.published_values import REEVALUATION_LIMITS, TABLE_8
 from experiments.registry import Context
-from experiments.result import Cell, Column, Finding, Picture, Result, Table, significant
+from experiments.result import (
+    Cell,
+    Column,
+    Finding,
+    Picture,
+    Result,
+    Table,
+    signed_percent,
+    significant,
+)
 
 N_SAMPLES = 100_000
 SAMPLE_SEED = 2
