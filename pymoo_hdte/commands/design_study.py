@@ -70,21 +70,59 @@ class Check:
     mean, std : float
         Of the DTE, arcsec: the surrogate's exact moments, corrected by what surrogate and model
         differ in on the same drives (a control variate).
-    std_error : float
-        Standard error of ``std``, arcsec, to first order.
-    difference : ndarray, shape (CHECKED_DRIVES,)
-        DTE of these drives by the model less that by the surrogate, arcsec.
+    mean_influence : ndarray, shape (CHECKED_DRIVES,)
+        Of every drive on ``mean``: its DTE by the model less that by the surrogate, arcsec.
+    std_influence : ndarray, shape (CHECKED_DRIVES,)
+        Of every drive on ``std``, to first order, arcsec.
     """
 
     mean: float
     std: float
-    std_error: float
-    difference: Values
+    mean_influence: Values
+    std_influence: Values
 
     @property
     def mean_error(self) -> float:
         """Standard error of ``mean``, arcsec."""
-        return _error_of_mean(self.difference)
+        return _error_of_mean(self.mean_influence)
+
+    @property
+    def std_error(self) -> float:
+        """Standard error of ``std``, arcsec."""
+        return _error_of_mean(self.std_influence)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How far an objective falls from the nominal to the chosen design; negative where it rises.
+
+    Attributes
+    ----------
+    promised : float
+        By the surrogate, arcsec.
+    found : float
+        By the drive model itself, arcsec.
+    error : float
+        Standard error of ``found``, arcsec.
+    share : float
+        Of ``found`` in the value at the nominal design.
+    """
+
+    promised: float
+    found: float
+    error: float
+    share: float
+
+    @property
+    def refuted(self) -> bool:
+        """Whether the model does not confirm that the objective falls, as promised."""
+        return self.promised > 0.0 and self.found <= 2.0 * self.error
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the surrogate is off by more than half of what it promises, beyond chance."""
+        off = abs(self.promised - self.found)
+        return off > max(0.5 * abs(self.promised), 2.0 * self.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,15 +171,18 @@ class DesignStudy:
         return self.front[self.chosen[self.preference]]
 
     @property
-    def gain(self) -> tuple[float, float]:
-        """How far the mean falls by the model itself, arcsec, and the standard error of that."""
+    def gains(self) -> dict[str, Gain]:
+        """What mean and standard deviation gain; both designs were checked on the same drives."""
         before, after = self.initial_check, self.optimum_check
-        return before.mean - after.mean, _error_of_mean(before.difference - after.difference)
-
-    @property
-    def promised(self) -> float:
-        """How far the mean falls by the surrogate, arcsec."""
-        return float(self.initial[0] - self.objectives[0])
+        promised = (self.initial - self.objectives).tolist()
+        errors = (
+            _error_of_mean(before.mean_influence - after.mean_influence),
+            _error_of_mean(before.std_influence - after.std_influence),
+        )
+        found = (before.mean - after.mean, before.std - after.std)
+        shares = (found[0] / before.mean, found[1] / before.std)
+        gains = map(Gain, promised, found, errors, shares)
+        return dict(zip(("mean", "standard deviation"), gains, strict=True))
 
 
 def design_study(
@@ -215,8 +256,8 @@ def _check(problem: RobustDTE, design: Values, seed: int) -> Check:
     return Check(
         mean=float(mean + difference.mean()),
         std=corrected,
-        std_error=corrected * _error_of_mean(influence),
-        difference=difference,
+        mean_influence=difference,
+        std_influence=corrected * influence,
     )
 
 
