@@ -107,7 +107,8 @@ def finite_array(
     """
     wanted = "(" + ", ".join("n" if size is None else str(size) for size in shape) + ")"
     try:
-        if np.iscomplexobj(value):
+        # Words and truth values would be turned into numbers.
+        if np.asarray(value).dtype.kind not in "iufO":
             raise TypeError
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):

@@ -63,6 +63,7 @@ def _of_mechanism(folder: Path, out: Path, data: Path | None, say: Say) -> dict[
 def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits
 
+    from pymoo_hdte.commands.optimum_shift import optimum_shift
     from pymoo_hdte.discrepancy import read_campaign
     from pymoo_hdte.discrepancy.locate import locate
     from pymoo_hdte.discrepancy.next_experiment import next_experiment
@@ -80,7 +81,8 @@ def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
         say("proving it on the records that were held out")
         proof = prove(analysis)
         say("choosing the next test and writing the report")
-        return write_report(analysis, location, proof, next_experiment(analysis), out)
+        proposal = next_experiment(analysis)
+        return write_report(analysis, location, proof, proposal, optimum_shift, out)
 
 
 def _summary(document: dict[str, Any], out: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from pymoo_hdte.discrepancy.effect_words import in_words
 from pymoo_hdte.discrepancy.limits import limits
 from pymoo_hdte.discrepancy.misfit_map import Location
 from pymoo_hdte.discrepancy.next_experiment import Proposal
-from pymoo_hdte.discrepancy.optimum import SURROGATE_ORDER, OptimumShift, optimum_shift
+from pymoo_hdte.discrepancy.optimum import OptimumShift
 from pymoo_hdte.discrepancy.prove import Proof
 from pymoo_hdte.discrepancy.report_figures import (
     gap_by_channel,
@@ -40,9 +41,13 @@ from pymoo_hdte.discrepancy.revise import (
 )
 from pymoo_hdte.discrepancy.verdict_file import verdict_document
 from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.reports.figures import data_uri
 from pymoo_hdte.reports.page import page
+
+OptimumOf = Callable[[DriveModel, DriveModel], OptimumShift]
+"""Says how the robust optimum moves from one drive model to another."""
 
 
 def write_report(
@@ -50,6 +55,7 @@ def write_report(
     location: Location,
     proof: Proof | None,
     proposal: Proposal,
+    optimum_shift: OptimumOf,
     out: str | Path,
 ) -> dict[str, Any]:
     """Write a report with verdict and revised model; return the verdict's document.
@@ -61,6 +67,9 @@ def write_report(
     proof : Proof or None
         None where no record was held out.
     proposal : Proposal
+    optimum_shift : callable
+        Of the fitted base and the revised model; asked only where an effect was added. That of
+        `pymoo_hdte.commands.optimum_shift` optimises both.
     out : str or Path
         New, empty, or an earlier report, which is replaced. Without a revised model, for a drive
         that a data sheet cannot hold, its two files are missing and the verdict says why.
@@ -82,7 +91,7 @@ def write_report(
         analysis, location, None if proof is None else proof.as_dict(), proposal
     )
     document["limits"] = limits(analysis)
-    model_files, shift = _revision(analysis)
+    model_files, shift = _revision(analysis, optimum_shift)
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
     html = _page(analysis, location, proof, document, shift)
@@ -90,7 +99,9 @@ def write_report(
     return document
 
 
-def _revision(analysis: Analysis) -> tuple[dict[str, str], OptimumShift]:
+def _revision(
+    analysis: Analysis, optimum_shift: OptimumOf
+) -> tuple[dict[str, str], OptimumShift]:
     """Return the files of the revised model, and what it does to the robust optimum."""
     try:
         model = revised_model(analysis)
@@ -160,5 +171,4 @@ def _page(
         metrics=metric_rows(proof),
         records=record_rows(analysis.campaign, proof),
         shift=shift,
-        surrogate_order=SURROGATE_ORDER,
     )
