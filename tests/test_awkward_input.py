@@ -1,6 +1,7 @@
 """Input that nobody means to give: what the fuzz campaign found, each with its clear refusal."""
 
 import re
+from fractions import Fraction
 from functools import cache
 
 import numpy as np
@@ -60,6 +61,19 @@ def test_huge_values_are_refused_like_others():
         whole_number("n", -(10**5000), 1)
     with pytest.raises(InvalidInput, match="real numbers of shape"):
         finite_array("x", nested(100), (None,))
+
+
+@pytest.mark.parametrize("value", [["1", "2"], [True, False], [b"1"], ["1", 2.0], [1j]])
+def test_words_and_truth_values_are_no_numbers(value):
+    with pytest.raises(InvalidInput, match=r"x is .*, allowed: real numbers of shape \(n\)"):
+        finite_array("x", value, (None,))
+
+
+@pytest.mark.parametrize(
+    "value", [[1, 2], [1.5], [Fraction(1, 2)], np.arange(2, dtype=np.uint8), []]
+)
+def test_every_kind_of_number_is_one(value):
+    assert finite_array("x", value, (None,)).tolist() == [float(one) for one in value]
 
 
 def write(path, *lines):
