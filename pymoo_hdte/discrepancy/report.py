@@ -99,9 +99,7 @@ def write_report(
     return document
 
 
-def _revision(
-    analysis: Analysis, optimum_shift: OptimumOf
-) -> tuple[dict[str, str], OptimumShift]:
+def _revision(analysis: Analysis, optimum_shift: OptimumOf) -> tuple[dict[str, str], OptimumShift]:
     """Return the files of the revised model, and what it does to the robust optimum."""
     try:
         model = revised_model(analysis)
