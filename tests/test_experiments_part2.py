@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
 from experiments import dte_map, fig12, sensitivity
@@ -173,6 +174,22 @@ class TestShares:
             other[:, axis] = rng.uniform(problem.xl[axis], problem.xu[axis], len(designs))
             total = np.mean((problem.moments(other)[0] - mean) ** 2) / (2.0 * mean.var())
             assert found["mean"].total[axis] == pytest.approx(total, rel=0.1, abs=1e-6)
+
+    @pytest.mark.parametrize("name", ["calibrated", "resonant"])
+    def test_shares_of_the_moments_are_exact(self, name):
+        problem = robust_problem(name)
+        found = design_indices(problem)
+        # The variance has twice the surrogate's degree in each variable, its square four times.
+        rule = leggauss(2 * max(problem.surrogate.orders) + 1)
+        nodes = np.stack(np.meshgrid(*[rule[0]] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
+        weights = np.prod(np.meshgrid(*[rule[1] / 2.0] * 4, indexing="ij"), axis=0).ravel()
+        middle, reach = (problem.xu + problem.xl) / 2.0, (problem.xu - problem.xl) / 2.0
+        mean, std = problem.moments(middle + reach * nodes)
+        for kind, values in (("mean", mean), ("variance", std**2)):
+            average = weights @ values
+            assert found[kind].mean == pytest.approx(average, rel=1e-12)
+            expected = weights @ (values - average) ** 2
+            assert found[kind].variance == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("experiment", [fig12, sensitivity])
