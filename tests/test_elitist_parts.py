@@ -118,6 +118,14 @@ def test_shares_follow_success_down_to_a_floor(rng):
     np.testing.assert_allclose(np.bincount(drawn) / 20_000, success.shares, atol=0.01)
 
 
+def test_a_rate_is_known_no_better_than_from_so_many_trials():
+    success = SuccessShares(3)
+    success.learn(np.array([0, 0, 0, 1]), np.array([True, False, False, False]))
+    # Laplace's rule of succession: one of three, none of one, none of none.
+    rates = np.array([2.0 / 5.0, 1.0 / 3.0, 1.0 / 2.0])
+    np.testing.assert_allclose(success.shares, 0.05 + 0.85 * rates / rates.sum())
+
+
 def test_old_success_fades():
     success = SuccessShares(2)
     moves = np.array([0] * 50 + [1] * 50)
@@ -234,6 +242,10 @@ def test_copies_go_before_anything_else():
     swarm = points([[0, 1], [0, 1], [1, 0], [5, 5], [0, 1], [9, 9]])
     np.testing.assert_array_equal(survivors(swarm, 4), [0, 2, 3, 5])
     np.testing.assert_array_equal(survivors(swarm, 5), [0, 1, 2, 3, 5])
+    # Among themselves they go by the front of what they repeat, not by their place.
+    swarm = points([[5, 5], [5, 5], [9, 9], [9, 9], [0, 1], [0, 1]])
+    np.testing.assert_array_equal(survivors(swarm, 4), [0, 2, 4, 5])
+    np.testing.assert_array_equal(survivors(swarm, 5), [0, 1, 2, 4, 5])
 
 
 def test_infeasible_points_are_ordered_by_violation():
