@@ -45,6 +45,9 @@ def test_entropy_is_bounded_by_the_number_of_cells_if_that_is_smaller():
     corners = np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]])
     # Four full cells of four are all the diversity there can be, though there are 40 solutions.
     assert normalised_entropy(np.tile(corners, (10, 1)), divisions=2) == pytest.approx(1.0)
+    # Four of the eight cells that three objectives make hold two thirds of it: ln 4 / ln 8.
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    assert normalised_entropy(np.tile(corners, (10, 1)), divisions=2) == pytest.approx(2.0 / 3.0)
 
 
 @pytest.mark.parametrize("n_obj", [2, 3])
