@@ -167,6 +167,25 @@ def test_a_huge_file_is_not_read(kind, tmp_path):
     refused(kind[0].load, path, "size of the file is 1099511627776")
 
 
+@pytest.mark.parametrize("more", [0, 1])
+def test_a_file_of_the_largest_size_is_read_and_no_larger_one(more, tmp_path):
+    path, form = tmp_path / "large", FileFormat("a test", 1, ("text",), ("numbers",))
+
+    def written(characters, numbers):
+        form.write(path, {"text": " " * characters}, numbers=np.zeros(numbers))
+        return path.stat().st_size
+
+    # A number takes eight bytes and a character four, beside what does not change.
+    count, odd = divmod(LARGEST_FILE - written(10, 400_000), 8)
+    count += 400_000
+    if more:
+        with pytest.raises(InvalidInput, match=f"at most {LARGEST_FILE} bytes"):
+            written(10 + odd // 4, count + 1)
+    else:
+        assert written(10 + odd // 4, count) == LARGEST_FILE
+        assert form.read(path)[1]["numbers"].shape == (count,)
+
+
 # --- archives ---------------------------------------------------------------------------------
 
 HEADER = members_of(SURROGATE)["header.npy"]
