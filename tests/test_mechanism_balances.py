@@ -10,7 +10,12 @@ from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.mesh_laws import HardeningStiffness
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
-from pymoo_hdte.mechanism.laws import ConstantForce, DirectionalFriction
+from pymoo_hdte.mechanism.laws import (
+    ConstantForce,
+    DirectionalFriction,
+    LinearDamper,
+    LinearSpring,
+)
 from pymoo_hdte.mechanism.motion import highest_frequency, motion_of, noise_of, smooth
 from pymoo_hdte.mechanism.port_motion import law_force
 
@@ -126,6 +131,22 @@ def test_the_balances_of_an_analytic_motion_close(name, law, force):
     assert np.sqrt(np.sum(left(balance, [effect]) ** 2)) < 2e-3 * scale
     # Without the law they do not close, so that the test can fail.
     assert np.sqrt(np.sum(left(balance) ** 2)) > 1e-2 * scale
+
+
+@pytest.mark.parametrize(("cutoff", "finer"), [(20.0, 1), (30.0, 2), (80.0, 4)])
+def test_a_law_that_is_linear_takes_what_the_port_of_its_coefficient_does(cutoff, finer):
+    balance = Balance(two_masses(), closed(), cutoff)
+    assert len(balance._fine["between"].speed) == finer * len(balance.time)
+    laws = [
+        LawAt("linear_stiffness", "between", LinearSpring(7.0)),
+        LawAt("viscous_friction", "between", LinearDamper(0.3)),
+    ]
+    names = quantity_names(balance.mechanism)
+    spring, damper = (f"{name} of between" for name in ("stiffness", "damping"))
+    terms = (
+        7.0 * balance.terms[:, names.index(spring)] + 0.3 * balance.terms[:, names.index(damper)]
+    )
+    assert balance.forces(laws) == pytest.approx(-terms, abs=1e-6 * np.abs(terms).max())
 
 
 def test_slipping_springs_follow_the_order_of_the_samples():
