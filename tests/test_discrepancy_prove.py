@@ -206,6 +206,33 @@ def test_overlay_shows_the_record_that_was_measured(ripple):
     assert missed > 10.0 * np.std(torque.after - torque.measured)
 
 
+def test_overlay_begins_where_a_turn_of_the_record_does(ripple):
+    proof = prove(ripple)
+    (record,) = (one for one in ripple.campaign.held_out if one.name == proof.worst)
+    row = np.abs(np.diff(record.input_angle)).max() / (2.0 * np.pi)
+    for shown in proof.overlays:
+        # Both turns are covered by samples from end to end.
+        assert np.diff([0.0, *np.sort(shown.sample_turns), 2.0]).max() <= 1.01 * row
+
+
+def test_the_worst_record_is_that_of_the_largest_multiple_of_its_noise(ripple):
+    data, worst = ripple.held_out, prove(ripple).worst
+    place = [record.name for record in data.features.records].index(worst)
+    covariance = data.features.covariance.copy()
+    covariance[place] *= 1e6
+    drowned = replace(data, features=replace(data.features, covariance=covariance))
+    assert prove(_With(ripple, drowned)).worst != worst
+
+
+def test_statistics_are_relative_to_what_was_measured(ripple):
+    proof = prove(ripple)
+    measured = proof.dte[0]
+    for predicted, metrics in zip(proof.dte[1:], proof.metrics, strict=True):
+        relative = 100.0 * np.mean(np.abs(predicted - measured) / measured)
+        assert metrics.mape_percent == pytest.approx(relative)
+        assert metrics.mean_error == pytest.approx(np.mean(predicted - measured))
+
+
 def test_floor_is_what_a_perfect_model_leaves(clean, rng):
     held_out = clean.held_out
     base = clean.verdict.base
