@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from planted_features import ORDERS, known_data, library, listed
 from virtual_rig_cases import BELIEVED
 
-from pymoo_hdte.discrepancy.candidate import lines_of, polar, wave, wave_starts
+from pymoo_hdte.discrepancy.candidate import (
+    line_with_variance,
+    lines_of,
+    polar,
+    wave,
+    wave_starts,
+)
 from pymoo_hdte.discrepancy.forward import coefficients_of
 from pymoo_hdte.discrepancy.library import candidates, out_of_tolerance
 from pymoo_hdte.discrepancy.parameters import MECHANICAL
@@ -92,6 +98,28 @@ def test_polar_is_the_same_wave(cosine, sine, angle):
     amplitude, phase = polar(cosine, sine)
     wanted = cosine * np.cos(angle) - sine * np.sin(angle)
     assert amplitude * np.cos(angle + phase) == pytest.approx(wanted, abs=1e-12 * (1 + amplitude))
+
+
+@given(st.floats(-3.1, 3.1), st.floats(0.1, 10.0), st.floats(-0.9, 0.9))
+def test_variances_of_a_line_are_carried_from_its_parts(angle, ratio, correlation):
+    cosine, sine = 2.0 * np.cos(angle), 2.0 * np.sin(angle)
+    covariance = 1e-4 * np.array([[1.0, correlation * ratio], [correlation * ratio, ratio**2]])
+    (amplitude, of_amplitude), (phase, of_phase) = line_with_variance(cosine, sine, covariance)
+    assert (amplitude, phase) == polar(cosine, sine)
+    # The slopes of amplitude and phase by the parts, as differences.
+    step = 1e-6 * np.eye(2)
+    ahead, behind = (
+        np.array([polar(cosine + sign * dc, sine + sign * ds) for dc, ds in step])
+        for sign in (1.0, -1.0)
+    )
+    slopes = (ahead - behind).T / 2e-6
+    expected = np.einsum("pi,ij,pj->p", slopes, covariance, slopes)
+    np.testing.assert_allclose([of_amplitude, of_phase], expected, rtol=1e-5)
+
+
+def test_of_a_line_that_is_not_there_the_phase_is_anywhere_in_a_turn():
+    _, (_, of_phase) = line_with_variance(1e-9, -1e-9, np.eye(2))
+    assert of_phase == pytest.approx((2.0 * np.pi) ** 2 / 12.0)
 
 
 @given(st.lists(st.tuples(parts, parts), min_size=1, max_size=3))
