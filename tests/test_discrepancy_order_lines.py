@@ -134,6 +134,20 @@ def test_covariance_is_that_of_simulated_noise():
             assert chi2.ppf(0.005, degrees) < total < chi2.ppf(0.995, degrees)
 
 
+def test_noise_of_the_angle_shows_where_a_line_is_steep():
+    phasors = np.array([0.3, 0.5 - 0.2j, 2.0j])
+    orders = np.array([1.0, 2.0, 6.0])
+    torque = waves(phasors, orders, ANGLE)
+    lines = order_lines(
+        record(1e-9 * np.sin(ANGLE), 1e-9 * np.sin(ANGLE), torque), RIG, RATIO, orders
+    )
+    slope = waves(1j * orders * phasors, orders, ANGLE)
+    quiet = row_covariance(RIG, RATIO, 1)
+    added = np.diag(lines.row_covariance - quiet)
+    assert added[2] == pytest.approx(np.mean(slope**2) * quiet[3, 3], rel=0.01)
+    assert added[[0, 1]] == pytest.approx(0.0, abs=1e-12 * added[2])
+
+
 def test_noise_of_the_input_encoder_is_shared_by_two_channels():
     rng = np.random.default_rng(8)
     fits = [order_lines(noisy(rng, 4), RIG, RATIO, [2.0]) for _ in range(300)]
