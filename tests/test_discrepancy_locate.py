@@ -79,6 +79,10 @@ def test_a_local_misfit_does_not_bias_the_refitted_base():
     p_value = chi2.sf(cell_chi_square(data, left), degrees_of_freedom(data))
     flagged = np.argwhere(benjamini_hochberg(p_value, 0.01))
     assert flagged.tolist() == [[record, 0, 0] for record in np.flatnonzero(loaded)]
+    # What is not left out keeps its weight: it is fitted down to its noise and no further.
+    clean = refit_clean(data, base)
+    freedom = data.features.values.size - loaded.sum()
+    assert clean.chi_square == pytest.approx(freedom, abs=4.0 * np.sqrt(2.0 * freedom))
 
 
 def test_a_named_line_flags_the_cells_that_it_moves():
