@@ -67,6 +67,24 @@ CASES = {
 }
 
 
+def test_a_record_in_reverse_has_its_speed(campaign):
+    """The fastest record turns backwards: its speed is another one all the same."""
+    fast = max(campaign.running, key=lambda record: record.input_speed)
+    slow = min(campaign.running, key=lambda record: abs(record.input_speed))
+    back = replace(
+        fast,
+        input_speed=-fast.input_speed,
+        input_angle=-fast.input_angle,
+        output_angle=-fast.output_angle,
+    )
+    forward = [replace(one, role="train") for one in campaign.running if one.input_speed > 0.0]
+    forward = [one for one in forward if one.input_speed == abs(slow.input_speed)]
+    assert forward
+    assert back.input_speed < -1.1 * forward[0].input_speed
+    fitted = [*forward, replace(back, role="train")]
+    assert not any("one speed" in sentence for sentence in said(campaign, fitted))
+
+
 def nyquist_order(record):
     return np.pi * record.sample_rate / abs(record.input_speed)
 
