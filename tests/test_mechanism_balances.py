@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from pymoo_hdte.drive.friction import CoulombFriction, PeriodicTorque
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
+from pymoo_hdte.drive.laws import PortState, periodic_phase
 from pymoo_hdte.drive.mesh_laws import HardeningStiffness
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
@@ -147,6 +148,19 @@ def test_a_law_that_is_linear_takes_what_the_port_of_its_coefficient_does(cutoff
         7.0 * balance.terms[:, names.index(spring)] + 0.3 * balance.terms[:, names.index(damper)]
     )
     assert balance.forces(laws) == pytest.approx(-terms, abs=1e-6 * np.abs(terms).max())
+
+
+@pytest.mark.parametrize("law", [DirectionalFriction(1.0, 0.5), LinearDamper(0.3)])
+def test_damping_of_a_law_is_its_derivative_by_the_speed(law):
+    # The smoothed sign turns within 1e-4; beyond it only what is viscous is left.
+    speed = np.array([-0.3, -2e-4, -5e-5, 3e-5, 1e-4, 0.2])
+
+    def respond(at):
+        return law.respond(PortState(0.0 * at, at, periodic_phase(0.0 * at), np.ones(1)))
+
+    step = 1e-9
+    slope = (respond(speed + step).torque - respond(speed - step).torque) / (2.0 * step)
+    assert np.broadcast_to(respond(speed).damping, slope.shape) == pytest.approx(slope, rel=1e-4)
 
 
 def test_slipping_springs_follow_the_order_of_the_samples():
