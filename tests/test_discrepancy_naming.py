@@ -1,6 +1,7 @@
 """The verdict on planted features: what is named, what is not, and which rule decides."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -151,6 +152,16 @@ def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():
     assert verdict.chosen.fit.values[place] == pytest.approx(wanted, abs=4.0 * deviation)
 
 
+def test_a_parameter_out_of_tolerance_does_not_hide_an_effect_beside_it():
+    def status(*names):
+        candidates = [SimpleNamespace(name=name) for name in names]
+        return naming._status(SimpleNamespace(listed=True, candidates=candidates), ())
+
+    assert status("parameter") == "parameter"
+    assert status("parameter", "parameter") == "parameter"
+    assert status("parameter", "torque_ripple") == "named"
+
+
 def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
     label = "eccentricity:sensor@0.009901"
     seen = [1.0 / 101.0]
@@ -216,6 +227,38 @@ def test_what_explains_one_channel_is_not_the_cause_of_what_another_shows(monkey
     assert left.tolist() == [False, True, False, False, False]
     monkeypatch.setattr(rival, "PART_SHARE", 0.0)
     assert verdict_on(data, [CUBIC, RIPPLE]).status == "named"
+
+
+def test_what_one_record_alone_shows_does_not_speak_against_a_curve():
+    """One condition may lie at a resonance, where no form is exact."""
+    data = disturbed(planted({CUBIC: (6e9,)}), 3000.0)
+    verdict = verdict_on(data, [CUBIC, RIPPLE])
+    assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC})
+    assert not rival.unexplained(data, verdict.base, verdict.chosen.fit).any()
+    excess = data.excess(verdict.chosen.fit)
+    assert excess.of_parts[1] > (rival.PLAIN - 1.0) * excess.freedom.sum(axis=0)[1]
+
+
+def test_an_effect_must_pay_for_its_unknowns():
+    freedom, price = 1000, 2.0 * np.log(1002)
+    base = SimpleNamespace(chi_square=1040.0, residuals=np.zeros(1002))
+    for gain, named in ((price + 5.9, False), (price + 6.1, True)):
+        found = SimpleNamespace(chi_square=base.chi_square - gain)
+        one = SimpleNamespace(
+            fit=found, candidates=[SimpleNamespace(unknowns=2)], exact=True, share=1.0
+        )
+        assert rival.explains(None, one, base, freedom) == named
+
+
+def test_rivals_are_compared_by_their_evidence():
+    def alternative(name, evidence):
+        fitted = SimpleNamespace(chi_square=1000.0, evidence=evidence)
+        return SimpleNamespace(fit=fitted, candidates=(name,), names={name}, exact=True)
+
+    chosen = alternative("chosen", 1050.0)
+    # Both leave the same; what counts is how much of its bounds each had to give up.
+    for more, equal in ((9.9, True), (10.1, False)):
+        assert rival.alike(alternative("other", 1050.0 + more), chosen, 1000) == equal
 
 
 def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent():
