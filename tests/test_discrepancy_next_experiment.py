@@ -74,6 +74,20 @@ def test_a_rival_is_told_apart_by_a_record_that_the_two_predict_apart():
     assert (proposal.test == "running") == (proposal.speed_rpm is not None)
 
 
+def test_the_test_to_make_tells_the_chosen_effect_from_its_nearest_rival(monkeypatch):
+    """Of the least separations 1, 0.5 and 3 the last is largest, though 9 stands elsewhere."""
+    data = known_data()
+    ripple, line = listed(data, "torque_ripple", [6.0]), listed(data, "kinematic_error", [6.0])
+    drag = listed(data, "nonlinear_drag")
+    data, _ = measured(ripple.build((0.005, 0.0)), np.random.default_rng(7))
+    chosen, *others = (rival(data, one, one.starts[0]) for one in (ripple, line, drag))
+    separations = iter([np.array([1.0, 9.0, 4.0]), np.array([8.0, 0.5, 3.0])])
+    monkeypatch.setitem(next_experiment.__globals__, "separation", lambda *_: next(separations))
+    proposal = next_experiment(judged(data, chosen, *others))
+    assert proposal.expected_separation == 3.0
+    assert proposal.separates == (chosen.label, others[1].label)
+
+
 def test_an_adequate_model_asks_for_its_least_certain_record():
     data, _ = measured(rng=np.random.default_rng(8))
     analysis = analysed(data, "adequate")
