@@ -61,6 +61,9 @@ def test_dry_friction_at_the_input_asks_for_the_other_direction():
     assert proposal.speed_rpm < 0.0
     assert "tare" in proposal.description
     assert proposal.separates == ("coulomb_friction:input", "zero error of the input torque sensor")
+    # Twice the level over the noise of 0.1 mN.m, which what the fit leaves open may half drown.
+    clear = (2.0 * 0.02 / 1e-4) ** 2
+    assert 0.5 * clear < proposal.expected_separation < clear
 
 
 def test_a_rival_is_told_apart_by_a_record_that_the_two_predict_apart():

@@ -162,6 +162,8 @@ def test_laws_have_the_signs_that_their_names_say():
     assert torque(DeadZone(1e-4), 5e-5) == pytest.approx(-2.5e4 * 5e-5, rel=1e-3)
     assert torque(PeriodicClearance(1.0, 0.0, 5e-5, 5e-5), 5e-4) == pytest.approx(-2.5e4 * 1e-4)
     assert torque(PeriodicClearance(1.0, np.pi, 5e-5, 5e-5), 5e-4) == pytest.approx(0.0, abs=1e-6)
+    # Where the variation would make it less than none, there is none.
+    assert torque(PeriodicClearance(1.0, np.pi, 5e-5, 8e-5), 5e-4) == pytest.approx(0.0, abs=1e-6)
     # Nothing is added before a sharp corner, and a straight line with the added stiffness beyond.
     corner = HardeningStiffness(0.0, 0.2, 1e-4, 20.0)
     assert torque(corner, 5e-5) == pytest.approx(0.0, abs=1e-6)
