@@ -51,6 +51,14 @@ def test_order_two_as_a_law_is_order_two_as_a_coefficient():
     size = np.abs(expected.torsion).max()
     assert torsion == pytest.approx(expected.torsion, abs=1e-9 * size)
     assert floquet_multipliers(by_law) == pytest.approx(floquet_multipliers(by_coefficient))
+    # A phase is one against another line: beside order 4 it decides how far motions grow.
+    other = ("mesh", PeriodicStiffness(4.0, 0.2, 0.3))
+    both = [
+        replace(one, laws=(*one.laws, other), input_speed=1.5 * one.input_speed)
+        for one in (by_law, by_coefficient)
+    ]
+    by_law, by_coefficient = (np.sort_complex(floquet_multipliers(one)[0]) for one in both)
+    assert by_coefficient == pytest.approx(by_law, rel=1e-9)
 
 
 @pytest.mark.parametrize("order", [1.0, 4.0, 2.02])
