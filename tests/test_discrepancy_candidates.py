@@ -117,9 +117,11 @@ def test_variances_of_a_line_are_carried_from_its_parts(angle, ratio, correlatio
     np.testing.assert_allclose([of_amplitude, of_phase], expected, rtol=1e-5)
 
 
-def test_of_a_line_that_is_not_there_the_phase_is_anywhere_in_a_turn():
-    _, (_, of_phase) = line_with_variance(1e-9, -1e-9, np.eye(2))
+@pytest.mark.parametrize("part", [1e-9, 1e-200, 0.0])
+def test_of_a_line_that_is_not_there_the_phase_is_anywhere_in_a_turn(part):
+    (_, of_amplitude), (_, of_phase) = line_with_variance(part, -part, 4.0 * np.eye(2))
     assert of_phase == pytest.approx((2.0 * np.pi) ** 2 / 12.0)
+    assert of_amplitude == pytest.approx(4.0)
 
 
 @given(st.lists(st.tuples(parts, parts), min_size=1, max_size=3))

@@ -167,10 +167,11 @@ def line_with_variance(
     than one of which nothing is known.
     """
     amplitude, phase = polar(cosine, sine)
-    size = max(amplitude, np.finfo(float).tiny)
-    along = np.array([cosine, sine]) / size
-    across = np.array([-sine, cosine]) / size
-    of_phase = min(float(across @ covariance @ across) / size**2, np.pi**2 / 3.0)
+    along = np.array([np.cos(phase), np.sin(phase)])
+    across = np.array([-np.sin(phase), np.cos(phase)])
+    sidewise = float(across @ covariance @ across)
+    nothing_known = np.pi**2 / 3.0
+    of_phase = sidewise / amplitude**2 if sidewise < nothing_known * amplitude**2 else nothing_known
     return (amplitude, float(along @ covariance @ along)), (phase, of_phase)
 
 
