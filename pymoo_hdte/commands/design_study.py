@@ -20,6 +20,8 @@ from pymoo_hdte.surrogate import SobolIndices, sobol_indices
 
 POPULATION = 100
 CHECKED_DRIVES = 1000
+LITTLE = 1e-3
+"""Share of mean and standard deviation that a variable must move, over its box, to matter."""
 
 Values = NDArray[np.float64]
 
@@ -169,6 +171,19 @@ class DesignStudy:
     def objectives(self) -> Values:
         """Its mean and standard deviation, shape (2,), arcsec."""
         return self.front[self.chosen[self.preference]]
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the variables that move neither objective by `LITTLE` over their whole box."""
+        problem = self.problem
+        moved = np.repeat(self.design[None], 2 * problem.n_var, axis=0)
+        for row, bound in enumerate((problem.xl, problem.xu)):
+            np.fill_diagonal(moved[row * problem.n_var :], bound)
+        changes = np.abs(problem.evaluate(moved) / self.objectives - 1.0).max(axis=1)
+        largest = changes.reshape(2, problem.n_var).max(axis=0)
+        return tuple(
+            name for name, one in zip(problem.var_names, largest, strict=True) if one < LITTLE
+        )
 
     @property
     def gains(self) -> dict[str, Gain]:

@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.commands.command import heading
-from pymoo_hdte.commands.design_study import CHECKED_DRIVES, POPULATION, Check, DesignStudy, Gain
+from pymoo_hdte.commands.design_study import (
+    CHECKED_DRIVES,
+    LITTLE,
+    POPULATION,
+    Check,
+    DesignStudy,
+    Gain,
+)
 from pymoo_hdte.decision import tolerance_band
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
@@ -78,6 +85,7 @@ def optimum_document(study: DesignStudy, notes: Sequence[str]) -> dict[str, Any]
                 problem.var_names, lower.tolist(), upper.tolist(), strict=True
             )
         },
+        "matter_little": list(study.free),
         "initial": dict(zip(problem.obj_names, study.initial.tolist(), strict=True)),
         "checked_on_the_model": {
             "drives": CHECKED_DRIVES,
@@ -125,47 +133,43 @@ def _gained(gain: Gain) -> dict[str, float]:
 
 
 def sentences(study: DesignStudy) -> list[str]:
-    """Say which design was chosen, what it gains, and whether the model confirms it."""
+    """Say which design was chosen, what it gains by the model, and what the surrogate promised."""
     problem = study.problem
     changes = 100.0 * (study.design / problem.nominal - 1.0)
     parts = [
         f"{name} {number(float(value), 4)} {problem.units[name]} ({change:+.1f} %)"
         for name, value, change in zip(problem.var_names, study.design, changes, strict=True)
     ]
-    judged = [
-        f"the {what} {_changed(gain.found)} ± {2.0 * gain.error:.2f} where the surrogate says that "
-        f"it {_changed(gain.promised)}"
-        for what, gain in study.gains.items()
-    ]
+    mean, std = study.gains.values()
+    before, after = study.initial_check, study.optimum_check
+    (mean_before, std_before), (mean_after, std_after) = study.initial, study.objectives
     return [
         f"Take {', '.join(parts)}.",
-        f"{_moved('The mean DTE', *_pair(study, 0))} arcsec, "
-        f"{_moved('the standard deviation', *_pair(study, 1))}.",
-        f"These are values of the surrogate. By the drive model itself {', and '.join(judged)} "
-        "(arcsec, two standard errors).",
+        f"By the drive model {_moved('the mean DTE', before.mean, after.mean)} arcsec "
+        f"({_by(mean)}), {_moved('the standard deviation', before.std, after.std)} "
+        f"({_by(std)}; two standard errors).",
+        f"By its surrogate, which was optimised, {_moved('the mean DTE', mean_before, mean_after)} "
+        f"arcsec, {_moved('the standard deviation', std_before, std_after)}.",
     ]
-
-
-def _pair(study: DesignStudy, objective: int) -> tuple[float, float]:
-    return float(study.initial[objective]), float(study.objectives[objective])
 
 
 def _moved(what: str, before: float, after: float) -> str:
-    return f"{what} {_verb(before - after)} from {before:.2f} to {after:.2f}"
+    return f"{what} {'falls' if after < before else 'rises'} from {before:.2f} to {after:.2f}"
 
 
-def _changed(fall: float) -> str:
-    return f"{_verb(fall)} by {abs(fall):.2f}"
-
-
-def _verb(fall: float) -> str:
-    return "falls" if fall > 0.0 else "rises"
+def _by(gain: Gain) -> str:
+    return f"by {abs(gain.found):.2f} ± {2.0 * gain.error:.2f}"
 
 
 def limits(study: DesignStudy, notes: Sequence[str]) -> list[str]:
     """Say what a reader should know before quoting the result; ``notes`` are of the drive."""
     found = list(notes)
     gains = study.gains
+    if study.free:
+        found.append(
+            f"No value of {' or '.join(study.free)} within the box moves mean or standard "
+            f"deviation by {100.0 * LITTLE:g} %: what is said of it carries no information."
+        )
     found += [
         f"The drive model does not confirm a lower {what}: do not build this design for it."
         for what, gain in gains.items()
