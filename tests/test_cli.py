@@ -67,6 +67,24 @@ def test_a_missing_campaign_is_one_line_and_writes_nothing(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["discrepancy", "."], "a folder with campaign.toml, of a harmonic drive, or rig.toml"),
+        (["optimise", "hs_20_10"], "a TOML file that is there, or hs_20_100"),
+    ],
+)
+def test_what_is_not_there_is_said_with_what_might_be(
+    arguments, words, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main([*arguments, "--out", "report"]) == cli.MISTAKE
+    printed = capsys.readouterr().err
+    assert words in printed
+    assert printed.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
     ("error", "words"),
     [
         (InvalidInput("believed.ratio", -1.0, "above 1"), "believed.ratio"),

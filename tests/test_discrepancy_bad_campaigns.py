@@ -115,7 +115,7 @@ def dead(values):
 
 
 FAULTS = {
-    "no table": (lambda folder: (folder / "campaign.toml").unlink(), "campaign.toml: No such file"),
+    "no table": (lambda folder: (folder / "campaign.toml").unlink(), "a folder with campaign.toml"),
     "empty table": (lambda folder: (folder / "campaign.toml").write_text(""), "line 1: title"),
     "no file": (lambda folder: (folder / ROW).unlink(), f"record.6..file is '{ROW}'"),
     "empty file": (lambda folder: (folder / ROW).write_bytes(b""), f"{ROW}, line 1"),

@@ -188,7 +188,11 @@ BAD_FIELDS = {
     "wrong ratio": ("ratio = 50", "ratio = 48", "slow.csv.gz.*transmission error"),
     "wrong turn": ("ratio = 50", "ratio = 52", "slow.csv.gz.*one output turn"),
     "wrong stiffness": ("rad = 25830", "rad = 450", "torsion.csv.gz.*slope"),
-    "stiffness in N.m/arcmin": ("rad = 25830", "rad = 7.5", "torsion.csv.gz.*slope"),
+    "stiffness in N.m/arcmin": (
+        "rad = 25830",
+        "rad = 7.5",
+        r"torsion.csv.gz.*slope.*believed stiffness of 7\.5 N\.m/rad.*the unit of either",
+    ),
     "inertia in g.cm2": (
         "inertia_kgm2 = 0.000197",
         "inertia_kgm2 = 1970",

@@ -71,7 +71,7 @@ STIFFNESS = 'stiffness = { value = 2.583e4, unit = "N.m/rad" }'
         ('symbol = "dfi1"', 'symbol = "dFp1"', "symbols", "each symbol once"),
         ('symbol = "dfi1"', 'symbol = ""', "error_source[1].symbol", "non-empty"),
         ("teeth_in_mesh = 50", "teeth_in_mesh = 0", "mesh.teeth_in_mesh", "at least 1"),
-        ("[teeth]", "[tooth]", "teeth", "missing"),
+        ("[teeth]", "[tooth]", "teeth", "missing; is it 'tooth'?"),
         ("[teeth]", "[teeth]\nmodule = 1", "teeth.module", "no such field"),
         ("[rated]", "[rated]\npower = 1", "rated.power", "no such field"),
         ("value = 20, unit", "value = 95, unit", "pressure_angle", "below 1.5"),

@@ -33,6 +33,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
 
 def _analysed(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
     """Analyse a campaign or a rig and write its report; return the verdict's document."""
+    from pymoo_hdte.discrepancy.campaign_format import CAMPAIGN_FILE
     from pymoo_hdte.discrepancy.report_folder import FOLDER
     from pymoo_hdte.measured.rig_files import RIG_FILE
 
@@ -41,6 +42,9 @@ def _analysed(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str,
         return _of_mechanism(folder, out, data, say)
     if data is not None:
         raise InvalidInput("--data", str(data), f"none without a {RIG_FILE}")
+    if folder.is_dir() and not (folder / CAMPAIGN_FILE).is_file():
+        allowed = f"a folder with {CAMPAIGN_FILE}, of a harmonic drive, or {RIG_FILE}, of another"
+        raise InvalidInput("CAMPAIGN", str(folder), allowed)
     return _of_drive(folder, out, say)
 
 

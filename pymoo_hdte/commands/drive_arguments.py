@@ -61,6 +61,8 @@ def read_sheet(named: str) -> DataSheet:
     """Return the data sheet of that file, or `BUILT_IN_SHEET`; errors as `read_drive`."""
     from pymoo_hdte.drive import hs_20_100, load_datasheet
 
-    if not named:
-        raise InvalidInput("DATASHEET", named, f"a TOML file, or {BUILT_IN_SHEET}")
-    return hs_20_100() if named == BUILT_IN_SHEET else load_datasheet(Path(named))
+    if named == BUILT_IN_SHEET:
+        return hs_20_100()
+    if not named or not Path(named).exists():
+        raise InvalidInput("DATASHEET", named, f"a TOML file that is there, or {BUILT_IN_SHEET}")
+    return load_datasheet(Path(named))

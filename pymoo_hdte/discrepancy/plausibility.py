@@ -148,11 +148,14 @@ def check_torsion(record: TorsionRecord, believed: Believed) -> None:
         slope = -float(torque @ record.output_angle / (torque @ torque))
         relative = slope * believed.stiffness
     if not 0.2 < relative < 5.0:
+        cause = "the unit of either" if relative > 0.0 else "a positive torque turns it backwards"
         allowed = (
-            f"{1.0 / believed.stiffness:.3g} rad/(N.m) within a factor of five; "
-            "a positive torque turns the output backwards"
+            f"{1.0 / believed.stiffness:.3g} rad/(N.m), as of the believed stiffness of "
+            f"{believed.stiffness:.4g} N.m/rad, within a factor of five ({cause})"
         )
-        raise InvalidInput("slope of -output_angle over output_torque", slope, allowed)
+        raise InvalidInput(
+            "slope of -output_angle over output_torque", float(f"{slope:.3g}"), allowed
+        )
 
 
 def _check_travel(record: RunningRecord, ratio: float) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Collection, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,9 @@ class Fields:
     def take(self, field: str, allowed: str) -> Any:
         """Return the raw value of a field that must be there; ``allowed`` words the error."""
         if field not in self._left:
-            raise InvalidInput(self._name(field), None, f"{allowed} (the field is missing)")
+            near = get_close_matches(field, self._left, 1)
+            what = f"missing; is it {near[0]!r}?" if near else "missing"
+            raise InvalidInput(self._name(field), None, f"{allowed} (the field is {what})")
         return self._left.pop(field)
 
     def table(self, field: str) -> Fields:
