@@ -15,7 +15,12 @@ import pytest
 from PIL import Image
 
 from experiments import swarm_parts
+from experiments.blind import OUTCOMES, SECONDS
+from experiments.blind_cases import MOST_WRONG_CONFIDENT
+from experiments.blind_data import read_outcomes
+from experiments.blind_targets import select
 from experiments.campaign import Campaign
+from experiments.committed import committed_file
 from experiments.comparison import objectives, true_front
 from experiments.peers_data import committed_scores
 from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table, subsets_table
@@ -187,6 +192,19 @@ class TestNumbersBesideThePaper:
         with io.StringIO(README) as text:
             rows = [line for line in csv.reader(text, delimiter="|") if len(line) == 5]
         assert all(cell.strip() for line in rows for cell in line[2:4])
+
+
+def test_how_often_the_workflow_is_right_and_wrong():
+    outcomes = read_outcomes(*(committed_file(name, "blind") for name in (OUTCOMES, SECONDS)))
+    single, none, pair = (select(outcomes, kind) for kind in ("single", "none", "pair"))
+    right = sum(one.right for one in single)
+    assert f"the first name or class is right in {right} of {len(single)}" in WORDS
+    alarms = sum(not one.right_answer for one in none)
+    assert f"with none hidden {alarms} of {len(none)} raise an alarm" in WORDS
+    both, wrong = sum(one.both for one in pair), sum(one.wrong_confident for one in pair)
+    assert f"With two hidden both are named in {both} of {len(pair)}" in WORDS
+    assert f"**{wrong} of {len(pair)} get a wrong name with confidence, five times what" in WORDS
+    assert wrong / len(pair) == pytest.approx(5.0 * MOST_WRONG_CONFIDENT)
 
 
 class TestNumbersOfThePeers:
