@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from test_discrepancy_prove import CONDITIONS, analysed
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
@@ -31,7 +33,7 @@ from pymoo_hdte.drive import (
     preset,
 )
 from pymoo_hdte.drive.mesh_laws import SoftWindup
-from pymoo_hdte.reports.page import number
+from pymoo_hdte.reports.page import digits, number
 from pymoo_hdte.units import ARCSEC
 
 PROPOSAL = Proposal("Turn it backwards.", "running", -600.0, 40.0, ("a", "b"), 12.0)
@@ -250,3 +252,26 @@ def test_model_without_steady_state_has_no_optimum():
     shift = optimum_shift(old, unstable)
     assert shift.choices == ()
     assert "no robust optimum" in shift.obstacle
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "shown"),
+    [
+        (0.015735405, 0.015741384, 6),
+        (1.0, 2.0, 4),
+        (-3.0, 3.0, 4),
+        (0.99999, 1.00001, 7),
+        (5.0, 5.0, 4),
+        (1.0, 1.0 + 1e-15, 12),
+    ],
+)
+def test_the_ends_of_an_interval_are_told_apart(lower, upper, shown):
+    assert digits(lower, upper) == shown
+
+
+@given(st.floats(1e-9, 1e9), st.floats(1e-9, 1.0))
+def test_ends_are_printed_within_a_twentieth_of_the_width(middle, relative):
+    lower, upper = middle * (1.0 - relative / 2.0), middle * (1.0 + relative / 2.0)
+    for end in (lower, upper):
+        printed = float(np.format_float_positional(end, digits(lower, upper), fractional=False))
+        assert abs(printed - end) <= 0.051 * (upper - lower)

@@ -18,6 +18,7 @@ def page(package: str, template: str, **values: Any) -> str:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
+    environment.globals["digits"] = digits
     return environment.get_template(template).render(**values)
 
 
@@ -32,3 +33,14 @@ def number(value: float | None, digits: int = 3) -> str:
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{mantissa}·10{power}".replace("-", "\N{MINUS SIGN}")
+
+
+def digits(lower: float | None, upper: float | None) -> int:
+    """Return how many digits tell the ends of an interval apart, with two of its width; at least 4.
+
+    More than 12 are not shown.
+    """
+    if lower is None or upper is None or not lower < upper:
+        return 4
+    places = np.log10(max(abs(lower), abs(upper)) / (upper - lower))
+    return int(np.clip(np.ceil(places) + 2, 4, 12)) if np.isfinite(places) else 4
