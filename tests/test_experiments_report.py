@@ -6,12 +6,15 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from importlib import import_module
+from importlib.metadata import packages_distributions
+from pathlib import Path
+from shutil import copytree, ignore_patterns
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from experiments import committed
+from experiments import committed, provenance
 from experiments.__main__ import main
 from experiments.campaign import Campaign
 from experiments.committed import read_origin, read_rows, stored_outcome, table_with_origin
@@ -227,6 +230,33 @@ def test_results_of_another_source_are_marked(out):
     stored = out / "table7" / "result.json"
     stored.write_text(re.sub(r'"made_by": "\w+"', '"made_by": "older"', stored.read_text()))
     assert "Made by another version" in write_report(out).read_text()
+
+
+@pytest.mark.parametrize("changed", ["report.py", "data/reliability.csv", "templates/index.html"])
+def test_a_result_depends_on_source_stored_outcomes_and_template(changed, tmp_path, monkeypatch):
+    folder = tmp_path / "experiments"
+    copytree(Path(provenance.__file__).parent, folder, ignore=ignore_patterns("__pycache__"))
+    monkeypatch.setattr(provenance, "__file__", str(folder / "provenance.py"))
+    before = provenance.report_fingerprint()
+    provenance.fingerprint.cache_clear()
+    assert provenance.report_fingerprint() == before
+    with (folder / changed).open("a") as file:
+        file.write("\n")
+    provenance.fingerprint.cache_clear()
+    assert provenance.report_fingerprint() != before
+
+
+def test_the_versions_are_those_of_all_that_computes_a_result():
+    """Every package that the sources import, but for those that only run or show a computation."""
+    root = Path(provenance.__file__).parents[1]
+    imported = set()
+    for path in [*(root / "pymoo_hdte").rglob("*.py"), *(root / "experiments").rglob("*.py")]:
+        imported |= set(re.findall(r"^ *(?:import|from) (\w+)", path.read_text(), re.MULTILINE))
+    distributions = packages_distributions()
+    found = {name for module in imported & distributions.keys() for name in distributions[module]}
+    bystanders = {"pymoo-hdte", "tqdm", "Jinja2", "threadpoolctl", "distributed"}
+    named = {name.lower() for name in (*provenance.PACKAGES, *provenance.EXTRAS)}
+    assert {name.lower() for name in found - bystanders} <= named
 
 
 def test_an_empty_folder_gives_an_empty_report(tmp_path):
