@@ -46,7 +46,14 @@ def example() -> Result:
         ("none", float("nan"), None, 0),
         ("all", float("inf"), None, 0),
     )
-    findings = (Finding(np.bool_(True), "They agree."), Finding(False, "They differ."))
+    findings = (
+        Finding(np.bool_(True), "They agree."),
+        Finding(False, "They differ."),
+        Finding(True, "A fit gives it back.", fitted=True),
+        Finding(False, "A fit misses it.", fitted=True),
+        Finding(True, "It holds.", check=True),
+        Finding(False, "It fails.", check=True),
+    )
     times = Table("times", "Wall times", (Column("time", "s"),), ((1.5,),), wall_times=True)
     return Result(
         title="An example",
@@ -220,9 +227,24 @@ def test_the_first_screen_repeats_the_headline_and_sorts_the_findings(out):
     first_screen, rest = page.split('<section id="table7">')
     assert "0.333" in first_screen
     assert "0.333" in rest
-    agreeing, differing = first_screen.split("Does not agree")
-    assert "They agree." in agreeing
-    assert "They differ." in differing
+    sections = first_screen.partition('<div class="verdicts">')[2].split("<h3 ")[1:]
+    found = [re.findall(r">([^<>]+)</h3>|<li>([^<]+) <a", section) for section in sections]
+    assert [[heading or sentence for heading, sentence in section] for section in found] == [
+        ["Agrees with the paper", "They agree."],
+        ["Does not agree with the paper", "They differ."],
+        ["Given back, because the model was fitted to it", "A fit gives it back."],
+        ["Not given back, though the model was fitted to it", "A fit misses it."],
+        ["Checks of our own that fail", "It fails."],
+        ["Checks of our own that hold", "It holds."],
+    ]
+    assert re.findall(r"<b>([^<]+)</b>", rest) == [
+        "Agrees.", "Differs.", "Fitted.", "Missed by the fit.", "Holds.", "Fails.",
+    ]  # fmt: skip
+
+
+def test_a_finding_is_judged_in_one_way():
+    with pytest.raises(ValueError, match="not both"):
+        Finding(True, "Both.", check=True, fitted=True)
 
 
 def test_results_of_another_source_are_marked(out):
