@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfreqz
 
-from experiments import dte_map, fig12, sensitivity, table8
+from experiments import dte_map, fig12, published, sensitivity, table8
 from experiments.accuracy_per_run import Trial, needed_table
 from experiments.campaign import Campaign
 from experiments.chaospy_twins import chaos, compare
@@ -37,7 +37,13 @@ from experiments.scatter import exact_moments
 from experiments.shares import design_indices, falls_when_halved, scatter_indices, study_designs
 from experiments.store import load, png_bytes, save
 from pymoo_hdte.decision import deviation_degree
-from pymoo_hdte.drive import PRESETS, MeshStiffnessVariation, floquet_multipliers, preset
+from pymoo_hdte.drive import (
+    PARAMETERS,
+    PRESETS,
+    MeshStiffnessVariation,
+    floquet_multipliers,
+    preset,
+)
 from pymoo_hdte.drive.measurement import CUTOFF, FILTER_ORDER, SAMPLING_RATE
 from pymoo_hdte.drive.speed_load_map import (
     SpeedLoadMap,
@@ -46,7 +52,13 @@ from pymoo_hdte.drive.speed_load_map import (
     torsional_mode,
 )
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, TruncatedNormal, latin_hypercube
+from pymoo_hdte.surrogate import (
+    Box,
+    ChebyshevSurrogate,
+    SobolIndices,
+    TruncatedNormal,
+    latin_hypercube,
+)
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 from pymoo_hdte.validation import validation_metrics
 
@@ -190,6 +202,30 @@ def test_quick_experiments_can_be_stored_and_read_again(experiment, tmp_path):
     if experiment is fig12:
         shares = [row[-1] for row in result.tables[0].rows if row[1] == "theta_s alone"]
         assert shares == pytest.approx([100.0] * 3)
+
+
+class TestSentences:
+    @pytest.mark.parametrize(("gain", "word"), [(1.009, "rigid"), (1.011, "not rigid")])
+    def test_a_drive_is_rigid_only_if_its_gain_is_1(self, gain, word):
+        finding = published._gain_finding(np.array([1.0, gain, 1.0]))
+        assert finding.sentence.endswith(f"the printed drive is {word} for its own excitation.")
+        assert finding.agrees == (word == "rigid")
+
+    @pytest.mark.parametrize(
+        ("dte", "word"), [(36.8, "damping hardly matter."), (37.0, "damping matter.")]
+    )
+    def test_parameters_matter_if_the_dte_is_not_the_static_error(self, dte, word):
+        table = published._designs([published.Design(36.5, dte, dte)])
+        assert table.findings[0].sentence.endswith(word)
+        assert table.findings[0].agrees == ("hardly" in word)
+
+    @pytest.mark.parametrize(("least", "idle"), [(0.02, False), (0.005, True)])
+    def test_variables_without_information_are_named_only_if_there_are_any(self, least, idle):
+        shares = np.array([0.9, 0.05, 0.03, least])
+        indices = SobolIndices(PARAMETERS[1:], 1.0, 1.0, shares, shares)
+        finding = sensitivity._influence_finding({"mean": indices})
+        assert ("The optimal value of the others" in finding.sentence) == idle
+        assert finding.agrees == (not idle)
 
 
 class TestFitted:
