@@ -17,6 +17,7 @@ from experiments.blind_codes import NAMES, code_of_set, words_of_set
 from experiments.blind_data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
 from experiments.blind_limits import size_at
 from experiments.blind_scoring import COLUMNS, BlindJob, bias_scores, truly_moved, verdict_scores
+from experiments.blind_shortfalls import shortfalls_table
 from experiments.blind_tables import _judged_table
 from experiments.blind_targets import judge_median, judge_rate, median, rate
 from experiments.campaign import Campaign, Run
@@ -385,3 +386,16 @@ def test_the_committed_outcomes_are_those_of_the_committed_cases():
     # Detection limits come last, and may be missing.
     assert [one.case for one in found] == cases()[: len(found)]
     assert {one.case.kind for one in found} >= {"none", "single", "unlisted", "pair"}
+
+
+@pytest.mark.parametrize(("moved", "words"), [(2.0, "by 4.0 standard"), (0.65, "by 1.3 standard")])
+def test_how_far_a_ripple_moves_the_base_is_measured(moved, words):
+    ripple = Case("single", ("torque_ripple",), 1.0, 0, ROOT)
+    biases = {"bias_before": moved, "bias_after": moved, "bias_error": 0.5}
+    cells = {"cells_moved": 1.0, "cells_flagged": 1.0, "cells_both": 1.0}
+    counts = Outcome(ripple, "named", ("torque_ripple:input",), numbers=biases | cells)
+    # Neither a case whose bias is within its error nor a failure counts.
+    idle = replace(counts, numbers=cells | {**biases, "bias_before": 0.1, "bias_after": 0.1})
+    failed = replace(counts, status="error", numbers={})
+    note = shortfalls_table([counts, counts, idle, idle, idle, failed]).note
+    assert f"torque ripple: in the median of the cases that count it moves the base {words}" in note
