@@ -18,7 +18,7 @@ from experiments import committed, provenance
 from experiments.__main__ import main
 from experiments.campaign import Campaign
 from experiments.committed import read_origin, read_rows, stored_outcome, table_with_origin
-from experiments.registry import EXPERIMENTS, Context
+from experiments.registry import EXPERIMENTS, Context, Experiment
 from experiments.report import check_page, write_report
 from experiments.result import Column, Finding, Picture, Result, Table, significant
 from experiments.store import load, png_bytes, save
@@ -180,6 +180,35 @@ def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["table5", "--full", "--out", str(tmp_path / "out")])
     assert "--full is for calibration, blind, peers" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda one: one.name)
+def test_seeds_are_refused_where_they_would_change_nothing(experiment, tmp_path, capsys):
+    module = import_module(f"experiments.{experiment.name}")
+    asks = "context.seeds" in Path(module.__file__).read_text()
+    assert experiment.takes_seeds == asks
+    if asks:
+        return
+    with pytest.raises(SystemExit) as stopped:
+        main([experiment.name, "--seeds", "20", "--out", str(tmp_path / "out")])
+    assert stopped.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--seeds is for table7, ablation; see" in line
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("option", "seeds"), [([], 20), (["--seeds", "3"], 3)])
+@pytest.mark.parametrize("name", [["table7"], []])
+def test_the_number_of_seeds_reaches_what_takes_it(name, option, seeds, tmp_path, monkeypatch):
+    asked = []
+
+    def run(experiment, context):
+        asked.append((experiment.name, context.seeds))
+        return Result("", "")
+
+    monkeypatch.setattr(Experiment, "run", run)
+    assert main([*name, *option, "--workers", "1", "--out", str(tmp_path)]) == 0
+    assert asked[0] == ("table7", seeds)
 
 
 def test_wall_times_are_stored_apart_from_what_must_come_out_the_same(out):
