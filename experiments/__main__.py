@@ -13,7 +13,7 @@ from pathlib import Path
 
 from experiments.campaign import Campaign
 from experiments.machine import usable_cores
-from experiments.registry import EXPERIMENTS, Context, Experiment
+from experiments.registry import EXPERIMENTS, Context, Experiment, ExtraMissing
 from experiments.report import check_page, write_report
 from experiments.store import save
 from experiments.workers import WorkerLost, WrongWorker, make_executor
@@ -21,7 +21,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.commands.parser import OneLineParser
 
 FAILED = 1
-"""Exit code where the workers or the disk fail, or a stored outcome is missing."""
+"""Exit code where the workers or the disk fail, or a stored outcome or an extra is missing."""
 SMALL = [one for one in EXPERIMENTS if one.has_small_version]
 STORED = [one for one in EXPERIMENTS if one.reads_outcome]
 SEEDED = [one for one in EXPERIMENTS if one.takes_seeds]
@@ -81,7 +81,7 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
             print(f"\n{message}", file=sys.stderr)
             write_report(context.out, notice=message)
             return INTERRUPTED
-        except (BrokenExecutor, WorkerLost, WrongWorker, OSError) as error:
+        except (BrokenExecutor, WorkerLost, WrongWorker, ExtraMissing, OSError) as error:
             # An OSError is a full disk, a folder that is no longer there, or no stored outcome.
             notes = getattr(error, "__notes__", [])
             print("\n" + "\n".join([f"{experiment.name}: {error}", *notes]), file=sys.stderr)

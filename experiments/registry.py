@@ -4,10 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 from experiments.campaign import Campaign
 from experiments.result import Result
+
+
+class ExtraMissing(RuntimeError):
+    """An experiment needs a package of an extra that is not installed."""
+
+
+def require(package: str, extra: str) -> None:
+    """Refuse to go on without a package that comes with an extra; it is not imported.
+
+    Raises
+    ------
+    ExtraMissing
+        It is not installed.
+    """
+    if find_spec(package) is None:
+        raise ExtraMissing(f"{package} is not installed: pip install '.[{extra}]'")
 
 
 @dataclass(frozen=True)

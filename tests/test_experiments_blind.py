@@ -1,8 +1,11 @@
 """Blind campaigns: what a case hides and nothing else, scores of verdicts, exact intervals."""
 
 import shutil
+import sys
+import tomllib
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from virtual_rig_cases import RIG as SHARED_RIG
 from virtual_rig_cases import SHORT
 
 from experiments import blind, blind_cases, blind_scoring, committed
+from experiments.__main__ import FAILED, main
 from experiments.blind_cases import BELIEVED, OUT_OF_TOLERANCE, RIG, Case, cases
 from experiments.blind_codes import NAMES, code_of_set, words_of_set
 from experiments.blind_data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
@@ -399,3 +403,17 @@ def test_how_far_a_ripple_moves_the_base_is_measured(moved, words):
     failed = replace(counts, status="error", numbers={})
     note = shortfalls_table([counts, counts, idle, idle, idle, failed]).note
     assert f"torque ripple: in the median of the cases that count it moves the base {words}" in note
+
+
+def test_without_the_extra_a_full_campaign_ends_with_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pysindy", None)
+    arguments = ["blind", "--full", "--workers", "1", "--out", str(tmp_path)]
+    assert main(arguments) == FAILED
+    title, blank, message = capsys.readouterr().err.splitlines()
+    assert title.startswith("blind: ")
+    assert (blank, message) == ("", "blind: pysindy is not installed: pip install '.[blind]'")
+    assert list(tmp_path.iterdir()) == []
+    # The extra that the line names is one that brings it.
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
+    (needed,) = project["project"]["optional-dependencies"]["blind"]
+    assert needed.startswith("pysindy")
