@@ -102,7 +102,7 @@ def _table(distributions: Sequence[Distribution]) -> Table:
         )
         for entry in distributions
     )
-    paper = ("paper", "not stated", *PAPER, None, None, None, None)
+    paper = ("paper", "±35 %, as we read it", *PAPER, None, None, None, None)
     columns = (
         Column("model"),
         Column("K, J_in, B_in, B_fc"),
