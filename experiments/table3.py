@@ -277,16 +277,12 @@ def _later_prototypes_table() -> Table:
         row.append(float(adjusted))
     least = min(rows, key=lambda row: row[-1])
     alike = least[-1] >= ALIKE
-    meaning = (
-        "nothing tells them from the series that Table 3 describes"
-        if alike
-        else "they are not of the series that Table 3 describes"
-    )
+    relation = "nothing tells them from" if alike else "they are not of"
     finding = Finding(
         alike,
         f"The five prototypes of Table 6 have a mean {least[0]} of {1e4 * least[1]:.3f}e-4 against "
         f"{1e4 * least[3]:.3f}e-4 in Table 3 (t-test, Holm's adjustment: p = "
-        f"{significant(least[-1], 1)}): {meaning}.",
+        f"{significant(least[-1], 1)}): {relation} the series that Table 3 describes.",
     )
     columns = (
         Column("coefficient"),
