@@ -13,7 +13,7 @@ from pathlib import Path
 
 from experiments.campaign import Campaign
 from experiments.machine import usable_cores
-from experiments.registry import EXPERIMENTS, Context, Experiment
+from experiments.registry import EXPERIMENTS, Context, Experiment, ExtraMissing
 from experiments.report import check_page, write_report
 from experiments.store import save
 from experiments.workers import WorkerLost, WrongWorker, make_executor
@@ -21,9 +21,12 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.commands.parser import OneLineParser
 
 FAILED = 1
-"""Exit code where the workers or the disk fail, or a stored outcome is missing."""
+"""Exit code where the workers or the disk fail, or a stored outcome or an extra is missing."""
 SMALL = [one for one in EXPERIMENTS if one.has_small_version]
 STORED = [one for one in EXPERIMENTS if one.reads_outcome]
+SEEDED = [one for one in EXPERIMENTS if one.takes_seeds]
+SEEDS = 20
+"""Runs of every algorithm in the paper, and here unless the user says otherwise."""
 INTERRUPTED = 130
 """Exit code that a shell expects of a program ended by Ctrl-C."""
 
@@ -40,6 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--quick is for {_names(SMALL)}")
     if options.full and options.name and not chosen[0].reads_outcome:
         parser.error(f"--full is for {_names(STORED)}")
+    if options.seeds and options.name and not chosen[0].takes_seeds:
+        parser.error(f"--seeds is for {_names(SEEDED)}")
     try:
         check_page(options.out)
     except (InvalidInput, OSError) as error:
@@ -55,7 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(str(error))
     with executor or nullcontext():
         campaign = Campaign(options.out, executor)
-        context = Context(options.seeds, options.out, campaign, options.full, options.quick)
+        seeds = options.seeds or SEEDS
+        context = Context(seeds, options.out, campaign, options.full, options.quick)
         return _run(chosen, context)
 
 
@@ -75,7 +81,7 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
             print(f"\n{message}", file=sys.stderr)
             write_report(context.out, notice=message)
             return INTERRUPTED
-        except (BrokenExecutor, WorkerLost, WrongWorker, OSError) as error:
+        except (BrokenExecutor, WorkerLost, WrongWorker, ExtraMissing, OSError) as error:
             # An OSError is a full disk, a folder that is no longer there, or no stored outcome.
             notes = getattr(error, "__notes__", [])
             print("\n" + "\n".join([f"{experiment.name}: {error}", *notes]), file=sys.stderr)
@@ -94,7 +100,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("name", nargs="?", help="one experiment; without it, the quick set")
     parser.add_argument("--list", action="store_true", help="list the experiments and stop")
     parser.add_argument(
-        "--seeds", type=_positive, default=20, help="runs of every algorithm (default 20)"
+        "--seeds",
+        type=_positive,
+        help=f"runs of every algorithm in {_names(SEEDED)} (default {SEEDS})",
     )
     parser.add_argument(
         "--workers",

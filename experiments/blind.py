@@ -31,7 +31,7 @@ from experiments.blind_tables import (
 )
 from experiments.campaign import Campaign
 from experiments.committed import committed_file, stored_outcome
-from experiments.registry import Context
+from experiments.registry import Context, require
 from experiments.result import Picture, Result
 from experiments.store import TIMES, write_atomically
 
@@ -120,6 +120,8 @@ def score_cases(chosen: list[Case], campaign: Campaign, title: str) -> list[Outc
 
 
 def _campaign(context: Context) -> list[Outcome]:
+    # Only the jobs import it, and the error of a job ends the command with a traceback.
+    require("pysindy", "blind")
     outcomes: list[Outcome] = []
     for title, limits in (("blind campaigns", False), ("detection limits", True)):
         chosen = [case for case in cases() if (case.kind == "detection") == limits]

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from experiments.blind_data import Outcome
 from experiments.blind_tables import JUDGED_COLUMNS, KINDS, judged_row
-from experiments.blind_targets import demands, select
-from experiments.result import Cell, Column, Table
+from experiments.blind_targets import demands, median, select
+from experiments.result import Cell, Column, Table, significant
 from pymoo_hdte.discrepancy.hidden_forms import LISTED_FORMS
 
 REASONS = {
@@ -24,12 +24,12 @@ REASONS = {
     "the input damping takes up the rest",
     "nonlinear drag": "the hidden powers of the speed are 1.7 and 3, the law's is 2, and the input "
     "damping takes up the rest",
-    "torque ripple": "it moves the base by three standard errors only, in the median, so that a "
-    "tenth of that is less than the records can tell",
+    "torque ripple": "in the median of the cases that count it moves the base by {errors} standard "
+    "errors, so that a tenth of that is less than the records can tell",
     "mesh stiffness variation": "where the hidden cosine is clipped it has harmonics beyond the "
     "law's",
 }
-"""What is known of the cause, for effects that fall short anywhere."""
+"""What is known of the cause, for effects that fall short anywhere; ``errors`` is measured."""
 PAIRS = "two effects"
 REASON_OF_PAIRS = (
     "beside a second effect one of near forms (stiffening with a corner and soft wind-up, backlash "
@@ -52,9 +52,22 @@ def shortfalls_table(outcomes: Sequence[Outcome]) -> Table:
     columns = (Column("hidden"), *JUDGED_COLUMNS)
     names = dict.fromkeys(str(row[0]) for row in rows)
     reasons = REASONS | {PAIRS: REASON_OF_PAIRS}
-    causes = [f"{name}: {reasons.get(name, 'not known')}" for name in names]
+    causes = [
+        f"{name}: {reasons.get(name, 'not known').format(errors=_errors(outcomes, name))}"
+        for name in names
+    ]
     note = (
         "What must be reached over all effects together, held against each alone, whether or not "
         f"its twenty cases could tell. Why, as far as it is known. {'; '.join(causes)}."
     )
     return Table("shortfalls", "Where a single effect falls short", columns, tuple(rows), note=note)
+
+
+def _errors(outcomes: Sequence[Outcome], name: str) -> str:
+    """Return the median bias that an effect gives the base, in standard errors of the base."""
+    biases = [
+        one.numbers["bias_before"] / one.numbers["bias_error"]
+        for one in select(outcomes, "single", name.replace(" ", "_"))
+        if "bias_error" in one.numbers and one.bias_ratio is not None
+    ]
+    return significant(median(biases).value, 2)

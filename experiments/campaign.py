@@ -8,6 +8,7 @@ Only the process that asks writes files, and a worker that would give other byte
 from __future__ import annotations
 
 import csv
+import hashlib
 import inspect
 import json
 import platform
@@ -65,9 +66,11 @@ Keep = Callable[[Job, Run], None]
 
 
 class Campaign:
-    """Runs jobs and keeps every finished one in ``out/runs/<fingerprint>/<key>.csv``.
+    """Runs jobs and keeps every finished one in ``out/runs/<origin>/<key>.csv``.
 
-    Seconds are kept apart, in ``out/times/runs``, because they differ from run to run.
+    The folder is named by a hash of the `origin`, which ``versions.json`` in it spells out, so that
+    no run is taken for that of another source, other versions or another kind of processor. Seconds
+    are kept apart, in ``out/times/runs``, because they differ from run to run.
 
     Parameters
     ----------
@@ -97,7 +100,7 @@ class Campaign:
         BrokenExecutor
             The executor itself has ended.
         """
-        pending = [job for job in jobs if not self._path(job).is_file()]
+        pending = [job for job in jobs if not self._finished(job)]
         done = len(jobs) - len(pending)
         with tqdm(total=len(jobs), initial=done, desc=title, unit="run", delay=2.0) as progress:
 
@@ -122,19 +125,24 @@ class Campaign:
             keep(job, run)
 
     def _path(self, job: Job) -> Path:
-        return self.out / "runs" / origin(_package(job))[SOURCE] / f"{job.key}.csv"
+        described = json.dumps(origin(_package(job)))
+        folder = hashlib.sha256(described.encode()).hexdigest()[:16]
+        return self.out / "runs" / folder / f"{job.key}.csv"
 
     def _time_path(self, job: Job) -> Path:
         path = self._path(job).relative_to(self.out)
         return (self.out / TIMES / path).with_suffix(".txt")
 
+    def _finished(self, job: Job) -> bool:
+        return self._path(job).is_file() and self._time_path(job).is_file()
+
     def _keep(self, job: Job, run: Run) -> None:
         settings = self._path(job).parent / "versions.json"
         if not settings.is_file():
-            write_atomically(settings, (json.dumps(environment(), indent=1) + "\n").encode())
+            described = json.dumps(origin(_package(job)), indent=1)
+            write_atomically(settings, f"{described}\n".encode())
         times = "".join(f"{seconds!r}\n" for seconds in (run.seconds, *run.parts))
         write_atomically(self._time_path(job), times.encode())
-        # The values come last: their file is the sign that the job is finished.
         table = csv_text(run.columns, run.values.tolist())
         write_atomically(self._path(job), table.encode())
 

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from experiments.measured_rigs import (
-    Study,
-    absent,
-    evidence_table,
-    fitted_values,
-    gaps_table,
-    pictures,
-    study,
-    values_table,
-    verdict_paragraphs,
-)
-from experiments.measured_twins import Twin, twins, twins_finding, twins_table
+from experiments.measured_report import MeasuredRig, measured_result
+from experiments.measured_rigs import Study, fitted_values, values_table
+from experiments.measured_twins import Twin, twins_finding
 from experiments.registry import Context
 from experiments.result import Finding, Result, Table
 
-TITLE = "EMPS: a positioning system with friction, measured by others"
-COMMAND = "python -m experiments emps"
+RIG = MeasuredRig(
+    name="emps",
+    folder="emps",
+    title="EMPS: a positioning system with friction, measured by others",
+    origin=(
+        "DATA_EMPS.mat and DATA_EMPS_PULSES.mat of the EMPS benchmark (Janot, Gautier, Brunot, "
+        "2019) at nonlinearbenchmark.org"
+    ),
+    believed=(
+        "The believed model is an inertia with viscous friction, in round numbers. One file is "
+        "fitted, the other, whose voltage has pulses added, is simulated from its voltage."
+    ),
+    port="joint",
+    # Dry friction of the rig is 20 N.
+    drag=30.0,
+)
 PUBLISHED = {
     "inertia of position": (95.109, 0.05),
     "damping of joint": (203.50, 0.05),
@@ -28,41 +33,16 @@ PUBLISHED = {
 }
 """Values of the benchmark's fit and the share within which ours should lie."""
 SOURCE = "Janot, Gautier, Brunot (2019), nonlinearbenchmark.org; its offset is -3.165 N."
-ORIGIN = (
-    "DATA_EMPS.mat and DATA_EMPS_PULSES.mat of the EMPS benchmark (Janot, Gautier, Brunot, 2019) "
-    "at nonlinearbenchmark.org"
-)
-DRAG = 30.0
-"""N at the largest speed, hidden in the twins; dry friction of the rig is 20 N."""
 
 
 def run(context: Context) -> Result:
     """Start from the model without friction; hold verdict, values and proof against the known."""
-    one = study("emps", "emps")
-    if one is None:
-        return absent(TITLE, "emps", COMMAND, ORIGIN)
-    found = twins(one, "joint", DRAG)
-    return Result(
-        title=TITLE,
-        command=COMMAND,
-        paragraphs=(
-            "The believed model is an inertia with viscous friction, in round numbers. One file is "
-            "fitted, the other, whose voltage has pulses added, is simulated from its voltage.",
-            *verdict_paragraphs(one),
-        ),
-        tables=(
-            _judged(one, found),
-            gaps_table(one),
-            twins_table(found),
-            evidence_table(one),
-        ),
-        pictures=pictures(one),
-        headline="values",
-    )
+    return measured_result(RIG, _judged)
 
 
 def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
-    table = values_table(one, {name: value for name, (value, _) in PUBLISHED.items()}, SOURCE)
+    known = {name: value for name, (value, _) in PUBLISHED.items()}
+    table = values_table(one, known, "literature", SOURCE)
     simulated = next(gap for gap in one.gaps if gap.kind == "simulation")
     ours = fitted_values(one)
     near = all(

@@ -93,24 +93,26 @@ def fitted_values(one: Study) -> dict[str, Any]:
     return found
 
 
-def values_table(one: Study, known: Mapping[str, float], source: str) -> Table:
-    """Return the fitted values with their intervals beside what the literature has.
+def values_table(one: Study, known: Mapping[str, float], heading: str, source: str) -> Table:
+    """Return the fitted values with their intervals beside values that are known otherwise.
 
     Parameters
     ----------
     one : Study
     known : mapping of str to float
-        The literature's values by parameter.
+        The other values by parameter.
+    heading : str
+        What the other values are, over their column.
     source : str
-        Of the literature's values.
+        Where they come from.
     """
     rows = []
     for name, value in fitted_values(one).items():
         lower, upper = value["interval95"]
-        literature = known.get(name)
-        off = None if literature is None else 100.0 * (value["value"] / literature - 1.0)
-        covers = "" if literature is None else "yes" if lower <= literature <= upper else "no"
-        rows.append((name, value["value"], lower, upper, literature, off, covers))
+        other = known.get(name)
+        off = None if other is None else 100.0 * (value["value"] / other - 1.0)
+        covers = "" if other is None else "yes" if lower <= other <= upper else "no"
+        rows.append((name, value["value"], lower, upper, other, off, covers))
     return Table(
         "values",
         "Parameters of the revised model",
@@ -119,12 +121,12 @@ def values_table(one: Study, known: Mapping[str, float], source: str) -> Table:
             Column("ours", "SI", 4),
             Column("lower", "SI", 4, "95 % interval"),
             Column("upper", "SI", 4, "95 % interval"),
-            Column("literature", "SI", 5),
+            Column(heading, "SI", 5),
             Column("difference", "%", 2),
             Column("interval covers"),
         ),
         tuple(rows),
-        note=f"Literature: {source}",
+        note=f"{heading.capitalize()}: {source}",
     )
 
 

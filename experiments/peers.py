@@ -60,9 +60,9 @@ PEERS_NOTE = (
     "part of what it offers, the second does not run there and ranks last. pymoo's MOPSO-CD and "
     "CMOPSO truncate their archives with generators without a seed; here these are seeded. Random "
     "search offers the non-dominated of all it drew. OMOPSO's archive has jMetalPy's epsilon of "
-    "0.0075 in objectives as they are, which leaves it two solutions of the welded beam. SMS-EMOA "
-    "selects by the hypervolume itself: where several have found the front, its points lie where "
-    "that measure counts them most."
+    "0.0075 in objectives as they are, which leaves it at most two solutions of the welded beam. "
+    "SMS-EMOA selects by the hypervolume itself: where several have found the front, its points "
+    "lie where that measure counts them most."
 )
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pymoo_hdte
 
-PACKAGES = ("numpy", "scipy", "numba", "pymoo", "moocore", "matplotlib")
+PACKAGES = ("numpy", "scipy", "numba", "pymoo", "moocore", "chaospy", "matplotlib")
 """Installed packages whose version can change a result."""
-EXTRAS = ("jmetalpy", "pygmo")
+EXTRAS = ("jmetalpy", "pygmo", "pysindy")
 """Packages that can as well, where they are installed."""
 
 
@@ -34,14 +34,20 @@ def fingerprint(*sources: Path) -> str:
     A change in any of them changes the fingerprint, so that what one state made is never taken for
     the work of another.
     """
-    package = Path(pymoo_hdte.__file__).parent
-    files = [p for p in package.rglob("*") if p.is_file() and "__pycache__" not in p.parts]
     digest = hashlib.sha256(json.dumps(environment()).encode())
-    for path in [*sorted(files), *sources]:
+    for path in [*_files(Path(pymoo_hdte.__file__).parent), *sources]:
         digest.update(f"{path.name} {path.stat().st_size}\n".encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 
 def report_fingerprint() -> str:
-    """Identify the state of everything that a finished result depends on."""
-    return fingerprint(*sorted(Path(__file__).parent.rglob("*.py")))
+    """Identify the state of everything in this repository that a finished result depends on.
+
+    That is the source, and the stored outcomes and the template of the page beside it.
+    """
+    return fingerprint(*_files(Path(__file__).parent))
+
+
+def _files(folder: Path) -> list[Path]:
+    found = (path for path in folder.rglob("*") if "__pycache__" not in path.parts)
+    return sorted(path for path in found if path.is_file())

@@ -4,10 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 from experiments.campaign import Campaign
 from experiments.result import Result
+
+
+class ExtraMissing(RuntimeError):
+    """An experiment needs a package of an extra that is not installed."""
+
+
+def require(package: str, extra: str) -> None:
+    """Refuse to go on without a package that comes with an extra; it is not imported.
+
+    Raises
+    ------
+    ExtraMissing
+        It is not installed.
+    """
+    if find_spec(package) is None:
+        raise ExtraMissing(f"{package} is not installed: pip install '.[{extra}]'")
 
 
 @dataclass(frozen=True)
@@ -17,7 +34,8 @@ class Context:
     Attributes
     ----------
     seeds
-        Number of independent runs of every algorithm: seeds 1..seeds.
+        Number of independent runs of every algorithm, seeds 1..seeds, of the experiments that take
+        it.
     out
         Folder of the results.
     campaign
@@ -52,6 +70,8 @@ class Experiment:
         Whether it shows the committed outcome of a long campaign, which ``--full`` runs.
     has_small_version
         Whether it takes ``--quick``.
+    takes_seeds
+        Whether ``--seeds`` says how many runs it makes; others have numbers of their own.
     """
 
     name: str
@@ -59,6 +79,7 @@ class Experiment:
     by_default: bool = True
     reads_outcome: bool = False
     has_small_version: bool = False
+    takes_seeds: bool = False
 
     def run(self, context: Context) -> Result:
         """Import the module and run it; nothing is imported for ``--list``."""
@@ -66,8 +87,14 @@ class Experiment:
 
 
 EXPERIMENTS = (
-    Experiment("table7", "Table 7 and Fig. 18: AMP-MOPSO against MOPSO and NSGA-II"),
-    Experiment("ablation", "Fig. 17: AMP-MOPSO without its pyramid, its entropy weight, or both"),
+    Experiment(
+        "table7", "Table 7 and Fig. 18: AMP-MOPSO against MOPSO and NSGA-II", takes_seeds=True
+    ),
+    Experiment(
+        "ablation",
+        "Fig. 17: AMP-MOPSO without its pyramid, its entropy weight, or both",
+        takes_seeds=True,
+    ),
     Experiment("table5", "Table 5 and Fig. 11: accuracy of the Chebyshev surrogate by order"),
     Experiment("table8", "Tables 8 and 9, Fig. 19: the designs that three preferences choose"),
     Experiment("published", "What Eq. (9) gives as printed, order by order, beside an integrator"),

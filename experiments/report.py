@@ -16,6 +16,15 @@ from pymoo_hdte.checks import InvalidInput
 
 PAGE = "index.html"
 _TITLE = "Robust design of a harmonic drive: results"
+_VERDICTS = {
+    "Agrees": ("Agrees with the paper", "yes"),
+    "Differs": ("Does not agree with the paper", "no"),
+    "Fitted": ("Given back, because the model was fitted to it", "fitted"),
+    "Missed by the fit": ("Not given back, though the model was fitted to it", "no"),
+    "Fails": ("Checks of our own that fail", "no"),
+    "Holds": ("Checks of our own that hold", "yes"),
+}
+"""Heading of the findings of one verdict, and the style that they are shown in."""
 
 
 def check_page(out: Path) -> None:
@@ -56,11 +65,10 @@ def write_report(out: Path, notice: str = "") -> Path:
         results=results,
         headlines=_headlines(results),
         verdicts=[
-            ("Agrees with the paper", "yes", _findings(results, agrees=True, check=False)),
-            ("Does not agree with the paper", "no", _findings(results, agrees=False, check=False)),
-            ("Checks of our own that fail", "no", _findings(results, agrees=False, check=True)),
-            ("Checks of our own that hold", "yes", _findings(results, agrees=True, check=True)),
+            (heading, mood, _findings(results, verdict))
+            for verdict, (heading, mood) in _VERDICTS.items()
         ],
+        moods={verdict: mood for verdict, (_, mood) in _VERDICTS.items()},
         outdated=[result.name for result in results if result.made_by != present],
         notice=notice,
         title=_TITLE,
@@ -81,13 +89,11 @@ def _headlines(results: Sequence[StoredResult]) -> list[tuple[StoredResult, Tabl
     ]
 
 
-def _findings(
-    results: Sequence[StoredResult], agrees: bool, check: bool
-) -> list[tuple[str, Finding]]:
+def _findings(results: Sequence[StoredResult], verdict: str) -> list[tuple[str, Finding]]:
     return [
         (result.name, finding)
         for result in results
         for table in result.tables
         for finding in table.findings
-        if finding.agrees == agrees and finding.check == check
+        if finding.verdict == verdict
     ]

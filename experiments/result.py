@@ -22,15 +22,28 @@ Cell = float | int | str | None
 class Finding:
     """One sentence that sets our numbers against the paper's, and whether the two agree.
 
-    A ``check`` sets them against a demand of our own instead, and says whether it holds.
+    A ``check`` sets them against a demand of our own instead, and says whether it holds. Where the
+    model was ``fitted`` to the paper's numbers, giving them back is no agreement.
     """
 
     agrees: bool
     sentence: str
     check: bool = False
+    fitted: bool = False
 
     def __post_init__(self) -> None:
+        if self.check and self.fitted:
+            raise ValueError("a finding is a check of our own or of a fit to the paper, not both")
         object.__setattr__(self, "agrees", bool(self.agrees))
+
+    @property
+    def verdict(self) -> str:
+        """What it comes to, in a word or two."""
+        if self.check:
+            return "Holds" if self.agrees else "Fails"
+        if self.fitted:
+            return "Fitted" if self.agrees else "Missed by the fit"
+        return "Agrees" if self.agrees else "Differs"
 
 
 @dataclass(frozen=True)

@@ -181,12 +181,12 @@ def _influence_finding(moments: dict[str, SobolIndices]) -> Finding:
         f"{name} {significant(100.0 * float(share), 2)} %"
         for name, share in zip(PARAMETERS[1:], largest, strict=True)
     ]
+    idle = "" if matter.all() else " The optimal value of the others carries no information."
     return Finding(
         bool(matter.all()),
         f"On {MODEL}, {matter.sum()} of {len(matter)} design variables have a total share of at "
         f"least {MATTERS_PERCENT:g} % in mean or variance of the DTE over the design box (larger "
-        f"of the two: {', '.join(shares)}). The optimal value of the others carries no "
-        "information.",
+        f"of the two: {', '.join(shares)}).{idle}",
         check=True,
     )
 

@@ -1,8 +1,11 @@
 """Blind campaigns: what a case hides and nothing else, scores of verdicts, exact intervals."""
 
 import shutil
+import sys
+import tomllib
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,11 +15,13 @@ from virtual_rig_cases import RIG as SHARED_RIG
 from virtual_rig_cases import SHORT
 
 from experiments import blind, blind_cases, blind_scoring, committed
+from experiments.__main__ import FAILED, main
 from experiments.blind_cases import BELIEVED, OUT_OF_TOLERANCE, RIG, Case, cases
 from experiments.blind_codes import NAMES, code_of_set, words_of_set
 from experiments.blind_data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
 from experiments.blind_limits import size_at
 from experiments.blind_scoring import COLUMNS, BlindJob, bias_scores, truly_moved, verdict_scores
+from experiments.blind_shortfalls import shortfalls_table
 from experiments.blind_tables import _judged_table
 from experiments.blind_targets import judge_median, judge_rate, median, rate
 from experiments.campaign import Campaign, Run
@@ -385,3 +390,30 @@ def test_the_committed_outcomes_are_those_of_the_committed_cases():
     # Detection limits come last, and may be missing.
     assert [one.case for one in found] == cases()[: len(found)]
     assert {one.case.kind for one in found} >= {"none", "single", "unlisted", "pair"}
+
+
+@pytest.mark.parametrize(("moved", "words"), [(2.0, "by 4.0 standard"), (0.65, "by 1.3 standard")])
+def test_how_far_a_ripple_moves_the_base_is_measured(moved, words):
+    ripple = Case("single", ("torque_ripple",), 1.0, 0, ROOT)
+    biases = {"bias_before": moved, "bias_after": moved, "bias_error": 0.5}
+    cells = {"cells_moved": 1.0, "cells_flagged": 1.0, "cells_both": 1.0}
+    counts = Outcome(ripple, "named", ("torque_ripple:input",), numbers=biases | cells)
+    # Neither a case whose bias is within its error nor a failure counts.
+    idle = replace(counts, numbers=cells | {**biases, "bias_before": 0.1, "bias_after": 0.1})
+    failed = replace(counts, status="error", numbers={})
+    note = shortfalls_table([counts, counts, idle, idle, idle, failed]).note
+    assert f"torque ripple: in the median of the cases that count it moves the base {words}" in note
+
+
+def test_without_the_extra_a_full_campaign_ends_with_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pysindy", None)
+    arguments = ["blind", "--full", "--workers", "1", "--out", str(tmp_path)]
+    assert main(arguments) == FAILED
+    title, blank, message = capsys.readouterr().err.splitlines()
+    assert title.startswith("blind: ")
+    assert (blank, message) == ("", "blind: pysindy is not installed: pip install '.[blind]'")
+    assert list(tmp_path.iterdir()) == []
+    # The extra that the line names is one that brings it.
+    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
+    (needed,) = project["project"]["optional-dependencies"]["blind"]
+    assert needed.startswith("pysindy")

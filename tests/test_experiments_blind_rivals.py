@@ -12,7 +12,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.parameters import Layout
 from pymoo_hdte.units import ARCSEC
 
-pytest.importorskip("pysindy", reason="pysindy comes with the dev extra only")
+pytest.importorskip("pysindy", reason="needs the extra blind")
 
 from experiments.blind_rivals import (
     explained,

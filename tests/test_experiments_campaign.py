@@ -1,5 +1,6 @@
 """Campaigns: same bytes for any number of workers, and after an interruption."""
 
+import json
 import os
 import platform
 import re
@@ -179,13 +180,34 @@ def test_an_executor_that_ends_takes_nothing_finished_with_it(tmp_path):
     assert caught.value.__notes__ == [KEPT.format(tmp_path)]
 
 
-def test_another_source_does_not_reuse_the_runs(tmp_path, monkeypatch):
+@pytest.mark.parametrize("part", ["fingerprint", "arithmetic", "environment"])
+def test_another_origin_does_not_reuse_the_runs(tmp_path, monkeypatch, part):
+    another = {"numpy": "another"} if part == "environment" else "another"
+    here = origin(Path(__file__).parent)
     Campaign(tmp_path).run(WALKS[:1], "walks")
-    monkeypatch.setattr("experiments.campaign.fingerprint", lambda *sources: "another")
+    monkeypatch.setattr(f"experiments.campaign.{part}", lambda *sources: another)
     origin.cache_clear()
     Campaign(tmp_path).run(WALKS[:1], "walks")
+    elsewhere = origin(Path(__file__).parent)
     origin.cache_clear()
-    assert len([name for name in files(tmp_path) if name.endswith(".csv")]) == 2
+    found = files(tmp_path)
+    assert len([name for name in found if name.endswith(".csv")]) == 2
+    stored = [json.loads(found[name]) for name in found if name.endswith("versions.json")]
+    assert sorted(stored, key=lambda one: one != here) == [here, elsewhere]
+    assert "another" in elsewhere.values()
+
+
+def test_a_run_whose_time_is_lost_is_done_again(tmp_path):
+    campaign = Campaign(tmp_path)
+    before = campaign.run(WALKS, "walks")
+    (lost,) = (tmp_path / "times").rglob("walk_seed2.txt")
+    lost.unlink()
+    after = campaign.run(WALKS, "walks")
+    assert lost.is_file()
+    seconds = [[run.seconds for run in runs] for runs in (before, after)]
+    assert [one == other for one, other in zip(*seconds, strict=True)] == [
+        seed != 2 for seed in SEEDS
+    ]
 
 
 def test_threads_of_one_process_take_turns(tmp_path):

@@ -9,7 +9,7 @@ from experiments.bench_campaign import draw_campaign, slope_error_per_noise, sum
 from experiments.campaign import Campaign
 from experiments.error_sources import outlier_counts, power, prototypes_needed, spoilt_readings
 from experiments.normality import pooled_rejection_rate, possible_sizes, shapiro_p
-from experiments.published_values import TABLE_2, TABLE_3
+from experiments.published_values import TABLE_2, TABLE_3, TABLE_6
 from experiments.rates import at_least
 from experiments.registry import Context
 from experiments.static_error_statistics import (
@@ -169,3 +169,35 @@ def test_experiments_run_and_their_own_checks_hold(experiment, few, monkeypatch,
     assert checks
     assert all(finding.agrees for finding in checks)
     assert repr(first.tables) == repr(second.tables)
+
+
+def test_whether_later_prototypes_are_of_the_series_is_said_as_the_test_has_it(monkeypatch):
+    (apart,) = table3._later_prototypes_table().findings
+    assert not apart.agrees
+    assert apart.sentence.endswith("they are not of the series that Table 3 describes.")
+    means = {name: row.mean for name, row in TABLE_3.items()}
+    alike = {
+        number: prototype._replace(
+            **{
+                name: mean * (0.96 + 0.02 * place)
+                for name, mean in means.items()
+                if name != "B_out"
+            }
+        )
+        for place, (number, prototype) in enumerate(TABLE_6.items())
+    }
+    monkeypatch.setattr(table3, "TABLE_6", alike)
+    (finding,) = table3._later_prototypes_table().findings
+    assert finding.agrees
+    assert finding.sentence.endswith("nothing tells them from the series that Table 3 describes.")
+
+
+def test_whether_b_out_needs_a_sensor_of_its_own_hangs_on_the_noise(monkeypatch):
+    (finding,) = table3._resolution_table().findings
+    assert not finding.agrees
+    assert finding.sentence.endswith("so B_out needs one of its own.")
+    coarse = TABLE_3 | {"B_out": TABLE_3["B_out"]._replace(std=1e3 * TABLE_3["B_out"].std)}
+    monkeypatch.setattr(table3, "TABLE_3", coarse)
+    (finding,) = table3._resolution_table().findings
+    assert finding.agrees
+    assert finding.sentence.endswith("which is enough.")

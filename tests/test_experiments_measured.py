@@ -1,11 +1,14 @@
 """Other people's measurements: the verdicts that the literature lets one expect, and the twins."""
 
+from types import SimpleNamespace
+
 import pytest
 
-from experiments import emps, kinova
+from experiments import emps, kinova, measured_rigs
 from experiments.campaign import Campaign
 from experiments.measured_rigs import MEASURED
 from experiments.registry import Context
+from experiments.result import Finding
 
 
 def result_of(experiment, folder, out):
@@ -30,3 +33,51 @@ def test_without_the_measurements_the_report_says_so(experiment, tmp_path, monke
     result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
     assert "Skipped" in result.paragraphs[0]
     assert str(tmp_path / "nowhere") in result.paragraphs[0]
+
+
+@pytest.fixture
+def judge_kinova(monkeypatch):
+    """Judge a study without effects, whose limits and next test are given."""
+
+    def judge(*, said=True, rate=-1.0):
+        limits = ("The records cannot separate Coulomb friction from an offset.",) * said
+        line = {"value": 0.03, "interval95": (0.02, 0.035)}
+        fitted = {"kinematic error: order 200 amplitude": line, "another": line}
+        monkeypatch.setattr(measured_rigs, "fitted_values", lambda one: fitted)
+        monkeypatch.setattr(kinova, "limits", lambda finding: limits)
+        monkeypatch.setattr(kinova, "next_test", lambda finding: SimpleNamespace(rate=rate))
+        monkeypatch.setattr(kinova, "twins_finding", lambda found: Finding(True, "", check=True))
+        study = SimpleNamespace(
+            names=(), finding=SimpleNamespace(accepted=SimpleNamespace(effects=()))
+        )
+        return kinova._judged(study, ())
+
+    return judge
+
+
+@pytest.mark.parametrize(
+    ("said", "rate", "words"),
+    [
+        (True, -1.0, ": said, and the reverse run is proposed."),
+        (True, 1.0, ": said, and the reverse run is not proposed."),
+        (False, -1.0, ": not said, and the reverse run is proposed."),
+        (False, 1.0, ": not said, and the reverse run is not proposed."),
+    ],
+)
+def test_what_is_said_of_one_direction_is_what_happened(judge_kinova, said, rate, words):
+    *_, finding, _ = judge_kinova(said=said, rate=rate).findings
+    assert finding.sentence.endswith(words)
+    assert finding.agrees == (said and rate < 0.0)
+
+
+def test_our_own_fits_are_not_called_literature(judge_kinova):
+    table = judge_kinova()
+    names = [column.name for column in table.columns]
+    assert "literature" not in names
+    assert table.note.startswith("Our fits record by record: ")
+    line, other = table.rows
+    values = dict(zip(names, line, strict=True))
+    assert values["our fits record by record"] == 0.040
+    assert values["difference"] == pytest.approx(-25.0)
+    assert values["interval covers"] == "no"
+    assert other[4:] == (None, None, "")

@@ -7,11 +7,13 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
-from experiments import dte_map, fig12, sensitivity
+from experiments import dte_map, fig12, published, sensitivity, table8
 from experiments.accuracy_per_run import Trial, needed_table
 from experiments.campaign import Campaign
 from experiments.chaospy_twins import chaos, compare
-from experiments.choices import BAND
+from experiments.choices import BAND, initial_choices, paper_choices
+from experiments.design_tables import _idle_sweep, deviation_table
+from experiments.models import FITTED
 from experiments.printed_validation import (
     HIGHEST,
     LOWEST,
@@ -28,13 +30,21 @@ from experiments.printed_validation import (
 )
 from experiments.prototype_consistency import Prediction, best_case_table, consistency_table
 from experiments.prototype_records import record
+from experiments.published_values import TABLE_6, Moments
 from experiments.registry import Context
 from experiments.rival_surrogates import FAMILIES, SCREENED, TENSOR, fit_grid, rivals
 from experiments.runs import robust_problem
 from experiments.scatter import exact_moments
 from experiments.shares import design_indices, falls_when_halved, scatter_indices, study_designs
 from experiments.store import load, png_bytes, save
-from pymoo_hdte.drive import MeshStiffnessVariation, floquet_multipliers, preset
+from pymoo_hdte.decision import deviation_degree
+from pymoo_hdte.drive import (
+    PARAMETERS,
+    PRESETS,
+    MeshStiffnessVariation,
+    floquet_multipliers,
+    preset,
+)
 from pymoo_hdte.drive.measurement import CUTOFF, FILTER_ORDER, SAMPLING_RATE
 from pymoo_hdte.drive.speed_load_map import (
     SpeedLoadMap,
@@ -43,7 +53,13 @@ from pymoo_hdte.drive.speed_load_map import (
     torsional_mode,
 )
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, TruncatedNormal, latin_hypercube
+from pymoo_hdte.surrogate import (
+    Box,
+    ChebyshevSurrogate,
+    SobolIndices,
+    TruncatedNormal,
+    latin_hypercube,
+)
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 from pymoo_hdte.validation import validation_metrics
 
@@ -203,6 +219,72 @@ def test_quick_experiments_can_be_stored_and_read_again(experiment, tmp_path):
     if experiment is fig12:
         shares = [row[-1] for row in result.tables[0].rows if row[1] == "theta_s alone"]
         assert shares == pytest.approx([100.0] * 3)
+
+
+class TestSentences:
+    @pytest.mark.parametrize(("gain", "word"), [(1.009, "rigid"), (1.011, "not rigid")])
+    def test_a_drive_is_rigid_only_if_its_gain_is_1(self, gain, word):
+        finding = published._gain_finding(np.array([1.0, gain, 1.0]))
+        assert finding.sentence.endswith(f"the printed drive is {word} for its own excitation.")
+        assert finding.agrees == (word == "rigid")
+
+    @pytest.mark.parametrize(
+        ("dte", "word"), [(36.8, "damping hardly matter."), (37.0, "damping matter.")]
+    )
+    def test_parameters_matter_if_the_dte_is_not_the_static_error(self, dte, word):
+        table = published._designs([published.Design(36.5, dte, dte)])
+        assert table.findings[0].sentence.endswith(word)
+        assert table.findings[0].agrees == ("hardly" in word)
+
+    @pytest.mark.parametrize(("least", "idle"), [(0.02, False), (0.005, True)])
+    def test_variables_without_information_are_named_only_if_there_are_any(self, least, idle):
+        shares = np.array([0.9, 0.05, 0.03, least])
+        indices = SobolIndices(PARAMETERS[1:], 1.0, 1.0, shares, shares)
+        finding = sensitivity._influence_finding({"mean": indices})
+        assert ("The optimal value of the others" in finding.sentence) == idle
+        assert finding.agrees == (not idle)
+
+
+class TestFitted:
+    def test_the_fitted_presets_say_so_themselves(self):
+        assert set(FITTED) == {name for name in PRESETS if "fitted" in preset(name).provenance}
+
+    @pytest.mark.parametrize("model", PRESETS)
+    @pytest.mark.parametrize("good", [0, 1])
+    def test_fig_12_is_judged_by_the_range_that_the_paper_states(self, model, good):
+        moments = [Moments(*(2.0 * np.array(fig12.PAPER)))] * 3
+        moments[good] = fig12.PAPER
+        distributions = [
+            fig12.Distribution(name, band, *pair, np.ones(1))
+            for name in PRESETS
+            for band, pair in zip(fig12.BANDS, zip(moments, [0.9] * 3, strict=True), strict=True)
+        ]
+        finding = list(fig12._findings(distributions))[list(PRESETS).index(model)]
+        assert finding.verdict == ("Agrees" if good == 0 else "Differs")
+        assert ("to which the model was fitted" in finding.sentence) == (model in FITTED)
+
+    def test_the_paper_s_own_designs_are_no_agreement_of_a_model_fitted_to_them(self):
+        ours = [replace(choice, source="AMP-MOPSO") for choice in paper_choices()]
+        table = table8._moments_table(initial_choices(), ours)
+        at_theirs, at_ours, _ = table.findings
+        assert (at_theirs.verdict, at_ours.verdict) == ("Fitted", "Agrees")
+
+    def test_which_prototype_is_nearest_hangs_on_a_variable_that_moves_nothing(self):
+        problem = robust_problem("calibrated")
+        *_, chosen, _, _ = study_designs(problem)
+        optimum = replace(paper_choices()[0], design=chosen[1])
+        table = deviation_table(optimum)
+        assert [finding.verdict for finding in table.findings] == ["Agrees"]
+        name, share, swept = _idle_sweep(optimum)
+        assert name == "B_in"
+        moments = problem.evaluate(swept)
+        assert np.ptp(moments, axis=0).max() < 0.02
+        assert 1e-8 < share < 1e-5
+        measured = [prototype.design for prototype in TABLE_6.values()]
+        degrees = np.array([deviation_degree(measured, design) for design in swept])
+        nearest = [list(TABLE_6)[place] for place in degrees.argmin(axis=1)]
+        assert len(set(nearest)) > 1
+        assert f"nearest is No. {', '.join(map(str, nearest))} and" in table.note
 
 
 class TestMap:

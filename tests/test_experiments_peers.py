@@ -231,6 +231,16 @@ def test_the_committed_outcome_is_whole_and_makes_the_report(tmp_path, experimen
     assert result.tables[0].rows
 
 
+def test_omopso_never_holds_more_than_two_solutions_of_the_welded_beam():
+    """What the page says of its archive: fewer than three points have no Spacing."""
+    assert "leaves it at most two solutions of the welded beam" in peers.PEERS_NOTE
+    scores = committed_scores("peers")
+    place = scores.problems.index("WeldedBeam"), scores.algorithms.index("OMOPSO")
+    values = dict(zip(MEASURES, scores.values[(slice(None), *place)], strict=True))
+    assert np.isfinite(values["igd"]).all()
+    assert np.isnan(values["spacing"]).all()
+
+
 def test_the_committed_scores_are_those_of_the_swarms_as_they_are(tmp_path):
     # Taking away exchange, difference, mutation or shares by success, or adding inertia, shows.
     problems, swarms = ["WFG4", "ZDT1-moved", "ZDT6-moved"], [OURS, FAITHFUL]

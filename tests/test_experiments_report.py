@@ -6,16 +6,19 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from importlib import import_module
+from importlib.metadata import packages_distributions
+from pathlib import Path
+from shutil import copytree, ignore_patterns
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from experiments import committed
+from experiments import committed, provenance
 from experiments.__main__ import main
 from experiments.campaign import Campaign
 from experiments.committed import read_origin, read_rows, stored_outcome, table_with_origin
-from experiments.registry import EXPERIMENTS, Context
+from experiments.registry import EXPERIMENTS, Context, Experiment
 from experiments.report import check_page, write_report
 from experiments.result import Column, Finding, Picture, Result, Table, significant
 from experiments.store import load, png_bytes, save
@@ -43,7 +46,14 @@ def example() -> Result:
         ("none", float("nan"), None, 0),
         ("all", float("inf"), None, 0),
     )
-    findings = (Finding(np.bool_(True), "They agree."), Finding(False, "They differ."))
+    findings = (
+        Finding(np.bool_(True), "They agree."),
+        Finding(False, "They differ."),
+        Finding(True, "A fit gives it back.", fitted=True),
+        Finding(False, "A fit misses it.", fitted=True),
+        Finding(True, "It holds.", check=True),
+        Finding(False, "It fails.", check=True),
+    )
     times = Table("times", "Wall times", (Column("time", "s"),), ((1.5,),), wall_times=True)
     return Result(
         title="An example",
@@ -172,6 +182,35 @@ def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):
     assert "--full is for calibration, blind, peers" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda one: one.name)
+def test_seeds_are_refused_where_they_would_change_nothing(experiment, tmp_path, capsys):
+    module = import_module(f"experiments.{experiment.name}")
+    asks = "context.seeds" in Path(module.__file__).read_text()
+    assert experiment.takes_seeds == asks
+    if asks:
+        return
+    with pytest.raises(SystemExit) as stopped:
+        main([experiment.name, "--seeds", "20", "--out", str(tmp_path / "out")])
+    assert stopped.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--seeds is for table7, ablation; see" in line
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("option", "seeds"), [([], 20), (["--seeds", "3"], 3)])
+@pytest.mark.parametrize("name", [["table7"], []])
+def test_the_number_of_seeds_reaches_what_takes_it(name, option, seeds, tmp_path, monkeypatch):
+    asked = []
+
+    def run(experiment, context):
+        asked.append((experiment.name, context.seeds))
+        return Result("", "")
+
+    monkeypatch.setattr(Experiment, "run", run)
+    assert main([*name, *option, "--workers", "1", "--out", str(tmp_path)]) == 0
+    assert asked[0] == ("table7", seeds)
+
+
 def test_wall_times_are_stored_apart_from_what_must_come_out_the_same(out):
     assert (out / "times" / "table7" / "times.csv").is_file()
     assert not (out / "table7" / "times.csv").exists()
@@ -217,9 +256,24 @@ def test_the_first_screen_repeats_the_headline_and_sorts_the_findings(out):
     first_screen, rest = page.split('<section id="table7">')
     assert "0.333" in first_screen
     assert "0.333" in rest
-    agreeing, differing = first_screen.split("Does not agree")
-    assert "They agree." in agreeing
-    assert "They differ." in differing
+    sections = first_screen.partition('<div class="verdicts">')[2].split("<h3 ")[1:]
+    found = [re.findall(r">([^<>]+)</h3>|<li>([^<]+) <a", section) for section in sections]
+    assert [[heading or sentence for heading, sentence in section] for section in found] == [
+        ["Agrees with the paper", "They agree."],
+        ["Does not agree with the paper", "They differ."],
+        ["Given back, because the model was fitted to it", "A fit gives it back."],
+        ["Not given back, though the model was fitted to it", "A fit misses it."],
+        ["Checks of our own that fail", "It fails."],
+        ["Checks of our own that hold", "It holds."],
+    ]
+    assert re.findall(r"<b>([^<]+)</b>", rest) == [
+        "Agrees.", "Differs.", "Fitted.", "Missed by the fit.", "Holds.", "Fails.",
+    ]  # fmt: skip
+
+
+def test_a_finding_is_judged_in_one_way():
+    with pytest.raises(ValueError, match="not both"):
+        Finding(True, "Both.", check=True, fitted=True)
 
 
 def test_results_of_another_source_are_marked(out):
@@ -227,6 +281,33 @@ def test_results_of_another_source_are_marked(out):
     stored = out / "table7" / "result.json"
     stored.write_text(re.sub(r'"made_by": "\w+"', '"made_by": "older"', stored.read_text()))
     assert "Made by another version" in write_report(out).read_text()
+
+
+@pytest.mark.parametrize("changed", ["report.py", "data/reliability.csv", "templates/index.html"])
+def test_a_result_depends_on_source_stored_outcomes_and_template(changed, tmp_path, monkeypatch):
+    folder = tmp_path / "experiments"
+    copytree(Path(provenance.__file__).parent, folder, ignore=ignore_patterns("__pycache__"))
+    monkeypatch.setattr(provenance, "__file__", str(folder / "provenance.py"))
+    before = provenance.report_fingerprint()
+    provenance.fingerprint.cache_clear()
+    assert provenance.report_fingerprint() == before
+    with (folder / changed).open("a") as file:
+        file.write("\n")
+    provenance.fingerprint.cache_clear()
+    assert provenance.report_fingerprint() != before
+
+
+def test_the_versions_are_those_of_all_that_computes_a_result():
+    """Every package that the sources import, but for those that only run or show a computation."""
+    root = Path(provenance.__file__).parents[1]
+    imported = set()
+    for path in [*(root / "pymoo_hdte").rglob("*.py"), *(root / "experiments").rglob("*.py")]:
+        imported |= set(re.findall(r"^ *(?:import|from) (\w+)", path.read_text(), re.MULTILINE))
+    distributions = packages_distributions()
+    found = {name for module in imported & distributions.keys() for name in distributions[module]}
+    bystanders = {"pymoo-hdte", "tqdm", "Jinja2", "threadpoolctl", "distributed"}
+    named = {name.lower() for name in (*provenance.PACKAGES, *provenance.EXTRAS)}
+    assert {name.lower() for name in found - bystanders} <= named
 
 
 def test_an_empty_folder_gives_an_empty_report(tmp_path):
