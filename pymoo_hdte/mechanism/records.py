@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
-from pymoo_hdte.mechanism.motion import noise_of
+from pymoo_hdte.mechanism.motion import noise_of, timing_noise
 
 ROLES = ("train", "held_out")
 FEWEST_SAMPLES = 16
@@ -112,14 +113,16 @@ class Record:
         channel : str
             Name of the channel.
         jumps : bool
-            Whether its signal may jump, as that of a force.
+            Whether its signal may jump, as that of a force: `timing_noise` is then part of it.
 
         Returns
         -------
         float
             SI.
         """
-        return self.noise.get(channel) or noise_of(self.channels[channel], jumps)
+        signal = self.channels[channel]
+        own = self.noise.get(channel) or noise_of(signal, jumps)
+        return math.hypot(own, timing_noise(signal)) if jumps else own
 
     def finer(self, factor: int) -> Record:
         """Return the record with ``factor`` samples for each, on a smooth curve through them.
