@@ -33,7 +33,7 @@ def working_rows(mechanism: Mechanism, record: Record, cutoff: float) -> slice:
         least = cutoff / highest_share(1.0)
         raise InvalidInput(
             f"sampling rate of record {record.name}",
-            1.0 / record.step,
+            round(1.0 / record.step, 6),
             f"at least {least:.4g} Hz, ten samples in a period of the cutoff of {cutoff:.4g} Hz; "
             f"or a cutoff of at most {highest_share(record.step):.4g} Hz",
         )
