@@ -50,6 +50,41 @@ def record_of(hidden, role="train", seed=1, size=20.0):
     )
 
 
+def relay_record(seed, force_noise=1e-3):
+    """Return a record of the bare oscillator under a force that jumps between its samples.
+
+    Exact: a sum of step responses, at instants that no sample shows.
+    """
+    generator = np.random.default_rng(seed)
+    time = np.arange(0.0, DURATION, 1.0 / RATE)
+    jumps = np.cumsum(generator.uniform(0.4, 2.0, 100))
+    sizes = 40.0 * np.where(np.arange(100) % 2, -1.0, 1.0)
+    since = np.maximum(time[:, None] - jumps[jumps < DURATION], 0.0)
+    decay = DAMPING / (2.0 * MASS)
+    omega = np.sqrt(STIFFNESS / MASS - decay**2)
+    swing = np.cos(omega * since) + decay / omega * np.sin(omega * since)
+    response = (1.0 - np.exp(-decay * since) * swing) / STIFFNESS
+    sizes = sizes[: since.shape[1]]
+    noise = generator.standard_normal((2, len(time)))
+    channels = {
+        "x": response @ sizes + POSITION_NOISE * noise[0],
+        "force": (since > 0.0) @ sizes + force_noise * noise[1],
+    }
+    return Record("relay", "train", time, channels)
+
+
+def decay_record(force_noise=0.0):
+    """Return a record of the bare oscillator let go, its force sensor at rest."""
+    generator = np.random.default_rng(6)
+    time = np.arange(0.0, DURATION, 1.0 / RATE)
+    decay = DAMPING / (2.0 * MASS)
+    omega = np.sqrt(STIFFNESS / MASS - decay**2)
+    x = 0.02 * np.exp(-decay * time) * np.cos(omega * time)
+    noise = generator.standard_normal((2, len(time)))
+    channels = {"x": x + POSITION_NOISE * noise[0], "force": force_noise * noise[1]}
+    return Record("decay", "train", time, channels)
+
+
 def nothing(x, v, z, t):
     """Nothing is hidden."""
     return 0.0, 0.0

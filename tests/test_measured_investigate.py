@@ -8,12 +8,21 @@ import pytest
 from measured_oscillator import bouc_wen, cubic, nothing, swinging_stiffness
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.fit import fit
 from pymoo_hdte.drive.friction import CoulombFriction
 from pymoo_hdte.measured import investigate
 from pymoo_hdte.measured.data import measured_data
+from pymoo_hdte.measured.intervals import Spread
 from pymoo_hdte.measured.next_test import next_test
+from pymoo_hdte.measured.preconditions import check_scale
 from pymoo_hdte.measured.prove import prove_measured
-from pymoo_hdte.measured.verdict_document import effects, limits, quantities, remainder
+from pymoo_hdte.measured.verdict_document import (
+    _parameters,
+    effects,
+    limits,
+    quantities,
+    remainder,
+)
 from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
 
 OSCILLATOR = Mechanism(
@@ -64,13 +73,73 @@ def test_hysteresis_of_another_form_is_named():
 
 
 def test_nothing_hidden_is_adequate_and_proved_to_be():
-    finding = investigate(OSCILLATOR, with_held_out(nothing))
+    first, *others = with_held_out(nothing)
+    holed = Record(first.name, first.role, first.time, first.channels, dropped=3)
+    finding = investigate(OSCILLATOR, [holed, *others])
     assert finding.verdict.status == "adequate"
+    (told,) = limits(finding)
+    assert "Rows of train 1 with values that are not finite: 3." in told
     assert effects(finding) == []
     assert np.all(finding.base_misfit < 1.3 * finding.sensor_noise)
     simulated, balanced = prove_measured(finding)
     assert simulated.before == simulated.after
     assert balanced.after < 1.3 * balanced.noise_floor
+
+
+@pytest.mark.parametrize("force_noise", [1e-3, 1.0])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_force_that_jumps_between_samples_is_no_missing_effect(seed, force_noise):
+    finding = investigate(OSCILLATOR, [rig.relay_record(seed, force_noise)])
+    assert finding.verdict.status == "adequate"
+    # The instants of the jumps are an error of the size that is said, not one of any size.
+    assert np.all(finding.base_misfit > 0.5 * finding.sensor_noise)
+
+
+def test_a_force_that_jumps_finds_the_damper_that_was_forgotten():
+    (port,) = OSCILLATOR.ports
+    forgetful = replace(OSCILLATOR, ports=(replace(port, damping=Believed(0.0)),))
+    (effect,) = effects(investigate(forgetful, [rig.relay_record(1)]))
+    assert effect["name"] == "viscous_friction"
+    assert effect["parameters"]["coefficient"]["value"] == pytest.approx(rig.DAMPING, rel=0.03)
+
+
+@pytest.mark.parametrize("force_noise", [0.0, rig.FORCE_NOISE, 1.0])
+def test_a_known_gain_sets_no_scale_where_its_input_is_noise(force_noise):
+    record = rig.decay_record(force_noise)
+    with pytest.raises(InvalidInput, match=r"known exactly \(gain of force\) .* drive the mech"):
+        investigate(OSCILLATOR, [record], cutoff=15.0)
+    weighed = replace(OSCILLATOR, inertias={"x": Believed(rig.MASS)})
+    (port,) = OSCILLATOR.ports
+    sprung = replace(OSCILLATOR, ports=(replace(port, stiffness=Believed(rig.STIFFNESS)),))
+    for known in (weighed, sprung):
+        check_scale(measured_data(known, [record], 15.0))
+    # One record in which it drives is enough, among others in which it does not.
+    check_scale(measured_data(OSCILLATOR, [record, rig.record_of(nothing)], 12.0))
+
+
+def test_a_held_out_record_that_cannot_be_judged_is_refused_by_name_at_once():
+    record = rig.record_of(nothing)
+
+    def held_out(name, rows):
+        channels = {channel: values[rows] for channel, values in record.channels.items()}
+        return Record(name, "held_out", record.time[rows], channels)
+
+    with pytest.raises(InvalidInput, match=r"sampling rate of record slow is 50.* a cutoff of at"):
+        investigate(OSCILLATOR, [record, held_out("slow", slice(None, None, 5))])
+    with pytest.raises(InvalidInput, match=r"duration of record brief .* at least"):
+        investigate(OSCILLATOR, [record, held_out("brief", slice(100))])
+    with pytest.raises(InvalidInput, match=r"sampling rate of record train 1 is 250.*most 25 Hz"):
+        investigate(OSCILLATOR, [record], cutoff=26.0)
+
+
+def test_an_interval_does_not_leave_the_tolerance():
+    data = measured_data(OSCILLATOR, [rig.record_of(nothing)], 12.0)
+    fitted = fit(data)
+    spread = Spread(data, fitted)
+    inside = _parameters(fitted, spread, range(3))["damping of spring"]["interval95"]
+    assert 2.5 < inside[0] < rig.DAMPING < inside[1] < 7.5
+    spread.covariance = 1e10 * spread.covariance
+    assert _parameters(fitted, spread, range(3))["damping of spring"]["interval95"] == [2.5, 7.5]
 
 
 def test_what_no_law_explains_is_unlisted_and_described():

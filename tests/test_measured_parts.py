@@ -1,13 +1,18 @@
 """Orders, intervals, rests and limits of measured records, each where the truth is known."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.optimize import curve_fit
+from scipy.stats import t
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.fit import fit
+from pymoo_hdte.discrepancy.fit import Fit, fit
+from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.measured import investigate
 from pymoo_hdte.measured.data import measured_data
-from pymoo_hdte.measured.intervals import covariance
+from pymoo_hdte.measured.intervals import Spread
 from pymoo_hdte.measured.next_test import next_test
 from pymoo_hdte.measured.orders import position_orders
 from pymoo_hdte.measured.verdict_document import effects, limits
@@ -121,11 +126,55 @@ def test_intervals_cover_when_the_rest_is_coloured():
         sensors = measured_data(JOINT, [Record("one", "train", TIME, channels)], CUTOFF)
         data = sensors.with_rest(fit(sensors).residuals)
         fitted = fit(data)
-        off = np.abs(fitted.values - truth)
-        for kind, spread in (("coloured", covariance(data, fitted)), ("white", fitted.covariance)):
-            covered[kind] += int(off[1] <= 1.96 * np.sqrt(spread[1, 1]))
+        off, spread = np.abs(fitted.values - truth), Spread(data, fitted)
+        covered["coloured"] += int(off[1] <= spread.reach[1] * np.sqrt(spread.covariance[1, 1]))
+        covered["white"] += int(off[1] <= 1.96 * np.sqrt(fitted.covariance[1, 1]))
     assert 0.88 <= covered["coloured"] / trials <= 0.99
     assert covered["white"] / trials < 0.8
+
+
+def line(n):
+    """Return frequencies, and slopes by three quantities, as of a motion that falls with them."""
+    frequency = np.arange(n) / n
+    motion = np.random.default_rng(n).standard_normal(n) / (1.0 + np.arange(n))
+    return frequency, np.column_stack([motion * frequency**2, motion, np.roll(motion, 1)])
+
+
+def spread_of(frequency, slopes, residuals):
+    parameters = tuple(Parameter(f"p{k}", 0.0, -1e9, 1e9, 1.0) for k in range(slopes.shape[1]))
+    fitted = Fit((), parameters, np.zeros(len(parameters)), residuals, slopes, slopes.T)
+    rows = [np.arange(len(frequency))]
+    return Spread(SimpleNamespace(frequency=frequency, rows_of_parts=lambda: rows), fitted)
+
+
+@pytest.mark.parametrize("n", [8, 11, 20])
+def test_intervals_of_one_band_are_those_of_least_squares(n):
+    frequency, slopes = line(n)
+    noise = np.random.default_rng(1).standard_normal(n)
+    values, expected = curve_fit(lambda _, *p: slopes @ p, frequency, noise, p0=[0.0] * 3)
+    found = spread_of(frequency, slopes, slopes @ values - noise)
+    np.testing.assert_allclose(found.covariance, expected, rtol=1e-4)
+    np.testing.assert_allclose(found.reach, t.ppf(0.975, n - 3), rtol=1e-6)
+
+
+@pytest.mark.parametrize("n", [11, 25, 60])
+def test_intervals_of_short_records_cover(n):
+    frequency, slopes = line(n)
+    generator, trials, covered = np.random.default_rng(2), 1500, np.zeros(3)
+    for _ in range(trials):
+        noise = generator.standard_normal(n)
+        off = np.linalg.lstsq(slopes, noise, rcond=None)[0]
+        found = spread_of(frequency, slopes, slopes @ off - noise)
+        covered += np.abs(off) <= found.reach * np.sqrt(np.diag(found.covariance))
+    # Four standard deviations of a count of so many trials.
+    assert covered / trials == pytest.approx(0.95, abs=0.0225)
+
+
+def test_what_no_record_determines_reaches_as_far_as_its_bounds():
+    frequency, slopes = line(40)
+    found = spread_of(frequency, 1e-14 * slopes, np.ones(40))
+    np.testing.assert_allclose(np.diag(found.covariance), 2e9**2 / 12.0, rtol=1e-6)
+    np.testing.assert_allclose(found.reach, 1.96, atol=0.001)
 
 
 def test_the_rest_is_never_less_than_the_sensors_noise():

@@ -124,6 +124,14 @@ def test_rows_that_are_not_finite_are_dropped_filled_and_counted(form, tmp_path)
     assert table.channels["r"][149] == pytest.approx((WAVE[150] + WAVE[152]) / 2, rel=1e-12)
     # Only the value that is missing is made up: the other columns of its row were measured.
     assert table.channels["r"][148] == WAVE[150]
+    longer = columns | {"q": columns["q"].copy()}
+    longer["q"][152] = math.nan
+    wide = {name: np.concatenate([column] * 2) for name, column in longer.items()}
+    wide["t"] = np.arange(600) * 1e-3
+    wide["q"][298:302] = wide["r"][450:452] = 0.0
+    wide["q"][450] = 0.0
+    place = {"matlab": "row 151: ", "csv": "line 152: "}.get(form, "line 151: ")
+    refused(write(tmp_path, form, wide), given, place, "gaps of at most 2 rows; here are 3")
     columns["q"][160] = math.nan
     place = {"matlab": "row 151: column q", "csv": "line 152: column q"}.get(form, "line 151: col")
     refused(write(tmp_path, form, columns), given, place, "is nan", "1 % of rows; here 3 are not")

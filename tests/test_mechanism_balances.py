@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.fft import dct
 
 from pymoo_hdte.drive.friction import CoulombFriction, PeriodicTorque
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
@@ -17,7 +18,13 @@ from pymoo_hdte.mechanism.laws import (
     LinearDamper,
     LinearSpring,
 )
-from pymoo_hdte.mechanism.motion import highest_frequency, motion_of, noise_of, smooth
+from pymoo_hdte.mechanism.motion import (
+    highest_frequency,
+    motion_of,
+    noise_of,
+    smooth,
+    timing_noise,
+)
 from pymoo_hdte.mechanism.port_motion import law_force
 
 STEP = 1e-3
@@ -94,6 +101,39 @@ def test_a_jump_of_a_force_is_no_noise():
     assert noise_of(force) > 0.05
     # Coarse steps have no median.
     assert noise_of(np.round(force), jumps=True) > 0.0
+
+
+def test_the_timing_of_jumps_is_white_noise_of_the_stated_size():
+    """Samples of a relay against the means over their steps, which know each instant."""
+    generator, low = np.random.default_rng(9), slice(1, 400)
+    power, said = [], []
+    for _ in range(40):
+        jumps = np.cumsum(generator.uniform(40.0, 200.0, 300))
+        jumps = jumps[jumps < len(TIME) - 1.0]
+        sizes = generator.uniform(1.0, 3.0, len(jumps)) * np.where(np.arange(len(jumps)) % 2, -1, 1)
+        places = np.arange(len(TIME))[:, None]
+        sampled = (places > jumps) @ sizes
+        exact = np.clip(places + 0.5 - jumps, 0.0, 1.0) @ sizes
+        power.append(dct(sampled - exact, type=2, norm="ortho") ** 2)
+        said.append(timing_noise(sampled))
+    by_frequency = np.mean(power, axis=0)
+    expected = np.mean(np.square(said))
+    assert by_frequency[low].mean() == pytest.approx(expected, rel=0.1)
+    assert by_frequency[5000:].mean() == pytest.approx(expected, rel=0.1)
+
+
+def test_smooth_signals_have_no_jumps_and_noise_hides_none():
+    sweep = 15.0 * np.sin(2.0 * np.pi * (0.2 + 0.5 * TIME) * TIME)
+    relay = 10.0 * np.sign(np.sin(2.0 * np.pi * 0.37 * TIME + 0.3))
+    jumps = np.count_nonzero(np.diff(relay))
+    expected = 20.0 * np.sqrt(jumps / 12.0 / len(TIME))
+    for size in (0.0, 1e-3, 0.1):
+        noise = size * np.random.default_rng(5).standard_normal(len(TIME))
+        assert timing_noise(sweep + noise) < 0.1 * size + 1e-5 * np.ptp(sweep)
+        assert timing_noise(relay + sweep + noise) == pytest.approx(expected, rel=0.03)
+    record = Record("relay", "train", TIME, {"f": relay, "x": sweep}, {"f": 0.2, "x": 0.1})
+    assert record.noise_of("f", jumps=True) == pytest.approx(np.hypot(0.2, expected))
+    assert record.noise_of("f") == 0.2
 
 
 def test_a_motion_is_known_up_to_where_it_ends():

@@ -8,26 +8,17 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.candidate import (
-    Candidate,
-    Values,
-    polar,
-    unknown,
-    wave,
-    wave_starts,
-)
-from pymoo_hdte.discrepancy.parameters import Parameter
+from pymoo_hdte.discrepancy.candidate import Candidate, unknown
 from pymoo_hdte.drive.effects import place_of
 from pymoo_hdte.drive.friction import (
     CoulombFriction,
     NonlinearDrag,
-    PeriodicFriction,
-    PeriodicTorque,
     StribeckFriction,
 )
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.mesh_laws import DeadZone, HardeningStiffness, SoftWindup
 from pymoo_hdte.measured.data import MeasuredData
+from pymoo_hdte.measured.periodic_candidates import LARGEST, of_reading, periodic
 from pymoo_hdte.mechanism import LawAt, Port
 from pymoo_hdte.mechanism.laws import (
     ConstantForce,
@@ -36,16 +27,12 @@ from pymoo_hdte.mechanism.laws import (
     LinearSpring,
 )
 
-Parts = tuple[Parameter, ...]
-
 CONTAINED = {
     "coulomb_friction": ("stribeck_friction", "hysteresis", "position_dependent_friction"),
 }
 """Laws that are this one where some of their parameters are nothing: as good, they say no more."""
 _BACKWARDS = 0.01
 """Least share of the way in the rarer direction that makes two directions."""
-_LARGEST = 5.0
-"""Largest force of an effect, in units of the largest that the inputs or springs have."""
 
 
 def mechanism_candidates(
@@ -72,16 +59,18 @@ def mechanism_candidates(
         speed = max(float(np.abs(one.speed).max()) for one in here)
         seen = orders.get(port.name, ())
         if port.read:
-            found += _of_reading(port.name, seen, force)
+            found += of_reading(port.name, seen, force)
             continue
         found += _linear(port, force, travel, speed)
         both = turns_back(data, port.name)
-        found += _dry(port.name, force, speed, both)
-        found += _periodic(port.name, seen, force)
+        found += _dry(port.name, force, speed)
+        if both:
+            found += _one_sided(port.name, force, speed)
+        found += periodic(port.name, seen, force)
         for read in data.mechanism.ports:
             # What a force sensor shows may be a torque that acts on the motion.
             if read.read and dict(read.motion) == dict(port.motion):
-                found += _periodic(port.name, orders.get(read.name, ()), force)[:1]
+                found += periodic(port.name, orders.get(read.name, ()), force)[:1]
         found += _elastic(port.name, force, travel, port.stiffness.value, both)
     known = {place_of(one) for one in data.known}  # type: ignore[arg-type]
     return [one for one in found if not one.places & known]
@@ -100,7 +89,7 @@ def _linear(port: Port, force: float, travel: float, speed: float) -> list[Candi
                 Candidate(
                     name,
                     port.name,
-                    (unknown("coefficient", 0.0, _LARGEST * typical, typical),),
+                    (unknown("coefficient", 0.0, LARGEST * typical, typical),),
                     ((typical,),),
                     lambda v, name=name, law=law: _at(name, port.name, law(v[0])),  # type: ignore[misc]
                     f"There is {words} at the {port.name} where none is believed.",
@@ -121,12 +110,12 @@ def turns_back(data: MeasuredData, port: str) -> bool:
     return bool(min(forward, backward) > _BACKWARDS * (forward + backward))
 
 
-def _dry(port: str, force: float, speed: float, both: bool) -> list[Candidate]:
-    most, drag = _LARGEST * force, force / speed**2
+def _dry(port: str, force: float, speed: float) -> list[Candidate]:
+    """Return frictions that are the same in both directions."""
+    most, drag = LARGEST * force, force / speed**2
     level = unknown("level", 0.0, most, force)
-    signed = unknown("level", -most, most, force)
     fading = tuple(share * speed for share in (0.02, 0.06, 0.2))
-    symmetric = [
+    return [
         Candidate(
             "coulomb_friction",
             port,
@@ -156,15 +145,19 @@ def _dry(port: str, force: float, speed: float, both: bool) -> list[Candidate]:
             f"A drag at the {port} that grows faster than the speed.",
         ),
     ]
-    if not both:
-        return symmetric
+
+
+def _one_sided(port: str, force: float, speed: float) -> list[Candidate]:
+    """Return forces that two directions tell from friction that is the same in both."""
+    most, slope = LARGEST * force, force / speed
+    level = unknown("level", -most, most, force)
+    viscous = unknown("viscous", -LARGEST * slope, LARGEST * slope, slope)
     return [
-        *symmetric,
         Candidate(
             "direction_dependent_friction",
             port,
-            (signed, unknown("viscous", -most / speed, most / speed, force / speed)),
-            ((force, 0.0), (0.0, force / speed), (force, -force / speed)),
+            (level, viscous),
+            ((force, 0.0), (0.0, slope), (force, -slope)),
             lambda v: _at("direction_dependent_friction", port, DirectionalFriction(*v)),
             f"Friction at the {port} that is not the same in both directions.",
         ),
@@ -179,84 +172,10 @@ def _dry(port: str, force: float, speed: float, both: bool) -> list[Candidate]:
     ]
 
 
-def _waves(name: str, orders: Sequence[float], largest: float, typical: float) -> Parts:
-    """Return cosine and sine parts of lines at several orders, which are one effect."""
-    return tuple(
-        part for order in orders for part in wave(f"order_{order:g}_{name}", largest, typical)
-    )
-
-
-def _lines(kind: Any, name: str, port: str, orders: Sequence[float]) -> Any:
-    def build(v: Values) -> tuple[Any, ...]:
-        parts = np.reshape(v, (-1, 2))
-        return tuple(
-            LawAt(name, port, kind(order, phase, amplitude))
-            for order, (amplitude, phase) in zip(
-                orders, (polar(*one) for one in parts), strict=True
-            )
-        )
-
-    return build
-
-
-def _periodic(port: str, orders: Sequence[float], force: float) -> list[Candidate]:
-    if not orders:
-        return []
-    most, form, words = _LARGEST * force, _listed(orders, "+"), _listed(orders, ", ")
-    ripple = _waves("amplitude", orders, most, force)
-    friction = _waves("level", orders, most, force)
-    mean = unknown("mean", 0.0, most, force)
-    varying = _lines(PeriodicFriction, "position_dependent_friction", port, orders)
-    return [
-        Candidate(
-            "torque_ripple",
-            port,
-            ripple,
-            wave_starts(ripple),
-            _lines(PeriodicTorque, "torque_ripple", port, orders),
-            f"A force at the {port} that varies with its position, orders {words}, and acts on the "
-            "motion.",
-            form=form,
-        ),
-        Candidate(
-            "position_dependent_friction",
-            port,
-            (*friction, mean),
-            wave_starts((*friction, mean)),
-            lambda v: (*varying(v[:-1]), *_at("coulomb_friction", port, CoulombFriction(v[-1]))),
-            f"Friction that varies with the position of the {port}, orders {words}.",
-            form=form,
-        ),
-    ]
-
-
-def _of_reading(port: str, orders: Sequence[float], force: float) -> list[Candidate]:
-    if not orders:
-        return []
-    form, words = _listed(orders, "+"), _listed(orders, ", ")
-    parts = _waves("amplitude", orders, _LARGEST * force, force)
-    return [
-        Candidate(
-            "kinematic_error",
-            port,
-            parts,
-            wave_starts(parts),
-            _lines(PeriodicTorque, "kinematic_error", port, orders),
-            f"The reading of {port} varies with the position, orders {words}, and has one "
-            "amplitude at all speeds run: it is kinematic, and no torque that moves inertias.",
-            form=form,
-        )
-    ]
-
-
-def _listed(orders: Sequence[float], between: str) -> str:
-    return between.join(f"{order:g}" for order in orders)
-
-
 def _elastic(
     port: str, force: float, travel: float, stiffness: float, both: bool
 ) -> list[Candidate]:
-    most, cubic = _LARGEST * force, force / travel**3
+    most, cubic = LARGEST * force, force / travel**3
     slip = unknown("torsion", 0.003 * travel, 2.0 * travel, 0.1 * travel)
     found = [
         Candidate(

@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.candidate import Candidate, out_of_tolerance
 from pymoo_hdte.discrepancy.evidence import Response, Vector
 from pymoo_hdte.discrepancy.excess import Excess
@@ -23,7 +22,6 @@ from pymoo_hdte.discrepancy.objective import Unknowns, built
 from pymoo_hdte.discrepancy.parameters import Parameter
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
-from pymoo_hdte.mechanism.motion import highest_frequency
 
 Values = NDArray[np.float64]
 
@@ -141,12 +139,19 @@ class MeasuredData:
 
     def excess(self, fitted: Fit) -> Excess:
         """Return the excess chi-square of a fit by record and part, shape (r, n_parts)."""
-        square = fitted.residuals**2
-        shape = (len(self.spectra), len(self.names))
-        chi_square = np.zeros(shape)
-        np.add.at(chi_square, (self._record, self._part), square)
-        freedom = np.array([one.kept.sum(axis=1) for one in self.spectra], dtype=float)
+        chi_square, freedom = self._chi_square(fitted.residuals), self._coefficients
         return Excess(chi_square - freedom, freedom)
+
+    def known_over_noise(self) -> float:
+        """Return by how much what is known exactly stands out of the noise.
+
+        The largest ratio of powers in the force balance of a coordinate in a record. Without a
+        force that is known exactly all others may be a multiple of what they are.
+        """
+        believed = np.array([parameter.start for parameter in self.base])
+        known = self._linear[0] - self.whitened_forces(believed, self.known)
+        ratios = self._chi_square(known) / self._coefficients
+        return float(ratios[:, : len(self.mechanism.coordinates)].max())
 
     def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
         """Return a candidate for each quantity of the mechanism that a fit left at a bound."""
@@ -190,6 +195,17 @@ class MeasuredData:
         return np.concatenate(
             [np.broadcast_to(one.frequency, one.kept.shape)[one.kept] for one in self.spectra]
         )
+
+    def _chi_square(self, residuals: Vector) -> Values:
+        """Return the sum of squares of whitened residuals (n,) by record and part."""
+        found = np.zeros((len(self.spectra), len(self.names)))
+        np.add.at(found, (self._record, self._part), residuals**2)
+        return found
+
+    @property
+    def _coefficients(self) -> Values:
+        """Number of coefficients by record and part."""
+        return np.array([one.kept.sum(axis=1) for one in self.spectra], dtype=float)
 
     @cached_property
     def _part(self) -> NDArray[np.int_]:
@@ -239,26 +255,6 @@ class BalanceObjective(Unknowns):
     def _effects(self, values: Vector) -> tuple[LawAt, ...]:
         parts = built(self.candidates, values)
         return tuple(effect for part in parts for effect in part)  # type: ignore[misc]
-
-
-def usual_cutoff(mechanism: Mechanism, records: Sequence[Record]) -> float:
-    """Return the frequency, Hz, up to which every coordinate stands out of its noise.
-
-    Raises
-    ------
-    InvalidInput
-        See `highest_frequency`.
-    """
-    found = []
-    for record in records:
-        for name in mechanism.coordinates:
-            noise = record.noise_of(name)
-            try:
-                found.append(highest_frequency(record.channels[name], record.step, noise))
-            except InvalidInput as error:
-                field = f"{name} of record {record.name}: {error.field}"
-                raise InvalidInput(field, error.value, error.allowed) from None
-    return min(found)
 
 
 def measured_data(

@@ -20,10 +20,15 @@ from pymoo_hdte.discrepancy.naming import EXPLAINED, FITTED, OF_ONE_NAME, Verdic
 from pymoo_hdte.discrepancy.rival import SHARE, Rival, down_to_noise, fit_all, rival, varied
 from pymoo_hdte.discrepancy.screening import screen
 from pymoo_hdte.measured.candidates import CONTAINED, mechanism_candidates
-from pymoo_hdte.measured.data import MeasuredData, measured_data, usual_cutoff
+from pymoo_hdte.measured.data import MeasuredData, measured_data
 from pymoo_hdte.measured.orders import position_orders
+from pymoo_hdte.measured.preconditions import (
+    check_sampling,
+    check_scale,
+    check_signals,
+    usual_cutoff,
+)
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-from pymoo_hdte.mechanism.balances import balance_names
 
 MAIN_SHARE = 0.5
 """Least share of the power of a misfit beyond the sensors' noise that a named effect removes."""
@@ -32,7 +37,6 @@ REST = 2.0
 PARSIMONY = 1.1
 """Ratio of powers of what two models leave up to which the one with fewer unknowns is named."""
 _ROUNDS = 2
-_SCALES = ("inertia", "stiffness", "gain")
 _SECONDS = 3
 """Second effects tried beside each of as many first ones to find what nobody explains."""
 
@@ -133,44 +137,23 @@ def investigate(
     Raises
     ------
     InvalidInput
-        If no record is to be fitted, a record lacks a channel, is too short or does not move, two
-        have one name, or the mechanism has no port, or no quantity that sets the scale.
+        If no record is to be fitted, a record, of either role, lacks a channel, is too short or too
+        slowly sampled or does not move, two have one name, the mechanism has no port, or no
+        quantity sets the scale: none is known, or the input whose gain is known is only noise.
     """
     train = [record for record in records if record.role == "train"]
     if not train:
         raise InvalidInput("number of train records", 0, "at least 1")
-    _check(mechanism, records)
+    check_signals(mechanism, records)
     cutoff = usual_cutoff(mechanism, train) if cutoff is None else cutoff
+    check_sampling(mechanism, records, cutoff)
     sensors = measured_data(mechanism, train, cutoff, known)
+    check_scale(sensors)
     base = fit(sensors)
     candidates = _candidates(sensors, base)
     data = _with_rest(sensors, base, candidates)
     verdict = _judged(sensors, data, candidates)
     return Finding(mechanism, tuple(records), cutoff, data, verdict)
-
-
-def _check(mechanism: Mechanism, records: Sequence[Record]) -> None:
-    if not mechanism.ports:
-        raise InvalidInput("mechanism.ports", (), "at least one: effects are looked for there")
-    scales = [name for name, one in mechanism.quantities.items() if one.tolerance == 0.0]
-    if not any(name.startswith(_SCALES) for name in scales):
-        allowed = "none for at least one inertia, stiffness or gain, or only ratios are known"
-        raise InvalidInput("tolerances of the mechanism", "on all", allowed)
-    needed = (*balance_names(mechanism), *(one.name for one in mechanism.inputs))
-    names = [record.name for record in records]
-    for record in records:
-        if names.count(record.name) > 1:
-            raise InvalidInput("record", record.name, "a name of its own for each record")
-        for name in needed:
-            if name not in record.channels:
-                allowed = f"{name} among them: every coordinate, input and force sensor is needed"
-                field = f"channels of record {record.name}"
-                raise InvalidInput(field, tuple(record.channels), allowed)
-        for name in mechanism.coordinates:
-            channel = record.channels[name]
-            if np.ptp(channel) == 0.0:
-                allowed = "a signal that changes; this one is dead"
-                raise InvalidInput(f"channel {name} of {record.name}", float(channel[0]), allowed)
 
 
 def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:

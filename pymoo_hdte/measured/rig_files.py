@@ -152,7 +152,7 @@ def _record(
     table = read_table(path, layout)
     try:
         of_channels = {one: noise[one] for one in noise if one in table.channels}
-        return Record(name, role, table.time, table.channels, of_channels)
+        return Record(name, role, table.time, table.channels, of_channels, table.dropped)
     except InvalidInput as error:
         raise InvalidInput(f"{path.name}: {error.field}", error.value, error.allowed) from None
 

@@ -32,6 +32,7 @@ UNITS: dict[str, float] = {
 FEWEST_ROWS = 16
 STEP_SPREAD = 0.01  # Relative, of a time step from the median step.
 ROWS_PER_FILLED = 100  # Interpolated values may stand in fewer than one row in this many.
+LONGEST_GAP = 2  # Rows: across more of them a straight line is no motion.
 LARGEST = 1e15  # A double beyond it no longer holds tenths: it marks a fault, nobody measured it.
 COMPRESSED, COMPLEX, NUMERIC = 15, 0x800, range(6, 16)  # Codes of MATLAB v5, as are these:
 NUMBERS = dict(zip((1, 2, 3, 4, 5, 6, 7, 9, 12, 13), "bBhHiIfdqQ", strict=True))
@@ -116,7 +117,7 @@ def read_table(path: Path, layout: TableLayout) -> Table:
 
     Raises `OSError` if the file cannot be read and `InvalidInput`, with file and line (MATLAB:
     row), if it is damaged, a column is missing, ragged or holds text or a huge number, too few
-    rows are finite, or time does not rise in equal steps.
+    rows are finite or too many at a time are not, or time does not rise in equal steps.
     """
     mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
     names = list(dict.fromkeys(channel.column for channel in mapped))
@@ -134,12 +135,19 @@ def read_table(path: Path, layout: TableLayout) -> Table:
     if whole.size < FEWEST_ROWS:
         place = f"{path.name}: finite rows after skip_rows = {layout.skip_rows}"
         raise InvalidInput(place, whole.size, f"at least {FEWEST_ROWS}")
-    start, stop = int(whole[0]), int(whole[-1]) + 1
-    filled = stop - start - whole.size
+
+    def missing(row: int, allowed: str) -> InvalidInput:
+        column = next(name for name, raw in columns.items() if not np.isfinite(raw[row]))
+        return refuse(row, column, f"finite, but for {allowed}")
+
+    start, stop, gaps = int(whole[0]), int(whole[-1]) + 1, np.diff(whole) - 1
+    filled = int(gaps.sum())
     if filled and filled * ROWS_PER_FILLED >= stop - start:
         row = start + int(np.argmin(finite[start:stop]))
-        column = next(name for name, raw in columns.items() if not np.isfinite(raw[row]))
-        raise refuse(row, column, f"finite, but for fewer than 1 % of rows; here {filled} are not")
+        raise missing(row, f"fewer than 1 % of rows; here {filled} are not")
+    for at in np.flatnonzero(gaps > LONGEST_GAP)[:1]:
+        allowed = f"gaps of at most {LONGEST_GAP} rows; here are {gaps[at]}"
+        raise missing(int(whole[at]) + 1, allowed)
     kept = {name: raw[start:stop] for name, raw in columns.items()}
     if layout.time:
         time = _si(layout.time, kept)

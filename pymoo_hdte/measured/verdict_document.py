@@ -16,12 +16,11 @@ from pymoo_hdte.discrepancy.naming import Verdict
 from pymoo_hdte.discrepancy.rival import Rival
 from pymoo_hdte.discrepancy.verdict_file import sentence
 from pymoo_hdte.measured.candidates import turns_back
-from pymoo_hdte.measured.intervals import covariance
+from pymoo_hdte.measured.intervals import Spread
 from pymoo_hdte.measured.investigate import Finding
 from pymoo_hdte.measured.next_test import NextTest
 from pymoo_hdte.measured.prove import MeasuredGap
 
-_DEVIATIONS = 1.96
 _OFFERED = 6.0
 """Gain of BIC with which a second effect that is not named is mentioned."""
 _MEANINGFUL = 0.05
@@ -78,7 +77,7 @@ def _sentence(verdict: Verdict) -> str:
 def effects(finding: Finding) -> list[dict[str, Any]]:
     """Return the accepted effects with values and 95 % intervals."""
     fitted = finding.accepted
-    spread = covariance(finding.data, fitted)
+    spread = Spread(finding.data, fitted)
     start, found = len(finding.data.base), []
     for candidate in fitted.candidates:
         rows = range(start, start + len(candidate.parameters))
@@ -180,6 +179,12 @@ def limits(finding: Finding) -> list[str]:
         for port in finding.mechanism.ports
         if not port.read and not turns_back(finding.data, port.name)
     ]
+    found += [
+        f"Rows of {record.name} with values that are not finite: {record.dropped}. They are left "
+        "out at the ends and interpolated inside."
+        for record in finding.records
+        if record.dropped
+    ]
     if not any(record.role == "held_out" for record in finding.records):
         found.append("No record was held out: the correction is not proved where it was not made.")
     if any(finding.accepted.bound_sides[: len(finding.data.base)]):
@@ -214,29 +219,34 @@ def _role(finding: Finding, one: Rival) -> str:
 
 def quantities(finding: Finding) -> dict[str, Any]:
     """Return the fitted values of the mechanism with 95 % intervals."""
-    spread = covariance(finding.data, finding.accepted)
+    spread = Spread(finding.data, finding.accepted)
     return _parameters(finding.accepted, spread, range(len(finding.data.base)))
 
 
-def _parameters(fitted: Fit, spread: Any, rows: range) -> dict[str, Any]:
+def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
     """Return values with intervals, SI; cosine and sine parts as amplitude and phase."""
     found: dict[str, Any] = {}
     for row in rows:
-        name, value = fitted.parameters[row].name, float(fitted.values[row])
+        parameter, value = fitted.parameters[row], float(fitted.values[row])
+        name, reach = parameter.name, float(spread.reach[row])
         if name.endswith("_sine"):
             continue
         if not name.endswith("_cosine"):
-            found[name] = _with_interval(value, float(spread[row, row]))
+            entry = _with_interval(value, float(spread.covariance[row, row]), reach)
+            # The fit was not free to leave its bounds.
+            cut = np.clip(entry["interval95"], parameter.lower, parameter.upper)
+            found[name] = entry | {"interval95": cut.tolist()}
             continue
         pair = slice(row, row + 2)
         cosine, sine = fitted.values[pair]
-        amplitude, phase = line_with_variance(cosine, sine, spread[pair, pair])
+        amplitude, phase = line_with_variance(cosine, sine, spread.covariance[pair, pair])
+        reach = float(spread.reach[pair].max())
         name = name.removesuffix("_cosine")
-        found[name] = _with_interval(*amplitude)
-        found[f"{name}_phase"] = _with_interval(*phase)
+        found[name] = _with_interval(*amplitude, reach)
+        found[f"{name}_phase"] = _with_interval(*phase, reach)
     return found
 
 
-def _with_interval(value: float, variance: float) -> dict[str, Any]:
-    half = _DEVIATIONS * float(np.sqrt(max(variance, 0.0)))
+def _with_interval(value: float, variance: float, reach: float) -> dict[str, Any]:
+    half = reach * float(np.sqrt(max(variance, 0.0)))
     return {"value": value, "unit": "SI", "interval95": [value - half, value + half]}

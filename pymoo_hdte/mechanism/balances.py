@@ -15,23 +15,19 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.interpolate import make_interp_spline
 
-from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
 from pymoo_hdte.mechanism.motion import (
     finer_than,
-    highest_share,
-    margin_of,
     motion_of,
     smooth,
     smoothed_noise,
-    stride_of,
 )
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force, port_motion
 from pymoo_hdte.mechanism.records import Record
+from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, working_rows
 
 Values = NDArray[np.float64]
 
-_FEWEST_BINS = 8
 _KEPT = 64
 
 
@@ -85,23 +81,11 @@ class Balance:
 
     def __init__(self, mechanism: Mechanism, record: Record, cutoff: float) -> None:
         self.mechanism, self.record = mechanism, record
-        real_number("cutoff", cutoff, above=0.0, at_most=highest_share(record.step))
         self._known: dict[tuple[LawAt, float], Values] = {}
-        margin = margin_of(cutoff, record.step)
-        read = any(port.read for port in mechanism.ports)
-        highest = highest_share(record.step) if read else cutoff
-        stride = stride_of(highest, record.step)
-        self._rows = slice(margin, len(record.time) - margin, stride)
-        n = len(record.time[self._rows])
-        frequency = np.arange(n) / (2.0 * n * record.step * stride)
+        self._rows = working_rows(mechanism, record, cutoff)
+        stride, highest = self._rows.step, highest_known(mechanism, record, cutoff)
+        frequency = frequencies(len(record.time[self._rows]), record.step * stride)
         self._bins = int(np.count_nonzero(frequency <= highest))
-        if np.count_nonzero(frequency <= cutoff) < _FEWEST_BINS:
-            shortest = _FEWEST_BINS / (2.0 * cutoff) + 2.0 * margin * record.step
-            raise InvalidInput(
-                f"duration of record {record.name}",
-                float(record.time[-1] - record.time[0]),
-                f"at least {shortest:.3g} s, to say anything below {cutoff:.3g} Hz",
-            )
         self.frequency = frequency[: self._bins]
         n_read = len(balance_names(mechanism)) - len(mechanism.coordinates)
         limits = [cutoff] * len(mechanism.coordinates) + [highest] * n_read

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.signal import butter, savgol_filter, sosfiltfilt, welch
 
 from pymoo_hdte.checks import InvalidInput
@@ -23,6 +24,9 @@ _HIGHEST_SHARE = 0.1
 """Largest cutoff as a share of the sampling rate: ten samples in a period."""
 _MEDIAN_OF_NORMAL = 0.6744897501960817
 _THIRD_DIFFERENCE = 20.0**0.5
+_CLEAR = 4.0
+"""Standard deviations of a difference beyond which a rise between two samples is a jump."""
+_NEIGHBOURS = 5
 _LAW_SAMPLES = 40
 """To a period of the cutoff: the jumps of dry friction lie between two of them."""
 _SEGMENT = 1024
@@ -54,6 +58,19 @@ def noise_of(signal: Values, jumps: bool = False) -> float:
     differences = np.abs(np.diff(signal, 3))
     middle = float(np.median(differences)) / _MEDIAN_OF_NORMAL if jumps else 0.0
     return (middle or float(np.sqrt(np.mean(differences**2)))) / _THIRD_DIFFERENCE
+
+
+def timing_noise(signal: Values) -> float:
+    """Return the standard deviation of white noise as strong as the timing of a signal's jumps.
+
+    When a force jumped is known to within a sample: a uniform error of one sample by the jump over
+    the square root of 12, white over the frequencies. A jump is what a rise has beyond those around
+    it, where it stands out of the noise: a smooth signal, of shape (n,), has none.
+    """
+    rises = np.diff(signal)
+    beyond = rises - median_filter(rises, _NEIGHBOURS, mode="nearest")
+    clear = np.abs(beyond) > _CLEAR * 2.0**0.5 * noise_of(signal, jumps=True)
+    return float(np.sqrt(np.sum(beyond[clear] ** 2) / (12.0 * len(signal))))
 
 
 def highest_frequency(position: Values, step: float, deviation: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -9,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
-from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
-from pymoo_hdte.mechanism.motion import noise_of
+from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number, whole_number
+from pymoo_hdte.mechanism.motion import noise_of, timing_noise
 
 ROLES = ("train", "held_out")
 FEWEST_SAMPLES = 16
@@ -37,12 +38,16 @@ class Record:
     noise : dict of str to float
         Standard deviation of the white noise of channels, SI, where it is known; of the others it
         is estimated, see `noise_of`.
+    dropped : int
+        Rows of its file that had values that are not finite: left out at the ends, interpolated
+        inside. A report tells their number.
 
     Raises
     ------
     InvalidInput
         For another role, times that are not uniform, a channel of another length or with a value
-        that is not finite, or a noise that is not positive or of no channel.
+        that is not finite, a noise that is not positive or of no channel, or a ``dropped`` that is
+        no count.
     """
 
     name: str
@@ -50,6 +55,7 @@ class Record:
     time: NDArray[np.float64]
     channels: Mapping[str, NDArray[np.float64]]
     noise: Mapping[str, float]
+    dropped: int
 
     def __init__(
         self,
@@ -58,6 +64,7 @@ class Record:
         time: ArrayLike,
         channels: Mapping[str, ArrayLike],
         noise: Mapping[str, float] | None = None,
+        dropped: int = 0,
     ) -> None:
         if not isinstance(name, str):
             raise InvalidInput("name of a record", name, "a text")
@@ -90,6 +97,7 @@ class Record:
             real_number(f"noise of channel {channel} of record {name}", deviation, above=0.0)
         for attribute, value in (
             ("noise", known),
+            ("dropped", whole_number(f"dropped of record {name}", dropped, at_least=0)),
             ("name", name),
             ("role", role),
             ("time", moments),
@@ -112,14 +120,16 @@ class Record:
         channel : str
             Name of the channel.
         jumps : bool
-            Whether its signal may jump, as that of a force.
+            Whether its signal may jump, as that of a force: `timing_noise` is then part of it.
 
         Returns
         -------
         float
             SI.
         """
-        return self.noise.get(channel) or noise_of(self.channels[channel], jumps)
+        signal = self.channels[channel]
+        own = self.noise.get(channel) or noise_of(signal, jumps)
+        return math.hypot(own, timing_noise(signal)) if jumps else own
 
     def finer(self, factor: int) -> Record:
         """Return the record with ``factor`` samples for each, on a smooth curve through them.
