@@ -170,9 +170,10 @@ def test_intervals_of_short_records_cover(n):
     assert covered / trials == pytest.approx(0.95, abs=0.0225)
 
 
-def test_what_no_record_determines_reaches_as_far_as_its_bounds():
+@pytest.mark.parametrize("share", [0.0, 1e-14])
+def test_what_no_record_determines_reaches_as_far_as_its_bounds(share):
     frequency, slopes = line(40)
-    found = spread_of(frequency, 1e-14 * slopes, np.ones(40))
+    found = spread_of(frequency, share * slopes, np.ones(40))
     np.testing.assert_allclose(np.diag(found.covariance), 2e9**2 / 12.0, rtol=1e-6)
     np.testing.assert_allclose(found.reach, 1.96, atol=0.001)
 

@@ -103,6 +103,12 @@ def folder(tmp_path):
     return tmp_path / "rig"
 
 
+def test_a_record_tells_how_many_rows_of_its_file_were_not_finite(folder):
+    lost = ROWS.replace("0.00,0\n", "0.00,\n").replace("0.19,361\n", "0.19,nan\n")
+    (folder / "more" / "second.csv").write_text(lost)
+    assert [record.dropped for record in read_rig(folder).records] == [0, 2]
+
+
 def test_rig_is_read_as_described(folder):
     rig = read_rig(folder)
     assert (rig.title, rig.cutoff, rig.source) == ("A rig", 40.0, str(folder / RIG_FILE))

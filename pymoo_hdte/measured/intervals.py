@@ -64,7 +64,9 @@ class Spread:
         self.covariance = spread * np.outer(scale, scale)
         shares = np.array([np.bincount(band, row**2) * power for row in influence])
         uncertain = np.sum(shares**2 / freedom, axis=1)
-        self.reach = np.asarray(t.ppf(_CENTRAL, np.diag(spread) ** 2 / uncertain))
+        # What only the bounds determine is as sure of its variance as can be: infinite freedom.
+        with np.errstate(divide="ignore"):
+            self.reach = np.asarray(t.ppf(_CENTRAL, np.diag(spread) ** 2 / uncertain))
 
 
 def _bands(data: MeasuredData) -> NDArray[np.int_]:
