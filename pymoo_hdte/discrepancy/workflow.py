@@ -36,7 +36,7 @@ CLEARANCES = ("backlash", "clearance_variation")
 _SAME_NOISE = 1.5
 """Largest ratio of variances up to which the noise is that of the believed drive."""
 LEAST_LOAD = 0.5
-"""N.m, a few times what a torque sensor's zero is known to."""
+"""N.m at a `torque_scale` of 1, a few times what a torque sensor's zero is known to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,8 @@ class Analysis:
             return None
         features = measure(self.campaign, records, self.data.features.orders.tolist())
         if len(self.data.features.records) < len(self.campaign.train):
-            features = features.rows(np.flatnonzero(_flanks_held(features)))
+            held = _flanks_held(features, self.campaign.torque_scale)
+            features = features.rows(np.flatnonzero(held))
         if not features.records:
             return None
         return replace(self.data, features=features, torsion=())
@@ -140,7 +141,8 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
 def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
     seen = _strong_lines(features, base)
-    return candidates(data.campaign.believed, features.orders.tolist(), seen)
+    campaign = data.campaign
+    return candidates(campaign.believed, features.orders.tolist(), seen, campaign.torque_scale)
 
 
 def _loaded(data: Data) -> Data:
@@ -148,19 +150,19 @@ def _loaded(data: Data) -> Data:
 
     With a clearance such a drive rattles and has no steady state to be fitted.
     """
-    held = _flanks_held(data.features)
+    held = _flanks_held(data.features, data.campaign.torque_scale)
     if np.all(held) or held.sum() < FEWEST_RECORDS:
         return data
     return replace(data, features=data.features.rows(np.flatnonzero(held)))
 
 
-def _flanks_held(features: Features) -> NDArray[np.bool_]:
+def _flanks_held(features: Features, torque_scale: float) -> NDArray[np.bool_]:
     """Return which records carry a load beyond the swing of their torque, shape (r,)."""
     m = len(features.orders)
     lines = features.values[:, features.places(2)].reshape(len(features.records), m, 2)
     swing = np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)
     load = np.abs(features.conditions.output_torque)
-    return np.asarray(load > np.maximum(swing, LEAST_LOAD))
+    return np.asarray(load > np.maximum(swing, torque_scale * LEAST_LOAD))
 
 
 def highest_order(campaign: Campaign) -> float:
