@@ -39,7 +39,8 @@ class RunningRecord:
     elapsed : float
         Time from the start of the session to the start of this record, s.
     time : ndarray, shape (n,)
-        Middle of the raw samples of each row, s, increasing.
+        Middle of the raw samples of each row, s, increasing; on any clock, since only ``elapsed``
+        says when the record began.
     input_angle, output_angle : ndarray, shape (n,)
         rad, absolute and unwrapped, with one common zero over a campaign.
     input_torque, output_torque : ndarray, shape (n,)
