@@ -428,3 +428,15 @@ def test_a_record_stands_in_one_file(campaign, tmp_path):
     toml.write_text(f"{toml.read_text()}\n[[record]]{entry}")
     with pytest.raises(InvalidInput, match=r"\.file is .*allowed: each name once"):
         read_campaign(tmp_path / "c")
+
+
+def test_a_torsion_sweep_that_is_held_out_is_refused_where_it_is_said(campaign, tmp_path):
+    (sweep,) = campaign.torsion
+    with pytest.raises(InvalidInput, match="role is 'held_out', allowed: 'train' for a torsion"):
+        replace(sweep, role="held_out")
+    write_campaign(campaign, tmp_path / "c")
+    toml = tmp_path / "c" / "campaign.toml"
+    before, after = toml.read_text().split('test = "torsion"')
+    toml.write_text(f'{before}test = "torsion"{after.replace("train", "held_out")}')
+    with pytest.raises(InvalidInput, match=r"^campaign\.toml, line \d+: record\[3\]\.role is"):
+        read_campaign(tmp_path / "c")

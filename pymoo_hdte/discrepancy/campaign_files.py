@@ -179,6 +179,8 @@ def _record(entry: Fields, file: str, place: str, folder: Path) -> RunningRecord
     except InvalidInput as error:
         if error.field.startswith(CAMPAIGN_FILE):
             raise
+        if error.field == "role":
+            raise InvalidInput(f"{place}.role", error.value, error.allowed) from None
         row = re.search(r"\[(\d+)]$", error.field)
         lines = f"line {line_of_row(int(row[1]))}" if row else _lines_of(len(measured["time"]))
         field = f"{file}, {lines}: {error.field}"

@@ -25,8 +25,10 @@ top                        ``title``, ``drive``
 
 Columns of a running record: ``time_s, input_angle_rad, output_angle_rad, input_torque_Nm,
 output_torque_Nm``; of a torsion record: ``time_s, output_angle_rad, output_torque_Nm``.
-``time_s`` counts from any origin, as that of the record, of the session or of the world:
-``elapsed_s`` says when a record began.
+
+The ``role`` of a running record is ``"train"``, to be fitted, or ``"held_out"``, to judge the
+result; a torsion record is always ``"train"``. ``time_s`` counts from any origin, be it that of the
+record, of the session or of the world: ``elapsed_s`` says when in the session a record began.
 """
 
 from __future__ import annotations

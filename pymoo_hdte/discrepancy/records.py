@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number, whole_number
 
 ROLES = ("train", "held_out")
-"""``train`` records are fitted; ``held_out`` records only judge the result."""
+"""``train`` records are fitted; ``held_out`` records, which must run, only judge the result."""
 
 FEWEST_SAMPLES = 8
 """Below this nothing can be said about a record."""
@@ -88,8 +88,10 @@ class TorsionRecord:
 
     Attributes
     ----------
-    name, role : str
+    name : str
         As in `RunningRecord`.
+    role : {"train"}
+        A sweep is fitted: what is proven is how a drive runs.
     sample_rate : float
         Hz.
     time : ndarray, shape (n,)
@@ -102,7 +104,7 @@ class TorsionRecord:
     Raises
     ------
     InvalidInput
-        As in `RunningRecord`.
+        As in `RunningRecord`, and for a sweep that is held out.
     """
 
     name: str
@@ -113,6 +115,9 @@ class TorsionRecord:
     output_torque: NDArray[np.float64]
 
     def __post_init__(self) -> None:
+        if self.role == "held_out":
+            allowed = "'train' for a torsion sweep: only running records can judge the result"
+            raise InvalidInput("role", self.role, allowed)
         _check_record(self, ("output_angle", "output_torque"))
 
 
