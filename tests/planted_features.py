@@ -49,7 +49,12 @@ def known_data(conditions=CONDITIONS, orders=ORDERS):
         np.tile(correlation * np.outer(deviation, deviation), (len(speed), 1, 1)),
     )
     campaign = SimpleNamespace(
-        believed=BELIEVED, rig=RIG, train=records, title="planted", torque_scale=1.0
+        believed=BELIEVED,
+        rig=RIG,
+        train=records,
+        running=records,
+        title="planted",
+        torque_scale=1.0,
     )
     return Data(campaign, features, base_parameters(BELIEVED, RIG, PHASES, 0.0))
 
