@@ -180,7 +180,7 @@ def highest_order(campaign: Campaign) -> float:
 
 def _shown_order(record: RunningRecord) -> float:
     """Return the order up to which the rows of a record show lines."""
-    return _BELOW_NYQUIST * np.pi * record.sample_rate / abs(record.input_speed)
+    return _BELOW_NYQUIST * (np.pi * record.sample_rate / abs(record.input_speed))
 
 
 def _error_lines(campaign: Campaign) -> list[float]:
