@@ -82,7 +82,10 @@ class Campaign:
 
     @property
     def torque_scale(self) -> float:
-        """How much larger its torques are than those that effects are sized for: see its module."""
+        """Torques beside those that the library of effects is sized for, dimensionless.
+
+        See `pymoo_hdte.discrepancy.torque_scale`.
+        """
         return torque_scale([record.load_torque for record in self.running], self.believed)
 
     def _check_each_once(self) -> None:
