@@ -48,7 +48,14 @@ def known_data(conditions=CONDITIONS, orders=ORDERS):
         np.zeros((len(speed), size)),
         np.tile(correlation * np.outer(deviation, deviation), (len(speed), 1, 1)),
     )
-    campaign = SimpleNamespace(believed=BELIEVED, rig=RIG, train=records, title="planted")
+    campaign = SimpleNamespace(
+        believed=BELIEVED,
+        rig=RIG,
+        train=records,
+        running=records,
+        title="planted",
+        torque_scale=1.0,
+    )
     return Data(campaign, features, base_parameters(BELIEVED, RIG, PHASES, 0.0))
 
 

@@ -20,6 +20,7 @@ from pymoo_hdte.discrepancy import (
     read_campaign,
     write_campaign,
 )
+from pymoo_hdte.discrepancy.features import measure
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 SHARED = Path("/work/shared/rig")
@@ -363,3 +364,83 @@ def test_shared_campaigns_are_read(path):
         # The load of a record is set to about a per cent only, beside gain and zero.
         limit = 0.03 * record.load_torque + 3.0 * read.rig.output_torque_zero
         assert record.output_torque.mean() == pytest.approx(record.load_torque, abs=limit)
+
+
+@pytest.mark.parametrize("origin", [0.0, 1e-3, 7.3, 1553.0, 1.7e9])
+def test_the_clock_of_a_record_does_not_move_it_in_the_session(campaign, origin):
+    shifted = [replace(record, time=record.time + origin) for record in campaign.running]
+    found = measure(campaign, shifted, [1.0, 2.0]).conditions.elapsed
+    wanted = [
+        record.elapsed + (record.time[-1] - record.time[0]) / 2.0 for record in campaign.running
+    ]
+    # To within the first row, which a record's own clock counts from its first sample.
+    rows = [1.0 / record.sample_rate for record in campaign.running]
+    assert np.all(np.abs(found - wanted) <= rows)
+
+
+def plainly(folder, name):
+    """Unpack a record's file in a campaign."""
+    packed = folder / f"{name}.csv.gz"
+    (folder / f"{name}.csv").write_bytes(gzip.decompress(packed.read_bytes()))
+    packed.unlink()
+    toml = folder / "campaign.toml"
+    toml.write_text(toml.read_text().replace(f"{name}.csv.gz", f"{name}.csv"))
+
+
+def test_a_plain_csv_file_is_read_like_a_compressed_one(campaign, tmp_path):
+    write_campaign(campaign, tmp_path / "c")
+    packed = read_campaign(tmp_path / "c")
+    for record in (*campaign.running[:2], *campaign.torsion):
+        plainly(tmp_path / "c", record.name)
+    plain = read_campaign(tmp_path / "c")
+    assert [one.name for one in plain.running] == [one.name for one in packed.running]
+    for one, other in zip(
+        (*plain.running, *plain.torsion), (*packed.running, *packed.torsion), strict=True
+    ):
+        for field in fields(one):
+            assert np.array_equal(getattr(one, field.name), getattr(other, field.name))
+
+
+def test_a_fault_in_a_plain_csv_file_names_it(campaign, tmp_path):
+    name = campaign.running[0].name
+    write_campaign(campaign, tmp_path / "c")
+    plainly(tmp_path / "c", name)
+    file = tmp_path / "c" / f"{name}.csv"
+    text = file.read_text()
+    rows = text.splitlines()[1:]
+    toml = tmp_path / "c" / "campaign.toml"
+    beliefs = toml.read_text()
+    toml.write_text(beliefs.replace("input_speed_rpm = 500", "input_speed_rpm = 900", 1))
+    with pytest.raises(InvalidInput, match=rf"{name}\.csv, lines 2 to \d+: mean speed"):
+        read_campaign(tmp_path / "c")
+    toml.write_text(beliefs)
+    file.write_bytes(gzip.compress(text.encode()))
+    with pytest.raises(InvalidInput, match=rf"^{name}\.csv is .*allowed: CSV text"):
+        read_campaign(tmp_path / "c")
+    file.write_text(text.replace(rows[3], rows[3].rsplit(",", 1)[0]))
+    with pytest.raises(InvalidInput, match=rf"^{name}\.csv, line 5: number of cells"):
+        read_campaign(tmp_path / "c")
+
+
+def test_a_record_stands_in_one_file(campaign, tmp_path):
+    name = campaign.running[0].name
+    write_campaign(campaign, tmp_path / "c")
+    toml = tmp_path / "c" / "campaign.toml"
+    packed = (tmp_path / "c" / f"{name}.csv.gz").read_bytes()
+    (tmp_path / "c" / f"{name}.csv").write_bytes(gzip.decompress(packed))
+    entry = toml.read_text().split("\n[[record]]")[1].replace(".csv.gz", ".csv")
+    toml.write_text(f"{toml.read_text()}\n[[record]]{entry}")
+    with pytest.raises(InvalidInput, match=r"\.file is .*allowed: each name once"):
+        read_campaign(tmp_path / "c")
+
+
+def test_a_torsion_sweep_that_is_held_out_is_refused_where_it_is_said(campaign, tmp_path):
+    (sweep,) = campaign.torsion
+    with pytest.raises(InvalidInput, match="role is 'held_out', allowed: 'train' for a torsion"):
+        replace(sweep, role="held_out")
+    write_campaign(campaign, tmp_path / "c")
+    toml = tmp_path / "c" / "campaign.toml"
+    before, after = toml.read_text().split('test = "torsion"')
+    toml.write_text(f'{before}test = "torsion"{after.replace("train", "held_out")}')
+    with pytest.raises(InvalidInput, match=r"^campaign\.toml, line \d+: record\[3\]\.role is"):
+        read_campaign(tmp_path / "c")

@@ -60,6 +60,7 @@ CASES = {
     ),
     "sweep": (lambda c: said(replace(c, torsion=())), "No torsion sweep"),
     "order": (lambda c: said(c, orders=[1.0, 2.0, 3.0]), "order 2.02."),
+    "between lines": (lambda c: said(c, orders=[1.0, 2.0, 2.02 + 0.4 / 101.0]), "order 2.02."),
     "rattle": (
         lambda c: said(c, c.train[:-1]),
         r"Neither fitted nor predicted.*: run_2000rpm_40Nm[,.]",
@@ -125,3 +126,10 @@ def test_only_what_is_missing_is_said(campaign):
     assert len(said(replace(campaign, torsion=()))) == 1
     assert len(said(campaign, orders=[1.0, 2.0, 3.0])) == 1
     assert len(said(replace(campaign, running=campaign.train))) == 1
+
+
+def test_a_line_above_all_that_is_looked_at_is_not_called_unresolved(campaign):
+    lines = {"error_orders": (1.0, 2.0, 14.5), "error_amplitudes": (1e-5, 1e-5, 1e-5)}
+    believed = replace(campaign.believed, **lines)
+    (sentence,) = said(replace(campaign, believed=believed))
+    assert sentence.startswith("The believed static error of order 14.5 is not looked at")

@@ -112,6 +112,24 @@ def test_nothing_is_said_of_nothing():
     assert "wherever it was measured" in trusted
 
 
+def test_a_model_that_a_sweep_contradicts_is_not_trusted_there():
+    where, trusted = said({}, sweep_flagged=True)
+    assert "The torsion sweep disagrees with the model." in where
+    assert "wherever it was measured" not in trusted
+    assert "but not in the torsion sweep" in trusted
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(1.0, "up to 10 N.m"), (0.01, "up to 0.1 N.m"), (100.0, "up to 1000 N.m")]
+)
+def test_a_limit_of_load_is_told_in_the_size_of_the_drive(factor, words):
+    torque = np.where(LOAD > 10.0, 1.0, 0.0)
+    _, trusted = said({(1, 4): torque}, load_torque=factor * LOAD)
+    assert f"in all records {words}" in trusted
+    _, trusted = said({(1, 4): np.where(LOAD > 0.0, 1.0, 0.0)}, load_torque=factor * LOAD)
+    assert "in all records without load" in trusted
+
+
 def recorded(torque_on_input, twist=None):
     """Return data of records with an input torque over time, and a twist over time and angle."""
     rng = np.random.default_rng(7)

@@ -101,6 +101,22 @@ def test_an_adequate_model_asks_for_its_least_certain_record():
     assert proposal.expected_separation == pytest.approx(variance[: len(grid.speed_rpm)].max())
 
 
+def test_a_record_that_the_campaign_has_is_called_a_repeat():
+    # The grid has loads 0, 20 and 40 N.m; nothing was measured at 20.
+    data, _ = measured(data=known_data([(rpm, t) for rpm in (10.0, 2000.0) for t in (0.0, 40.0)]))
+    grid = Grid.of(analysed(data, "adequate"))
+    assert grid.load_torque.tolist() == [0.0, 20.0, 40.0, 0.0, 20.0, 40.0]
+    said = [grid.condition(test)[0] for test in range(6)]
+    for what, load in zip(said, grid.load_torque, strict=True):
+        assert what.startswith("a record at" if load == 20.0 else "a repeat of the record at")
+    assert grid.condition(6)[0].startswith("a torsion sweep")
+    turned = [SimpleNamespace(**(vars(one) | {"input_speed": -one.input_speed}))
+              for one in data.campaign.running]  # fmt: skip
+    data.campaign.running = turned
+    grid = Grid.of(analysed(data, "adequate"))
+    assert not grid.repeats.any()
+
+
 def test_a_superset_of_the_named_effects_is_no_rival():
     def fake(*names):
         return SimpleNamespace(

@@ -183,6 +183,24 @@ def test_residual_spectrum_shows_the_unlisted_line_only():
     assert not np.any(np.isclose(orders, 204 / RATIO))
 
 
+def test_residual_spectrum_looks_at_whole_orders_of_the_input_and_of_the_output():
+    spoiled = noisy(np.random.default_rng(12))
+    hidden = 0.3 * RIG.output_torque_noise * np.cos(3.0 * ANGLE + 1.0)
+    spoiled = replace(spoiled, output_torque=spoiled.output_torque + hidden)
+    grids = {}
+    for ratio in (RATIO, RATIO - 0.5, RATIO - 0.63):
+        orders, amplitudes = residual_spectrum(spoiled, RIG, ratio, ORDERS)
+        assert orders[np.argmax(amplitudes[2])] == pytest.approx(3.0, abs=1e-12)
+        assert np.all(np.diff(orders) > 0.0)
+        grids[ratio] = orders
+    whole = [order for order in range(1, 10) if np.abs(np.array(ORDERS) - order).min() > 0.02]
+    for ratio, orders in grids.items():
+        of_output = np.abs(orders * ratio - np.round(orders * ratio)) < 1e-9
+        of_input = np.abs(orders - np.round(orders)) < 1e-9
+        assert np.all(of_output | of_input)
+        assert np.round(orders[of_input]).tolist() == whole
+
+
 @pytest.mark.parametrize("orders", [[0.0], [-1.0], [10.5], [np.nan], [2.0, 2.0], [2.0, 2.00001]])
 def test_orders_out_of_reach_are_refused(orders, rng):
     with pytest.raises(InvalidInput, match="orders"):

@@ -166,3 +166,21 @@ def test_lines_that_no_one_expected_are_found_the_strongest_first(lines):
     features = Features(records, conditions, orders, np.zeros((3, 26)), np.zeros((3, 26, 26)))
     found = unexpected_orders(features, BELIEVED.ratio, RIG)
     assert found == pytest.approx(lines, abs=0.5 / BELIEVED.ratio)
+
+
+def test_a_line_of_the_input_is_found_at_its_order_where_the_ratio_is_no_whole_number():
+    def error(angle):
+        return 0.5 * ARCSEC * np.sin(7.0 * angle)
+
+    rng = np.random.default_rng(8)
+    records = tuple(record(rng, error) for _ in range(3))
+    angles = [one.input_angle * (1.0 / BELIEVED.ratio - 1.0 / 50.5) for one in records]
+    records = tuple(
+        replace(one, output_angle=one.output_angle - angle)
+        for one, angle in zip(records, angles, strict=True)
+    )
+    conditions = Conditions(*np.ones((3, 3)), np.zeros((3, 3, 4), dtype=complex))
+    orders = np.array([1.0, 2.0])
+    features = Features(records, conditions, orders, np.zeros((3, 18)), np.zeros((3, 18, 18)))
+    # What the lines of such a ratio leak to comes after it.
+    assert unexpected_orders(features, 50.5, RIG)[0] == 7.0

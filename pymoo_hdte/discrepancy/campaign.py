@@ -15,6 +15,7 @@ from pymoo_hdte.discrepancy.plausibility import (
     check_torsion,
 )
 from pymoo_hdte.discrepancy.records import RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.torque_scale import torque_scale
 
 __all__ = ["Believed", "Campaign", "Rig", "RunningRecord", "TorsionRecord"]
 
@@ -78,6 +79,14 @@ class Campaign:
     def held_out(self) -> tuple[RunningRecord, ...]:
         """Running records to judge by; empty where nothing can be said about new conditions."""
         return tuple(record for record in self.running if record.role == "held_out")
+
+    @property
+    def torque_scale(self) -> float:
+        """Torques beside those that the library of effects is sized for, dimensionless.
+
+        See `pymoo_hdte.discrepancy.torque_scale`.
+        """
+        return torque_scale([record.load_torque for record in self.running], self.believed)
 
     def _check_each_once(self) -> None:
         names: set[str] = set()

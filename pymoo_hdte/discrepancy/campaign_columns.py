@@ -1,4 +1,4 @@
-"""Columns of numbers in gzip-compressed CSV; an error names the file and its line.
+"""Columns of numbers in CSV, compressed by gzip or plain; an error names the file and its line.
 
 Line 1 is the header. Columns come in any order and others are ignored.
 """
@@ -24,13 +24,13 @@ def line_of_row(row: int) -> int:
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
-    """Read named columns of a ``.csv.gz`` file, each of shape (n_rows,).
+    """Read named columns of a ``.csv`` or ``.csv.gz`` file, each of shape (n_rows,).
 
     Raises
     ------
     InvalidInput
-        For a file that is no compressed text, a missing column, a row of another length, an empty
-        cell, text, or a value that is not finite.
+        For a file that is no text, or not compressed as its name says, a missing column, a row of
+        another length, an empty cell, text, or a value that is not finite.
     OSError
         If the file cannot be read.
     """
@@ -66,11 +66,13 @@ def write_columns(path: Path, columns: dict[str, tuple[NDArray[np.float64], int]
 
 
 def _lines(path: Path) -> list[str]:
+    compressed = path.suffix == ".gz"
     try:
-        with gzip.open(path, "rt", encoding="utf-8-sig") as file:
+        with (gzip.open if compressed else open)(path, "rt", encoding="utf-8-sig") as file:
             return file.read().rstrip().split("\n")
     except (gzip.BadGzipFile, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise InvalidInput(path.name, str(error), "gzip-compressed CSV text in UTF-8") from None
+        allowed = f"{'gzip-compressed ' if compressed else ''}CSV text in UTF-8"
+        raise InvalidInput(path.name, str(error), allowed) from None
 
 
 def _row_by_row(

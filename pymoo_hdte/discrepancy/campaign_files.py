@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.campaign_format import (
     COLUMNS,
     CONTROL,
     ENDING,
+    PLAIN_ENDING,
     RIG,
     RUNNING,
     TORSION,
@@ -38,8 +39,8 @@ def read_campaign(folder: str | Path) -> Campaign:
     Parameters
     ----------
     folder : str or Path
-        With ``campaign.toml`` and a ``.csv.gz`` file for each record, whose fields and columns have
-        their units in their names.
+        With ``campaign.toml`` and a ``.csv.gz`` or plain ``.csv`` file for each record, whose
+        fields and columns have their units in their names.
 
     Returns
     -------
@@ -61,16 +62,17 @@ def read_campaign(folder: str | Path) -> Campaign:
         rig = _rig(top.table("rig"))
         entries = top.tables("record")
         top.finish()
+        files = [entry.text("file") for entry in entries]
         records = [
-            _record(entry, f"{CAMPAIGN_FILE}.record[{index}]", folder)
-            for index, entry in enumerate(entries)
+            _record(entry, file, f"{CAMPAIGN_FILE}.record[{index}]", folder)
+            for index, (entry, file) in enumerate(zip(entries, files, strict=True))
         ]
         running = tuple(record for record in records if isinstance(record, RunningRecord))
         torsion = tuple(record for record in records if isinstance(record, TorsionRecord))
         try:
             return Campaign(title, drive, believed, rig, running, torsion)
         except InvalidInput as error:
-            raise _placed_in_files(error, records) from None
+            raise _placed_in_files(error, records, files) from None
 
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> None:
@@ -155,10 +157,12 @@ def _rig(table: Fields) -> Rig:
     return _build(Rig, RIG, table, place, proportional=proportional, integral=integral)
 
 
-def _record(entry: Fields, place: str, folder: Path) -> RunningRecord | TorsionRecord:
-    file = entry.text("file")
-    if not re.fullmatch(rf"\w[\w.-]*{re.escape(ENDING)}", file, re.ASCII):
-        allowed = f"letters, digits, '.', '-' and '_', ending in {ENDING}"
+def _record(entry: Fields, file: str, place: str, folder: Path) -> RunningRecord | TorsionRecord:
+    named = re.fullmatch(
+        rf"(\w[\w.-]*?)({re.escape(ENDING)}|{re.escape(PLAIN_ENDING)})", file, re.ASCII
+    )
+    if not named:
+        allowed = f"letters, digits, '.', '-' and '_', ending in {ENDING} or {PLAIN_ENDING}"
         raise InvalidInput(f"{place}.file", file, allowed)
     path = folder / file
     if not path.is_file():
@@ -170,12 +174,13 @@ def _record(entry: Fields, place: str, folder: Path) -> RunningRecord | TorsionR
     channels = [field.name for field in fields(kind) if field.name in COLUMNS]
     columns = read_columns(path, [COLUMNS[channel][0] for channel in channels])
     measured = {channel: columns[COLUMNS[channel][0]] for channel in channels}
-    name = file.removesuffix(ENDING)
     try:
-        return _build(kind, names, entry, place, name=name, role=role, **measured)
+        return _build(kind, names, entry, place, name=named[1], role=role, **measured)
     except InvalidInput as error:
         if error.field.startswith(CAMPAIGN_FILE):
             raise
+        if error.field == "role":
+            raise InvalidInput(f"{place}.role", error.value, error.allowed) from None
         row = re.search(r"\[(\d+)]$", error.field)
         lines = f"line {line_of_row(int(row[1]))}" if row else _lines_of(len(measured["time"]))
         field = f"{file}, {lines}: {error.field}"
@@ -223,21 +228,28 @@ def _placed_in_table(error: InvalidInput, attribute: str, names: Names, place: s
 
 
 def _placed_in_files(
-    error: InvalidInput, records: Sequence[RunningRecord | TorsionRecord]
+    error: InvalidInput,
+    records: Sequence[RunningRecord | TorsionRecord],
+    files: Sequence[str],
 ) -> InvalidInput:
     """Return an error of `Campaign` as one about its files."""
     table, _, attribute = error.field.partition(".")
     names = {"believed": BELIEVED, "rig": RIG}.get(table)
     if names is not None and attribute in names:
         return _placed_in_table(error, attribute, names, f"{CAMPAIGN_FILE}.{table}")
-    return InvalidInput(_place_in_files(error, records), error.value, error.allowed)
+    return InvalidInput(_place_in_files(error, records, files), error.value, error.allowed)
 
 
-def _place_in_files(error: InvalidInput, records: Sequence[RunningRecord | TorsionRecord]) -> str:
+def _place_in_files(
+    error: InvalidInput,
+    records: Sequence[RunningRecord | TorsionRecord],
+    files: Sequence[str],
+) -> str:
     lengths = {record.name: len(record.time) for record in records}
     name, _, channel = error.field.partition(": ")
     if channel:
-        return f"{name}{ENDING}, {_lines_of(lengths[name])}: {channel}"
+        (file,) = (file for file, one in zip(files, records, strict=True) if one.name == name)
+        return f"{file}, {_lines_of(lengths[name])}: {channel}"
     numbers = [index for index, record in enumerate(records) if record.name == error.value]
     if numbers:
         return f"{CAMPAIGN_FILE}.record[{numbers[-1]}].file"

@@ -1,4 +1,4 @@
-"""Names of the campaign format: ``campaign.toml`` and a ``.csv.gz`` file for each record.
+"""Names of the campaign format: ``campaign.toml`` and a ``.csv.gz`` or ``.csv`` file each record.
 
 =========================  ===================================================================
 table                      fields; those with ``=`` may be left out
@@ -25,6 +25,10 @@ top                        ``title``, ``drive``
 
 Columns of a running record: ``time_s, input_angle_rad, output_angle_rad, input_torque_Nm,
 output_torque_Nm``; of a torsion record: ``time_s, output_angle_rad, output_torque_Nm``.
+
+The ``role`` of a running record is ``"train"``, to be fitted, or ``"held_out"``, to judge the
+result; a torsion record is always ``"train"``. ``time_s`` counts from any origin, be it that of the
+record, of the session or of the world: ``elapsed_s`` says when in the session a record began.
 """
 
 from __future__ import annotations
@@ -37,7 +41,9 @@ from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 CAMPAIGN_FILE = "campaign.toml"
 
 ENDING = ".csv.gz"
-"""Of the file of a record; what stands before it is the name of the record."""
+"""Of the file of a record that is written; what stands before it is the name of the record."""
+PLAIN_ENDING = ".csv"
+"""Of one that is read as well."""
 
 Names = Mapping[str, tuple[str, float]]
 """For each attribute its name in the file and the factor to SI units."""

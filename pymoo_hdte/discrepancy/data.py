@@ -211,9 +211,8 @@ class Data:
 
 
 def training_data(campaign: Campaign, features: Features) -> Data:
-    """Return features of training records with first guesses and the training sweeps."""
-    sweeps = [record for record in campaign.torsion if record.role == "train"]
-    points = tuple(torsion_points(record, campaign.rig) for record in sweeps)
+    """Return features of training records with first guesses, and the sweeps."""
+    points = tuple(torsion_points(record, campaign.rig) for record in campaign.torsion)
     return Data(campaign, features, start_parameters(campaign, features), points)
 
 

@@ -46,12 +46,16 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Tests that could be made: running records, then a sweep through zero torque."""
+    """Tests that could be made: running records, then a sweep through zero torque.
+
+    ``repeats`` tells which of the running records the campaign has already, shape (n_running,).
+    """
 
     data: Data
     speed_rpm: Values
     load_torque: Values
     slopes: Values
+    repeats: NDArray[np.bool_]
 
     @classmethod
     def of(cls, analysis: Analysis) -> Grid:
@@ -83,7 +87,9 @@ class Grid:
         data = replace(analysis.data, features=planned, torsion=(sweep,) if largest else ())
         # Those without effects serve for all models: how uncertain a test is needs no more.
         slopes = Objective(data, ()).slopes_at(analysis.verdict.base.values)
-        return cls(data, speed / REVOLUTION_PER_MINUTE, load, slopes)
+        made = [(one.input_speed, one.load_torque) for one in analysis.campaign.running]
+        repeats = np.isclose(grid[:, None], made).all(axis=2).any(axis=1)
+        return cls(data, speed / REVOLUTION_PER_MINUTE, load, slopes, repeats)
 
     def model(self, fitted: Fit) -> Model:
         """Return the predictions of a fit with their uncertainty."""
@@ -120,7 +126,8 @@ class Grid:
             what = f"a torsion sweep through zero between -{reach:.3g} and {reach:.3g} N.m"
             return what, None, None, "torsion_sweep"
         speed, load = float(self.speed_rpm[test]), float(self.load_torque[test])
-        what = f"a record at {speed:.4g} r/min with {load:.3g} N.m"
+        record = "a repeat of the record" if self.repeats[test] else "a record"
+        what = f"{record} at {speed:.4g} r/min with {load:.3g} N.m"
         return what, speed, load, "running"
 
 

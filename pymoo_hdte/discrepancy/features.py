@@ -89,15 +89,22 @@ def measure(
     conditions = Conditions(
         input_speed=np.array([line.slope[3] for line in lines]),
         output_torque=np.array([line.mean[2] for line in lines]),
-        elapsed=np.array(
-            [record.elapsed + (record.time[0] + record.time[-1]) / 2.0 for record in records]
-        ),
+        elapsed=np.array([_middle(record) for record in records]),
         bends=np.array([line.bends for line in lines]),
     )
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
     return Features(tuple(records), conditions, np.array(orders), values, covariance)
+
+
+def _middle(record: RunningRecord) -> float:
+    """Return the time from the start of the session to the middle of a record, s."""
+    # The first row is the mean of samples that end within a row's time: what is later or earlier
+    # is another clock, of the session or of the world.
+    own_clock = abs(record.time[0]) * record.sample_rate <= 1.0
+    start = 0.0 if own_clock else record.time[0]
+    return float(record.elapsed + (record.time[0] + record.time[-1]) / 2.0 - start)
 
 
 def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[np.float64]:

@@ -24,24 +24,26 @@ from pymoo_hdte.drive.friction import (
 RATED_SPEED = 209.4
 """rad/s of the input; where the drag is scaled."""
 TYPICAL_LEVEL = {"input": 0.01, "output": 1.0}
-"""Dry friction of a shaft, N.m."""
+"""Dry friction of a shaft, N.m; like all torques here for a `torque_scale` of 1."""
 
 
-def friction_candidates(ratio: float, orders: Sequence[float]) -> list[Candidate]:
-    """Return the candidates for a drive of this ratio and features of these orders."""
+def friction_candidates(
+    ratio: float, orders: Sequence[float], torque_scale: float
+) -> list[Candidate]:
+    """Return the candidates for a drive of this ratio and size and features of these orders."""
+    level = {port: torque_scale * typical for port, typical in TYPICAL_LEVEL.items()}
     return [
-        _coulomb("input"),
-        _coulomb("output"),
-        _stribeck(),
-        _periodic("input", 1.0, 1.0, orders),
-        _periodic("input", 2.0, 1.0, orders),
-        _periodic("output", 1.0, ratio, orders),
-        _drag(),
+        _coulomb("input", level["input"]),
+        _coulomb("output", level["output"]),
+        _stribeck(level["input"]),
+        _periodic("input", 1.0, 1.0, orders, level["input"]),
+        _periodic("input", 2.0, 1.0, orders, level["input"]),
+        _periodic("output", 1.0, ratio, orders, level["output"]),
+        _drag(torque_scale),
     ]
 
 
-def _coulomb(port: str) -> Candidate:
-    scale = TYPICAL_LEVEL[port]
+def _coulomb(port: str, scale: float) -> Candidate:
     return Candidate(
         "coulomb_friction",
         port,
@@ -52,22 +54,24 @@ def _coulomb(port: str) -> Candidate:
     )
 
 
-def _stribeck() -> Candidate:
+def _stribeck(scale: float) -> Candidate:
     return Candidate(
         "stribeck_friction",
         "input",
         (
-            unknown("level", 0.0, 0.2, 0.01),
-            unknown("excess", 0.0, 0.3, 0.01),
+            unknown("level", 0.0, 20 * scale, scale),
+            unknown("excess", 0.0, 30 * scale, scale),
             unknown("fading", 1.0, 150.0, 20.0),
         ),
-        ((0.01, 0.01, 8.0), (0.01, 0.01, 25.0), (0.01, 0.01, 70.0)),
+        tuple((scale, scale, fading) for fading in (8.0, 25.0, 70.0)),
         lambda v: (LawAtPort("stribeck_friction", "input", StribeckFriction(*v)),),
         "Dry friction at the input that falls with speed.",
     )
 
 
-def _periodic(port: str, order: float, slower: float, orders: Sequence[float]) -> Candidate:
+def _periodic(
+    port: str, order: float, slower: float, orders: Sequence[float], scale: float
+) -> Candidate:
     name = "position_dependent_friction"
 
     def build(v: Values) -> tuple[Effect, ...]:
@@ -77,7 +81,6 @@ def _periodic(port: str, order: float, slower: float, orders: Sequence[float]) -
         ]
         return (*varying, LawAtPort("coulomb_friction", port, CoulombFriction(v[-1])))
 
-    scale = TYPICAL_LEVEL[port]
     mean = unknown("mean", 0.0, 20 * scale, scale)
     parts = (*wave("level", 20 * scale, scale, harmonics_among(orders, order / slower, 2)), mean)
     return Candidate(
@@ -91,8 +94,8 @@ def _periodic(port: str, order: float, slower: float, orders: Sequence[float]) -
     )
 
 
-def _drag() -> Candidate:
-    coefficient = 0.02 / RATED_SPEED**2
+def _drag(torque_scale: float) -> Candidate:
+    coefficient = torque_scale * (0.02 / RATED_SPEED**2)
     return Candidate(
         "nonlinear_drag",
         "input",

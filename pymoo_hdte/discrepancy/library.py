@@ -18,7 +18,7 @@ _OF_THEIR_OWN = ("load_inertia", "damping")
 
 
 def candidates(
-    believed: Believed, orders: Sequence[float], seen: Sequence[float]
+    believed: Believed, orders: Sequence[float], seen: Sequence[float], torque_scale: float = 1.0
 ) -> list[Candidate]:
     """Return all candidates for a drive.
 
@@ -29,11 +29,13 @@ def candidates(
         All orders of the features.
     seen : sequence of float
         Orders at which something was seen, for effects whose order is not known beforehand.
+    torque_scale : float
+        Of the campaign: how much larger its torques are than those the library is sized for.
     """
     return [
-        *mesh_candidates(believed, orders),
-        *friction_candidates(believed.ratio, orders),
-        *line_candidates(believed, orders, seen),
+        *mesh_candidates(believed, orders, torque_scale),
+        *friction_candidates(believed.ratio, orders, torque_scale),
+        *line_candidates(believed, orders, seen, torque_scale),
         *_others(believed),
     ]
 

@@ -14,8 +14,8 @@ _SAME_SPEED = 1.1
 """Ratio of the largest to the smallest speed up to which records run at one speed."""
 _SAME_LOAD = 0.1
 """Range of loads, as a share of the largest, up to which records carry one load."""
-_RESOLVED = 0.5
-"""Largest distance, in cycles per output turn, at which a line stands for an order."""
+_SAME_ORDER = 1e-6
+"""Largest distance at which a line is that of an order: one beside it is not predicted for it."""
 
 
 def limits(analysis: Analysis) -> list[str]:
@@ -78,12 +78,21 @@ def _unvaried(analysis: Analysis) -> list[str]:
 
 
 def _unseen(analysis: Analysis) -> list[str]:
-    believed, orders = analysis.campaign.believed, analysis.data.features.orders
-    unseen = _unresolved(believed.error_orders, orders.tolist(), _RESOLVED / believed.ratio)
-    if not unseen:
-        return []
-    named = ", ".join(f"{order:.4g}" for order in unseen)
-    return [f"The records do not resolve the believed static error of order {named}."]
+    orders, highest = analysis.data.features.orders, highest_order(analysis.campaign)
+    unseen = [
+        order
+        for order in analysis.campaign.believed.error_orders
+        if np.abs(orders - order).min() > _SAME_ORDER
+    ]
+    found = []
+    if mixed := _named([order for order in unseen if order <= highest]):
+        found.append(f"The records do not resolve the believed static error of order {mixed}.")
+    if high := _named([order for order in unseen if order > highest]):
+        found.append(
+            f"The believed static error of order {high} is not looked at: lines are compared up to "
+            f"order {highest:.3g}."
+        )
+    return found
 
 
 def _too_high(analysis: Analysis) -> list[str]:
@@ -102,5 +111,5 @@ def _too_high(analysis: Analysis) -> list[str]:
     ]
 
 
-def _unresolved(wanted: Sequence[float], orders: Sequence[float], near: float) -> list[float]:
-    return [order for order in wanted if min(abs(order - line) for line in orders) > near]
+def _named(orders: Sequence[float]) -> str:
+    return ", ".join(f"{order:.4g}" for order in orders)

@@ -24,12 +24,15 @@ from pymoo_hdte.units import ARCSEC
 
 LARGEST_ERROR = 100 * ARCSEC
 TYPICAL_ERROR = 2 * ARCSEC
+LARGEST_RIPPLE = 0.5
+TYPICAL_RIPPLE = 0.01
+"""N.m of the motor, both for a `torque_scale` of 1."""
 ENCODER_LINE = "encoder_line"
 """Name of an error of the encoder's scale, which no verdict names: see `Candidate.listed`."""
 
 
 def line_candidates(
-    believed: Believed, orders: Sequence[float], seen: Sequence[float]
+    believed: Believed, orders: Sequence[float], seen: Sequence[float], torque_scale: float
 ) -> list[Candidate]:
     """Return candidates for lines.
 
@@ -40,6 +43,8 @@ def line_candidates(
         All orders of the features: harmonics beyond them would be guesses.
     seen : sequence of float
         Orders at which something was seen.
+    torque_scale : float
+        See the module of this name.
     """
     ratio = believed.ratio
     found = [_encoder("eccentricity", 1.0, ratio, orders)]
@@ -53,7 +58,7 @@ def line_candidates(
             turns = order * ratio
             if turns > 1.5 and abs(turns - round(turns)) < 1e-6:
                 found.append(_encoder(ENCODER_LINE, float(round(turns)), ratio, orders))
-        found.append(_torque_ripple(order, orders))
+        found.append(_torque_ripple(order, orders, torque_scale))
     return found
 
 
@@ -81,14 +86,15 @@ def _kinematic_line(order: float, orders: Sequence[float]) -> Candidate:
     )
 
 
-def _torque_ripple(order: float, orders: Sequence[float]) -> Candidate:
+def _torque_ripple(order: float, orders: Sequence[float], torque_scale: float) -> Candidate:
     def build(v: Values) -> tuple[Effect, ...]:
         return tuple(
             LawAtPort("torque_ripple", "input", PeriodicTorque(multiple * order, phase, amplitude))
             for multiple, amplitude, phase in lines_of(v)
         )
 
-    parts = wave("amplitude", 0.5, 0.01, harmonics_among(orders, order, 2))
+    largest, typical = torque_scale * LARGEST_RIPPLE, torque_scale * TYPICAL_RIPPLE
+    parts = wave("amplitude", largest, typical, harmonics_among(orders, order, 2))
     return Candidate(
         "torque_ripple",
         "input",

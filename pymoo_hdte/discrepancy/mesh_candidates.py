@@ -15,6 +15,7 @@ from pymoo_hdte.discrepancy.candidate import (
     wave,
     wave_starts,
 )
+from pymoo_hdte.discrepancy.torque_scale import RATED_TORQUE
 from pymoo_hdte.drive import Effect, LawAtPort, MeshStiffnessVariation
 from pymoo_hdte.drive.hysteresis import MaxwellSlip
 from pymoo_hdte.drive.mesh_laws import (
@@ -25,17 +26,19 @@ from pymoo_hdte.drive.mesh_laws import (
 )
 from pymoo_hdte.units import ARCSEC
 
-RATED_TORQUE = 40.0
-"""N.m; where strengths of mesh laws are scaled."""
+TYPICAL_FORCE = 1.0
+"""Dry friction inside the mesh, N.m at a `torque_scale` of 1."""
 WIDEST = 40 * ARCSEC
 """Largest half width of a clearance."""
 VARYING_MOST = 15 * ARCSEC
 """Largest variation of it in a turn."""
 
 
-def mesh_candidates(believed: Believed, orders: Sequence[float]) -> list[Candidate]:
-    """Return the candidates at the mesh of a drive, for features of these orders."""
-    windup = RATED_TORQUE / believed.stiffness
+def mesh_candidates(
+    believed: Believed, orders: Sequence[float], torque_scale: float
+) -> list[Candidate]:
+    """Return the candidates at the mesh of a drive of this size, for features of these orders."""
+    windup = torque_scale * RATED_TORQUE / believed.stiffness
     cubic = 0.1 * believed.stiffness / windup**2
     hardening = Candidate(
         "hardening_stiffness",
@@ -78,12 +81,13 @@ def mesh_candidates(believed: Believed, orders: Sequence[float]) -> list[Candida
         lambda v: (LawAtPort("backlash", "mesh", DeadZone(v[0])),),
         "There is play between the teeth.",
     )
+    force = torque_scale * TYPICAL_FORCE
     slip = unknown("torsion", 0.01 * windup, 2 * windup, 0.2 * windup)
     hysteresis = Candidate(
         "hysteresis",
         "mesh",
-        (unknown("force", 0.0, 10.0, 1.0), slip, unknown("spread", 0.3, 4.0, 1.5)),
-        tuple((1.0, share * windup, 1.5) for share in (0.1, 0.3, 0.8)),
+        (unknown("force", 0.0, 10 * force, force), slip, unknown("spread", 0.3, 4.0, 1.5)),
+        tuple((force, share * windup, 1.5) for share in (0.1, 0.3, 0.8)),
         lambda v: (LawAtPort("hysteresis", "mesh", MaxwellSlip(*v)),),
         "The torsion lags behind the torque: dry friction inside the mesh.",
     )

@@ -144,6 +144,11 @@ def _trusted(location: Location, ratio: float) -> str:
     """Return channels, orders and records in which nothing is flagged."""
     flagged = location.flagged
     if not flagged.any():
+        if location.sweep_flagged:
+            return (
+                "The model may be trusted as it is in the running records, but not in the torsion "
+                "sweep."
+            )
         return "The model may be trusted as it is wherever it was measured."
     channels = [_WORDS[k] for k in range(len(CHANNELS)) if not flagged[:, k].any()]
     wrong = np.asarray(flagged.any(axis=(0, 1)))
@@ -171,8 +176,10 @@ def _conditions(location: Location, clean: Flags) -> str:
         size = np.abs(condition)
         limit = size[clean].max()
         if np.array_equal(clean, size <= limit):
-            limit = round(limit)
-            return f"in all records {f'up to {limit} {unit}' if limit else 'without load'}"
+            # Two digits of the largest; below that is what a sensor's zero makes of no load.
+            step = min(10.0 ** np.floor(np.log10(size.max()) - 1.0), 1.0)
+            limit = round(limit / step) * step
+            return f"in all records {f'up to {limit:g} {unit}' if limit else 'without load'}"
     return f"in {int(clean.sum())} of {len(clean)} records"
 
 

@@ -1,9 +1,11 @@
 """The next experiment: the test that best tells the named effect from its nearest rivals.
 
-Two models that fit all that was measured are held against each other where nothing was measured
-yet. Their difference is weighed by the noise and by what either model leaves uncertain there, after
-Hunter and Reiner (Technometrics 1965) and Box and Hill (Technometrics 1967). Where nothing is
-missing, the most uncertain prediction is what a further record would teach most about.
+Two models that fit all that was measured are held against each other in tests within the range of
+conditions measured, new ones and repeats: a further record of a known condition still averages its
+noise, and is called a repeat. Their difference is weighed by the noise and by what either model
+leaves uncertain there, after Hunter and Reiner (Technometrics 1965) and Box and Hill (Technometrics
+1967). Where nothing is missing, the most uncertain prediction is what a further record would teach
+most about.
 """
 
 from __future__ import annotations

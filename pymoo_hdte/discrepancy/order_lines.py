@@ -160,10 +160,13 @@ def row_covariance(rig: Rig, ratio: float, samples_averaged: int) -> NDArray[np.
 def residual_spectrum(
     record: RunningRecord, rig: Rig, ratio: float, orders: ArrayLike | Sequence[float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what the order lines leave, at every multiple of 1/N, in units of the noise.
+    """Return what the order lines leave, at multiples of 1/N and of 1, in units of the noise.
+
+    What turns with the output repeats in an output turn and what turns with the input in an input
+    turn; with a ratio that is no whole number, these are not the same orders.
 
     Each line is fitted to the residual after it, too, was cleared of the fitted lines, so that
-    these do not leak into it. Multiples of 1/N too close to a fitted line are left out. Under noise
+    these do not leak into it. Orders too close to a fitted line are left out. Under noise
     alone the power is exponential (Scargle, Astrophysical Journal 263, 1982).
 
     Parameters
@@ -188,20 +191,27 @@ def residual_spectrum(
     fit = _Fit.of(record, ratio, orders)
     highest = min(HIGHEST_ORDER, _nyquist_order(record))
     multiples = np.arange(1, int(np.ceil(highest * ratio - 1e-9)))
+    whole = ratio * np.arange(1, int(np.ceil(highest - 1e-9)))
+    whole = whole[np.abs(whole - whole.round()) > 1e-9]
     sigma = np.sqrt(np.diag(row_covariance(rig, ratio, record.samples_averaged)))
     residual = (fit.values - fit.basis @ (fit.basis.T @ fit.values)) / sigma
     rows = np.hstack([fit.basis, residual]).T
     angle = record.input_angle[:, None] / ratio
     powers = np.exp(1j * angle * np.arange(BLOCK))
     found, amplitudes = [], []
-    for block in np.split(multiples, range(BLOCK, len(multiples), BLOCK)):
-        waves = powers[:, : len(block)] * np.exp(1j * angle * block[0])
+    for block in (*np.split(multiples, range(BLOCK, len(multiples), BLOCK)), whole):
+        if block is whole:
+            waves = np.exp(1j * angle * whole)
+        else:
+            waves = powers[:, : len(block)] * np.exp(1j * angle * block[0])
         # As real numbers: a product of real and complex matrices would copy the real one.
         products = (rows @ waves.view(float)).view(complex)
         separate, amplitude = _amplitudes(waves, *np.split(products, [fit.basis.shape[1]]))
         found.append(block[separate] / ratio)
         amplitudes.append(amplitude)
-    return np.concatenate(found), np.concatenate(amplitudes, axis=1)
+    searched = np.concatenate(found)
+    rising = np.argsort(searched)
+    return searched[rising], np.concatenate(amplitudes, axis=1)[:, rising]
 
 
 def _amplitudes(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number, whole_number
 
 ROLES = ("train", "held_out")
-"""``train`` records are fitted; ``held_out`` records only judge the result."""
+"""``train`` records are fitted; ``held_out`` records, which must run, only judge the result."""
 
 FEWEST_SAMPLES = 8
 """Below this nothing can be said about a record."""
@@ -39,7 +39,8 @@ class RunningRecord:
     elapsed : float
         Time from the start of the session to the start of this record, s.
     time : ndarray, shape (n,)
-        Middle of the raw samples of each row, s, increasing.
+        Middle of the raw samples of each row, s, increasing; on any clock, since only ``elapsed``
+        says when the record began.
     input_angle, output_angle : ndarray, shape (n,)
         rad, absolute and unwrapped, with one common zero over a campaign.
     input_torque, output_torque : ndarray, shape (n,)
@@ -87,8 +88,10 @@ class TorsionRecord:
 
     Attributes
     ----------
-    name, role : str
+    name : str
         As in `RunningRecord`.
+    role : {"train"}
+        A sweep is fitted: what is proven is how a drive runs.
     sample_rate : float
         Hz.
     time : ndarray, shape (n,)
@@ -101,7 +104,7 @@ class TorsionRecord:
     Raises
     ------
     InvalidInput
-        As in `RunningRecord`.
+        As in `RunningRecord`, and for a sweep that is held out.
     """
 
     name: str
@@ -112,6 +115,9 @@ class TorsionRecord:
     output_torque: NDArray[np.float64]
 
     def __post_init__(self) -> None:
+        if self.role == "held_out":
+            allowed = "'train' for a torsion sweep: only running records can judge the result"
+            raise InvalidInput("role", self.role, allowed)
         _check_record(self, ("output_angle", "output_torque"))
 
 

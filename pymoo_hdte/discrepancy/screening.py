@@ -139,7 +139,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
     base = fitted.values[None, : len(data.base)]
     before = data.torsion_residuals(base, fitted.effects)[0]
     stiffness, offset = np.eye(len(data.base))[[0, -1]]
-    steps = np.array([0.01 * base[0, 0], 0.05])
+    steps = np.array([0.01 * base[0, 0], data.campaign.torque_scale * 0.05])
     moved = np.vstack([base + steps[0] * stiffness, base + steps[1] * offset])
     imitated = (data.torsion_residuals(moved, fitted.effects) - before).T
     orthonormal, _ = np.linalg.qr(imitated)

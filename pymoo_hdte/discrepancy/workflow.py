@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.fit import Fit, fit
 from pymoo_hdte.discrepancy.library import candidates
 from pymoo_hdte.discrepancy.naming import Verdict, judge
 from pymoo_hdte.discrepancy.order_lines import HIGHEST_ORDER
+from pymoo_hdte.discrepancy.records import RunningRecord
 from pymoo_hdte.discrepancy.rival import SHARE
 from pymoo_hdte.discrepancy.screening import leading_sweep_effect, unexpected_orders
 
@@ -36,7 +37,7 @@ CLEARANCES = ("backlash", "clearance_variation")
 _SAME_NOISE = 1.5
 """Largest ratio of variances up to which the noise is that of the believed drive."""
 LEAST_LOAD = 0.5
-"""N.m, a few times what a torque sensor's zero is known to."""
+"""N.m at a `torque_scale` of 1, a few times what a torque sensor's zero is known to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,20 +70,27 @@ class Analysis:
             return None
         features = measure(self.campaign, records, self.data.features.orders.tolist())
         if len(self.data.features.records) < len(self.campaign.train):
-            features = features.rows(np.flatnonzero(_flanks_held(features)))
+            held = _flanks_held(features, self.campaign.torque_scale)
+            features = features.rows(np.flatnonzero(held))
         if not features.records:
             return None
         return replace(self.data, features=features, torsion=())
 
 
 def expected_orders(campaign: Campaign) -> list[float]:
-    """Return the orders that are always looked at: of the error, their sums, of the output turn."""
+    """Return the orders that are always looked at: of the error, their sums, of the output turn.
+
+    Raises
+    ------
+    InvalidInput
+        For a line of the believed static error that some record does not show or tell apart.
+    """
     believed = campaign.believed
     lines = believed.error_orders
     wanted = [1.0 / believed.ratio, 2.0 / believed.ratio, *lines]
     wanted += [one + other for place, one in enumerate(lines) for other in lines[place:]]
     wanted += [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
-    return _apart(wanted, campaign)
+    return _apart(wanted, campaign, _error_lines(campaign))
 
 
 @threadpool_limits.wrap(limits=1)
@@ -94,7 +102,8 @@ def analyse(campaign: Campaign) -> Analysis:
     Raises
     ------
     InvalidInput
-        If fewer than `FEWEST_RECORDS` records are there to be fitted.
+        If fewer than `FEWEST_RECORDS` records are there to be fitted, or a record cannot show or
+        tell apart the lines of the believed static error.
     """
     if len(campaign.train) < FEWEST_RECORDS:
         allowed = f"at least {FEWEST_RECORDS}, or base and effects cannot be told apart"
@@ -104,7 +113,7 @@ def analyse(campaign: Campaign) -> Analysis:
     features = measure(campaign, campaign.train, expected)
     unexpected = unexpected_orders(features, ratio, campaign.rig)
     if unexpected:
-        orders = _apart([*expected, *unexpected], campaign)
+        orders = _apart(unexpected, campaign, expected)
         features = measure(campaign, campaign.train, orders)
     data = training_data(campaign, features)
     base = fit(data)
@@ -140,7 +149,8 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
 def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
     seen = _strong_lines(features, base)
-    return candidates(data.campaign.believed, features.orders.tolist(), seen)
+    campaign = data.campaign
+    return candidates(campaign.believed, features.orders.tolist(), seen, campaign.torque_scale)
 
 
 def _loaded(data: Data) -> Data:
@@ -148,32 +158,75 @@ def _loaded(data: Data) -> Data:
 
     With a clearance such a drive rattles and has no steady state to be fitted.
     """
-    held = _flanks_held(data.features)
+    held = _flanks_held(data.features, data.campaign.torque_scale)
     if np.all(held) or held.sum() < FEWEST_RECORDS:
         return data
     return replace(data, features=data.features.rows(np.flatnonzero(held)))
 
 
-def _flanks_held(features: Features) -> NDArray[np.bool_]:
+def _flanks_held(features: Features, torque_scale: float) -> NDArray[np.bool_]:
     """Return which records carry a load beyond the swing of their torque, shape (r,)."""
     m = len(features.orders)
     lines = features.values[:, features.places(2)].reshape(len(features.records), m, 2)
     swing = np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)
     load = np.abs(features.conditions.output_torque)
-    return np.asarray(load > np.maximum(swing, LEAST_LOAD))
+    return np.asarray(load > np.maximum(swing, torque_scale * LEAST_LOAD))
 
 
 def highest_order(campaign: Campaign) -> float:
     """Return the order up to which lines of a campaign are looked at, cycles per input turn."""
-    nyquist = [np.pi * record.sample_rate / abs(record.input_speed) for record in campaign.running]
-    return float(min(HIGHEST_ORDER, _BELOW_NYQUIST * min(nyquist)))
+    return float(min(HIGHEST_ORDER, *(_shown_order(record) for record in campaign.running)))
 
 
-def _apart(wanted: list[float], campaign: Campaign) -> list[float]:
-    """Return orders, the first ones first served, that every record can tell apart."""
+def _shown_order(record: RunningRecord) -> float:
+    """Return the order up to which the rows of a record show lines."""
+    return _BELOW_NYQUIST * (np.pi * record.sample_rate / abs(record.input_speed))
+
+
+def _error_lines(campaign: Campaign) -> list[float]:
+    """Return the orders of the believed static error that the records show, if they can.
+
+    A line that a record folds to another order, or mixes with its neighbour, would be there and
+    not predicted: a drive that hides nothing would miss something. What is believed to be nothing
+    need not be seen, and what lies above `HIGHEST_ORDER` is looked at nowhere.
+    """
+    believed = campaign.believed
+    coarsest = min(campaign.running, key=_shown_order)
+    shortest = min(campaign.running, key=_travel)
+    least = 2.0 * np.pi * _SEPARATION / max(_travel(shortest), 2.0 * np.pi * believed.ratio)
+    kept: list[float] = []
+    for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True):
+        if amplitude == 0.0:
+            continue
+        if order > (shown := _shown_order(coarsest)):
+            rate = coarsest.sample_rate * order / shown
+            allowed = (
+                f"at most {shown:.4g}, {_BELOW_NYQUIST:g} of the Nyquist order of "
+                f"{coarsest.name}: rows at {rate:.4g} Hz or more instead of "
+                f"{coarsest.sample_rate:g} Hz, or a campaign without this record"
+            )
+            raise InvalidInput("believed.error_orders", order, allowed)
+        near = min(kept, key=lambda one: abs(one - order), default=np.inf)
+        if abs(order - near) < least:
+            turns = _SEPARATION / (believed.ratio * abs(order - near))
+            allowed = (
+                f"{least:.4g} or more from order {near:g}, or {shortest.name} cannot tell them "
+                f"apart: records of at least {turns:.3g} output turns, or both as one line"
+            )
+            raise InvalidInput("believed.error_orders", order, allowed)
+        kept.append(order)
+    return [order for order in kept if order <= highest_order(campaign)]
+
+
+def _travel(record: RunningRecord) -> float:
+    return abs(float(record.input_angle[-1] - record.input_angle[0]))
+
+
+def _apart(wanted: list[float], campaign: Campaign, kept: list[float]) -> list[float]:
+    """Return orders that every record can tell apart: those kept, then the first ones first."""
     least = _SEPARATION / campaign.believed.ratio
     highest = highest_order(campaign)
-    kept: list[float] = []
+    kept = list(kept)
     for order in wanted:
         if order <= highest and all(abs(order - other) >= least for other in kept):
             kept.append(order)
