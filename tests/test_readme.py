@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments import swarm_parts
+from experiments import fig12, swarm_parts
 from experiments.blind import OUTCOMES, SECONDS
 from experiments.blind_cases import MOST_WRONG_CONFIDENT
 from experiments.blind_data import read_outcomes
@@ -149,6 +149,11 @@ class TestNumbersBesideThePaper:
         _, ours = row("DTE of the nominal design")
         problem = RobustDTE()
         assert ours == [round(value, 2) for value in problem.evaluate(problem.nominal)]
+
+    def test_nominal_design_in_the_wider_reading(self, tmp_path):
+        rows = fig12.run(Context(20, tmp_path, Campaign(tmp_path))).tables[0].rows
+        (wide,) = (row for row in rows if row[0] == "calibrated" and "35 %" in row[1])
+        assert f"it gives {wide[2]:.1f}, {wide[3]:.1f} arcsec" in WORDS
 
     def test_surrogate(self):
         problem = RobustDTE()
