@@ -217,8 +217,8 @@ def test_first_positions_a_rounding_beyond_the_bounds_are_put_on_them():
     np.testing.assert_array_equal(population.get("X"), X)
 
 
-@pytest.mark.parametrize(("value", "side"), [(2.0 + 1e-11, 1), (np.nan, 0), (-1.5, 0)])
-def test_first_positions_beyond_the_bounds_are_named(value, side):
+@pytest.mark.parametrize("value", [2.0 + 1e-11, np.nan, -1.5])
+def test_first_positions_beyond_the_bounds_are_named(value):
     X = np.zeros((20, 3))
     X[4, 1] = value
     with pytest.raises(InvalidInput, match=r"sampling\[4, 1\]") as error:

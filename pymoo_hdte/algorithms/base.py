@@ -43,10 +43,33 @@ class Swarm(Algorithm):
         )
 
     # Not `_setup`, which pymoo's wrappers for constraint handling replace by their own.
-    def setup(self, problem: Problem, *args: Any, **kwargs: Any) -> Algorithm:
-        """Prepare a run on ``problem`` as `pymoo.core.algorithm.Algorithm.setup` does."""
+    def setup(self, problem: Problem, **kwargs: Any) -> Algorithm:
+        """Prepare a run; a running swarm goes on from where it is.
+
+        Parameters
+        ----------
+        problem : Problem
+            With real variables, finite bounds and two objectives or more.
+        **kwargs
+            What `pymoo.core.algorithm.Algorithm.setup` takes: termination, seed and others.
+
+        Returns
+        -------
+        Algorithm
+            The swarm itself.
+
+        Raises
+        ------
+        InvalidInput
+            If the problem does not fit.
+        """
         _check_problem(problem)
-        return super().setup(problem, *args, **kwargs)
+        super().setup(problem, **kwargs)
+        self._plan()
+        return self
+
+    def _plan(self) -> None:
+        """Fix what depends on how long the run will be."""
 
     def _initialize_infill(self) -> Population:
         particles = self.initialization.do(

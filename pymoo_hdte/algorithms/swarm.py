@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pymoo.core.algorithm import Algorithm
 from pymoo.core.individual import Individual
 from pymoo.core.population import Population
-from pymoo.core.problem import Problem
 from pymoo.core.sampling import Sampling
 
 from pymoo_hdte.algorithms.archive import LeaderArchive
@@ -108,11 +106,8 @@ class ParticleSwarm(Swarm):
         self.inertia = inertia
         self.hierarchy = hierarchy
 
-    def setup(self, problem: Problem, *args: Any, **kwargs: Any) -> Algorithm:
-        """Prepare a run on ``problem`` as `pymoo.core.algorithm.Algorithm.setup` does."""
-        super().setup(problem, *args, **kwargs)
+    def _plan(self) -> None:
         self.generations = generation_limit(self.termination, self.pop_size, self.n_max_gen)
-        return self
 
     def _initialize_infill(self) -> Population:
         particles = super()._initialize_infill()
