@@ -22,7 +22,7 @@ from pymoo_hdte.checks import InvalidInput
 
 
 class ElitistSwarm(Swarm):
-    """A swarm that keeps the best of all it has visited, for two objectives or more.
+    """A swarm that keeps the best of all it has visited, for two to five objectives.
 
     In a generation every particle makes one of the moves, towards a leader from the best front,
     and a sparse mutation; the best of the old and the new positions are the next swarm, thinned
@@ -32,6 +32,10 @@ class ElitistSwarm(Swarm):
     It is what was left of ideas for AMP-MOPSO, whose results it does not borrow, when those that
     seemed to gain nothing in tuning were taken out, inertia among them. Not every part that stayed
     is shown to help: ``python -m experiments swarm_parts`` tells what each is worth.
+
+    With more than five objectives nearly all positions are non-dominated, and it fails as NSGA-II
+    does, whose ranks it shares: it is no better than random positions on DTLZ2 with six objectives
+    and worse with eight. Take AGE-MOEA-II there.
 
     Parameters
     ----------
