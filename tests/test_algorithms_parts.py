@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from pymoo.core.population import Population
 from pymoo.core.termination import NoTermination, TerminateIfAll, TerminateIfAny
 from pymoo.termination import get_termination
 from pymoo.termination.collection import TerminationCollection
@@ -13,7 +14,7 @@ from scipy.stats import entropy
 from pymoo_hdte.algorithms import EntropyWeight, Flat, LinearDecrease, Pyramid
 from pymoo_hdte.algorithms.horizon import generation_limit
 from pymoo_hdte.algorithms.inertia import normalised_entropy
-from pymoo_hdte.algorithms.personal_best import updated_personal_best
+from pymoo_hdte.algorithms.personal_best import improves, personal_bests
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.pyramid import mutation_step
 from pymoo_hdte.checks import InvalidInput
@@ -133,19 +134,23 @@ def test_personal_best_follows_dominance():
         np.array([0.0, 0.0, 0.5, 0.1]),
     )
     for seed in range(8):
-        new = updated_personal_best(best, visited, np.random.default_rng(seed))
-        np.testing.assert_array_equal(new.X.ravel(), [1.0, 0.0, 1.0, 0.0])
-        np.testing.assert_array_equal(new.F[2:], [[9.0, 9.0], [2.0, 2.0]])
-        np.testing.assert_array_equal(new.violation, [0.0, 0.0, 0.5, 0.0])
+        replaced = improves(best, visited, np.random.default_rng(seed))
+        np.testing.assert_array_equal(replaced, [True, False, True, False])
 
 
 def test_a_coin_decides_between_incomparable_bests():
     n = 10_000
     best = Points(np.zeros((n, 1)), np.tile([1.0, 2.0], (n, 1)), np.zeros(n))
     visited = Points(np.ones((n, 1)), np.tile([2.0, 1.0], (n, 1)), np.zeros(n))
-    new = updated_personal_best(best, visited, np.random.default_rng(2))
-    assert new.X.mean() == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(n))
-    np.testing.assert_array_equal(new.F[:, 0], 1.0 + new.X[:, 0])
+    replaced = improves(best, visited, np.random.default_rng(2))
+    assert replaced.mean() == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(n))
+
+
+def test_a_particle_carries_its_best_and_is_that_itself_by_default():
+    first, second, third, old = Population.new("X", np.arange(4.0)[:, np.newaxis])
+    second.data["best"], third.data["best"] = old, None
+    bests = personal_bests(Population([first, second, third]))
+    assert list(bests) == [first, old, third]
 
 
 @pytest.mark.parametrize(

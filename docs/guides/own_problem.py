@@ -82,7 +82,7 @@ plt.show()
 # Three objectives
 # ----------------
 #
-# Nothing has to be set for more objectives. On DTLZ2 the true front is an eighth of the unit
+# Nothing has to be set for three objectives. On DTLZ2 the true front is an eighth of the unit
 # sphere, so the objectives of every solution should have length 1.
 
 result = minimize(get_problem("dtlz2"), ElitistSwarm(), ("n_gen", 150), seed=1)
@@ -94,6 +94,21 @@ ax.scatter(*result.F.T, s=14)
 ax.set(xlabel="f1", ylabel="f2", zlabel="f3")
 ax.view_init(elev=25, azim=45)
 plt.show()
+
+# %%
+# Five are about the limit. Among more objectives nearly every solution is non-dominated, and what
+# ranks by dominance, as NSGA-II does too, loses its way. Distances to the front (IGD in units of
+# its ranges, smaller is better) on DTLZ2 after 20,000 evaluations:
+#
+# ==========  ============  =======  =============  ===========
+# Objectives  ElitistSwarm  NSGA-II  Random search  AGE-MOEA-II
+# ==========  ============  =======  =============  ===========
+# 5           0.29          0.45     0.38           0.20
+# 6           0.60          1.06     0.45           0.27
+# 8           2.15          1.63     0.63           0.36
+# ==========  ============  =======  =============  ===========
+#
+# (Medians of three seeds, of one with AGE-MOEA-II.) Take pymoo's ``AGEMOEA2`` there.
 
 # %%
 # How long a run has

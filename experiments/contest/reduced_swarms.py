@@ -15,6 +15,7 @@ from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.inertia import normalised_entropy
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, SparseMutation
+from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.success_shares import SuccessShares
 
 GRID_DIVISIONS = 32
@@ -30,19 +31,16 @@ class EqualShares(SuccessShares):
 class EqualSwarm(ElitistSwarm):
     """Without learning which move succeeds."""
 
-    def _setup(self, problem: Problem, **kwargs: Any) -> None:
-        super()._setup(problem, **kwargs)
+    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
+        super()._initialize_advance(infills, **kwargs)
         self.success = EqualShares(len(self.moves))
 
 
 class AnyLeaderSwarm(ElitistSwarm):
     """Leaders drawn from the best front without regard to crowding."""
 
-    def _leaders(self) -> NDArray[np.float64]:
-        front = best_front(self.swarm)
-        if not len(front):
-            return self.swarm.X
-        return self.swarm.X[front[self.random_state.integers(len(front), size=self.pop_size)]]
+    def _leaders(self, front: Points) -> NDArray[np.float64]:
+        return front.X[self.random_state.integers(len(front), size=self.pop_size)]
 
 
 class OneSizeMutation(SparseMutation):
@@ -77,7 +75,7 @@ class ConstantInertiaSwarm(ElitistSwarm):
         return 0.3
 
     def _infill(self) -> Population:
-        before = self.swarm.X
+        before = self._points(self.pop).X
         still = np.zeros(before.shape[1])
         last = np.array([one.data.get("step", still) for one in self.pop])  # type: ignore[union-attr]
         particles = super()._infill()
@@ -93,7 +91,8 @@ class EntropyInertiaSwarm(ConstantInertiaSwarm):
     """The same, weighted by 0.1 + 0.4 (1 - S), S being the normalised entropy of the best front."""
 
     def _weight(self) -> float:
-        front = self.swarm.F[best_front(self.swarm)]
+        swarm = self._points(self.pop)
+        front = swarm.F[best_front(swarm)]
         return 0.1 + 0.4 * (1.0 - normalised_entropy(front, GRID_DIVISIONS))
 
 

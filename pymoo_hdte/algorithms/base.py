@@ -19,6 +19,9 @@ from pymoo.util.display.multi import MultiObjectiveOutput
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.checks import InvalidInput, whole_number
 
+# First positions computed from the bounds miss them by a few roundings; those are let in.
+_EDGE = 1e-12
+
 
 class Swarm(Algorithm):
     """Base of `ParticleSwarm` and `ElitistSwarm`, which tell its parameters and errors."""
@@ -39,8 +42,34 @@ class Swarm(Algorithm):
             FloatRandomSampling() if sampling is None else sampling
         )
 
-    def _setup(self, problem: Problem, **kwargs: Any) -> None:
+    # Not `_setup`, which pymoo's wrappers for constraint handling replace by their own.
+    def setup(self, problem: Problem, **kwargs: Any) -> Algorithm:
+        """Prepare a run; a running swarm goes on from where it is.
+
+        Parameters
+        ----------
+        problem : Problem
+            With real variables, finite bounds and two objectives or more.
+        **kwargs
+            What `pymoo.core.algorithm.Algorithm.setup` takes: termination, seed and others.
+
+        Returns
+        -------
+        Algorithm
+            The swarm itself.
+
+        Raises
+        ------
+        InvalidInput
+            If the problem does not fit.
+        """
         _check_problem(problem)
+        super().setup(problem, **kwargs)
+        self._plan()
+        return self
+
+    def _plan(self) -> None:
+        """Fix what depends on how long the run will be."""
 
     def _initialize_infill(self) -> Population:
         particles = self.initialization.do(
@@ -51,11 +80,19 @@ class Swarm(Algorithm):
         if X.shape != (self.pop_size, self.problem.n_var):
             wanted = f"{(self.pop_size, self.problem.n_var)}, a position for every particle"
             raise InvalidInput("shape of sampling", X.shape, wanted)
-        inside = np.all((lowest <= X) & (highest >= X), axis=1)
-        if not inside.all():
-            row = int(inside.argmin())
-            raise InvalidInput(f"sampling[{row}]", X[row], "within the bounds of the problem")
+        beyond = np.maximum(lowest - X, X - highest)
+        outside = np.argwhere(~(beyond <= _EDGE * (highest - lowest)))
+        if len(outside):
+            row, column = map(int, outside[0])
+            allowed = f"{lowest[column]!s} to {highest[column]!s}, the bounds of the problem"
+            raise InvalidInput(f"sampling[{row}, {column}]", float(X[row, column]), allowed)
+        particles = particles.copy()
+        for number in np.flatnonzero(np.any(beyond > 0.0, axis=1)):
+            particles[number] = Individual(X=np.clip(X[number], lowest, highest))
         return particles
+
+    def _points(self, population: Population) -> Points:
+        return Points.of(population, self.problem.has_constraints())
 
     def _evaluated(self, infills: Population | None) -> Points:
         """Return the points of a swarm that comes back from evaluation, in the order of ``ask``."""
@@ -63,7 +100,7 @@ class Swarm(Algorithm):
         if infills is None or n != self.pop_size:
             allowed = f"the {self.pop_size} particles of ask(), in their order"
             raise InvalidInput("number of infills", n, allowed)
-        points = Points.of(infills, self.problem.has_constraints())
+        points = self._points(infills)
         expected = (self.pop_size, self.problem.n_obj)
         if points.F.shape != expected:
             raise InvalidInput("shape of F of infills", points.F.shape, f"{expected}, evaluated")

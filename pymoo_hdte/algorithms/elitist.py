@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.population import Population
-from pymoo.core.problem import Problem
 from pymoo.core.sampling import Sampling
 
 from pymoo_hdte.algorithms.base import Swarm, particles_at
 from pymoo_hdte.algorithms.crowding import crowding_tournaments
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, SparseMutation
+from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.algorithms.success_shares import SuccessShares
 from pymoo_hdte.algorithms.survival import Truncation, survivors
@@ -22,7 +22,7 @@ from pymoo_hdte.checks import InvalidInput
 
 
 class ElitistSwarm(Swarm):
-    """A swarm that keeps the best of all it has visited, for two objectives or more.
+    """A swarm that keeps the best of all it has visited, for two to five objectives.
 
     In a generation every particle makes one of the moves, towards a leader from the best front,
     and a sparse mutation; the best of the old and the new positions are the next swarm, thinned
@@ -32,6 +32,10 @@ class ElitistSwarm(Swarm):
     It is what was left of ideas for AMP-MOPSO, whose results it does not borrow, when those that
     seemed to gain nothing in tuning were taken out, inertia among them. Not every part that stayed
     is shown to help: ``python -m experiments swarm_parts`` tells what each is worth.
+
+    With more than five objectives nearly all positions are non-dominated, and it fails as NSGA-II
+    does, whose ranks it shares: it is no better than random positions on DTLZ2 with six objectives
+    and worse with eight. Take AGE-MOEA-II there.
 
     Parameters
     ----------
@@ -63,7 +67,8 @@ class ElitistSwarm(Swarm):
     - a position beyond the box is cut to it;
     - feasible solutions come before infeasible ones, these by total violation (Deb et al. 2002); a
       solution that is not finite comes last, copies of another one after that;
-    - the result of a run is the best front of the swarm, at most ``pop_size`` solutions.
+    - the result of a run is the best front of the swarm, at most ``pop_size`` solutions;
+    - callbacks may change the population, which is all that the swarm knows of positions.
     """
 
     def __init__(
@@ -83,44 +88,40 @@ class ElitistSwarm(Swarm):
         self.mutation = SparseMutation() if mutation is None else mutation
         self.truncation = truncation
 
-    def _setup(self, problem: Problem, **kwargs: Any) -> None:
-        super()._setup(problem, **kwargs)
-        self.success = SuccessShares(len(self.moves))
-
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        self.swarm = self._evaluated(infills)
+        self._evaluated(infills)
+        self.success = SuccessShares(len(self.moves))
         self.pop = infills
 
+    # Callbacks may change the population, so it is read anew wherever it counts.
     def _infill(self) -> Population:
-        X, random_state = self.swarm.X, self.random_state
+        swarm, random_state = self._points(self.pop), self.random_state
         lowest, highest = self.problem.bounds()
-        leaders = self._leaders()
+        # Of a population that is not as long as it was, particles move in turn.
+        X = np.resize(swarm.X, (self.pop_size, swarm.X.shape[1]))
+        front = swarm[best_front(swarm)]
+        leaders = self._leaders(front) if len(front) else X
         self.chosen = self.success.draw(self.pop_size, random_state)
         steps = np.empty_like(X)
         for number, move in enumerate(self.moves):
             rows = self.chosen == number
-            steps[rows] = move(X[rows], leaders[rows], X, random_state)
+            steps[rows] = move(X[rows], leaders[rows], swarm.X, random_state)
         steps += self.mutation(steps, highest - lowest, random_state)
         return particles_at(np.clip(X + steps, lowest, highest))
 
-    def _leaders(self) -> NDArray[np.float64]:
+    def _leaders(self, front: Points) -> NDArray[np.float64]:
         """Draw a leader's position for every particle, shape (n, d)."""
-        front = best_front(self.swarm)
-        if not len(front):
-            return self.swarm.X
-        chosen = crowding_tournaments(self.swarm.F[front], self.pop_size, self.random_state)
-        return self.swarm.X[front[chosen]]
+        return front.X[crowding_tournaments(front.F, self.pop_size, self.random_state)]
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        points = self.swarm.followed_by(self._evaluated(infills))
+        points = self._points(self.pop).followed_by(self._evaluated(infills))
         kept = survivors(points, self.pop_size, self.truncation)
-        survived = np.zeros(2 * self.pop_size, dtype=bool)
+        survived = np.zeros(len(points), dtype=bool)
         survived[kept] = True
-        self.success.learn(self.chosen, survived[self.pop_size :])
-        self.swarm = points[kept]
+        self.success.learn(self.chosen, survived[-self.pop_size :])
         self.pop = Population.merge(self.pop, infills)[kept]
 
     def _set_optimum(self) -> None:
         # pymoo reads the optimum in every generation, even if nothing could be judged so far.
-        front = best_front(self.swarm)
+        front = best_front(self._points(self.pop))
         self.opt = self.pop[front if len(front) else [0]]  # type: ignore[index]

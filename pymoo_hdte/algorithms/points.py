@@ -31,13 +31,14 @@ class Points:
     @classmethod
     def of(cls, population: Population, constrained: bool) -> Points:
         """Read the points of an evaluated pymoo population, whose problem may have constraints."""
-        # Attribute access, because Population.get costs more than everything else in a generation.
-        X = np.array([individual.X for individual in population], dtype=float)
-        F = np.array([individual.F for individual in population], dtype=float)
-        violation = np.zeros(len(population))
+        # Attributes in a list, because Population.get costs more than all else in a generation.
+        individuals = population.tolist()
+        X = np.array([individual.X for individual in individuals], dtype=float)
+        F = np.array([individual.F for individual in individuals], dtype=float)
+        violation = np.zeros(len(individuals))
         if constrained:
-            violation = np.array([individual.CV[0] for individual in population])
-            violation[violation <= population[0].config.get("cv_eps", 0.0)] = 0.0
+            violation = np.array([individual.CV[0] for individual in individuals])
+            violation[violation <= individuals[0].config.get("cv_eps", 0.0)] = 0.0
         judged = np.isfinite(F).all(axis=1) & ~np.isnan(violation)
         return cls(X, F, np.where(judged, violation, np.inf))
 
@@ -58,13 +59,4 @@ class Points:
             np.concatenate([self.X, other.X]),
             np.concatenate([self.F, other.F]),
             np.concatenate([self.violation, other.violation]),
-        )
-
-    def replaced_by(self, other: Points, rows: NDArray[np.bool_]) -> Points:
-        """Return these points with the marked rows taken from ``other``."""
-        column = rows[:, np.newaxis]
-        return Points(
-            np.where(column, other.X, self.X),
-            np.where(column, other.F, self.F),
-            np.where(rows, other.violation, self.violation),
         )

@@ -9,8 +9,9 @@ Crowding distance, which adds up objective by objective, spreads evenly with two
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pymoo_hdte.compiled import compiled
 
 
 def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
@@ -27,7 +28,7 @@ def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
     return np.flatnonzero(_kept(scaled, size))
 
 
-@njit(cache=True)
+@compiled
 def _kept(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
     n = len(scaled)
     stays = np.ones(n, dtype=np.bool_)
@@ -48,12 +49,12 @@ def _kept(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
     return stays
 
 
-@njit(cache=True)
+@compiled
 def _closer(gaps: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
     return gaps[0] < others[0] or (gaps[0] == others[0] and gaps[1] < others[1])
 
 
-@njit(cache=True)
+@compiled
 def _find_neighbours(
     scaled: NDArray[np.float64],
     stays: NDArray[np.bool_],

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pymoo.core.individual import Individual
 from pymoo.core.population import Population
-from pymoo.core.problem import Problem
 from pymoo.core.sampling import Sampling
 
 from pymoo_hdte.algorithms.archive import LeaderArchive
 from pymoo_hdte.algorithms.base import Swarm, particles_at
-from pymoo_hdte.algorithms.dominance import constrained_ranks
+from pymoo_hdte.algorithms.dominance import best_front, constrained_ranks
 from pymoo_hdte.algorithms.horizon import generation_limit
 from pymoo_hdte.algorithms.inertia import InertiaWeight
-from pymoo_hdte.algorithms.personal_best import updated_personal_best
+from pymoo_hdte.algorithms.personal_best import improves, personal_bests
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.pyramid import Hierarchy
 from pymoo_hdte.checks import whole_number
@@ -77,6 +78,13 @@ class ParticleSwarm(Swarm):
       oldest leaves;
     - feasible solutions come before infeasible ones, these by total violation, in personal bests,
       archive and ranks (Deb et al. 2002); a solution that is not finite comes last.
+
+    Callbacks may change the population: velocity and own best travel with an individual (as ``V``
+    and ``best`` of its data), and one put in enters the archive, at rest. Leaders and own bests
+    that have left the population keep their values if the problem changes; a callback evaluates
+    ``leaders.members`` and the ``best`` again as well. Within pymoo's
+    `AdaptiveEpsilonConstraintHandling` the swarm runs, but hardly gets back from what was allowed
+    at first: AMP-MOPSO then finds nothing feasible of TNK, where it finds a front on its own.
     """
 
     def __init__(
@@ -98,56 +106,96 @@ class ParticleSwarm(Swarm):
         self.inertia = inertia
         self.hierarchy = hierarchy
 
-    def _setup(self, problem: Problem, **kwargs: Any) -> None:
-        super()._setup(problem, **kwargs)
+    def _plan(self) -> None:
         self.generations = generation_limit(self.termination, self.pop_size, self.n_max_gen)
-        # pymoo adds to `self.archive` by itself and truncates it with an unseeded generator.
-        self.leaders = LeaderArchive(self.archive_size, problem.n_var, problem.n_obj)
 
     def _initialize_infill(self) -> Population:
         particles = super()._initialize_infill()
         X = particles.get("X")
         lowest, highest = self.problem.bounds()
-        self.next_velocity = self.random_state.uniform(lowest - X, highest - X)
-        particles.set("V", self.next_velocity)
+        V = self.random_state.uniform(lowest - X, highest - X)
+        return self._flying(particles, V, [None] * self.pop_size)
+
+    def _flying(
+        self, particles: Population, V: NDArray[np.float64], best: Sequence[Individual | None]
+    ) -> Population:
+        """Give particles velocities and own bests, None if themselves, to travel in their data."""
+        for particle, velocity, one in zip(particles.tolist(), V, best, strict=True):
+            particle.data |= {"V": velocity.copy(), "best": one}
+        self.asked = particles
         return particles
 
+    def _evaluated(self, infills: Population | None) -> Points:
+        points = super()._evaluated(infills)
+        for told, asked in zip(infills.tolist(), self.asked.tolist(), strict=True):  # type: ignore[union-attr]
+            # Individuals made anew from a particle's numbers have lost what it carried.
+            if "V" not in told.data:
+                told.data |= {"V": asked.data["V"], "best": asked.data["best"]}
+        return points
+
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        self.personal_best = self._evaluated(infills)
-        self._settle(infills, self.personal_best)
+        points = self._evaluated(infills)
+        self.leaders = self._empty_archive()
+        self._settle(infills, points)
+
+    def _empty_archive(self) -> LeaderArchive:
+        # pymoo adds to `self.archive` by itself and truncates it with an unseeded generator.
+        return LeaderArchive(self.archive_size, self.problem.n_var, self.problem.n_obj)
 
     def _infill(self) -> Population:
-        swarm, random_state = self.swarm, self.random_state
+        self._admit_newcomers()
+        # Callbacks may change the population; if its length, particles move in turn.
+        particles = self.pop[np.arange(self.pop_size) % len(self.pop)]
+        swarm, random_state = self._points(particles), self.random_state
         lowest, highest = self.problem.bounds()
         progress = min(1.0, (self.n_iter - 1) / self.generations)
         ranks = constrained_ranks(swarm)
 
-        own = self.personal_best.X
+        best = personal_bests(particles)
+        own = np.array([one.X for one in best.tolist()])
         leader = self.leaders.draw(self.pop_size, random_state) if len(self.leaders) else own
         w = self.inertia(progress, self.leaders.points.F)
         c1, c2 = self.hierarchy.acceleration(ranks)
         r1, r2 = random_state.random((2, *swarm.X.shape))
+        at_rest = np.zeros(swarm.X.shape[1])
+        velocity = np.array([particle.data.get("V", at_rest) for particle in particles.tolist()])
         V = (
-            w * self.velocity
+            w * velocity
             + c1[:, np.newaxis] * r1 * (own - swarm.X)
             + c2[:, np.newaxis] * r2 * (leader - swarm.X)
         )
         mutation = self.hierarchy.mutation(ranks, progress, highest - lowest, random_state)
-        self.next_velocity = V
-        particles = particles_at(np.clip(swarm.X + V + mutation, lowest, highest))
-        for particle, velocity in zip(particles, V, strict=True):
-            particle.data["V"] = velocity.copy()
-        return particles
+        X = np.clip(swarm.X + V + mutation, lowest, highest)
+        return self._flying(particles_at(X), V, best.tolist())
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         points = self._evaluated(infills)
-        self.personal_best = updated_personal_best(self.personal_best, points, self.random_state)
+        best = self._points(personal_bests(infills))
+        improved = improves(best, points, self.random_state)
+        for particle in infills[improved]:  # type: ignore[index]
+            particle.data["best"] = None
         self._settle(infills, points)
 
     def _settle(self, infills: Population, points: Points) -> None:
-        self.pop, self.swarm, self.velocity = infills, points, self.next_velocity
+        # A copy, as `self.off` shall tell what callbacks bring into the population.
+        self.pop = infills.copy()
+        former, self.leaders = self.leaders.members, self._empty_archive()
+        if len(former):
+            # Judged anew: callbacks evaluate again, and constraint handling may grow stricter.
+            infills = Population.merge(former, infills)
+            points = self._points(former).followed_by(points)
         self.leaders.update(infills, points)
+
+    def _admit_newcomers(self) -> None:
+        known = set(map(id, self.off))
+        newcomers = [particle for particle in self.pop.tolist() if id(particle) not in known]
+        if newcomers:
+            population = Population(newcomers)
+            self.leaders.update(population, self._points(population))
 
     def _set_optimum(self) -> None:
         # pymoo reads the optimum in every generation, even if nothing could be judged so far.
-        self.opt = self.leaders.members if len(self.leaders) else self.pop[:1]
+        best = self.leaders.members
+        if len(best):
+            best = best[best_front(self._points(best))]
+        self.opt = best if len(best) else self.pop[:1]

@@ -10,8 +10,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from pymoo_hdte.compiled import compiled
 
 _NONE: NDArray[np.float64] = np.zeros(0)
 
@@ -137,20 +138,20 @@ class Mesh(NamedTuple):
     slip_limit: NDArray[np.float64] = _NONE
 
 
-@njit(cache=True)
+@compiled
 def softplus(value: float) -> float:
     """Return log(1 + exp(value)) without overflow."""
     return max(value, 0.0) + math.log1p(math.exp(-abs(value)))
 
 
-@njit(cache=True)
+@compiled
 def rounded_dead_zone(torsion: float, half_width: float, rounding: float) -> float:
     """Return the torsion beyond a dead zone with rounded corners; slope 1 far out."""
     upper = softplus((torsion - half_width) / rounding)
     return rounding * (upper - softplus(-(torsion + half_width) / rounding))
 
 
-@njit(cache=True)
+@compiled
 def backbone(mesh: Mesh, torsion: float, angle: float) -> float:
     """Return the torsion that a linear spring would need for the same elastic torque, rad."""
     bent = torsion
@@ -171,7 +172,7 @@ def backbone(mesh: Mesh, torsion: float, angle: float) -> float:
     return result
 
 
-@njit(cache=True)
+@compiled
 def stiffness_at(mesh: Mesh, angle: float, input_speed: float) -> float:
     """Return K at this input angle and speed, N.m/rad."""
     stiffness = mesh.stiffness * (1.0 + mesh.stiffening * abs(input_speed))
@@ -183,7 +184,7 @@ def stiffness_at(mesh: Mesh, angle: float, input_speed: float) -> float:
     return stiffness * (1.0 + mesh.depth * wave)
 
 
-@njit(cache=True)
+@compiled
 def slip_torque(mesh: Mesh, slip: NDArray[np.float64], travel: float, element: int) -> float:
     """Return the torque of one Maxwell element after a further monotone travel, N.m."""
     limit: float = mesh.slip_limit[element]
@@ -191,7 +192,7 @@ def slip_torque(mesh: Mesh, slip: NDArray[np.float64], travel: float, element: i
     return min(max(stuck, -limit), limit)
 
 
-@njit(cache=True)
+@compiled
 def static_mesh_torque(
     mesh: Mesh,
     torsion: float,
@@ -210,14 +211,14 @@ def static_mesh_torque(
     return torque
 
 
-@njit(cache=True)
+@compiled
 def damping_at(mesh: Mesh, input_speed: float) -> float:
     """Return c at this input speed, N.m.s/rad."""
     growth = 1.0 + mesh.damping_growth * abs(input_speed)
     return mesh.damping * mesh.damping_factor * growth
 
 
-@njit(cache=True)
+@compiled
 def static_error(mesh: Mesh, angle: float) -> tuple[float, float]:
     """Return theta_s, rad, and its derivative by the input angle."""
     value, slope = mesh.error_offset, 0.0
@@ -235,14 +236,14 @@ def static_error(mesh: Mesh, angle: float) -> tuple[float, float]:
     return value, slope
 
 
-@njit(cache=True)
+@compiled
 def angle_wave(order: float, angle: float, phase: float, second_phase: float) -> float:
     """Return a cosine of the angle plus a fifth of its second harmonic."""
     first = math.cos(order * angle + phase)
     return first + 0.2 * math.cos(2.0 * order * angle + second_phase)
 
 
-@njit(cache=True)
+@compiled
 def friction(side: Side, speed: float, angle: float, time: float) -> float:
     """Return the torque that resists a positive speed of this shaft, N.m."""
     torque = side.damping * speed
@@ -262,7 +263,7 @@ def friction(side: Side, speed: float, angle: float, time: float) -> float:
     return torque
 
 
-@njit(cache=True)
+@compiled
 def burst_envelope(time: float, period: float, width: float) -> float:
     """Return a smooth bump of height 1 at an irregular instant of every period."""
     number = math.floor(time / period)
@@ -274,7 +275,7 @@ def burst_envelope(time: float, period: float, width: float) -> float:
     return 0.0 if distance > width / 2.0 else math.cos(math.pi * distance / width) ** 2
 
 
-@njit(cache=True)
+@compiled
 def ripple(side: Side, angle: float) -> float:
     """Return the angle-periodic torque of this shaft, in the unit of ``side.ripple``."""
     if side.ripple == 0.0:

@@ -6,9 +6,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pymoo_hdte.compiled import compiled
 from pymoo_hdte.discrepancy.hidden_laws import (
     Mesh,
     Side,
@@ -75,7 +75,7 @@ class Mechanics(NamedTuple):
     mesh: Mesh
 
 
-@njit(cache=True)
+@compiled
 def derivative(
     rig: Mechanics,
     course: Course,
@@ -123,7 +123,7 @@ def derivative(
     return motor, sensor
 
 
-@njit(cache=True)
+@compiled
 def integrate(
     rig: Mechanics,
     course: Course,
@@ -193,7 +193,7 @@ def integrate(
     return samples
 
 
-@njit(cache=True)
+@compiled
 def quasi_static_torsion(
     mesh: Mesh,
     angle: float,

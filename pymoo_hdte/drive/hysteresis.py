@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
+from pymoo_hdte.compiled import compiled
 from pymoo_hdte.drive.laws import Aperiodic, PortState, Response, Values
 
 SPRINGS = 4
@@ -82,7 +82,7 @@ def slip_along(path: Values, slips: Values) -> tuple[Values, Values]:
     return stretch, sticking
 
 
-@njit(cache=True)
+@compiled
 def _slip(path: Values, slips: Values, stretch: Values, sticking: Values) -> None:
     springs, rows, steps = stretch.shape
     for row in range(rows):

@@ -10,9 +10,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pymoo_hdte.compiled import compiled
 from pymoo_hdte.mechanism.acting_forces import Command, PortForce
 
 Values = NDArray[np.float64]
@@ -127,7 +127,7 @@ class ExponentialIntegrator:
         return min(shares, default=1.0)
 
 
-@njit(cache=True)
+@compiled
 def _predict(
     step: float, state: Values, push: Values, drift: Values, plant: Triple, tangent: Triple
 ) -> tuple[tuple[Values, Values], Values]:
@@ -164,7 +164,7 @@ def _predict(
     return (middle, end), whole
 
 
-@njit(cache=True)
+@compiled
 def _moved(exponential: Values, sources: Values, step: float) -> Values:
     """Return the change of positions and speeds, (2, coordinates), by sources in ways per step."""
     n = len(sources) // 5
@@ -174,7 +174,7 @@ def _moved(exponential: Values, sources: Values, step: float) -> Values:
     return move
 
 
-@njit(cache=True)
+@compiled
 def _correct(
     step: float,
     share: float,
@@ -200,7 +200,7 @@ def _correct(
     return _moved(exponential, sources, step)
 
 
-@njit(cache=True)
+@compiled
 def _exponentials(matrix: Values) -> tuple[Values, Values]:
     """Return the exponentials of half a matrix and the whole one, by a series and squaring."""
     norm, halvings, n = 0.0, 1, len(matrix)
@@ -220,7 +220,7 @@ def _exponentials(matrix: Values) -> tuple[Values, Values]:
     return result, _product(result, result)
 
 
-@njit(cache=True)
+@compiled
 def _product(first: Values, second: Values) -> Values:
     """Return the product of matrices that are small, with many zeros."""
     result = np.zeros((len(first), second.shape[1]))
@@ -232,7 +232,7 @@ def _product(first: Values, second: Values) -> Values:
     return result
 
 
-@njit(cache=True)
+@compiled
 def _judge(
     after: Values, error: Values, origin: Values, watched: Values, reach: Values, rtol: float
 ) -> tuple[Values, float]:

@@ -1,0 +1,23 @@
+"""Compilation of number-crunching functions, kept on disk for the next process where it may be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from numba import njit
+from numba.core.dispatcher import Dispatcher
+
+F = TypeVar("F", bound=Callable)
+
+
+def compiled(function: F) -> Dispatcher[F]:
+    """Return ``function`` as machine code, which numba makes at the first call.
+
+    Without any place to write, as in a read-only installation for a user without a home, every
+    process compiles anew.
+    """
+    try:
+        return njit(cache=True)(function)
+    except RuntimeError:
+        return njit(function)
