@@ -9,7 +9,7 @@ import pymoo_hdte
 
 ROOT = Path(pymoo_hdte.__file__).parent
 LOWEST_FIRST = (
-    *("__version__", "checks", "units", "storage", "reports"),
+    *("__version__", "checks", "units", "compiled", "storage", "reports"),
     *("drive", "surrogate", "validation", "identification", "mechanism", "discrepancy", "measured"),
     *("problems", "algorithms", "decision", "commands", "cli"),
 )
