@@ -70,6 +70,13 @@ def test_a_torque_on_the_input_leaves_the_output_alone():
     assert "in the transmission error and output torque" in trusted
 
 
+def test_orders_that_the_input_angle_alone_shows_are_counted():
+    lines = {(1, 4): np.full(12, 0.02), (3, 4): 1e-3 / SPEED, (3, 1): 1e-3 / SPEED}
+    where, trusted = said(lines | {(3, 2): 1e-3 / SPEED})
+    assert "At order 6 in the input torque and input angle; less at 2 further orders." in where
+    assert "at all orders but order 0.05941 (6 per output turn), order 1 and order 6" in trusted
+
+
 def test_friction_of_the_output_needs_torque_that_does_not_arrive():
     torque = np.full(12, 1.0)
     where, _ = said({(0, 0): torque / BELIEVED.stiffness, (1, 0): torque / BELIEVED.ratio})

@@ -84,7 +84,7 @@ def _orders(location: Location, size: Values, ratio: float) -> str:
         channels = _channels(size[:, :, place].sum(axis=0))
         by_channels.setdefault(channels, []).append(_order(location, place, ratio))
     parts = [f"at {_listed(orders)} in {channels}" for channels, orders in by_channels.items()]
-    more = len(ranked) - len(shown)
+    more = np.count_nonzero(size.any(axis=(0, 1))) - len(shown)
     if more:
         parts.append(f"less at {more} further order{'s' if more > 1 else ''}")
     words = "; ".join(parts)

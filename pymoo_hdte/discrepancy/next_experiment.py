@@ -118,7 +118,7 @@ def _proposal(
     elif verdict.equivalent:
         said = f"The data cannot tell {one} from {other}; what can is"
     else:
-        said = f"The data tell {one} from {other}, its nearest rival; the best further proof is"
+        said = f"The data tell {one} from its rivals; the best further proof against {other} is"
     return Proposal(f"{said} {what}.", kind, speed, load, labels, expected)
 
 

@@ -76,12 +76,12 @@ class EffectRow:
 
 @dataclass(frozen=True)
 class RivalRow:
-    """Evidence for a set of effects; ``bic`` above that of the best."""
+    """Evidence for a set of effects; ``bic`` above that of the best, share in words."""
 
     label: str
     role: str
     chi_square: float
-    share: float
+    share: str
     bic: float
     at_bounds: str
 
@@ -199,7 +199,7 @@ def rival_rows(verdict: Verdict) -> list[RivalRow]:
             in_words(rival.label),
             _role(verdict, rival),
             rival.fit.chi_square,
-            rival.share,
+            _percent(rival.share),
             rival.bic - best,
             ", ".join(name.replace("_", " ") for name in rival.fit.at_bounds) or "none",
         )
