@@ -266,6 +266,9 @@ def test_the_first_screen_repeats_the_headline_and_sorts_the_findings(out):
         ["Checks of our own that fail", "It fails."],
         ["Checks of our own that hold", "It holds."],
     ]
+    counts = re.findall(r'href="#(findings-\d)">([^<]+): <b>1</b>', first_screen)
+    assert [heading for _, heading in counts] == [heading for (heading, _), *_ in map(list, found)]
+    assert re.findall(r'<section id="(findings-\d)">', first_screen) == [link for link, _ in counts]
     assert re.findall(r"<b>([^<]+)</b>", rest) == [
         "Agrees.", "Differs.", "Fitted.", "Missed by the fit.", "Holds.", "Fails.",
     ]  # fmt: skip
