@@ -91,7 +91,7 @@ def _table(trials: list[Trial]) -> Table:
     rows = [tuple(_cells(trial)) for trial in trials]
     columns = [Column("model"), Column("k"), Column("model runs for the fit")]
     for _, _, heading, unit in MEASURES:
-        digits = 5 if heading == "R2" else 3
+        digits = 5 if heading == "R2" else 4
         columns.append(Column("ours", unit, digits, heading))
         columns.append(Column("paper", unit, 4, heading, paper=True))
     title = f"Errors at {N_TEST} test points"
