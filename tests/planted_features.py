@@ -95,7 +95,7 @@ def with_sweep(data, effects=(), rng=None, **changes):
 
 def library(data, seen=()):
     """All candidates; lines of unexpected order at those that were seen."""
-    return candidates(data.campaign.believed, data.features.orders.tolist(), seen)
+    return candidates(data.campaign.believed, data.features.orders.tolist(), seen, 1.0)
 
 
 def listed(data, name, seen=()):

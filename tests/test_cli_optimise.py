@@ -11,7 +11,7 @@ from scipy.stats import qmc, truncnorm
 
 from pymoo_hdte import cli
 from pymoo_hdte.commands import optimum_report
-from pymoo_hdte.commands.design_study import Settings, _check, design_study
+from pymoo_hdte.commands.design_study import Gain, Settings, _check, design_study
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
@@ -179,6 +179,11 @@ class TestCheck:
             spans[name] = np.ptp(problem.evaluate(along) / study.objectives, axis=0).max()
         assert study.free == ("B_in",) == tuple(name for name, one in spans.items() if one < 1e-3)
         assert "No value of B_in within the box" in optimum_report.limits(study, ())[0]
+
+    def test_the_surrogate_is_coarse_only_beyond_chance(self):
+        assert Gain(promised=1.0, found=0.4, error=0.1, share=0.01).coarse
+        assert not Gain(promised=1.0, found=0.6, error=0.1, share=0.01).coarse
+        assert not Gain(promised=0.1, found=0.0, error=0.2, share=0.0).coarse
 
     def test_gains_are_known_better_than_either_value(self, study):
         before, after = study.initial_check, study.optimum_check

@@ -128,6 +128,11 @@ def test_only_what_is_missing_is_said(campaign):
     assert len(said(replace(campaign, running=campaign.train))) == 1
 
 
+def test_a_line_believed_to_be_nothing_need_not_be_seen(campaign):
+    lines = {"error_orders": (1.0, 2.0, 2.023, 20.0), "error_amplitudes": (1e-5, 1e-5, 0.0, 0.0)}
+    assert said(replace(campaign, believed=replace(campaign.believed, **lines))) == said(campaign)
+
+
 def test_a_line_above_all_that_is_looked_at_is_not_called_unresolved(campaign):
     lines = {"error_orders": (1.0, 2.0, 14.5), "error_amplitudes": (1e-5, 1e-5, 1e-5)}
     believed = replace(campaign.believed, **lines)

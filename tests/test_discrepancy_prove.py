@@ -38,7 +38,7 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
-LISTED = candidates(BELIEVED, [6.0], [6.0])
+LISTED = candidates(BELIEVED, [6.0], [6.0], 1.0)
 
 
 def analysed(campaign, label=None, status="named"):

@@ -117,6 +117,27 @@ def test_a_known_gain_sets_no_scale_where_its_input_is_noise(force_noise):
     check_scale(measured_data(OSCILLATOR, [record, rig.record_of(nothing)], 12.0))
 
 
+def with_zero(record, zero):
+    return replace(record, channels=record.channels | {"force": record.channels["force"] + zero})
+
+
+@pytest.mark.parametrize("zero", [0.03, 0.5, -20.0])
+def test_the_zero_of_a_force_sensor_drives_nothing(zero):
+    record = rig.decay_record(rig.FORCE_NOISE)
+    off = with_zero(record, zero)
+    ratio = measured_data(OSCILLATOR, [record], 15.0).known_over_noise()
+    moved = measured_data(OSCILLATOR, [off], 15.0)
+    assert moved.known_over_noise() == pytest.approx(ratio, rel=0.01)
+    with pytest.raises(InvalidInput, match="drive the mechanism"):
+        check_scale(moved)
+
+
+def test_steady_forces_that_differ_from_record_to_record_are_no_zero():
+    record = rig.decay_record(rig.FORCE_NOISE)
+    other = replace(with_zero(record, 0.5), name="other")
+    check_scale(measured_data(OSCILLATOR, [record, other], 15.0))
+
+
 def test_a_held_out_record_that_cannot_be_judged_is_refused_by_name_at_once():
     record = rig.record_of(nothing)
 

@@ -4,8 +4,8 @@ Use the swarms on your own problem
 
 The algorithms of this package know nothing of drives. They take any pymoo problem with real
 variables, finite bounds and two objectives or more, constrained or not. ``ElitistSwarm`` is the one
-to use: it has nothing to tune. ``AMPMOPSO`` is the paper's algorithm as printed, for those who
-compare with it.
+to use with up to five objectives: it has nothing to tune. ``AMPMOPSO`` is the paper's algorithm as
+printed, for those who compare with it.
 """
 
 import pickle

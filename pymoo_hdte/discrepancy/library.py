@@ -18,7 +18,7 @@ _OF_THEIR_OWN = ("load_inertia", "damping")
 
 
 def candidates(
-    believed: Believed, orders: Sequence[float], seen: Sequence[float], torque_scale: float = 1.0
+    believed: Believed, orders: Sequence[float], seen: Sequence[float], torque_scale: float
 ) -> list[Candidate]:
     """Return all candidates for a drive.
 

@@ -79,10 +79,11 @@ def _unvaried(analysis: Analysis) -> list[str]:
 
 def _unseen(analysis: Analysis) -> list[str]:
     orders, highest = analysis.data.features.orders, highest_order(analysis.campaign)
+    believed = analysis.campaign.believed
     unseen = [
         order
-        for order in analysis.campaign.believed.error_orders
-        if np.abs(orders - order).min() > _SAME_ORDER
+        for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True)
+        if amplitude != 0.0 and np.abs(orders - order).min() > _SAME_ORDER
     ]
     found = []
     if mixed := _named([order for order in unseen if order <= highest]):

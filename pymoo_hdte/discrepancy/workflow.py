@@ -206,6 +206,8 @@ def _error_lines(campaign: Campaign) -> list[float]:
                 f"{coarsest.sample_rate:g} Hz, or a campaign without this record"
             )
             raise InvalidInput("believed.error_orders", order, allowed)
+        if order > HIGHEST_ORDER:
+            continue
         near = min(kept, key=lambda one: abs(one - order), default=np.inf)
         if abs(order - near) < least:
             turns = _SEPARATION / (believed.ratio * abs(order - near))
@@ -215,7 +217,7 @@ def _error_lines(campaign: Campaign) -> list[float]:
             )
             raise InvalidInput("believed.error_orders", order, allowed)
         kept.append(order)
-    return [order for order in kept if order <= highest_order(campaign)]
+    return kept
 
 
 def _travel(record: RunningRecord) -> float:

@@ -146,10 +146,14 @@ class MeasuredData:
         """Return by how much what is known exactly stands out of the noise.
 
         The largest ratio of powers in the force balance of a coordinate in a record. Without a
-        force that is known exactly all others may be a multiple of what they are.
+        force that is known exactly all others may be a multiple of what they are. What is the same
+        in all records at rest may be the zero of a sensor and does not count.
         """
         believed = np.array([parameter.start for parameter in self.base])
         known = self._linear[0] - self.whitened_forces(believed, self.known)
+        for part in range(len(self.names)):
+            still = (self.frequency == 0.0) & (self._part == part)
+            known[still] -= known[still].mean() if still.any() else 0.0
         ratios = self._chi_square(known) / self._coefficients
         return float(ratios[:, : len(self.mechanism.coordinates)].max())
 

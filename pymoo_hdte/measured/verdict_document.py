@@ -242,7 +242,8 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
         amplitude, phase = line_with_variance(cosine, sine, spread.covariance[pair, pair])
         reach = float(spread.reach[pair].max())
         name = name.removesuffix("_cosine")
-        found[name] = _with_interval(*amplitude, reach)
+        entry = _with_interval(*amplitude, reach)
+        found[name] = entry | {"interval95": np.maximum(entry["interval95"], 0.0).tolist()}
         found[f"{name}_phase"] = _with_interval(*phase, reach)
     return found
 
