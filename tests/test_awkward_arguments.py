@@ -84,6 +84,9 @@ VALID = {
     ),
 }
 
+STRANGE = (np.empty(0), np.empty((0, 3)), np.zeros((20, 1)), np.array(1.0), object())
+"""What neither compares nor counts as other values do."""
+
 scalars = st.one_of(
     st.none(),
     st.booleans(),
@@ -100,7 +103,7 @@ values = st.one_of(
     st.lists(scalars, max_size=6),
     st.lists(st.lists(st.floats(), max_size=3), max_size=3),
     st.lists(st.floats(), min_size=20, max_size=20).map(np.array),
-    st.sampled_from([np.empty(0), np.empty((0, 3)), np.zeros((20, 1)), np.array(1.0), object()]),
+    st.sampled_from(STRANGE),
     st.dictionaries(st.text(max_size=2), scalars, max_size=2),
 )
 
@@ -115,9 +118,19 @@ def test_valid_arguments_make_an_object(name):
 @given(data=st.data())
 @settings(max_examples=60)
 def test_an_awkward_argument_is_refused_by_name_or_taken(name, data):
+    field = data.draw(st.sampled_from(sorted(VALID[name][1])))
+    assert_refused_or_taken(name, field, data.draw(values))
+
+
+@pytest.mark.parametrize("name", VALID)
+def test_a_strange_argument_is_refused_by_name_or_taken_everywhere(name):
+    for field in VALID[name][1]:
+        for value in STRANGE:
+            assert_refused_or_taken(name, field, value)
+
+
+def assert_refused_or_taken(name, field, value):
     constructor, arguments = VALID[name]
-    field = data.draw(st.sampled_from(sorted(arguments)))
-    value = data.draw(values)
     refusal = None
     try:
         constructor(**arguments | {field: value})

@@ -115,10 +115,10 @@ class TorsionRecord:
     output_torque: NDArray[np.float64]
 
     def __post_init__(self) -> None:
+        _check_record(self, ("output_angle", "output_torque"))
         if self.role == "held_out":
             allowed = "'train' for a torsion sweep: only running records can judge the result"
             raise InvalidInput("role", self.role, allowed)
-        _check_record(self, ("output_angle", "output_torque"))
 
 
 def _check_record(record: Any, channels: tuple[str, ...]) -> None:
