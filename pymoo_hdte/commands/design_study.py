@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,7 +173,7 @@ class DesignStudy:
         """Its mean and standard deviation, shape (2,), arcsec."""
         return self.front[self.chosen[self.preference]]
 
-    @property
+    @cached_property
     def free(self) -> tuple[str, ...]:
         """Names of the variables that move neither objective by `LITTLE` over their whole box."""
         problem = self.problem

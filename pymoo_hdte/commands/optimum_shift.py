@@ -13,6 +13,7 @@ from pymoo.optimize import minimize
 
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.commands.design_study import POPULATION
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia, deviation_degree
 from pymoo_hdte.discrepancy.optimum import Choice, OptimumShift, Values
 from pymoo_hdte.drive import DriveModel
@@ -20,7 +21,6 @@ from pymoo_hdte.problems import RobustDTE
 
 SURROGATE_ORDER = 3
 """That of the paper; with laws at ports it costs a harmonic balance in each of 4^5 runs."""
-POPULATION = 100
 EVALUATIONS = 5_000
 
 

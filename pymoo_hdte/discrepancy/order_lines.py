@@ -11,8 +11,9 @@ hold it, and of each by the slope of its lines, order x |phasor| x N x angle_noi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -197,13 +198,8 @@ def residual_spectrum(
     residual = (fit.values - fit.basis @ (fit.basis.T @ fit.values)) / sigma
     rows = np.hstack([fit.basis, residual]).T
     angle = record.input_angle[:, None] / ratio
-    powers = np.exp(1j * angle * np.arange(BLOCK))
     found, amplitudes = [], []
-    for block in (*np.split(multiples, range(BLOCK, len(multiples), BLOCK)), whole):
-        if block is whole:
-            waves = np.exp(1j * angle * whole)
-        else:
-            waves = powers[:, : len(block)] * np.exp(1j * angle * block[0])
+    for block, waves in _waves(angle, multiples, whole):
         # As real numbers: a product of real and complex matrices would copy the real one.
         products = (rows @ waves.view(float)).view(complex)
         separate, amplitude = _amplitudes(waves, *np.split(products, [fit.basis.shape[1]]))
@@ -212,6 +208,16 @@ def residual_spectrum(
     searched = np.concatenate(found)
     rising = np.argsort(searched)
     return searched[rising], np.concatenate(amplitudes, axis=1)[:, rising]
+
+
+def _waves(
+    angle: NDArray[np.float64], multiples: NDArray[np.int_], others: NDArray[np.floating[Any]]
+) -> Iterator[tuple[NDArray[Any], NDArray[np.complex128]]]:
+    """Yield consecutive multiples in blocks, then others, with their waves over angles (n, 1)."""
+    powers = np.exp(1j * angle * np.arange(BLOCK))
+    for block in np.split(multiples, range(BLOCK, len(multiples), BLOCK)):
+        yield block, powers[:, : len(block)] * np.exp(1j * angle * block[0])
+    yield others, np.exp(1j * angle * others)
 
 
 def _amplitudes(

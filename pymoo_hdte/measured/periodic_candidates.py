@@ -58,21 +58,18 @@ def periodic(port: str, orders: Sequence[float], force: float) -> list[Candidate
     """
     if not orders:
         return []
-    most, form, words = LARGEST * force, _listed(orders, "+"), _listed(orders, ", ")
-    ripple = _waves("amplitude", orders, most, force)
+    most, words = LARGEST * force, _listed(orders, ", ")
     friction = _waves("level", orders, most, force)
     mean = unknown("mean", 0.0, most, force)
     varying = _lines(PeriodicFriction, "position_dependent_friction", port, orders)
     return [
-        Candidate(
+        _ripple(
             "torque_ripple",
             port,
-            ripple,
-            wave_starts(ripple),
-            _lines(PeriodicTorque, "torque_ripple", port, orders),
+            orders,
+            force,
             f"A force at the {port} that varies with its position, orders {words}, and acts on the "
             "motion.",
-            form=form,
         ),
         Candidate(
             "position_dependent_friction",
@@ -84,7 +81,7 @@ def periodic(port: str, orders: Sequence[float], force: float) -> list[Candidate
                 LawAt("coulomb_friction", port, CoulombFriction(v[-1])),
             ),
             f"Friction that varies with the position of the {port}, orders {words}.",
-            form=form,
+            form=_listed(orders, "+"),
         ),
     ]
 
@@ -93,20 +90,26 @@ def of_reading(port: str, orders: Sequence[float], force: float) -> list[Candida
     """Return a ripple of a force sensor's reading at known orders; the arguments as `periodic`."""
     if not orders:
         return []
-    form, words = _listed(orders, "+"), _listed(orders, ", ")
-    parts = _waves("amplitude", orders, LARGEST * force, force)
     return [
-        Candidate(
+        _ripple(
             "kinematic_error",
             port,
-            parts,
-            wave_starts(parts),
-            _lines(PeriodicTorque, "kinematic_error", port, orders),
-            f"The reading of {port} varies with the position, orders {words}, and has one "
-            "amplitude at all speeds run: it is kinematic, and no torque that moves inertias.",
-            form=form,
+            orders,
+            force,
+            f"The reading of {port} varies with the position, orders {_listed(orders, ', ')}, and "
+            "has one amplitude at all speeds run: it is kinematic, and no torque that moves "
+            "inertias.",
         )
     ]
+
+
+def _ripple(
+    name: str, port: str, orders: Sequence[float], force: float, sentence: str
+) -> Candidate:
+    parts = _waves("amplitude", orders, LARGEST * force, force)
+    build = _lines(PeriodicTorque, name, port, orders)
+    form = _listed(orders, "+")
+    return Candidate(name, port, parts, wave_starts(parts), build, sentence, form=form)
 
 
 def _listed(orders: Sequence[float], between: str) -> str:

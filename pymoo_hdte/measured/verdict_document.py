@@ -232,22 +232,23 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
         if name.endswith("_sine"):
             continue
         if not name.endswith("_cosine"):
-            entry = _with_interval(value, float(spread.covariance[row, row]), reach)
             # The fit was not free to leave its bounds.
-            cut = np.clip(entry["interval95"], parameter.lower, parameter.upper)
-            found[name] = entry | {"interval95": cut.tolist()}
+            bounds = parameter.lower, parameter.upper
+            found[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
             continue
         pair = slice(row, row + 2)
         cosine, sine = fitted.values[pair]
         amplitude, phase = line_with_variance(cosine, sine, spread.covariance[pair, pair])
         reach = float(spread.reach[pair].max())
         name = name.removesuffix("_cosine")
-        entry = _with_interval(*amplitude, reach)
-        found[name] = entry | {"interval95": np.maximum(entry["interval95"], 0.0).tolist()}
+        found[name] = _with_interval(*amplitude, reach, lower=0.0)
         found[f"{name}_phase"] = _with_interval(*phase, reach)
     return found
 
 
-def _with_interval(value: float, variance: float, reach: float) -> dict[str, Any]:
+def _with_interval(
+    value: float, variance: float, reach: float, lower: float = -np.inf, upper: float = np.inf
+) -> dict[str, Any]:
     half = reach * float(np.sqrt(max(variance, 0.0)))
-    return {"value": value, "unit": "SI", "interval95": [value - half, value + half]}
+    interval = np.clip([value - half, value + half], lower, upper)
+    return {"value": value, "unit": "SI", "interval95": interval.tolist()}
