@@ -11,14 +11,14 @@ from concurrent.futures import BrokenExecutor
 from contextlib import nullcontext
 from pathlib import Path
 
-from experiments.campaign import Campaign
-from experiments.machine import usable_cores
-from experiments.registry import EXPERIMENTS, Context, Experiment, ExtraMissing
-from experiments.report import check_page, write_report
-from experiments.store import save
-from experiments.workers import WorkerLost, WrongWorker, make_executor
+from experiments.runner.campaign import Campaign
+from experiments.runner.machine import usable_cores
+from experiments.runner.registry import EXPERIMENTS, Context, Experiment, ExtraMissing
+from experiments.runner.report import check_page, write_report
+from experiments.runner.store import save
+from experiments.runner.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.commands.parser import OneLineParser
+from pymoo_hdte.cli.parser import OneLineParser
 
 FAILED = 1
 """Exit code where the workers or the disk fail, or a stored outcome or an extra is missing."""

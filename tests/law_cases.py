@@ -1,20 +1,15 @@
 """One effect of every law, which the forward and the reverse tests of the drive share."""
 
-from pymoo_hdte.drive.friction import (
+from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
+from pymoo_hdte.laws.friction import (
     CoulombFriction,
     NonlinearDrag,
     PeriodicFriction,
     PeriodicTorque,
     StribeckFriction,
 )
-from pymoo_hdte.drive.hysteresis import MaxwellSlip
-from pymoo_hdte.drive.mesh_laws import (
-    DeadZone,
-    HardeningStiffness,
-    PeriodicClearance,
-    SoftWindup,
-)
-from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
+from pymoo_hdte.laws.hysteresis import MaxwellSlip
+from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.units import ARCSEC
 
 EFFECTS = [

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.candidate_terms import terms
-from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
+from experiments.blind.candidate_terms import terms
+from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.drive import (
     Eccentricity,
     KinematicErrorLine,
@@ -15,8 +15,8 @@ from pymoo_hdte.drive import (
     MeshStiffnessVariation,
     ThermalDrift,
 )
-from pymoo_hdte.drive.friction import CoulombFriction, NonlinearDrag, PeriodicTorque
-from pymoo_hdte.drive.mesh_laws import HardeningStiffness
+from pymoo_hdte.laws.friction import CoulombFriction, NonlinearDrag, PeriodicTorque
+from pymoo_hdte.laws.stiffness import HardeningStiffness
 from pymoo_hdte.units import ARCSEC
 
 EFFECTS = {

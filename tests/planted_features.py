@@ -7,16 +7,17 @@ from types import SimpleNamespace
 import numpy as np
 from virtual_rig_cases import BELIEVED, PHASES, RIG
 
-from pymoo_hdte.discrepancy.data import Data
-from pymoo_hdte.discrepancy.features import Features
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.discrepancy.forward import Conditions, coefficients_of
-from pymoo_hdte.discrepancy.library import candidates
-from pymoo_hdte.discrepancy.naming import Verdict
-from pymoo_hdte.discrepancy.parameters import Layout, base_parameters
-from pymoo_hdte.discrepancy.rival import Rival
-from pymoo_hdte.discrepancy.torsion_curve import TorsionPoints
-from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.drive.features import Features
+from pymoo_hdte.discrepancy.drive.parameters import base_parameters
+from pymoo_hdte.discrepancy.drive.prediction import Conditions, coefficients_of
+from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
+from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 

@@ -4,8 +4,8 @@ import numpy as np
 from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.discrepancy import Campaign
-from pymoo_hdte.discrepancy.rig_runs import Condition
-from pymoo_hdte.discrepancy.virtual_rig import draw_rig, run_campaign
+from pymoo_hdte.virtual.rig import draw_rig, run_campaign
+from pymoo_hdte.virtual.runs import Condition
 
 CONDITIONS = tuple(
     Condition(speed, load, 500.0 if speed < 1000.0 else 1000.0, 2 if speed < 1000.0 else 1, role)

@@ -11,10 +11,10 @@ from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.checks import InvalidInput, finite_array, whole_number
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
-from pymoo_hdte.discrepancy.virtual_rig import draw_rig, run_campaign
 from pymoo_hdte.drive import load_datasheet
 from pymoo_hdte.identification import error_statistics, read_no_load_runs
 from pymoo_hdte.problems.duty_cycle import OperatingCondition, load_conditions, shares
+from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 
 @pytest.mark.parametrize(

@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-from experiments import calibration
-from experiments.calibration import OUTCOMES, best_rungs
-from experiments.calibration_data import Outcome, format_outcomes, gap, read_outcomes
-from experiments.campaign import Campaign
-from experiments.committed import committed_file
-from experiments.fitting import Budget, Fit, _refine, _residuals, outcome_row
-from experiments.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate, ladder
-from experiments.predictions import (
+from experiments.paper.calibrating import experiment as calibration
+from experiments.paper.calibrating.data import Outcome, format_outcomes, gap, read_outcomes
+from experiments.paper.calibrating.experiment import OUTCOMES, best_rungs
+from experiments.paper.calibrating.fitting import Budget, Fit, _refine, _residuals, outcome_row
+from experiments.paper.calibrating.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate, ladder
+from experiments.paper.calibrating.predictions import (
     BAND,
     FITS,
     PUBLISHED,
@@ -20,10 +18,12 @@ from experiments.predictions import (
     surrogate_moments,
     uncertain_box,
 )
-from experiments.published_values import TABLE_9
-from experiments.registry import Context
-from experiments.scatter import dte_samples
-from experiments.trade_off import TRAITS, front_traits
+from experiments.paper.calibrating.trade_off import TRAITS, front_traits
+from experiments.paper.published_values import TABLE_9
+from experiments.paper.scatter import dte_samples
+from experiments.runner.campaign import Campaign
+from experiments.runner.committed import committed_file
+from experiments.runner.registry import Context
 from pymoo_hdte.drive import PARAMETERS, PRESETS, preset
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import TruncatedNormal

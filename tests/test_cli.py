@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from pymoo_hdte import cli
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.commands import discrepancy
+from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import discrepancy
 from pymoo_hdte.drive import UnstableDrive
 
 DOCUMENT = {
@@ -155,7 +155,7 @@ def test_what_a_terminal_cannot_show_is_replaced():
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_a_full_disk_behind_stdout_is_one_line():
     code = (
-        "import sys; from pymoo_hdte import cli; from pymoo_hdte.commands import discrepancy;"
+        "import sys; from pymoo_hdte import cli; from pymoo_hdte.cli import discrepancy;"
         "discrepancy._analysed = lambda *a: {'a': 1};"
         "discrepancy._summary = lambda *a: 'found';"
         "sys.exit(cli.main(['discrepancy', 'x', '--out', 'y']))"

@@ -8,15 +8,10 @@ import pytest
 from scipy.stats import linregress
 from scipy.stats import t as student
 
-from pymoo_hdte import cli
+from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.drive import hs_20_100, load_datasheet
-from pymoo_hdte.identification.virtual_bench import (
-    COMPLETE_DRIVE,
-    INPUT_BEARING,
-    OUTPUT_BEARING,
-    TorsionBench,
-)
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+from pymoo_hdte.virtual.bench import COMPLETE_DRIVE, INPUT_BEARING, OUTPUT_BEARING, TorsionBench
 
 TRUTH = {"K": 2.4e4, "B_in": 1.7e-4, "B_fc": 4.4e-4, "B_out": 5.0e-4}
 BENCH = TorsionBench()

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import qmc, truncnorm
 
-from pymoo_hdte import cli
-from pymoo_hdte.commands import optimum_report
-from pymoo_hdte.commands.design_study import Gain, Settings, _check, design_study
+from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import optimum_report
+from pymoo_hdte.cli.design_study import Gain, Settings, _check, design_study
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml

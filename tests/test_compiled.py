@@ -9,7 +9,7 @@ from numba.core import caching
 for locator in caching.CacheImpl._locator_classes:
     locator.from_function = classmethod(lambda cls, function, file: None)
 import pymoo_hdte.algorithms, pymoo_hdte.drive, pymoo_hdte.mechanism, pymoo_hdte.problems
-from pymoo_hdte.discrepancy.hidden_laws import softplus
+from pymoo_hdte.virtual.laws import softplus
 print(softplus(0.0), softplus.stats.cache_path)
 """
 

@@ -5,8 +5,8 @@ import pytest
 from moocore import is_nondominated
 from swarm_problems import Parabolas
 
+from experiments.contest.contestants import CONTESTANTS, SWARM_VARIANTS
 from experiments.contest.job import ContestRun, front_among
-from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
 from experiments.contest.problems import problem_of
 
 BUDGETS = (400, 700)

@@ -6,7 +6,7 @@ from moocore import is_nondominated
 from pymoo.problems import get_problem
 from scipy.optimize import differential_evolution, minimize
 
-from experiments.benchmark_fronts import (
+from experiments.contest.benchmark_fronts import (
     WELDED_BEAM,
     even_curve,
     follow_welded_beam,

@@ -13,9 +13,11 @@ import pytest
 from quick_campaigns import quick_campaign
 from virtual_rig_cases import effect
 
-from pymoo_hdte import cli
-from pymoo_hdte.discrepancy import report, workflow, write_campaign
-from pymoo_hdte.discrepancy.report_folder import FOLDER
+from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.discrepancy import write_campaign
+from pymoo_hdte.discrepancy.drive import analysis as workflow
+from pymoo_hdte.discrepancy.report import write as report
+from pymoo_hdte.discrepancy.report.write import FOLDER
 from pymoo_hdte.drive import load_datasheet, load_model, simulate
 from pymoo_hdte.reports import folder as reports_folder
 from pymoo_hdte.reports.folder import PAGE_FILE

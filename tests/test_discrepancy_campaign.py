@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy import (
     read_campaign,
     write_campaign,
 )
-from pymoo_hdte.discrepancy.features import measure
+from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 SHARED = Path("/work/shared/rig")
@@ -134,7 +134,7 @@ def test_writing_is_all_or_nothing(campaign, tmp_path, monkeypatch):
     def full_disk(path, columns):
         raise OSError("no space left")
 
-    monkeypatch.setattr("pymoo_hdte.discrepancy.campaign_files.write_columns", full_disk)
+    monkeypatch.setattr("pymoo_hdte.discrepancy.campaign.files.write_columns", full_disk)
     with pytest.raises(OSError, match="no space"):
         write_campaign(campaign, tmp_path / "new")
     assert [path.name for path in tmp_path.iterdir()] == ["out"]

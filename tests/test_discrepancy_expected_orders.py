@@ -7,7 +7,7 @@ import pytest
 from quick_campaigns import quick_campaign
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.workflow import analyse, expected_orders
+from pymoo_hdte.discrepancy.drive.analysis import analyse, expected_orders
 
 RATIO = 101.0
 

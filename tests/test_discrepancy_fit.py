@@ -7,10 +7,10 @@ import pytest
 from planted_features import CONDITIONS, known_data, listed, measured, with_sweep
 from scipy.stats import chi2, kstest
 
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.discrepancy.library import out_of_tolerance
-from pymoo_hdte.discrepancy.objective import LOST, Objective
-from pymoo_hdte.discrepancy.parameters import Layout
+from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
+from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
+from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.units import ARCSEC
 
 FEW = CONDITIONS[::2]

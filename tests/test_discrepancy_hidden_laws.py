@@ -5,14 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pymoo_hdte.discrepancy.hidden_laws import (
-    Mesh,
-    Side,
-    backbone,
-    friction,
-    rounded_dead_zone,
-)
-from pymoo_hdte.discrepancy.rig_integrator import quasi_static_torsion
+from pymoo_hdte.virtual.integrator import quasi_static_torsion
+from pymoo_hdte.virtual.laws import Mesh, Side, backbone, friction, rounded_dead_zone
 
 
 def test_maxwell_loop_has_the_area_and_the_saturation_of_its_elements():

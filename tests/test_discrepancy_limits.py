@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from quick_campaigns import quick_campaign
 
-from pymoo_hdte.discrepancy.data import Data
-from pymoo_hdte.discrepancy.features import measure
-from pymoo_hdte.discrepancy.limits import limits
-from pymoo_hdte.discrepancy.naming import Verdict
-from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.drive.limits import limits
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0]
 FREEDOM = 2000

@@ -8,11 +8,11 @@ import pytest
 from planted_features import known_data
 from virtual_rig_cases import BELIEVED, RIG
 
-from pymoo_hdte.discrepancy.effect_words import in_words
-from pymoo_hdte.discrepancy.misfit_map import Location
-from pymoo_hdte.discrepancy.misfit_words import sentences
-from pymoo_hdte.discrepancy.records import RunningRecord
-from pymoo_hdte.discrepancy.stray_lines import StrayLines, stray_lines
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.drive.misfit_map import Location
+from pymoo_hdte.discrepancy.drive.misfit_nature import StrayLines, stray_lines
+from pymoo_hdte.discrepancy.drive.misfit_words import sentences
+from pymoo_hdte.discrepancy.report.document import in_words
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 CONDITIONS = [(rpm, load) for rpm in (10.0, 200.0, 1000.0, 2000.0) for load in (0.0, 10.0, 40.0)]

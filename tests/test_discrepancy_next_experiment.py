@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from planted_features import analysed, known_data, listed, measured
 
-from pymoo_hdte.discrepancy.experiment_grid import Grid, Model, separation
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.discrepancy.locate import locate
-from pymoo_hdte.discrepancy.naming import Verdict
-from pymoo_hdte.discrepancy.next_experiment import nearest_rivals, next_experiment
-from pymoo_hdte.discrepancy.rival import Rival
-from pymoo_hdte.discrepancy.verdict_file import verdict_document
-from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.location import locate
+from pymoo_hdte.discrepancy.drive.next_test import nearest_rivals, next_experiment
+from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.report.document import verdict_document
 from pymoo_hdte.units import ARCSEC
 
 

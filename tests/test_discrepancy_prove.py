@@ -7,23 +7,22 @@ import pytest
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.data import Data, start_parameters
-from pymoo_hdte.discrepancy.features import measure
-from pymoo_hdte.discrepancy.fit import Fit, fit
-from pymoo_hdte.discrepancy.forward import coefficients_of
-from pymoo_hdte.discrepancy.gap import Gap
-from pymoo_hdte.discrepancy.library import candidates
-from pymoo_hdte.discrepancy.naming import Verdict
-from pymoo_hdte.discrepancy.parameters import base_parameters
-from pymoo_hdte.discrepancy.prove import prove
-from pymoo_hdte.discrepancy.revise import drive_model, revised_model
-from pymoo_hdte.discrepancy.rig_runs import Condition
-from pymoo_hdte.discrepancy.rival import Rival
-from pymoo_hdte.discrepancy.virtual_rig import run_campaign
-from pymoo_hdte.discrepancy.workflow import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
+from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.drive.parameters import base_parameters
+from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
+from pymoo_hdte.discrepancy.drive.proof import Gap, prove
+from pymoo_hdte.discrepancy.drive.revision import drive_model, revised_model
+from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive import load_datasheet, load_model
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.virtual.rig import run_campaign
+from pymoo_hdte.virtual.runs import Condition
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 6.0]
 CONDITIONS = tuple(

@@ -13,17 +13,15 @@ from test_discrepancy_prove import CONDITIONS, analysed
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.commands.optimum_shift import optimum_shift
-from pymoo_hdte.discrepancy import report
-from pymoo_hdte.discrepancy.locate import locate
-from pymoo_hdte.discrepancy.next_experiment import Proposal
-from pymoo_hdte.discrepancy.optimum import OptimumShift
-from pymoo_hdte.discrepancy.prove import prove
-from pymoo_hdte.discrepancy.report import write_report
-from pymoo_hdte.discrepancy.report_folder import FOLDER
-from pymoo_hdte.discrepancy.report_tables import certainty, gap_sentence, parameter_rows
-from pymoo_hdte.discrepancy.revise import accepted_fit, drive_model, revised_model
-from pymoo_hdte.discrepancy.virtual_rig import run_campaign
+from pymoo_hdte.cli.optimum_shift import optimum_shift
+from pymoo_hdte.discrepancy.drive.location import locate
+from pymoo_hdte.discrepancy.drive.next_test import Proposal
+from pymoo_hdte.discrepancy.drive.proof import prove
+from pymoo_hdte.discrepancy.drive.revision import accepted_fit, drive_model, revised_model
+from pymoo_hdte.discrepancy.report import write as report
+from pymoo_hdte.discrepancy.report.optimum import OptimumShift
+from pymoo_hdte.discrepancy.report.tables import certainty, gap_sentence, parameter_rows
+from pymoo_hdte.discrepancy.report.write import FOLDER, write_report
 from pymoo_hdte.drive import (
     LawAtPort,
     LoadInertia,
@@ -32,9 +30,10 @@ from pymoo_hdte.drive import (
     load_model,
     preset,
 )
-from pymoo_hdte.drive.mesh_laws import SoftWindup
+from pymoo_hdte.laws.stiffness import SoftWindup
 from pymoo_hdte.reports.page import digits, number
 from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.virtual.rig import run_campaign
 
 PROPOSAL = Proposal("Turn it backwards.", "running", -600.0, 40.0, ("a", "b"), 12.0)
 

@@ -7,12 +7,13 @@ import pytest
 from planted_features import CONDITIONS, known_data, library, listed, measured, with_sweep
 from virtual_rig_cases import BELIEVED, RIG
 
-from pymoo_hdte.discrepancy.features import Features
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.discrepancy.forward import Conditions
-from pymoo_hdte.discrepancy.library import out_of_tolerance
-from pymoo_hdte.discrepancy.records import RunningRecord
-from pymoo_hdte.discrepancy.screening import leading_sweep_effect, screen, unexpected_orders
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
+from pymoo_hdte.discrepancy.drive.features import Features
+from pymoo_hdte.discrepancy.drive.prediction import Conditions
+from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.units import ARCSEC
 
 SEEN = [3.0, 6.0]

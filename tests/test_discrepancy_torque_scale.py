@@ -10,9 +10,9 @@ from planted_features import known_data
 from quick_campaigns import quick_campaign
 from virtual_rig_cases import BELIEVED, effect
 
-from pymoo_hdte.discrepancy.library import candidates
-from pymoo_hdte.discrepancy.torque_scale import RATED_TORQUE, torque_scale
-from pymoo_hdte.discrepancy.workflow import _flanks_held, analyse
+from pymoo_hdte.discrepancy.campaign.campaign import RATED_TORQUE, torque_scale
+from pymoo_hdte.discrepancy.drive.analysis import _flanks_held, analyse
+from pymoo_hdte.discrepancy.drive.candidates import candidates
 
 OF_TORQUE = {
     "believed": ("stiffness", "damping", "input_inertia", "input_damping", "output_damping",

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from quick_campaigns import quick_campaign
 
-from pymoo_hdte.discrepancy import naming, rival, second_effect
-from pymoo_hdte.discrepancy.data import Data
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.discrepancy.plausibility import LEAST_TOLERANCE
-from pymoo_hdte.discrepancy.workflow import analyse
+from pymoo_hdte.discrepancy.campaign.plausibility import LEAST_TOLERANCE
+from pymoo_hdte.discrepancy.drive.analysis import analyse
+from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.engine import hypothesis as rival
+from pymoo_hdte.discrepancy.engine import selection as second_effect
+from pymoo_hdte.discrepancy.engine import verdict as naming
+from pymoo_hdte.discrepancy.engine.fitting import fit
 
 
 @pytest.fixture(scope="module", params=[1, 2])

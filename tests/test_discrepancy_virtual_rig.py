@@ -9,23 +9,13 @@ import pytest
 from virtual_rig_cases import BELIEVED, RIG, SHORT, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy import virtual_rig
-from pymoo_hdte.discrepancy.hidden_forms import HIDDEN_FORMS, draw_effect
-from pymoo_hdte.discrepancy.hidden_laws import (
-    Mesh,
-    backbone,
-    static_error,
-)
-from pymoo_hdte.discrepancy.rig_runs import Condition
-from pymoo_hdte.discrepancy.rig_sensors import OutputEncoder, TorqueErrors, measure
-from pymoo_hdte.discrepancy.virtual_rig import (
-    DEFAULT_CONDITIONS,
-    TrueRig,
-    draw_rig,
-    repeated,
-    run_campaign,
-)
 from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.virtual import rig as virtual_rig
+from pymoo_hdte.virtual.hidden_forms import HIDDEN_FORMS, draw_effect
+from pymoo_hdte.virtual.laws import Mesh, backbone, static_error
+from pymoo_hdte.virtual.rig import DEFAULT_CONDITIONS, TrueRig, draw_rig, repeated, run_campaign
+from pymoo_hdte.virtual.runs import Condition
+from pymoo_hdte.virtual.sensors import OutputEncoder, TorqueErrors, measure
 
 
 def test_torsion_record_has_the_slope_of_the_drive(rng):

@@ -19,33 +19,28 @@ from pymoo_hdte.drive import (
     preset,
     simulate,
 )
-from pymoo_hdte.drive.balance import SpeedLoop
 from pymoo_hdte.drive.effects import effect_from_fields
-from pymoo_hdte.drive.friction import (
-    CoulombFriction,
-    NonlinearDrag,
-    PeriodicFriction,
-    PeriodicTorque,
-    StribeckFriction,
-)
-from pymoo_hdte.drive.harmonic_balance import harmonic_balance
-from pymoo_hdte.drive.hysteresis import MaxwellSlip, slip_along
-from pymoo_hdte.drive.laws import PortState, periodic_phase
-from pymoo_hdte.drive.mesh_laws import (
-    DeadZone,
-    HardeningStiffness,
-    PeriodicClearance,
-    SoftWindup,
-)
 from pymoo_hdte.drive.port_effects import LAWS, KinematicErrorLine, KinematicReaction, LawAtPort
-from pymoo_hdte.drive.toml_fields import Fields
-from pymoo_hdte.drive.torus import (
+from pymoo_hdte.drive.solve.harmonic_balance import harmonic_balance
+from pymoo_hdte.drive.solve.steady_motion import SpeedLoop
+from pymoo_hdte.drive.solve.torus import (
     Torus,
     fundamental_orders,
     multiplication,
     stacked,
     unstacked,
 )
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.laws.friction import (
+    CoulombFriction,
+    NonlinearDrag,
+    PeriodicFriction,
+    PeriodicTorque,
+    StribeckFriction,
+)
+from pymoo_hdte.laws.hysteresis import MaxwellSlip, slip_along
+from pymoo_hdte.laws.law import PortState, periodic_phase
+from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.units import ARCSEC
 

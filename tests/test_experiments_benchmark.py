@@ -4,8 +4,8 @@ import time
 
 import pytest
 
-from experiments.machine import machine_table, usable_cores
-from experiments.timing import Ratio, best_time, ratio_table
+from experiments.runner.machine import machine_table, usable_cores
+from experiments.studies.timing import Ratio, best_time, ratio_table
 
 
 def test_the_best_of_several_times_is_taken(monkeypatch):

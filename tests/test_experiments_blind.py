@@ -14,27 +14,30 @@ from virtual_rig_cases import BELIEVED as SHARED_DRIVE
 from virtual_rig_cases import RIG as SHARED_RIG
 from virtual_rig_cases import SHORT
 
-from experiments import blind, blind_cases, blind_scoring, committed
 from experiments.__main__ import FAILED, main
-from experiments.blind_cases import BELIEVED, OUT_OF_TOLERANCE, RIG, Case, cases
-from experiments.blind_codes import NAMES, code_of_set, words_of_set
-from experiments.blind_data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
-from experiments.blind_limits import size_at
-from experiments.blind_scoring import COLUMNS, BlindJob, bias_scores, truly_moved, verdict_scores
-from experiments.blind_shortfalls import shortfalls_table
-from experiments.blind_tables import _judged_table
-from experiments.blind_targets import judge_median, judge_rate, median, rate
-from experiments.campaign import Campaign, Run
-from experiments.committed import committed_file
-from experiments.registry import Context
-from pymoo_hdte.discrepancy.data import Data, start_parameters
-from pymoo_hdte.discrepancy.features import measure
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.discrepancy.hidden_forms import LISTED_FORMS, UNLISTED_FORMS
-from pymoo_hdte.discrepancy.parameters import Layout
-from pymoo_hdte.discrepancy.rival import Rival
-from pymoo_hdte.discrepancy.virtual_rig import TrueRig
-from pymoo_hdte.discrepancy.workflow import Analysis
+from experiments.blind import cases as blind_cases
+from experiments.blind import experiment as blind
+from experiments.blind import scoring as blind_scoring
+from experiments.blind.cases import BELIEVED, OUT_OF_TOLERANCE, RIG, Case, cases
+from experiments.blind.codes import NAMES, code_of_set, words_of_set
+from experiments.blind.data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
+from experiments.blind.limits import size_at
+from experiments.blind.scoring import COLUMNS, BlindJob, bias_scores, truly_moved, verdict_scores
+from experiments.blind.shortfalls import shortfalls_table
+from experiments.blind.tables import _judged_table
+from experiments.blind.targets import judge_median, judge_rate, median, rate
+from experiments.runner import committed
+from experiments.runner.campaign import Campaign, Run
+from experiments.runner.committed import committed_file
+from experiments.runner.registry import Context
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
+from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.virtual.hidden_forms import LISTED_FORMS, UNLISTED_FORMS
+from pymoo_hdte.virtual.rig import TrueRig
 
 ROOT = 99
 ECCENTRIC = Case("single", ("eccentricity",), 1.0, 0, ROOT)

@@ -9,19 +9,19 @@ from planted_balances import EFFECTS, swept
 from planted_features import analysed, known_data, measured
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.parameters import Layout
+from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.units import ARCSEC
 
 pytest.importorskip("pysindy", reason="needs the extra blind")
 
-from experiments.blind_rivals import (
+from experiments.blind.simpler_tools import (
     explained,
     held_out_misfit,
     largest_residual_rule,
     sparse_regression,
     stlsq_support,
 )
-from experiments.torque_balances import Regression
+from experiments.blind.torque_balances import Regression
 
 
 def planted(effects=(), seed=1):

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from walk_jobs import DeadlyWalk, EndlesslyDeadlyWalk, Walk
 
-from experiments.campaign import Campaign
-from experiments.runs import OptimisationRun
-from experiments.workers import WorkerLost, WrongWorker, make_executor
+from experiments.comparison.runs import OptimisationRun
+from experiments.runner.campaign import Campaign
+from experiments.runner.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
 
 pytest.importorskip("distributed", reason="needs the extra dask")
@@ -236,7 +236,10 @@ def test_a_worker_with_another_source_or_none_is_refused(tmp_path):
     (none / "experiments" / "__init__.py").touch()
     with cluster(tmp_path / "cluster") as dask, make_executor(1, dask.address) as executor:
         campaign = Campaign(tmp_path / "out", executor)
-        for source, reason in ((other, "source or versions"), (none, "experiments.campaign")):
+        for source, reason in (
+            (other, "source or versions"),
+            (none, "experiments.runner.campaign"),
+        ):
             worker = dask.worker("--no-nanny", source=source)
             with pytest.raises(WrongWorker, match=reason):
                 campaign.run([Walk(seed) for seed in range(1, 4)], "walks")
@@ -259,7 +262,7 @@ def test_a_scheduler_can_end_the_wait_for_workers(tmp_path):
 
 
 def test_a_silent_service_at_the_dask_address_is_refused(monkeypatch):
-    monkeypatch.setattr("experiments.workers.CONNECT_SECONDS", 0.2)
+    monkeypatch.setattr("experiments.runner.workers.CONNECT_SECONDS", 0.2)
     with (
         socket.create_server(("127.0.0.1", 0)) as service,
         pytest.raises(InvalidInput, match="the address of a running Dask scheduler"),

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from experiments import tolerance_front
-from experiments.front_agreement import disagreement
-from experiments.level_search import LevelSearch, on_level, without_local_optima
+from experiments.fronts import tolerance_front
+from experiments.fronts.agreement import disagreement
+from experiments.fronts.level_search import LevelSearch, on_level, without_local_optima
 from pymoo_hdte.problems import RobustToy
 from pymoo_hdte.problems.reference import ReferenceFront
 

@@ -4,15 +4,23 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from experiments import static_error_statistics, table2, table3
-from experiments.bench_campaign import draw_campaign, slope_error_per_noise, summaries
-from experiments.campaign import Campaign
-from experiments.error_sources import outlier_counts, power, prototypes_needed, spoilt_readings
-from experiments.normality import pooled_rejection_rate, possible_sizes, shapiro_p
-from experiments.published_values import TABLE_2, TABLE_3, TABLE_6
-from experiments.rates import at_least
-from experiments.registry import Context
-from experiments.static_error_statistics import (
+from experiments.comparison.rates import at_least
+from experiments.paper import table2, table3
+from experiments.paper.bench_campaign import draw_campaign, slope_error_per_noise, summaries
+from experiments.paper.published_values import TABLE_2, TABLE_3, TABLE_6
+from experiments.paper.static_error import statistics as static_error_statistics
+from experiments.paper.static_error.normality import (
+    pooled_rejection_rate,
+    possible_sizes,
+    shapiro_p,
+)
+from experiments.paper.static_error.sources import (
+    outlier_counts,
+    power,
+    prototypes_needed,
+    spoilt_readings,
+)
+from experiments.paper.static_error.statistics import (
     READINGS,
     angle_ranges,
     components,
@@ -21,6 +29,8 @@ from experiments.static_error_statistics import (
     statistics,
     tooth_order_error,
 )
+from experiments.runner.campaign import Campaign
+from experiments.runner.registry import Context
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import detectable_correlation
 from pymoo_hdte.units import ARCSEC

@@ -4,11 +4,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from experiments import emps, kinova, measured_rigs
-from experiments.campaign import Campaign
-from experiments.measured_rigs import MEASURED
-from experiments.registry import Context
-from experiments.result import Finding
+from experiments.measured import emps, kinova
+from experiments.measured import rigs as measured_rigs
+from experiments.measured.rigs import MEASURED
+from experiments.runner.campaign import Campaign
+from experiments.runner.registry import Context
+from experiments.runner.result import Finding
 
 
 def result_of(experiment, folder, out):
@@ -29,7 +30,7 @@ def test_every_demand_on_a_real_rig_holds(experiment, folder, tmp_path):
 
 @pytest.mark.parametrize("experiment", [emps, kinova], ids=["emps", "kinova"])
 def test_without_the_measurements_the_report_says_so(experiment, tmp_path, monkeypatch):
-    monkeypatch.setattr("experiments.measured_rigs.MEASURED", tmp_path / "nowhere")
+    monkeypatch.setattr("experiments.measured.rigs.MEASURED", tmp_path / "nowhere")
     result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
     assert "Skipped" in result.paragraphs[0]
     assert str(tmp_path / "nowhere") in result.paragraphs[0]

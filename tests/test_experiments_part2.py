@@ -7,14 +7,13 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
-from experiments import dte_map, fig12, published, sensitivity, table8
-from experiments.accuracy_per_run import Trial, needed_table
-from experiments.campaign import Campaign
-from experiments.chaospy_twins import chaos, compare
-from experiments.choices import BAND, initial_choices, paper_choices
-from experiments.design_tables import _idle_sweep, deviation_table
-from experiments.models import FITTED
-from experiments.printed_validation import (
+from experiments.comparison.runs import robust_problem
+from experiments.paper import fig12, published, table8
+from experiments.paper.choices import BAND, initial_choices, paper_choices
+from experiments.paper.design_tables import _idle_sweep, deviation_table
+from experiments.paper.models import FITTED
+from experiments.paper.prototypes.consistency import Prediction, best_case_table, consistency_table
+from experiments.paper.prototypes.printed_validation import (
     HIGHEST,
     LOWEST,
     MAE,
@@ -28,15 +27,22 @@ from experiments.printed_validation import (
     bounds,
     nearest_assignment,
 )
-from experiments.prototype_consistency import Prediction, best_case_table, consistency_table
-from experiments.prototype_records import record
-from experiments.published_values import TABLE_6, Moments
-from experiments.registry import Context
-from experiments.rival_surrogates import FAMILIES, SCREENED, TENSOR, fit_grid, rivals
-from experiments.runs import robust_problem
-from experiments.scatter import exact_moments
-from experiments.shares import design_indices, falls_when_halved, scatter_indices, study_designs
-from experiments.store import load, png_bytes, save
+from experiments.paper.prototypes.records import record
+from experiments.paper.published_values import TABLE_6, Moments
+from experiments.paper.scatter import exact_moments
+from experiments.paper.shares import (
+    design_indices,
+    falls_when_halved,
+    scatter_indices,
+    study_designs,
+)
+from experiments.runner.campaign import Campaign
+from experiments.runner.registry import Context
+from experiments.runner.store import load, png_bytes, save
+from experiments.studies import dte_map, sensitivity
+from experiments.studies.accuracy_per_run import Trial, needed_table
+from experiments.studies.chaospy_twins import chaos, compare
+from experiments.studies.rival_surrogates import FAMILIES, SCREENED, TENSOR, fit_grid, rivals
 from pymoo_hdte.decision import deviation_degree
 from pymoo_hdte.drive import (
     PARAMETERS,

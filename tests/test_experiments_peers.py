@@ -6,12 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import peers, swarm_parts
-from experiments.campaign import Campaign
-from experiments.contest.peers import CONTESTANTS, SWARM_VARIANTS
-from experiments.contest.problems import BENCHMARKS
-from experiments.indicators import CORNER, IndicatorsAgainst
-from experiments.peers_data import (
+from experiments.comparison.indicators import CORNER, IndicatorsAgainst
+from experiments.contest import peers, swarm_parts
+from experiments.contest.contestants import CONTESTANTS, SWARM_VARIANTS
+from experiments.contest.peers_data import (
     MEASURES,
     Scores,
     committed_scores,
@@ -20,9 +18,16 @@ from experiments.peers_data import (
     format_seconds,
     read_scores,
 )
-from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table, subsets_table
-from experiments.peers_tables import OURS, ranks_tables
-from experiments.registry import Context
+from experiments.contest.peers_rivals import (
+    FAITHFUL,
+    must_reach_table,
+    nearest_rival_table,
+    subsets_table,
+)
+from experiments.contest.peers_tables import OURS, ranks_tables
+from experiments.contest.problems import BENCHMARKS
+from experiments.runner.campaign import Campaign
+from experiments.runner.registry import Context
 from pymoo_hdte.checks import InvalidInput
 
 PROBLEMS = tuple(name for name in BENCHMARKS if name.startswith(("ZDT", "WFG")))

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from scipy.stats import friedmanchisquare
 
-from experiments.ranks import (
+from experiments.comparison.ranks import (
     average_ranks,
     cliques,
     friedman,
@@ -24,7 +24,7 @@ from experiments.ranks import (
     rank_intervals,
     win_tie_loss,
 )
-from experiments.ranks_figures import critical_difference_plot, rank_heatmap
+from experiments.comparison.ranks_figures import critical_difference_plot, rank_heatmap
 from pymoo_hdte.checks import InvalidInput
 
 # Areas under the curve, J. Mach. Learn. Res. 7 (2006), Table 6. The last row but one is printed as

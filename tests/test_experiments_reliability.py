@@ -12,12 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments import committed, reliability, reliability_kill
 from experiments.__main__ import main
-from experiments.campaign import Campaign, Run
-from experiments.registry import Context
-from experiments.reliability_commands import Wrong
-from experiments.reliability_data import (
+from experiments.reliability import experiment as reliability
+from experiments.reliability import kill as reliability_kill
+from experiments.reliability.commands import Wrong
+from experiments.reliability.data import (
     FUZZ,
     KILL,
     LIMIT,
@@ -30,7 +29,7 @@ from experiments.reliability_data import (
     tally_of_inputs,
     tally_of_kills,
 )
-from experiments.reliability_fuzz import (
+from experiments.reliability.fuzz import (
     ACCEPTED,
     CRASHED,
     HUNG,
@@ -39,9 +38,12 @@ from experiments.reliability_fuzz import (
     outcome,
     outcomes_of_process,
 )
-from experiments.reliability_inputs import KINDS, THROUGH_COMMANDS
-from experiments.reliability_mutations import Link, mutated, put
-from experiments.reliability_text import BYTES, TEXTS
+from experiments.reliability.inputs import KINDS, THROUGH_COMMANDS
+from experiments.reliability.mutations import Link, mutated, put
+from experiments.reliability.text import BYTES, TEXTS
+from experiments.runner import committed
+from experiments.runner.campaign import Campaign, Run
+from experiments.runner.registry import Context
 
 LOADERS = [name for name in KINDS if name not in THROUGH_COMMANDS]
 ROOT = Path(__file__).parents[1]
@@ -193,8 +195,8 @@ def test_torn_and_differing_files_are_counted(tmp_path, monkeypatch):
 
 def test_a_kill_in_the_midst_of_writing_leaves_whole_files_only(tmp_path):
     script = (
-        "from pathlib import Path; from experiments.reliability_kill import _die_at; "
-        "from experiments.store import write_atomically; _die_at({step}); "
+        "from pathlib import Path; from experiments.reliability.kill import _die_at; "
+        "from experiments.runner.store import write_atomically; _die_at({step}); "
         "[write_atomically(Path(r'{out}') / name, b'0123456789') for name in 'ab']"
     )
     left = {1: (set(), {5}), 2: (set(), {10}), 3: ({"a"}, {5}), 4: ({"a"}, {10})}
@@ -208,7 +210,7 @@ def test_a_kill_in_the_midst_of_writing_leaves_whole_files_only(tmp_path):
 
 def test_workers_end_with_a_command_that_is_killed():
     script = (
-        "import time; from experiments.workers import make_executor\n"
+        "import time; from experiments.runner.workers import make_executor\n"
         "executor = make_executor(2)\n"
         "list(executor.map(abs, range(8))); print('ready', flush=True); time.sleep(60)"
     )
@@ -225,7 +227,7 @@ def test_a_disk_that_fills_up_keeps_the_former_file_and_no_part(tmp_path, size):
     path.write_bytes(b"former")
     script = (
         "import resource; from pathlib import Path\n"
-        "from experiments.store import write_atomically\n"
+        "from experiments.runner.store import write_atomically\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
         f"write_atomically(Path({str(path)!r}), b'x' * 5000)"
     )
@@ -242,7 +244,7 @@ def test_a_full_disk_is_one_sentence_and_code_1(tmp_path, monkeypatch, capsys):
         raise OSError(28, "No space left on device", str(tmp_path))
 
     monkeypatch.setattr("experiments.__main__.save", full)
-    monkeypatch.setattr("experiments.emps.run", lambda context: None)
+    monkeypatch.setattr("experiments.measured.emps.run", lambda context: None)
     assert main(["emps", "--workers", "1", "--out", str(tmp_path)]) == 1
     assert "emps: [Errno 28] No space left on device" in capsys.readouterr().err
 

@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from experiments import committed, provenance
 from experiments.__main__ import main
-from experiments.campaign import Campaign
-from experiments.committed import read_origin, read_rows, stored_outcome, table_with_origin
-from experiments.registry import EXPERIMENTS, Context, Experiment
-from experiments.report import check_page, write_report
-from experiments.result import Column, Finding, Picture, Result, Table, significant
-from experiments.store import load, png_bytes, save
+from experiments.runner import committed, provenance
+from experiments.runner.campaign import Campaign
+from experiments.runner.committed import read_origin, read_rows, stored_outcome, table_with_origin
+from experiments.runner.registry import EXPERIMENTS, Context, Experiment
+from experiments.runner.report import check_page, write_report
+from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
+from experiments.runner.store import load, png_bytes, save
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.reports.csv_text import csv_text
 

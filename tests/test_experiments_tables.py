@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.campaign import Campaign
-from experiments.published_values import TABLE_6, TABLE_9
-from experiments.runs import ALGORITHMS, OptimisationRun, robust_problem
-from experiments.scatter import dte_samples, exact_moments
+from experiments.comparison.runs import ALGORITHMS, OptimisationRun, robust_problem
+from experiments.paper.published_values import TABLE_6, TABLE_9
+from experiments.paper.scatter import dte_samples, exact_moments
+from experiments.runner.campaign import Campaign
 from pymoo_hdte.decision import deviation_degree
 
 SMALL = {"population": 20, "generations": 5, "final_size": 8}

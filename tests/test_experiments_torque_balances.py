@@ -5,9 +5,9 @@ import pytest
 from planted_balances import EFFECTS, library_of, swept
 from planted_features import measured
 
-from experiments.candidate_terms import BREAKAWAYS
-from experiments.torque_balances import balances, regression
-from pymoo_hdte.discrepancy.parameters import Layout
+from experiments.blind.candidate_terms import BREAKAWAYS
+from experiments.blind.torque_balances import balances, regression
+from pymoo_hdte.discrepancy.engine.candidate import Layout
 
 
 def test_the_balances_of_a_clean_drive_are_nil():

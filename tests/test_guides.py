@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from pymoo_hdte.discrepancy import excess, rival
+from pymoo_hdte.discrepancy.engine import excess
+from pymoo_hdte.discrepancy.engine import hypothesis as rival
+from pymoo_hdte.discrepancy.mechanism.analysis import MAIN_SHARE
 from pymoo_hdte.drive import hs_20_100
-from pymoo_hdte.measured.investigate import MAIN_SHARE
 from pymoo_hdte.surrogate import TruncatedNormal
 
 ROOT = Path(__file__).parents[1]

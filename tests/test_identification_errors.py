@@ -16,11 +16,7 @@ from pymoo_hdte.identification import (
     largest_deviation,
 )
 from pymoo_hdte.identification.outliers import mean_of_valid
-from pymoo_hdte.identification.virtual_bench import (
-    draw_prototypes,
-    plant_outliers,
-    repeat_measurements,
-)
+from pymoo_hdte.virtual.bench import draw_prototypes, plant_outliers, repeat_measurements
 
 SYMBOLS = tuple(f"e{number}" for number in range(13))
 MEANS, STDS = np.linspace(4.0, 10.0, 13), np.linspace(0.6, 1.7, 13)

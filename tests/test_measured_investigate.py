@@ -8,21 +8,21 @@ import pytest
 from measured_oscillator import bouc_wen, cubic, nothing, swinging_stiffness
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.drive.friction import CoulombFriction
-from pymoo_hdte.measured import investigate
-from pymoo_hdte.measured.data import measured_data
-from pymoo_hdte.measured.intervals import Spread
-from pymoo_hdte.measured.next_test import next_test
-from pymoo_hdte.measured.preconditions import check_scale
-from pymoo_hdte.measured.prove import prove_measured
-from pymoo_hdte.measured.verdict_document import (
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
+from pymoo_hdte.discrepancy.mechanism.intervals import Spread
+from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
+from pymoo_hdte.discrepancy.mechanism.preconditions import check_scale
+from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
+from pymoo_hdte.discrepancy.report.mechanism_document import (
     _parameters,
     effects,
     limits,
     quantities,
     remainder,
 )
+from pymoo_hdte.laws.friction import CoulombFriction
 from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
 
 OSCILLATOR = Mechanism(

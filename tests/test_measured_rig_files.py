@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.measured.rig_files import RIG_FILE, read_model, read_rig, rig_toml
+from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE, read_model, read_rig, rig_toml
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import law_from_values
 

@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive.mesh_laws import PeriodicClearance
+from pymoo_hdte.discrepancy.mechanism.files import read_model, rig_toml
 from pymoo_hdte.drive.port_effects import LAWS
-from pymoo_hdte.measured.rig_files import read_model, rig_toml
+from pymoo_hdte.laws.linear import ConstantForce
+from pymoo_hdte.laws.stiffness import PeriodicClearance
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import EFFECTS, law_from_values, values_of
-from pymoo_hdte.mechanism.laws import ConstantForce
 
 RIG = Mechanism(
     {"q": Believed(2.0)}, [Port("joint", {"q": 1.0}), Port("cell", {"q": 0.5}, read=True)]

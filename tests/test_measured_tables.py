@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive.toml_fields import Fields
-from pymoo_hdte.measured import tables
+from pymoo_hdte.io import tables
+from pymoo_hdte.io.fields import Fields
 
 EMPS = Path(__file__).parents[2] / "shared" / "measured" / "emps" / "DATA_EMPS.mat"
 KINOVA = EMPS.parents[1] / "kinova_gen3_j7"

@@ -6,26 +6,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.fft import dct
 
-from pymoo_hdte.drive.friction import CoulombFriction, PeriodicTorque
-from pymoo_hdte.drive.hysteresis import MaxwellSlip
-from pymoo_hdte.drive.laws import PortState, periodic_phase
-from pymoo_hdte.drive.mesh_laws import HardeningStiffness
+from pymoo_hdte.laws.friction import CoulombFriction, PeriodicTorque
+from pymoo_hdte.laws.hysteresis import MaxwellSlip
+from pymoo_hdte.laws.law import PortState, periodic_phase
+from pymoo_hdte.laws.linear import ConstantForce, DirectionalFriction, LinearDamper, LinearSpring
+from pymoo_hdte.laws.stiffness import HardeningStiffness
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
-from pymoo_hdte.mechanism.laws import (
-    ConstantForce,
-    DirectionalFriction,
-    LinearDamper,
-    LinearSpring,
-)
 from pymoo_hdte.mechanism.motion import (
     highest_frequency,
+    law_force,
     motion_of,
     noise_of,
     smooth,
     timing_noise,
 )
-from pymoo_hdte.mechanism.port_motion import law_force
 
 STEP = 1e-3
 TIME = np.arange(0.0, 8.0, STEP)

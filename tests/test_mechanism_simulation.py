@@ -10,12 +10,14 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import LawAtPort, friction, harmonic_balance, preset, time_domain
-from pymoo_hdte.drive.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
-from pymoo_hdte.drive.hysteresis import MaxwellSlip
-from pymoo_hdte.drive.laws import PortState, Response, periodic_phase
-from pymoo_hdte.drive.mesh_laws import DeadZone, HardeningStiffness, SoftWindup
+from pymoo_hdte.drive import LawAtPort, preset
 from pymoo_hdte.drive.port_effects import KinematicReaction
+from pymoo_hdte.drive.solve import harmonic_balance, time_domain
+from pymoo_hdte.laws import friction
+from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
+from pymoo_hdte.laws.hysteresis import MaxwellSlip
+from pymoo_hdte.laws.law import PortState, Response, periodic_phase
+from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, SoftWindup
 from pymoo_hdte.mechanism import (
     Believed,
     ErrorLine,

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pymoo_hdte import cli
-from pymoo_hdte.measured.rig_files import read_rig
+from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.discrepancy.mechanism.files import read_rig
 from pymoo_hdte.mechanism.effects import EFFECTS
 
 DOCS = Path(__file__).parents[1] / "docs"

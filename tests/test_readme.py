@@ -14,22 +14,28 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from experiments import fig12, swarm_parts, table5
-from experiments.blind import OUTCOMES, SECONDS
-from experiments.blind_cases import MOST_WRONG_CONFIDENT
-from experiments.blind_data import read_outcomes
-from experiments.blind_targets import select
-from experiments.campaign import Campaign
-from experiments.committed import committed_file
-from experiments.comparison import objectives, true_front
-from experiments.peers_data import committed_scores
-from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table, subsets_table
-from experiments.peers_tables import NAMES, median_ranks
-from experiments.published_values import TABLE_7
-from experiments.quality import TrueFront
-from experiments.registry import Context
-from experiments.runs import OptimisationRun
-from pymoo_hdte import cli
+from experiments.blind.cases import MOST_WRONG_CONFIDENT
+from experiments.blind.data import read_outcomes
+from experiments.blind.experiment import OUTCOMES, SECONDS
+from experiments.blind.targets import select
+from experiments.comparison.paired import objectives, true_front
+from experiments.comparison.quality import TrueFront
+from experiments.comparison.runs import OptimisationRun
+from experiments.contest import swarm_parts
+from experiments.contest.peers_data import committed_scores
+from experiments.contest.peers_rivals import (
+    FAITHFUL,
+    must_reach_table,
+    nearest_rival_table,
+    subsets_table,
+)
+from experiments.contest.peers_tables import NAMES, median_ranks
+from experiments.paper import fig12, table5
+from experiments.paper.published_values import TABLE_7
+from experiments.runner.campaign import Campaign
+from experiments.runner.committed import committed_file
+from experiments.runner.registry import Context
+from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import accuracy, latin_hypercube

@@ -11,12 +11,12 @@ from test_cli_identify import records  # noqa: F401
 from test_experiments_report import example
 from virtual_rig_cases import effect
 
-from experiments.report import write_report
-from experiments.store import save
-from pymoo_hdte import cli
+from experiments.runner.report import write_report
+from experiments.runner.store import save
+from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.discrepancy import write_campaign
-from pymoo_hdte.measured import investigate
-from pymoo_hdte.measured.report import write_measured_report
+from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
 from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import DriveModel
-from pymoo_hdte.storage import DEEPEST_HEADER, LARGEST_FILE, LARGEST_HEADER, FileFormat
+from pymoo_hdte.io.archive import DEEPEST_HEADER, LARGEST_FILE, LARGEST_HEADER, FileFormat
 from pymoo_hdte.surrogate import ChebyshevSurrogate
 
 STORED = Path(__file__).parent / "stored"

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from experiments.blind_cases import BELIEVED, RIG
-from pymoo_hdte.discrepancy.hidden_forms import HiddenEffect
-from pymoo_hdte.discrepancy.rig_runs import Condition
-from pymoo_hdte.discrepancy.virtual_rig import TrueRig
+from experiments.blind.cases import BELIEVED, RIG
+from pymoo_hdte.virtual.hidden_forms import HiddenEffect
+from pymoo_hdte.virtual.rig import TrueRig
+from pymoo_hdte.virtual.runs import Condition
 
 __all__ = ["BELIEVED", "FAST", "PHASES", "RIG", "SHORT", "effect", "true_rig"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.campaign import Run
+from experiments.runner.campaign import Run
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from pymoo_hdte.discrepancy import write_campaign
-from pymoo_hdte.discrepancy.believed import Believed, Rig
-from pymoo_hdte.discrepancy.hidden_forms import draw_effect
-from pymoo_hdte.discrepancy.virtual_rig import draw_rig, run_campaign
+from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
 from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.virtual.hidden_forms import draw_effect
+from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 BELIEVED = Believed(
     ratio=101.0,

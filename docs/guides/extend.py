@@ -20,8 +20,9 @@ from pymoo.optimize import minimize
 from pymoo_hdte.algorithms import ElitistSwarm, EntropyWeight, Flat, LinearDecrease, ParticleSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange
-from pymoo_hdte.drive import harmonic_balance, preset, simulate
-from pymoo_hdte.drive.laws import Aperiodic, Response
+from pymoo_hdte.drive import preset, simulate
+from pymoo_hdte.drive.solve import harmonic_balance
+from pymoo_hdte.laws.law import Aperiodic, Response
 from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.simulation import simulate as simulate_mechanism
 from pymoo_hdte.problems import RobustDTE
@@ -31,7 +32,7 @@ from pymoo_hdte.problems import RobustDTE
 # -----
 #
 # A *law* says with which torque (or force) a place answers to the motion there. It is any object
-# with ``orders`` and ``respond``: the protocol ``pymoo_hdte.drive.laws.Law``. ``respond`` gets the
+# with ``orders`` and ``respond``: the protocol ``pymoo_hdte.laws.law.Law``. ``respond`` gets the
 # motion at the port as a ``PortState``, arrays of one shape, and returns torque and both
 # derivatives, which Newton's method needs. Laws that depend on no angle inherit ``Aperiodic``;
 # those that vary with one inherit ``Periodic`` and name their order, so that solvers keep its
@@ -141,8 +142,8 @@ print(f"robust problem on it: mean {mean:.1f}, std {std:.1f} arcsec")
 # Two things need a change in the package. Model files name only the effects of
 # ``pymoo_hdte.drive.effects.EFFECT_NAMES``: for yours in a TOML file, add the law to
 # ``port_effects.LAWS``. And a verdict of ``pymoo-hdte discrepancy`` names only what it has a
-# candidate for: add one to ``pymoo_hdte/discrepancy/friction_candidates.py`` for drives, to
-# ``pymoo_hdte/measured/candidates.py`` for other machines.
+# candidate for: add one to ``pymoo_hdte/discrepancy/drive/friction_candidates.py`` for drives, to
+# ``pymoo_hdte/discrepancy/mechanism/candidates.py`` for other machines.
 #
 # A port
 # ------
@@ -250,7 +251,7 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 #
 # An experiment is a module in the folder ``experiments`` with a function ``run(context)`` that
 # returns a ``Result``: paragraphs, tables, figures. It is listed with one line in
-# ``experiments/registry.py``,
+# ``experiments/runner/registry.py``,
 #
 # .. code-block:: python
 #
@@ -276,9 +277,9 @@ sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
 from stiffer import run
 
-from experiments.campaign import Campaign
-from experiments.registry import Context
-from experiments.store import load, save
+from experiments.runner.campaign import Campaign
+from experiments.runner.registry import Context
+from experiments.runner.store import load, save
 
 with tempfile.TemporaryDirectory() as folder:
     out = Path(folder)

@@ -29,12 +29,7 @@ from scipy.optimize import minimize as minimize_one
 
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
-from pymoo_hdte.problems import (
-    OperatingCondition,
-    RobustDTE,
-    RobustDTETolerance,
-    robust_dte_family,
-)
+from pymoo_hdte.problems import OperatingCondition, RobustDTE, RobustDTETolerance, robust_dte_family
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 problem = RobustDTE()

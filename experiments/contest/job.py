@@ -9,9 +9,9 @@ import numpy as np
 from moocore import is_nondominated
 from numpy.typing import NDArray
 
-from experiments.campaign import Run
-from experiments.contest.peers import EVERYONE
+from experiments.contest.contestants import EVERYONE
 from experiments.contest.problems import problem_of
+from experiments.runner.campaign import Run
 
 EVALUATIONS, SPENT = "evaluations", "spent"
 """Columns of a run, before those of the objectives."""

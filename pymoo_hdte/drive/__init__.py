@@ -1,15 +1,7 @@
 """The machine: data sheet, static error, equations of motion, steady state, time integration."""
 
-from pymoo_hdte.drive.balance import Balance, SpeedLoop
-from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100, load_datasheet
-from pymoo_hdte.drive.effects import (
-    DampingReference,
-    Effect,
-    LoadInertia,
-    MeshStiffnessVariation,
-)
-from pymoo_hdte.drive.harmonic_balance import harmonic_balance
+from pymoo_hdte.drive.effects import DampingReference, Effect, LoadInertia, MeshStiffnessVariation
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.measurement import low_pass, measured_dte
 from pymoo_hdte.drive.model import (
@@ -20,18 +12,17 @@ from pymoo_hdte.drive.model import (
     load_model,
     preset,
 )
-from pymoo_hdte.drive.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
-from pymoo_hdte.drive.quasi_static import mean_torsion, quasi_static_torsion
 from pymoo_hdte.drive.sensor_effects import Eccentricity, ThermalDrift
-from pymoo_hdte.drive.stability import UnstableDrive, floquet_multipliers
-from pymoo_hdte.drive.static_error import (
-    StaticErrorSample,
-    class_amplitudes,
-    sample_static_error,
-)
-from pymoo_hdte.drive.steady_state import steady_state, transfer_function
-from pymoo_hdte.drive.time_domain import Run, simulate
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.harmonic_balance import harmonic_balance
+from pymoo_hdte.drive.solve.hill import steady_state, transfer_function
+from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
+from pymoo_hdte.drive.solve.quasi_static import mean_torsion, quasi_static_torsion
+from pymoo_hdte.drive.solve.stability import UnstableDrive, floquet_multipliers
+from pymoo_hdte.drive.solve.steady_motion import Balance, SpeedLoop
+from pymoo_hdte.drive.solve.time_domain import Run, simulate
+from pymoo_hdte.drive.static_error import StaticErrorSample, class_amplitudes, sample_static_error
 
 __all__ = [
     "PARAMETERS",

@@ -7,7 +7,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
-from pymoo_hdte.drive.toml_fields import Fields, read_toml
+from pymoo_hdte.io.fields import Fields, read_toml
 
 ERROR_CLASSES = ("e_m", "e_g", "e_w", "e_p", "e_h")
 """Classes of Eq. (1): stationary, with the flexspline, with the wave generator, pitch, tooth."""

@@ -13,8 +13,6 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.drive.coefficients import Coefficients
-from pymoo_hdte.drive.mesh_laws import PeriodicStiffness
 from pymoo_hdte.drive.port_effects import (
     LAWS,
     KinematicErrorLine,
@@ -22,7 +20,9 @@ from pymoo_hdte.drive.port_effects import (
     law_from_fields,
 )
 from pymoo_hdte.drive.sensor_effects import Eccentricity, ThermalDrift
-from pymoo_hdte.drive.toml_fields import Fields
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.laws.stiffness import PeriodicStiffness
 
 WAVE_GENERATOR_ORDER = 2.0
 """Order of what the two lobes of the wave generator do, in cycles per input turn."""

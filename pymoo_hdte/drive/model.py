@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of
-from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100
 from pymoo_hdte.drive.effects import Effect, effect_from_fields, place_of
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.model_file import FORMAT, model_tables, parts_of
-from pymoo_hdte.drive.order_spectrum import OrderSpectrum
-from pymoo_hdte.drive.steady_state import steady_state
-from pymoo_hdte.drive.toml_fields import Fields, read_toml
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.hill import steady_state
+from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
+from pymoo_hdte.io.fields import Fields, read_toml
 from pymoo_hdte.units import ARCSEC
 
 PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")
@@ -137,7 +137,7 @@ class DriveModel:
         """Return the steady-state theta_d of n designs, rad, as an order spectrum.
 
         Parameters as in `coefficients`; the methods are those of
-        `pymoo_hdte.drive.steady_state`.
+        `pymoo_hdte.drive.solve.hill`.
 
         Raises
         ------

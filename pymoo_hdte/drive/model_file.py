@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from pymoo_hdte.drive.datasheet import NOMINAL_QUANTITIES, DataSheet, datasheet_from_fields
 from pymoo_hdte.drive.port_effects import with_unit
-from pymoo_hdte.drive.toml_fields import Fields
-from pymoo_hdte.storage import FileFormat
+from pymoo_hdte.io.archive import FileFormat
+from pymoo_hdte.io.fields import Fields
 
 if TYPE_CHECKING:
     from pymoo_hdte.drive.model import DriveModel

@@ -26,24 +26,19 @@ from typing import ClassVar
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.drive.coefficients import Coefficients
-from pymoo_hdte.drive.friction import (
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
+from pymoo_hdte.io.fields import UNITS, Fields
+from pymoo_hdte.laws.friction import (
     CoulombFriction,
     NonlinearDrag,
     PeriodicFriction,
     PeriodicTorque,
     StribeckFriction,
 )
-from pymoo_hdte.drive.hysteresis import MaxwellSlip
-from pymoo_hdte.drive.laws import Law
-from pymoo_hdte.drive.mesh_laws import (
-    DeadZone,
-    HardeningStiffness,
-    PeriodicClearance,
-    SoftWindup,
-)
-from pymoo_hdte.drive.order_spectrum import sine_phasor
-from pymoo_hdte.drive.toml_fields import UNITS, Fields
+from pymoo_hdte.laws.hysteresis import MaxwellSlip
+from pymoo_hdte.laws.law import Law
+from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 
 FRICTION_PORTS = ("input", "output")
 

@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.drive.coefficients import Coefficients
-from pymoo_hdte.drive.laws import Values
 from pymoo_hdte.drive.port_effects import with_unit
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.laws.law import Values
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.drive.hysteresis import MaxwellSlip
-from pymoo_hdte.drive.laws import Law, PortState, periodic_phase
+from pymoo_hdte.laws.hysteresis import MaxwellSlip
+from pymoo_hdte.laws.law import Law, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Loop, Mechanism, Port
-from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
+from pymoo_hdte.mechanism.motion import PortMotion, law_force
 from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]

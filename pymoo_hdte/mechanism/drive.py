@@ -8,9 +8,9 @@ import math
 from numpy.typing import ArrayLike
 
 from pymoo_hdte.checks import InvalidInput, finite_array
-from pymoo_hdte.drive.coefficients import Coefficients
 from pymoo_hdte.drive.model import PARAMETERS, DriveModel
 from pymoo_hdte.drive.port_effects import LawAtPort
+from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.mechanism.mechanism import Believed, ErrorLine, Input, LawAt, Mechanism, Port
 
 

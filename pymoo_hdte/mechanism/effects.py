@@ -20,15 +20,10 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.drive.friction import PeriodicTorque
-from pymoo_hdte.drive.laws import Law
 from pymoo_hdte.drive.port_effects import LAWS
-from pymoo_hdte.mechanism.laws import (
-    ConstantForce,
-    DirectionalFriction,
-    LinearDamper,
-    LinearSpring,
-)
+from pymoo_hdte.laws.friction import PeriodicTorque
+from pymoo_hdte.laws.law import Law
+from pymoo_hdte.laws.linear import ConstantForce, DirectionalFriction, LinearDamper, LinearSpring
 from pymoo_hdte.mechanism.mechanism import LawAt
 
 EFFECTS: dict[str, tuple[type, tuple[str, ...]]] = {

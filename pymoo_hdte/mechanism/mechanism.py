@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.drive.laws import Law
+from pymoo_hdte.laws.law import Law
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
-from pymoo_hdte.mechanism.acting_forces import (
-    Command,
-    PortForce,
-    coordinate_row,
-)
+from pymoo_hdte.mechanism.acting_forces import Command, PortForce, coordinate_row
 from pymoo_hdte.mechanism.exponential_steps import ExponentialIntegrator
 from pymoo_hdte.mechanism.mechanism import LawAt, Loop, Mechanism
 from pymoo_hdte.mechanism.records import Record

@@ -1,10 +1,6 @@
 """Robust design problems for pymoo."""
 
-from pymoo_hdte.problems.duty_cycle import (
-    OperatingCondition,
-    hs_20_100_duty_cycle,
-    load_conditions,
-)
+from pymoo_hdte.problems.duty_cycle import OperatingCondition, hs_20_100_duty_cycle, load_conditions
 from pymoo_hdte.problems.family import robust_dte_family
 from pymoo_hdte.problems.robust import RobustProblem
 from pymoo_hdte.problems.robust_dte import RobustDTE

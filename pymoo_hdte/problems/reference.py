@@ -1,6 +1,6 @@
 """Stored true Pareto fronts: reading, writing, and telling to which problem a front belongs.
 
-`experiments/reference_front.py` computes them. A file is a CSV with one header comment that holds
+`experiments/fronts/reference_front.py` computes them. A file is a CSV with one header comment that holds
 the settings of the problem as JSON; a front is only used for a problem of the same settings.
 """
 

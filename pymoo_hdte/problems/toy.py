@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.problems.robust import RobustProblem, make_moments
-from pymoo_hdte.surrogate import (
-    Box,
-    ChebyshevSurrogate,
-    TruncatedNormal,
-    UniformBand,
-)
+from pymoo_hdte.surrogate import Box, ChebyshevSurrogate, TruncatedNormal, UniformBand
 
 _VARIABLES = ("x_1", "x_2", "x_3")
 _NOISE = (TruncatedNormal(0.0, 0.2), TruncatedNormal(0.0, 0.3))

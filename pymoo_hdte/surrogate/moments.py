@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
+from pymoo_hdte.surrogate.inputs import UncertainInput, Uncertainty
 from pymoo_hdte.surrogate.tensor import (
     TensorPolynomial,
     chebyshev_basis,
     chebyshev_nodes,
     coefficients_from_nodes,
 )
-from pymoo_hdte.surrogate.uncertainty import UncertainInput, Uncertainty
 
 
 class ExactMoments:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo_hdte.checks import whole_number
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
+from pymoo_hdte.surrogate.inputs import UncertainInput, Uncertainty
 from pymoo_hdte.surrogate.moments import divide_or_zero
-from pymoo_hdte.surrogate.uncertainty import UncertainInput, Uncertainty
 
 # Bounds the memory, whatever the number of designs.
 _POINTS_AT_ONCE = 8192

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
+from pymoo_hdte.surrogate.inputs import UncertainInput
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
-from pymoo_hdte.surrogate.uncertainty import UncertainInput
 
 Rule = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Values of one variable, shape (q,), and their weights, which sum to one."""

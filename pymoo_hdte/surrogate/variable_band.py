@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
-from pymoo_hdte.surrogate.distributions import TruncatedNormal, UniformBand
+from pymoo_hdte.surrogate.inputs import TruncatedNormal, UncertainInput, Uncertainty, UniformBand
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
-from pymoo_hdte.surrogate.uncertainty import UncertainInput, Uncertainty
 
 _AT_ONCE = 2**15
 """Numbers in one array: more leave the processor's cache, fewer leave numpy idle."""

@@ -1,0 +1,42 @@
+"""Words of a verdict as numbers, which is what the store of a campaign keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pymoo_hdte.discrepancy.drive.line_candidates import ENCODER_LINE
+from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
+from pymoo_hdte.discrepancy.engine.verdict import STATUSES as VERDICTS
+from pymoo_hdte.virtual.hidden_forms import HIDDEN_FORMS
+
+ERROR = "error"
+"""Status of a case in which the workflow raised an exception."""
+STATUSES = (*VERDICTS, ERROR)
+NAMES = (
+    *HIDDEN_FORMS,
+    ENCODER_LINE,
+    "parameter",
+    *(status for status in STATUSES if status != "parameter"),
+)
+"""What a tool may answer: an effect, or a status where it names none."""
+PORTS = ("input", "output", "mesh", "sensor", "base", *MECHANICAL)
+
+
+def code(word: str, words: tuple[str, ...]) -> float:
+    """Return the place of a word."""
+    return float(words.index(word))
+
+
+def word(number: float, words: tuple[str, ...]) -> str:
+    """Return the word of a `code`."""
+    return words[int(number)]
+
+
+def code_of_set(names: Iterable[str]) -> float:
+    """Return a set of `NAMES` as the number whose bits they are; exact, as they are below 53."""
+    return float(sum(1 << NAMES.index(name) for name in set(names)))
+
+
+def words_of_set(number: float) -> tuple[str, ...]:
+    """Return the set of a `code_of_set`, in the order of `NAMES`."""
+    return tuple(name for place, name in enumerate(NAMES) if int(number) >> place & 1)

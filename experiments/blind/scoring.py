@@ -1,0 +1,245 @@
+"""One blind case run, analysed and scored against its truth, as a job of a campaign."""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from experiments.blind.cases import Case
+from experiments.blind.codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
+from experiments.runner.campaign import Run
+from pymoo_hdte.discrepancy import Campaign
+from pymoo_hdte.discrepancy.drive.analysis import Analysis, analyse
+from pymoo_hdte.discrepancy.drive.evidence import training_data
+from pymoo_hdte.discrepancy.drive.features import (
+    Features,
+    cell_chi_square,
+    degrees_of_freedom,
+    measure,
+)
+from pymoo_hdte.discrepancy.drive.location import locate
+from pymoo_hdte.discrepancy.drive.misfit_map import Flags
+from pymoo_hdte.discrepancy.drive.next_test import next_experiment
+from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
+from pymoo_hdte.discrepancy.drive.proof import Proof, prove
+from pymoo_hdte.discrepancy.drive.revision import accepted_fit
+from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+
+PARTS = ("analyse", "locate", "prove", "next_experiment")
+RIVALS = ("largest_residual_rule", "sparse_regression")
+"""Simpler tools of `blind_rivals`, from an analysis to a name, "adequate" or "unlisted"."""
+COMPARED = ("none", "single", "unlisted")
+"""Kinds on which the simpler tools are run too."""
+REVISED = ("single", "pair")
+"""Kinds that a right verdict adds a listed effect to."""
+GAPS = ("transmission_error", "leading", "overall")
+"""Gaps on held-out records: that of the verdict's document, that of the channel in which the base
+stands out of the noise most, and that of all features."""
+DETERMINED = 0.5
+"""Standard error, in tolerances, up to which the records and not the bounds say what a parameter
+is: damping of the output bearings has one of 150."""
+VERDICT_COLUMNS = (
+    "status",
+    "first",
+    "first_port",
+    "first_order",
+    "second",
+    "second_port",
+    "second_order",
+    "equivalents",
+    "truth_in_class",
+)
+NUMBERS = (
+    "cells_moved",
+    "cells_flagged",
+    "cells_both",
+    "bias_before",
+    "bias_after",
+    "bias_error",
+    "bias_of_all_before",
+    "bias_of_all_after",
+    *(f"{gap}_{state}" for gap in GAPS for state in ("before", "after", "floor")),
+)
+COLUMNS = (*VERDICT_COLUMNS, *NUMBERS, *RIVALS)
+
+Scores = dict[str, float]
+Tool = Callable[[Analysis], str]
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class BlindJob:
+    """One case; its run has one row of `COLUMNS`, nan where a kind is not scored."""
+
+    case: Case
+
+    @property
+    def key(self) -> str:
+        """All fields of the case in one name."""
+        return self.case.key
+
+    def execute(self) -> Run:
+        """Run, analyse and score; an exception is a defect, shown and scored as wrong.
+
+        Seconds are those of the processor, so that other work on the machine does not count.
+        """
+        tools = rivals()
+        try:
+            scores, parts = score(self.case, tools)
+        except Exception:
+            _show_defect(self.key)
+            scores, parts = {"status": code(ERROR, STATUSES)}, ()
+        row = [scores.get(column, np.nan) for column in COLUMNS]
+        return Run(COLUMNS, np.array([row]), sum(parts), parts)
+
+
+def rivals() -> dict[str, Tool]:
+    """Return the simpler tools by name.
+
+    They are imported here only, so that a report of stored outcomes does not need their packages.
+    """
+    module = import_module("experiments.blind.simpler_tools")
+    return {name: getattr(module, name) for name in RIVALS}
+
+
+def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, ...]]:
+    """Return the scores of a case and the seconds of the `PARTS` that it takes.
+
+    For a detection limit the verdict is all that counts.
+    """
+    campaign = case.run(case.effects())
+    analysis, analysed = _timed(analyse, campaign)
+    scores = verdict_scores(case, analysis.verdict)
+    if case.kind == "detection":
+        return scores, (analysed,)
+    location, located = _timed(locate, analysis)
+    proof, proved = _timed(prove, analysis)
+    _, proposed = _timed(next_experiment, analysis)
+    if case.kind != "parameter":
+        twin = case.run(()) if case.effects() else campaign
+        scores |= location_scores(truly_moved(analysis, twin), location.flagged)
+        if case.kind in REVISED:
+            scores |= bias_scores(analysis.verdict, twin_fit(twin, analysis.data.features))
+    if proof is not None:
+        scores |= gap_scores(proof)
+    if case.kind in COMPARED:
+        scores |= {name: code(_answer(tool, analysis), NAMES) for name, tool in tools.items()}
+    return scores, (analysed, located, proved, proposed)
+
+
+def verdict_scores(case: Case, verdict: Verdict) -> Scores:
+    """Return what the verdict says, and whether its class holds all that is hidden."""
+    scores = {"status": code(verdict.status, STATUSES)}
+    candidates = verdict.chosen.candidates if verdict.chosen is not None else ()
+    for place, candidate in zip(("first", "second"), candidates, strict=False):
+        scores[place] = code(candidate.name, NAMES)
+        scores[f"{place}_port"] = code(candidate.port, PORTS)
+        scores[f"{place}_order"] = np.nan if candidate.order is None else candidate.order
+    truth = {"parameter"} if case.kind == "parameter" else set(case.names)
+    alike = [{candidate.name for candidate in rival.candidates} for rival in verdict.equivalent]
+    scores["equivalents"] = code_of_set(set().union(*alike))
+    scores["truth_in_class"] = float(any(truth <= names for names in alike))
+    return scores
+
+
+def truly_moved(analysis: Analysis, twin: Campaign) -> Flags:
+    """Return the cells that the hidden effects move by more than the root mean square of the noise.
+
+    The twin is the same run without them: it differs by nothing else, not even by its noise, but
+    for the rounding of the encoders, a hundredth of that noise's variance.
+    """
+    kept = analysis.data.features
+    moved: NDArray[np.float64] = cell_chi_square(
+        analysis.data, kept.values - _features(twin, kept).values
+    )
+    return moved > degrees_of_freedom(analysis.data)
+
+
+def location_scores(moved: Flags, flagged: Flags) -> Scores:
+    """Return the numbers of cells moved, flagged and both."""
+    return {
+        "cells_moved": float(moved.sum()),
+        "cells_flagged": float(flagged.sum()),
+        "cells_both": float((moved & flagged).sum()),
+    }
+
+
+def twin_fit(twin: Campaign, kept: Features) -> Fit:
+    """Fit the base to a campaign without the effect, with the records and orders of ``kept``."""
+    return fit(training_data(twin, _features(twin, kept)))
+
+
+def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
+    """Return how far the effect moves the base before and after the revision, in tolerances.
+
+    Root mean square over mechanical parameters and amplitudes of the static error: over all of
+    them, and over those that twin and revised fit determine (`DETERMINED`), with the twin's
+    standard error of these.
+    """
+    layout = Layout(twin.parameters)
+    lines = [p.name for p in twin.parameters if p.name.startswith("error_amplitude_")]
+    rows = np.array([layout.index(name) for name in (*MECHANICAL, *lines)])
+    scale = layout.array("scale")[rows]
+    error, revised = (
+        np.sqrt(np.diagonal(fitted.covariance)[rows]) / scale
+        for fitted in (twin, accepted_fit(verdict))
+    )
+    known = np.maximum(error, revised) < DETERMINED
+    scores = {"bias_error": _root_mean_square(error[known])}
+    for state, fitted in (("before", verdict.base), ("after", accepted_fit(verdict))):
+        moved = (fitted.values[rows] - twin.values[rows]) / scale
+        scores[f"bias_{state}"] = _root_mean_square(moved[known])
+        scores[f"bias_of_all_{state}"] = _root_mean_square(moved)
+    return scores
+
+
+def gap_scores(proof: Proof) -> Scores:
+    """Return before, after and noise floor of `GAPS`."""
+    gaps = (proof.channels["transmission_error"], proof.channels[proof.leading], proof.overall)
+    scores = {}
+    for name, gap in zip(GAPS, gaps, strict=True):
+        scores[f"{name}_before"] = gap.before
+        scores[f"{name}_after"] = gap.after
+        scores[f"{name}_floor"] = gap.noise_floor
+    return scores
+
+
+def _features(campaign: Campaign, kept: Features) -> Features:
+    """Return the features of a campaign in the records and at the orders of ``kept``."""
+    names = {record.name for record in kept.records}
+    records = [record for record in campaign.train if record.name in names]
+    return measure(campaign, records, kept.orders.tolist())
+
+
+def _root_mean_square(values: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _answer(tool: Tool, analysis: Analysis) -> str:
+    """Return what a simpler tool says; its defects must not look like the workflow's."""
+    try:
+        return tool(analysis)
+    except Exception:
+        _show_defect(tool.__name__)
+        return ERROR
+
+
+def _show_defect(where: str) -> None:
+    tqdm.write(f"{where}\n{traceback.format_exc()}", file=sys.stderr)
+
+
+def _timed(function: Callable[..., _Result], argument: object) -> tuple[_Result, float]:
+    begin = time.process_time()
+    result = function(argument)
+    return result, time.process_time() - begin

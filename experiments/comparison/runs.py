@@ -1,0 +1,67 @@
+"""One run of one algorithm on one robust design problem, as a job of a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.core.algorithm import Algorithm
+from pymoo.optimize import minimize
+
+from experiments.runner.campaign import Run
+from pymoo_hdte.algorithms import AMOPSO, AMPMOPSO, MOPSO, MPMOPSO
+from pymoo_hdte.algorithms.crowding import least_crowded
+from pymoo_hdte.problems import RobustDTE
+
+ALGORITHMS: dict[str, Callable[[int, int], Algorithm]] = {
+    "NSGA-II": lambda population, _: NSGA2(pop_size=population),
+    "MOPSO": lambda population, size: MOPSO(pop_size=population, archive_size=size),
+    "A-MOPSO": lambda population, size: AMOPSO(pop_size=population, archive_size=size),
+    "MP-MOPSO": lambda population, size: MPMOPSO(pop_size=population, archive_size=size),
+    "AMP-MOPSO": lambda population, size: AMPMOPSO(pop_size=population, archive_size=size),
+}
+"""How each algorithm is made from the size of its population and of its final set."""
+
+
+@cache
+def robust_problem(model: str) -> RobustDTE:
+    """Return the robust problem on the drive model of that name, built once per process."""
+    return RobustDTE(model=model)
+
+
+@dataclass(frozen=True)
+class OptimisationRun:
+    """One algorithm, one problem, one seed; defaults are the budget of Section 5.1."""
+
+    model: str
+    algorithm: str
+    seed: int
+    population: int = 100
+    generations: int = 100
+    final_size: int = 50
+
+    @property
+    def key(self) -> str:
+        """All settings in one name."""
+        budget = f"{self.population}x{self.generations}_final{self.final_size}"
+        return f"{self.model}_{self.algorithm}_{budget}_seed{self.seed}"
+
+    def execute(self) -> Run:
+        """Optimise, and reduce what is found to ``final_size`` designs in the same way for all.
+
+        Columns are the design variables and the objectives, rows by rising first objective.
+        """
+        problem = robust_problem(self.model)
+        algorithm = ALGORITHMS[self.algorithm](self.population, self.final_size)
+        found = minimize(problem, algorithm, ("n_gen", self.generations), seed=self.seed)
+        spent = found.algorithm.evaluator.n_eval
+        if spent != self.population * self.generations:
+            raise RuntimeError(f"{self.key} spent {spent} evaluations: no fair comparison")
+        X, F = found.opt.get("X", "F")
+        kept = least_crowded(F, self.final_size)
+        kept = kept[np.lexsort(F[kept].T[::-1])]
+        columns = (*problem.var_names, *problem.obj_names)
+        return Run(columns, np.hstack([X[kept], F[kept]]), found.exec_time)

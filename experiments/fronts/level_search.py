@@ -1,0 +1,88 @@
+"""Solutions that lie on their level of f1 exactly, and local optima replaced from beside them.
+
+The last digits of a front: what `FrontSearch` finds may rest beside its level, or on a local
+optimum that is as good as the global one to six digits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.problem import Problem
+
+from experiments.fronts.true_front import FrontSearch, Solution
+from pymoo_hdte.problems.reference import ReferenceFront
+
+_BESIDE = 1e-6
+"""A design closer to its level than this, relatively, is meant to be on it."""
+_FAR = 0.1
+"""Of the search space in some variable."""
+_IMPROVEMENT = 1e-10
+
+
+class LevelSearch(FrontSearch):
+    """A search whose solutions lie on their levels exactly."""
+
+    def best(self, level: float, starts: list[NDArray[np.float64]]) -> Solution | None:
+        """Return what `below` finds from these starts, moved on to the level."""
+        found = self.below(level, starts)
+        if found is None:
+            return None
+        problem = self._problem
+        design = on_level(problem, self.designs(found.cube), level)
+        return self._solution((design - problem.xl) / self._width)
+
+
+def without_local_optima(
+    problem: Problem, found: ReferenceFront, rng: np.random.Generator
+) -> ReferenceFront:
+    """Return a front of two objectives after `hand_over`; other rows keep their digits."""
+    search = LevelSearch(problem, rng)
+    cubes = (found.designs - problem.xl) / (problem.xu - problem.xl)
+    before = [Solution(*row) for row in zip(cubes, found.front, strict=True)]
+    after = list(before)
+    hand_over(search, found.front[:, 0], after)
+    front, designs = found.front.copy(), found.designs.copy()
+    for row, (old, new) in enumerate(zip(before, after, strict=True)):
+        if new is not old:
+            front[row], designs[row] = new.objectives, search.designs(new.cube)
+    return ReferenceFront(front, designs)
+
+
+def hand_over(search: LevelSearch, levels: NDArray[np.float64], solutions: list[Solution]) -> None:
+    """Try at each level but the ends the solution beside it, until nothing improves.
+
+    Only neighbours far apart are tried: one of them may be a local optimum.
+    """
+    inner = range(1, len(solutions) - 1)
+    neighbours = [(i, i + 1) for i in reversed(inner)] + [(i, i - 1) for i in inner]
+    improved = True
+    while improved:
+        improved = False
+        for target, source in neighbours:
+            mine, other = solutions[target], solutions[source]
+            if np.max(np.abs(mine.cube - other.cube)) <= _FAR:
+                continue
+            found = search.best(levels[target], [other.cube])
+            limit = mine.objectives[1] * (1.0 - _IMPROVEMENT)
+            if found is not None and found.objectives[1] < limit:
+                solutions[target], improved = found, True
+
+
+def on_level(problem: Problem, design: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    """Move a design on to a level of f1, by one Newton step along its slope in the free part.
+
+    SLSQP leaves it beside the level by some 1e-7 of the range of f1 over all designs. That is more
+    than it seems: the front is far narrower than that range, and may be steep. A design well below
+    its level, as in a gap of the front, stays where it is.
+    """
+    values, slopes = problem.evaluate(design, return_values_of=["F", "dF"])
+    width = problem.xu - problem.xl
+    free = (design > problem.xl) & (design < problem.xu)
+    slope = np.where(free, slopes[0] * width, 0.0)
+    length = slope @ slope
+    missing = level - values[0]
+    if length == 0.0 or missing > _BESIDE * abs(level):
+        return design
+    step = missing / length * slope
+    return np.clip(design + step * width, problem.xl, problem.xu)

@@ -1,0 +1,167 @@
+"""The true fronts of the robust DTE problems: computed twice, compared, held against the stored.
+
+Writes ``front_<name>.csv`` beside its report; copied to ``pymoo_hdte/problems/data`` it is what
+``pareto_front()`` of that problem returns.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.core.problem import Problem
+from pymoo.optimize import minimize
+from tqdm import tqdm
+
+from experiments.comparison.figures import BLUE, grid
+from experiments.comparison.quality import TrueFront
+from experiments.fronts.agreement import disagreement
+from experiments.fronts.level_search import without_local_optima
+from experiments.fronts.tolerance_front import (
+    POINTS,
+    TOLERANCES,
+    tolerance_disagreement,
+    tolerance_front,
+)
+from experiments.fronts.true_front import true_front
+from experiments.runner.registry import Context
+from experiments.runner.result import Column, Finding, Picture, Result, Table
+from experiments.runner.store import write_atomically
+from pymoo_hdte.problems import RobustDTE, RobustDTETolerance, robust_dte_family
+from pymoo_hdte.problems.family import Member
+from pymoo_hdte.problems.reference import ReferenceFront, format_reference
+
+N_POINTS = 1000
+SEEDS = (1, 2)
+TOLERANCE = 1e-6
+_RANDOM_DESIGNS = 2**20
+_RIVAL_GENERATIONS = 300
+
+
+def run(context: Context) -> Result:
+    """Compute, cross-check and write the fronts of the printed model and of the whole family."""
+    members: dict[str, Member] = {"published": partial(RobustDTE, "published")}
+    members |= robust_dte_family()
+    rows, findings, pictures = [], [], []
+    for name, build in tqdm(members.items(), desc="reference_front", unit="front"):
+        problem = build()
+        found, second = (_search(problem, seed) for seed in SEEDS)
+        front = found.front
+        columns = (*problem.obj_names, *problem.var_names)
+        text = format_reference(found, problem.settings, columns)
+        target = context.out / "reference_front" / f"front_{name}.csv"
+        write_atomically(target, text.encode())
+        differ = 0.0
+        pieces: int | None = 1
+        if len(front) > 1:
+            differ = _disagreement(problem, found, second)
+            pieces = len(TrueFront(front).pieces) if problem.n_obj == 2 else None
+            pictures.append(Picture(name, f"True front of {name}.", _picture(found)))
+        undercut = _undercut(problem, front)
+        stored = _distance_to_stored(problem, front)
+        span = np.ptp(front, axis=0)[:2]
+        rows.append((name, len(front), pieces, *span, differ, undercut, stored))
+        findings += _findings(name, differ, undercut, stored)
+    table = Table(
+        "agreement",
+        "Two independent searches, rival solutions, and the stored front",
+        (
+            Column("problem"),
+            Column("points"),
+            Column("pieces"),
+            Column("mean", "arcsec", group="width in"),
+            Column("std", "arcsec", group="width in"),
+            Column("two searches differ by", "of the width", 2),
+            Column("rivals undercut by", "of the width", 2),
+            Column("stored front differs by", "of the width", 2),
+        ),
+        tuple(rows),
+        findings=tuple(findings),
+    )
+    return Result(
+        title="True fronts of the robust DTE problems",
+        command="python -m experiments reference_front",
+        paragraphs=(
+            f"Each front is searched from two seeds; rivals are {_RANDOM_DESIGNS} random designs "
+            f"and NSGA-II after {_RIVAL_GENERATIONS} generations. A negative number means that no "
+            "rival undercuts the front. With a free tolerance there is a third objective, and the "
+            f"front is a sheet: {POINTS} points at each of {TOLERANCES} tolerances, compared at "
+            "each of them.",
+        ),
+        tables=(table,),
+        pictures=tuple(pictures),
+    )
+
+
+def _search(problem: RobustDTE | RobustDTETolerance, seed: int) -> ReferenceFront:
+    rng = np.random.default_rng(seed)
+    if isinstance(problem, RobustDTETolerance):
+        return tolerance_front(problem, rng)
+    found = ReferenceFront(*true_front(problem, N_POINTS, rng))
+    return without_local_optima(problem, found, rng)
+
+
+def _disagreement(
+    problem: RobustDTE | RobustDTETolerance, found: ReferenceFront, second: ReferenceFront
+) -> float:
+    if isinstance(problem, RobustDTETolerance):
+        return tolerance_disagreement(problem, found, second)
+    return disagreement(problem, found, second, np.ptp(found.front, axis=0))
+
+
+def _undercut(problem: Problem, front: NDArray[np.float64]) -> float:
+    """Return by how much of the width the best rival dominates the front, negative if none does."""
+    rng = np.random.default_rng(SEEDS[0])
+    designs = rng.uniform(problem.xl, problem.xu, (_RANDOM_DESIGNS, problem.n_var))
+    evolved = minimize(problem, NSGA2(pop_size=200), ("n_gen", _RIVAL_GENERATIONS), seed=1)
+    sampled = problem.evaluate(designs)
+    good = sampled[np.argsort(sampled @ (1.0 / np.ptp(sampled, axis=0)))[:1000]]
+    rivals = np.vstack([good, evolved.F])
+    width = np.ptp(front, axis=0) if len(front) > 1 else front[0]
+    gain = (front[None, :, :] - rivals[:, None, :]) / width
+    return float(gain.min(axis=2).max())
+
+
+def _distance_to_stored(problem: Problem, front: NDArray[np.float64]) -> float | None:
+    stored = problem.pareto_front()
+    if stored is None or stored.shape != front.shape:
+        return None
+    width = np.ptp(front, axis=0) if len(front) > 1 else front[0]
+    return float(np.max(np.abs(stored - front) / width))
+
+
+def _findings(name: str, differ: float, undercut: float, stored: float | None) -> list[Finding]:
+    return [
+        Finding(
+            max(differ, undercut) <= TOLERANCE,
+            f"On {name}, two searches differ by {differ:.1e} of the front's width, and the "
+            f"best rival undercuts it by {undercut:.1e}; {TOLERANCE:.0e} is allowed.",
+            check=True,
+        ),
+        Finding(
+            stored is not None and stored <= TOLERANCE,
+            f"On {name}, the stored front differs by {stored:.1e} of the width."
+            if stored is not None
+            else f"On {name}, no stored front fits these settings; copy the one written here.",
+            check=True,
+        ),
+    ]
+
+
+def _picture(found: ReferenceFront) -> Figure:
+    """Draw std over mean, coloured by tolerance where it is free."""
+    figure, axes = grid(1, 1, width=5.0, height=3.6)
+    axis = axes.flat[0]
+    mean, std = found.front[:, :2].T
+    if found.front.shape[1] == 2:
+        axis.plot(mean, std, ".", color=BLUE, markersize=2)
+    else:
+        tolerance = 100.0 * found.designs[:, -1]
+        points = axis.scatter(mean, std, c=tolerance, s=2, cmap="viridis")
+        figure.colorbar(points, ax=axis, label="tolerance [%]")
+    axis.set_xlabel("mean DTE [arcsec]")
+    axis.set_ylabel("std DTE [arcsec]")
+    return figure

@@ -1,0 +1,95 @@
+"""Fig. 17: what the pyramid and the entropy weight each contribute to AMP-MOPSO."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from experiments.comparison.figures import fronts, igd_of_runs
+from experiments.comparison.paired import Comparison, compare, too_few_seeds
+from experiments.paper.comparison_tables import (
+    change,
+    coverage_table,
+    paired_tests_table,
+    quality_table,
+    runs_table,
+)
+from experiments.paper.published_values import TABLE_7
+from experiments.runner.registry import Context
+from experiments.runner.result import Finding, Picture, Result, significant
+
+FULL = "AMP-MOPSO"
+PARTS = (FULL, "A-MOPSO", "MP-MOPSO", "MOPSO")
+
+SETTING = (
+    "A-MOPSO keeps only the entropy weight, MP-MOPSO only the pyramid, MOPSO neither. Budget, "
+    "seeds and measures are those of Table 7. The paper shows this ablation as one picture of each "
+    "front and prints no numbers for A-MOPSO and MP-MOPSO."
+)
+
+
+FLOWCHART = (
+    "Fig. 16 is the flow chart of the algorithm and shows no result; its steps stand, one part "
+    "each, in pymoo_hdte.algorithms, and the variants here leave parts out."
+)
+
+
+def run(context: Context) -> Result:
+    """Compare AMP-MOPSO with itself less one or both strategies."""
+    comparisons = compare(context, PARTS, "ablation")
+    return Result(
+        title=f"Fig. 17: ablation of AMP-MOPSO, seeds 1 to {context.seeds}",
+        command=f"python -m experiments ablation --seeds {context.seeds}",
+        paragraphs=(SETTING, FLOWCHART),
+        tables=(
+            quality_table(comparisons, TABLE_7, list(_evenness(comparisons))),
+            coverage_table(comparisons, list(_gaps(comparisons))),
+            paired_tests_table(comparisons, FULL),
+            runs_table(comparisons),
+        ),
+        pictures=(
+            Picture(
+                "fronts",
+                "As Fig. 17: for every variant the run of median IGD over the true front.",
+                fronts(comparisons),
+            ),
+            Picture("igd", "IGD of every run; bars mark the medians.", igd_of_runs(comparisons)),
+        ),
+        notes=too_few_seeds(comparisons),
+    )
+
+
+def _gaps(comparisons: Sequence[Comparison]) -> Iterator[Finding]:
+    """Whether a gap opens in the front without the pyramid, as Fig. 17b shows."""
+    for comparison in comparisons:
+        if len(comparison.truth.pieces) < 2:
+            continue
+        seeds = len(comparison.values(FULL, "lost_pieces"))
+        full, without = (
+            int((comparison.values(name, "lost_pieces") > 0).sum()) for name in (FULL, "A-MOPSO")
+        )
+        yield Finding(
+            without > full,
+            f"On {comparison.model}, {without} of {seeds} runs without the pyramid (A-MOPSO) lose "
+            f"a piece of the front against {full} of {seeds} with it; the paper shows a gap in the "
+            "middle of A-MOPSO's front.",
+        )
+
+
+def _evenness(comparisons: Sequence[Comparison]) -> Iterator[Finding]:
+    """Whether the front is less even without the entropy weight, as Fig. 17c shows."""
+    for comparison in comparisons:
+        if not comparison.can_be_judged:
+            continue
+        tests = {test.rival: test for test in comparison.paired_tests(FULL, "spacing")}
+        test = tests["MP-MOPSO"]
+        full = np.median(comparison.values(FULL, "spacing"))
+        without = np.median(comparison.values("MP-MOPSO", "spacing"))
+        word = "significant" if test.significant else "not significant"
+        yield Finding(
+            test.significant and test.better > 0.5,
+            f"On {comparison.model}, median Spacing without the entropy weight (MP-MOPSO) is "
+            f"{change(full, without)} AMP-MOPSO's, {word} (p = {significant(test.p, 2)}); the "
+            "paper shows a less even front.",
+        )

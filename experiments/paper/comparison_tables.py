@@ -1,0 +1,142 @@
+"""Tables of a comparison of algorithms, beside the paper's numbers where it has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from experiments.comparison.paired import Comparison
+from experiments.comparison.statistics import summary
+from experiments.paper.models import model_sentences
+from experiments.paper.published_values import AlgorithmQuality
+from experiments.runner.result import Cell, Column, Finding, Table, significant
+
+WHO = (Column("problem"), Column("algorithm"))
+INDICATOR_NAMES = {"igd": "IGD", "spacing": "Spacing", "hypervolume": "hypervolume"}
+
+
+def quality_table(
+    comparisons: Sequence[Comparison],
+    published: Mapping[str, AlgorithmQuality],
+    findings: Sequence[Finding],
+) -> Table:
+    """IGD and Spacing over the runs; the paper prints one number each."""
+
+    def cells(comparison: Comparison, algorithm: str) -> Iterable[Cell]:
+        paper = published.get(algorithm)
+        for indicator in ("igd", "spacing"):
+            yield from summary(comparison.values(algorithm, indicator))
+            yield getattr(paper, indicator) if paper else None
+
+    columns = [
+        column
+        for name in ("IGD", "Spacing")
+        for column in (*_summary_columns(name), _paper_column(name))
+    ]
+    return Table(
+        "quality",
+        "IGD and Spacing of the final sets, normalised by the true front; smaller is better",
+        (*WHO, *columns),
+        _rows(comparisons, cells),
+        note=" ".join(model_sentences(*(comparison.model for comparison in comparisons))),
+        findings=tuple(findings),
+    )
+
+
+def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding] = ()) -> Table:
+    """Hypervolume, and pieces of the true front that no solution comes near."""
+
+    def cells(comparison: Comparison, algorithm: str) -> Iterable[Cell]:
+        lost = comparison.values(algorithm, "lost_pieces")
+        yield from summary(comparison.values(algorithm, "hypervolume"))
+        yield len(comparison.truth.pieces)
+        yield int(lost.sum())
+        yield int((lost > 0).sum())
+
+    columns = (
+        *_summary_columns("hypervolume", digits=5),
+        Column("of the true front", group="pieces"),
+        Column("lost in all runs", group="pieces"),
+        Column("runs that lose one", group="pieces"),
+    )
+    title = "Hypervolume (reference point 1.1, 1.1; larger is better) and lost pieces of the front"
+    rows = _rows(comparisons, cells)
+    return Table("coverage", title, (*WHO, *columns), rows, findings=tuple(findings))
+
+
+def paired_tests_table(comparisons: Sequence[Comparison], algorithm: str) -> Table:
+    """Paired tests of ``algorithm`` against every other one."""
+    rows = [
+        (comparison.model, INDICATOR_NAMES[indicator], test.rival, test.p, test.better)
+        for comparison in comparisons
+        for indicator in INDICATOR_NAMES
+        for test in comparison.paired_tests(algorithm, indicator)
+    ]
+    columns = (
+        Column("problem"),
+        Column("indicator"),
+        Column("rival"),
+        Column("p, Wilcoxon with Holm", digits=2),
+        Column(f"A12: {algorithm} better", digits=3),
+    )
+    title = f"{algorithm} against each rival on the same seeds (A12 = 0.5: no difference)"
+    return Table("tests", title, columns, tuple(rows))
+
+
+def runs_table(comparisons: Sequence[Comparison]) -> Table:
+    """Every single run."""
+    rows = [
+        (comparison.model, algorithm, seed, *quality)
+        for comparison in comparisons
+        for algorithm, qualities in comparison.qualities.items()
+        for seed, quality in enumerate(qualities, start=1)
+    ]
+    columns = [Column(name) for name in ("seed", "IGD", "Spacing", "hypervolume", "lost pieces")]
+    return Table("runs", "Every run", (*WHO, *columns), tuple(rows), folded=True)
+
+
+def times_table(
+    comparisons: Sequence[Comparison],
+    published: Mapping[str, AlgorithmQuality],
+    findings: Sequence[Finding],
+) -> Table:
+    """Wall time of a run, which no two executions repeat."""
+
+    def cells(comparison: Comparison, algorithm: str) -> Iterable[Cell]:
+        yield from summary(comparison.seconds(algorithm))
+        yield published[algorithm].seconds if algorithm in published else None
+
+    columns = (*_summary_columns("time", "s"), _paper_column("time", "s", digits=4))
+    title = "Wall time of one run of 10,000 evaluations, other runs going on beside it"
+    rows = _rows(comparisons, cells)
+    found = tuple(findings)
+    return Table("times", title, (*WHO, *columns), rows, findings=found, wall_times=True)
+
+
+def change(before: float, after: float) -> str:
+    """Describe how ``after`` differs from ``before`` in percent, e.g. ``12 % below``."""
+    if before == 0.0:
+        return "equal to" if after == 0.0 else "above"
+    percent = 100.0 * (after - before) / before
+    return f"{significant(abs(percent), 2)} % {'above' if percent > 0 else 'below'}"
+
+
+def _summary_columns(group: str, unit: str = "", digits: int = 3) -> tuple[Column, ...]:
+    return (
+        Column("mean", unit, digits, group),
+        Column("median", unit, digits, group),
+        Column("std", unit, 2, group),
+    )
+
+
+def _paper_column(group: str, unit: str = "", digits: int = 3) -> Column:
+    return Column("paper", unit, digits, group, paper=True)
+
+
+def _rows(
+    comparisons: Sequence[Comparison], cells: Callable[[Comparison, str], Iterable[Cell]]
+) -> tuple[tuple[Cell, ...], ...]:
+    return tuple(
+        (comparison.model, algorithm, *cells(comparison, algorithm))
+        for comparison in comparisons
+        for algorithm in comparison.algorithms
+    )

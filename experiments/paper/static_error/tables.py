@@ -1,0 +1,190 @@
+"""Fig. 5 and what of it gives the printed static error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from scipy.stats import chi2, gaussian_kde, shapiro
+
+from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
+from experiments.paper.published_values import TABLE_6
+from experiments.paper.static_error.statistics import (
+    ANGLES,
+    ASSUMED_ANGLE,
+    N_SAMPLES,
+    READINGS,
+    AngleRange,
+    Values,
+    angle_ranges,
+    components,
+    of_component,
+    statistics,
+    tooth_order_error,
+)
+from experiments.runner.result import Cell, Column, Finding, Picture, Table, significant
+from pymoo_hdte.drive import StaticErrorSample, hs_20_100
+from pymoo_hdte.units import ARCSEC
+
+PRINTED = round(hs_20_100().nominal.static_error / ARCSEC, 3)
+"""theta_s of Table 4, arcsec."""
+
+WITHIN_PERCENT = 1.0
+COLOURS = (BLUE, ORANGE, GREEN, PINK, YELLOW)
+OUTPUT_TURN = "peak-to-peak, output turn"
+
+
+def statistic_table(drawn: StaticErrorSample) -> Table:
+    """Set the mean of every statistic at every pressure angle beside the printed theta_s."""
+    reading = READINGS[0]
+    means = {angle: statistics(reading.sample(angle, drawn)) for angle in ANGLES}
+    ranges = angle_ranges(reading, drawn, PRINTED)
+    rows = []
+    for name, values in means[ASSUMED_ANGLE].items():
+        at_angles = [means[angle][name].mean() for angle in ANGLES]
+        normality = shapiro(values).pvalue
+        rows.append((name, *at_angles, values.std(ddof=1), normality, *_cells(ranges[name])))
+    columns = (
+        Column("statistic of theta_s"),
+        *(Column(f"{angle:g}°", "arcsec", 4, "mean at pressure angle") for angle in ANGLES),
+        Column("std", "arcsec", 3, f"at {ASSUMED_ANGLE:g}°"),
+        Column("Shapiro-Wilk p", "", 2, f"at {ASSUMED_ANGLE:g}°"),
+        *_angle_columns(),
+    )
+    title = f"Which statistic of theta_s is {PRINTED} arcsec, and at which pressure angle"
+    note = (
+        f"{N_SAMPLES} prototypes of Table 2, phases independent and uniform; factor "
+        f"{reading.name}. The range of angles is what two samples of {N_SAMPLES} cannot tell "
+        "apart. Order 404 is added as twice its amplitude, at most "
+        f"{significant(tooth_order_error(drawn), 1)} arcsec above the exact peak-to-peak. The sum "
+        "of the amplitudes is the largest |theta_s| that ever occurs."
+    )
+    findings = tuple(_statistic_findings(means[ASSUMED_ANGLE], ranges))
+    return Table("statistics", title, columns, tuple(rows), note, findings)
+
+
+def reading_table(drawn: StaticErrorSample) -> Table:
+    """Show every statistic under the other readings of Eqs. (1) and (2)."""
+    readings = READINGS[1:]
+    found = {r: statistics(r.sample(ASSUMED_ANGLE, drawn)) for r in readings}
+    ranges = {r: angle_ranges(r, drawn, PRINTED) for r in readings}
+    rows = tuple(
+        (name, *(c for r in readings for c in (found[r][name].mean(), ranges[r][name].exact)))
+        for name in found[readings[0]]
+    )
+    columns = [Column("statistic of theta_s")]
+    for reading in readings:
+        columns += [
+            Column(f"mean at {ASSUMED_ANGLE:g}°", "arcsec", 4, reading.name),
+            Column(f"angle for {PRINTED} arcsec", "deg", 3, reading.name),
+        ]
+    title = "The same under other readings of the factor and the phases"
+    note = (
+        "The text of Eq. (2) has lost its fraction. Eq. (1) has one phase for each class; with it, "
+        "the errors of a class add up as numbers, otherwise as vectors."
+    )
+    return Table("readings", title, tuple(columns), rows, note, folded=True)
+
+
+def component_picture(drawn: StaticErrorSample) -> Picture:
+    """Show the errors of every component, and theta_s if there were no others."""
+    names = components(drawn.sheet)
+    figure, axes = grid(2, len(names), width=3.5, height=2.9)
+    for name, (upper, lower) in zip(names, axes.T, strict=True):
+        alone = of_component(drawn, name)
+        members = [
+            (source.symbol, drawn.magnitudes[:, index] * 1e6)
+            for index, source in enumerate(drawn.sheet.error_sources)
+            if source.component == name
+        ]
+        for (symbol, values), colour in zip(members, COLOURS, strict=False):
+            _density(upper, values, colour, symbol)
+        _density(lower, statistics(alone)[OUTPUT_TURN], BLUE, "without order 404")
+        upper.set_title(name, fontsize=10)
+        upper.set_xlabel("error [µm]")
+        lower.set_xlabel("theta_s of this component alone [arcsec]")
+        for axis in (upper, lower):
+            axis.set_ylim(bottom=0.0)
+            axis.legend(fontsize=7, frameon=False)
+    axes[0, 0].set_ylabel("density [1/µm]")
+    axes[1, 0].set_ylabel("density [1/arcsec]")
+    caption = (
+        "As Fig. 5a-d, above: distribution of the errors of each component. Below: peak-to-peak of "
+        "theta_s over an output turn if only this component had errors."
+    )
+    return Picture("components", caption, figure)
+
+
+def total_picture(drawn: StaticErrorSample) -> Picture:
+    """Show the distribution of theta_s under several statistics."""
+    figure, axes = grid(1, 1, width=7.5, height=4.0)
+    axis = axes[0, 0]
+    found = statistics(READINGS[0].sample(ASSUMED_ANGLE, drawn))
+    shown = [name for name in found if name.startswith("peak-to-peak")]
+    shown.append("sum of the order amplitudes, with order 404")
+    for name, colour in zip(shown, COLOURS, strict=True):
+        _density(axis, found[name], colour, f"{name}, mean {found[name].mean():.1f}")
+    axis.axvline(PRINTED, color="black", linewidth=1, linestyle="--", label=f"Table 4: {PRINTED}")
+    for number, prototype in TABLE_6.items():
+        label = "prototypes 1-5 of Table 6" if number == 1 else None
+        axis.plot(prototype.theta_s_arcsec, 0.0008, "k|", markersize=12, label=label)
+    axis.set_xlabel("theta_s [arcsec]")
+    axis.set_ylabel("density [1/arcsec]")
+    axis.set_ylim(bottom=0.0)
+    axis.legend(fontsize=8, frameon=False)
+    caption = (
+        f"As Fig. 5e: distribution of theta_s over {N_SAMPLES} prototypes, pressure angle "
+        f"{ASSUMED_ANGLE:g}°, under five statistics."
+    )
+    return Picture("static_error", caption, figure)
+
+
+def _statistic_findings(
+    at_assumed: dict[str, Values], ranges: dict[str, AngleRange]
+) -> Iterator[Finding]:
+    means = {name: float(values.mean()) for name, values in at_assumed.items()}
+    nearest = min(means, key=lambda name: abs(means[name] - PRINTED))
+    compatible = [n for n, r in ranges.items() if _holds(r, ASSUMED_ANGLE)]
+    yield Finding(
+        abs(means[nearest] / PRINTED - 1.0) <= WITHIN_PERCENT / 100.0,
+        f"At {ASSUMED_ANGLE:g}° the statistic nearest to the printed {PRINTED} arcsec is the "
+        f"{nearest} with {means[nearest]:.2f}; {len(compatible)} of {len(ranges)} statistics agree "
+        "within sampling error. One in twelve can do so by chance, so none is chosen here.",
+    )
+    exact = [f"{n} at {r.exact:.1f}°" for n, r in ranges.items() if r.exact is not None]
+    yield Finding(
+        any(_holds(ranges[OUTPUT_TURN], angle) for angle in ANGLES),
+        "The peak-to-peak over an output turn, by which the paper defines its dynamic error, needs "
+        f"a pressure angle of {ranges[OUTPUT_TURN].exact:.1f}°, far above that of gears. Exactly "
+        f"{PRINTED} arcsec come from: {'; '.join(exact)}.",
+    )
+    measured = np.array([prototype.theta_s_arcsec for prototype in TABLE_6.values()])
+    scatter = float(at_assumed[OUTPUT_TURN].std(ddof=1) / at_assumed[OUTPUT_TURN].mean())
+    ratio = float(measured.std(ddof=1) / measured.mean()) / scatter
+    p = float(chi2.cdf((len(measured) - 1) * ratio**2, len(measured) - 1))
+    yield Finding(
+        p >= 0.05,
+        f"The five prototypes of Table 6 scatter by {100 * ratio * scatter:.0f} % of their mean "
+        f"({measured.mean():.1f} arcsec), independent phases give {100 * scatter:.0f} %: so little "
+        f"scatter among five has a probability of {significant(p, 2)}.",
+    )
+
+
+def _holds(found: AngleRange, angle: float) -> bool:
+    return found.low is not None and found.high is not None and found.low <= angle <= found.high
+
+
+def _cells(found: AngleRange) -> tuple[Cell, ...]:
+    return found.exact, found.low, found.high
+
+
+def _angle_columns() -> tuple[Column, ...]:
+    group = f"pressure angle for {PRINTED} arcsec"
+    return tuple(Column(name, "deg", 3, group) for name in ("exact", "95 % from", "to"))
+
+
+def _density(axis: Axes, values: Values, colour: str, label: str) -> None:
+    at = np.linspace(0.9 * values.min(), 1.05 * values.max(), 300)
+    axis.plot(at, gaussian_kde(values)(at), color=colour, linewidth=1.6, label=label)
+    axis.axvline(values.mean(), color=GREY, linewidth=0.6)

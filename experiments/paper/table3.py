@@ -1,0 +1,298 @@
+"""Tables 3 and 4, Figs. 9 and 10: stiffness and damping identified from records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import t as student
+from scipy.stats import ttest_ind_from_stats
+
+from experiments.comparison.rates import at_least, rate_p
+from experiments.comparison.statistics import holm
+from experiments.paper.bench_campaign import (
+    COEFFICIENTS,
+    N_PROTOTYPES,
+    N_REPEATS,
+    NOMINAL_STIFFNESS,
+    TORSION,
+    draw_campaign,
+    slope_error_per_noise,
+    summaries,
+)
+from experiments.paper.published_values import TABLE_3, TABLE_6
+from experiments.paper.table3_figures import damping_lines, torsion_loop
+from experiments.runner.registry import Context
+from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
+from pymoo_hdte.drive import hs_20_100
+from pymoo_hdte.identification import Series, hysteresis_width, lost_energy
+from pymoo_hdte.identification.damping import INPUT_SPEEDS, OUTPUT_SPEEDS
+from pymoo_hdte.units import ARCSEC
+
+SEED = 1
+N_CAMPAIGNS = 200
+SHOWN = (1, 1)
+"""Prototype and repeat in the figures."""
+
+SCALES = {"K": (1.0, "N.m/rad"), **dict.fromkeys(TABLE_3, (1e4, "1e-4 N.m.s/rad"))}
+FRICTIONS = (0.0, 0.5, 1.5, 3.0)
+"""Hysteretic torques of the drive on the torsion bench, N.m."""
+
+ALIKE = 0.05
+"""Level of the test that tells two series of prototypes apart."""
+SENSOR_SHARE = 1e-3
+"""What a good torque sensor resolves, as a share of its range."""
+
+SETTING = (
+    f"The bench is virtual: {N_PROTOTYPES} prototypes are drawn around the printed Tables 3 and 4 "
+    f"(the scatter of K from Table 6), {N_REPEATS} no-load runs and one torsion loop each, with "
+    "sensor noise, zero errors, Coulomb friction and hysteresis of our choice. So agreement with "
+    "the tables tests the procedure, not the paper's data, which are not printed."
+)
+MEANING = (
+    "K is the slope of the forward loading branch a1 (torque over torsion), B_in and B_out slopes "
+    "of no-load torque over speed, B_fc that of the torque which flexspline and mesh add "
+    "(Eqs. 26-28). Intervals assume normal noise: independent from speed to speed, autocorrelated "
+    "along a torsion loop."
+)
+
+
+def run(context: Context) -> Result:
+    """Identify one virtual campaign, and judge the intervals on many."""
+    rng = np.random.default_rng(SEED)
+    records, _ = draw_campaign(rng)
+    fits = records.fits()
+    found = summaries(fits)
+    return Result(
+        title="Tables 3 and 4: identified stiffness and damping",
+        command="python -m experiments table3",
+        paragraphs=(SETTING, MEANING),
+        tables=(
+            _coefficient_table(found),
+            _nominal_table(found),
+            _coverage_table(rng),
+            _friction_table(rng),
+            _resolution_table(),
+            _later_prototypes_table(),
+        ),
+        pictures=(
+            Picture(
+                "loop",
+                "As Fig. 9: torque over torsion of one prototype with the branches that were "
+                "found, and the same without the line of a1, which shows the hysteresis.",
+                torsion_loop(records, SHOWN),
+            ),
+            Picture(
+                "damping",
+                "As Fig. 10: no-load torque over speed of one prototype, with the fitted lines and "
+                "standard errors.",
+                damping_lines(records, fits, SHOWN),
+            ),
+        ),
+    )
+
+
+def _coefficient_table(found: Mapping[str, Series]) -> Table:
+    rows = []
+    inside = []
+    for name, series in found.items():
+        scale, unit = SCALES[name]
+        between, paper = series.between, TABLE_3.get(name)
+        mean = paper.mean if paper else NOMINAL_STIFFNESS
+        intervals = (between.mean_interval(), between.std_interval())
+        for value, (low, high) in zip((mean, paper and paper.std), intervals, strict=True):
+            if value is not None:
+                inside.append(low <= value <= high)
+        cells: list[Cell] = [name, unit]
+        for value, interval, printed in zip(
+            (between.mean, between.std), intervals, (mean, paper and paper.std), strict=True
+        ):
+            cells += [scale * value, *(scale * end for end in interval)]
+            cells.append(None if printed is None else scale * printed)
+        cells += [between.cv_percent, paper.cv_percent if paper else None]
+        rows.append((*cells, scale * series.repeatability))
+    columns = [Column("coefficient"), Column("unit")]
+    for group in ("mean", "standard deviation over prototypes"):
+        columns += [Column(part, "", 4, group) for part in ("ours", "95 % from", "to")]
+        columns.append(Column("paper", "", 4, group, paper=True))
+    columns += [Column("ours", "%", 3, "CV"), Column("paper", "%", 3, "CV", paper=True)]
+    columns.append(Column("std of repeats", "", 2))
+    finding = Finding(
+        at_least(sum(inside), len(inside), 0.95),
+        f"{sum(inside)} of {len(inside)} printed means and standard deviations lie in our 95 % "
+        "intervals; the prototypes were drawn from them.",
+        check=True,
+    )
+    title = f"Table 3: {N_PROTOTYPES} virtual prototypes beside the printed statistics"
+    note = "The paper's mean of K stands in Table 4; it prints no standard deviation of K."
+    return Table("coefficients", title, tuple(columns), tuple(rows), note, (finding,))
+
+
+def _nominal_table(found: Mapping[str, Series]) -> Table:
+    nominal = hs_20_100().nominal
+    printed = {
+        "theta_s": (nominal.static_error / ARCSEC, "arcsec", "from Eqs. (1) and (2), see table2"),
+        "K": (nominal.stiffness, "N.m/rad", "torsion loop, a1"),
+        "J_in": (nominal.input_inertia, "kg.m2", "CAD, not identified"),
+        "B_in": (nominal.input_damping, "N.m.s/rad", "no-load runs"),
+        "B_fc": (nominal.mesh_damping, "N.m.s/rad", "no-load runs"),
+        "J_out": (nominal.output_inertia, "kg.m2", "CAD, not identified"),
+        "B_out": (nominal.output_damping, "N.m.s/rad", "no-load runs"),
+    }
+    rows = []
+    for name, (value, unit, source) in printed.items():
+        ours = found[name].between if name in found else None
+        cells = (ours.mean, ours.mean_error) if ours else (None, None)
+        rows.append((name, unit, *cells, value, source))
+    columns = (
+        Column("parameter"),
+        Column("unit"),
+        Column("ours", "", 4),
+        Column("standard error", "", 2),
+        Column("paper", "", 5, paper=True),
+        Column("source"),
+    )
+    return Table("nominal", "Table 4: nominal values", columns, tuple(rows))
+
+
+def _coverage_table(rng: np.random.Generator) -> Table:
+    kinds = ("one record", "mean of the series", "std of the series")
+    covered = dict.fromkeys(((kind, name) for kind in kinds for name in COEFFICIENTS), 0)
+    for _ in range(N_CAMPAIGNS):
+        records, truth = draw_campaign(rng)
+        fits = records.fits()
+        for name, series in summaries(fits).items():
+            trials = (
+                (fits[name][SHOWN].slope_interval(), truth.first[name]),
+                (series.between.mean_interval(), truth.mean[name]),
+                (series.between.std_interval(), truth.std[name]),
+            )
+            for kind, ((low, high), true) in zip(kinds, trials, strict=True):
+                covered[kind, name] += low <= true <= high
+    rows = tuple(
+        (name, kind, n, N_CAMPAIGNS, 100.0 * n / N_CAMPAIGNS, rate_p(n, N_CAMPAIGNS, 0.95))
+        for (kind, name), n in covered.items()
+    )
+    counts = list(covered.values())
+    rejected = sum(not at_least(count, N_CAMPAIGNS, 0.95) for count in counts)
+    finding = Finding(
+        rejected == 0,
+        f"On {N_CAMPAIGNS} virtual campaigns the 95 % intervals cover the truth in "
+        f"{100 * min(counts) / N_CAMPAIGNS:.1f} to {100 * max(counts) / N_CAMPAIGNS:.1f} %; a "
+        f"one-sided exact binomial test at 1 % rejects {rejected} of the {len(counts)}.",
+        check=True,
+    )
+    columns = (
+        Column("coefficient"),
+        Column("interval of"),
+        Column("covered"),
+        Column("campaigns"),
+        Column("coverage", "%", 3),
+        Column("p of so few", "", 2),
+    )
+    title = "Coverage of the 95 % intervals"
+    return Table("coverage", title, columns, rows, findings=(finding,))
+
+
+def _friction_table(rng: np.random.Generator) -> Table:
+    rows = []
+    for friction in FRICTIONS:
+        bench = replace(TORSION, friction_torque=friction)
+        loop = bench.record(NOMINAL_STIFFNESS, rng)
+        bias = bench.loading_stiffness(NOMINAL_STIFFNESS) / NOMINAL_STIFFNESS - 1.0
+        width = 2.0 * friction / NOMINAL_STIFFNESS / ARCSEC
+        rows.append(
+            (
+                friction,
+                100.0 * round(bias, 6),
+                hysteresis_width(loop) / ARCSEC,
+                width,
+                1e3 * lost_energy(loop),
+            )
+        )
+    columns = (
+        Column("hysteretic torque", "N.m", 2),
+        Column("K of a1 above the spring's", "%", 2),
+        Column("from the record", "arcsec", 3, "hysteresis width"),
+        Column("2 T_f / K", "arcsec", 3, "hysteresis width"),
+        Column("lost in a loop", "mJ", 3),
+    )
+    note = (
+        "Friction turns over the first arcseconds of a1 and steepens its line: the slope of a1 is "
+        "not the stiffness of the spring alone."
+    )
+    return Table("friction", "What hysteresis does to the loop", columns, tuple(rows), note)
+
+
+def _resolution_table() -> Table:
+    rated = hs_20_100().load_torque
+    rows = []
+    for name, paper in TABLE_3.items():
+        speeds = OUTPUT_SPEEDS if name == "B_out" else INPUT_SPEEDS
+        load = rated if name == "B_out" else rated / hs_20_100().ratio
+        noise = paper.std * N_REPEATS**0.5 / slope_error_per_noise(name)
+        rows.append((name, 1e3 * paper.mean * np.ptp(speeds), 1e3 * noise, 100.0 * noise / load))
+    share = rows[-1][-1] / 100.0
+    enough = share >= SENSOR_SHARE
+    meaning = "which is enough" if enough else "so B_out needs one of its own"
+    finding = Finding(
+        enough,
+        f"B_out raises the torque by {significant(rows[-1][1], 2)} mN.m from 2 to 20 r/min. The "
+        f"scatter that Table 3 prints leaves no more than {significant(rows[-1][2], 2)} mN.m of "
+        f"noise, {share:.1e} of the rated {rated:g} N.m: a sensor for the rated torque resolves "
+        f"about {SENSOR_SHARE:g}, {meaning}.",
+    )
+    columns = (
+        Column("coefficient"),
+        Column("torque over the speed range", "mN.m", 3),
+        Column("noise that the printed std allows", "mN.m", 3),
+        Column("share of the rated torque there", "%", 2),
+    )
+    note = (
+        "The printed standard deviation holds the scatter of the prototypes and the noise of the "
+        f"mean of {N_REPEATS} runs; the noise alone cannot exceed it."
+    )
+    title = "The torque noise that Table 3 allows"
+    return Table("resolution", title, columns, tuple(rows), note, (finding,))
+
+
+def _later_prototypes_table() -> Table:
+    five = {
+        name: np.array([getattr(p, name) for p in TABLE_6.values()]) for name in COEFFICIENTS[:3]
+    }
+    rows = []
+    for name, values in five.items():
+        mean, std = values.mean(), values.std(ddof=1)
+        paper = TABLE_3.get(name)
+        if paper:
+            p = ttest_ind_from_stats(mean, std, 5, paper.mean, paper.std, N_PROTOTYPES).pvalue
+            printed = paper.mean
+        else:
+            printed = NOMINAL_STIFFNESS
+            statistic = (mean - printed) / std / (1 / 5 + 1 / N_PROTOTYPES) ** 0.5
+            p = 2.0 * student.sf(abs(statistic), 4)
+        rows.append([name, mean, std, printed, paper.std if paper else None, p])
+    for row, adjusted in zip(rows, holm([row[-1] for row in rows]), strict=True):
+        row.append(float(adjusted))
+    least = min(rows, key=lambda row: row[-1])
+    alike = least[-1] >= ALIKE
+    relation = "nothing tells them from" if alike else "they are not of"
+    finding = Finding(
+        alike,
+        f"The five prototypes of Table 6 have a mean {least[0]} of {1e4 * least[1]:.3f}e-4 against "
+        f"{1e4 * least[3]:.3f}e-4 in Table 3 (t-test, Holm's adjustment: p = "
+        f"{significant(least[-1], 1)}): {relation} the series that Table 3 describes.",
+    )
+    columns = (
+        Column("coefficient"),
+        Column("mean", "", 4, "Table 6, five prototypes"),
+        Column("std", "", 3, "Table 6, five prototypes"),
+        Column("mean", "", 4, "Tables 3 and 4, 20 prototypes", paper=True),
+        Column("std", "", 3, "Tables 3 and 4, 20 prototypes", paper=True),
+        Column("p", "", 2),
+        Column("p, adjusted", "", 2),
+    )
+    title = "Are the prototypes of Table 6 of the same series?"
+    note = "SI units. K: with the standard deviation of the five, since Table 3 prints none."
+    return Table("later", title, columns, tuple(map(tuple, rows)), note, (finding,))

@@ -1,0 +1,69 @@
+"""The commands of the command line on an input: a whole report, or one line and nothing else."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable
+from contextlib import redirect_stderr
+from pathlib import Path
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import identification_report, optimum_report, simulation_report
+from pymoo_hdte.discrepancy.report import write as report_folder
+from pymoo_hdte.reports.folder import ReportFolder
+
+
+class Wrong(Exception):
+    """Something was accepted that must not be, or left behind."""
+
+
+def discrepancy(folder: Path) -> None:
+    """Judge the campaign or rig in a folder; errors as `_run`."""
+    _run(["discrepancy", str(folder)], folder, report_folder.FOLDER)
+
+
+def simulate(folder: Path) -> None:
+    """Simulate the drive in a folder; errors as `_run`."""
+    _run(["simulate", *_drive(folder)], folder, simulation_report.FOLDER)
+
+
+def optimise(folder: Path) -> None:
+    """Optimise the drive in a folder over its duty cycle, shortly; errors as `_run`."""
+    shortly = ["--cycle", str(folder / "cycle.csv"), "--order", "2", "--evaluations", "200"]
+    _run(["optimise", *_drive(folder), *shortly], folder, optimum_report.FOLDER)
+
+
+def identify(folder: Path) -> None:
+    """Identify what the records in a folder tell; errors as `_run`."""
+    sheet = ["--datasheet", str(folder / "sheet.toml")]
+    _run(["identify", str(folder), *sheet], folder, identification_report.FOLDER)
+
+
+COMMANDS: tuple[Callable[[Path], None], ...] = (discrepancy, simulate, optimise, identify)
+
+
+def _drive(folder: Path) -> list[str]:
+    return [str(folder / "sheet.toml"), "--model", str(folder / "model.toml")]
+
+
+def _run(arguments: list[str], folder: Path, report: ReportFolder) -> None:
+    """Run a command; raise `InvalidInput` where it refuses, `Wrong` where it does so wrongly."""
+    out, errors = folder.parent / "out", io.StringIO()
+    with redirect_stderr(errors):
+        code = cli.main([*arguments, "--out", str(out), "--quiet"])
+    written = {path.name for path in out.iterdir()} if out.is_dir() else set()
+    beside = {path.name for path in folder.parent.iterdir()} - {folder.name, out.name}
+    if beside:
+        raise Wrong(f"left beside the report: {beside}")
+    if code == cli.MISTAKE:
+        if written or out.exists():
+            raise Wrong(f"written in spite of code 2: {written}")
+        line = errors.getvalue()
+        if line.count("\n") != 1 or not line.startswith("pymoo-hdte: error: "):
+            raise Wrong(f"not one line: {line[:200]!r}")
+        raise InvalidInput(arguments[0], None, line.strip())
+    if code != 0 or not set(report.always) <= written <= set(report.files):
+        raise Wrong(f"code {code} and {written}")
+    json.loads((out / report.document).read_text(encoding="utf-8"))

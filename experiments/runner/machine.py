@@ -1,0 +1,55 @@
+"""What the machine is that times were measured on."""
+
+from __future__ import annotations
+
+import os
+import platform
+from pathlib import Path
+
+from threadpoolctl import threadpool_info
+
+from experiments.runner.provenance import environment
+from experiments.runner.result import Column, Table
+
+
+def machine_table() -> Table:
+    """Return processor, cores, memory, system and versions."""
+    versions = environment()
+    rows = [
+        ("processor", _processor()),
+        ("cores this process may use", str(usable_cores())),
+        ("memory", f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.1f} GiB"),
+        ("system", f"{platform.system()} {platform.release()}"),
+        ("linear algebra", _linear_algebra()),
+        ("load when it ended, over one minute", f"{os.getloadavg()[0]:.1f}"),
+        ("versions", ", ".join(f"{name} {version}" for name, version in versions.items())),
+    ]
+    return Table(
+        "machine", "The machine", (Column("what"), Column("fact")), tuple(rows), wall_times=True
+    )
+
+
+def usable_cores() -> int:
+    """Return how many cores this process may use."""
+    # A scheduler or taskset may leave this process fewer cores than the machine has.
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _processor() -> str:
+    facts = Path("/proc/cpuinfo")
+    if facts.is_file():
+        for line in facts.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _linear_algebra() -> str:
+    found = {
+        f"{one['internal_api']} {one['version']}, {one['num_threads']} threads"
+        for one in threadpool_info()
+        if one["user_api"] == "blas"
+    }
+    return "; ".join(sorted(found)) or "unknown"

@@ -1,0 +1,145 @@
+"""Which experiments there are, and what each gets to work with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+from experiments.runner.campaign import Campaign
+from experiments.runner.result import Result
+
+
+class ExtraMissing(RuntimeError):
+    """An experiment needs a package of an extra that is not installed."""
+
+
+def require(package: str, extra: str) -> None:
+    """Refuse to go on without a package that comes with an extra; it is not imported.
+
+    Raises
+    ------
+    ExtraMissing
+        It is not installed.
+    """
+    if find_spec(package) is None:
+        raise ExtraMissing(f"{package} is not installed: pip install '.[{extra}]'")
+
+
+@dataclass(frozen=True)
+class Context:
+    """What an experiment may use.
+
+    Attributes
+    ----------
+    seeds
+        Number of independent runs of every algorithm, seeds 1..seeds, of the experiments that take
+        it.
+    out
+        Folder of the results.
+    campaign
+        Runs jobs on the workers that the user allowed.
+    full
+        Whether to run long campaigns instead of reading their committed outcome.
+    quick
+        Whether to run a small version of those that have one.
+    """
+
+    seeds: int
+    out: Path
+    campaign: Campaign
+    full: bool = False
+    quick: bool = False
+
+    def command(self, experiment: str) -> str:
+        """Return what one types to get this extent of an experiment."""
+        option = " --full" if self.full else " --quick" if self.quick else ""
+        return f"python -m experiments {experiment}{option}"
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A module ``experiments.<name>`` with ``run(context: Context) -> Result``.
+
+    Attributes
+    ----------
+    by_default
+        Whether it belongs to the set that runs when no name is given.
+    reads_outcome
+        Whether it shows the committed outcome of a long campaign, which ``--full`` runs.
+    has_small_version
+        Whether it takes ``--quick``.
+    takes_seeds
+        Whether ``--seeds`` says how many runs it makes; others have numbers of their own.
+    """
+
+    name: str
+    summary: str
+    by_default: bool = True
+    reads_outcome: bool = False
+    has_small_version: bool = False
+    takes_seeds: bool = False
+
+    def run(self, context: Context) -> Result:
+        """Import the module and run it; nothing is imported for ``--list``."""
+        return import_module(f"experiments.{self.name}").run(context)
+
+
+EXPERIMENTS = (
+    Experiment(
+        "table7", "Table 7 and Fig. 18: AMP-MOPSO against MOPSO and NSGA-II", takes_seeds=True
+    ),
+    Experiment(
+        "ablation",
+        "Fig. 17: AMP-MOPSO without its pyramid, its entropy weight, or both",
+        takes_seeds=True,
+    ),
+    Experiment("table5", "Table 5 and Fig. 11: accuracy of the Chebyshev surrogate by order"),
+    Experiment("table8", "Tables 8 and 9, Fig. 19: the designs that three preferences choose"),
+    Experiment("published", "What Eq. (9) gives as printed, order by order, beside an integrator"),
+    Experiment("table2", "Table 2, Figs. 4 and 5: error statistics and the static error"),
+    Experiment("table3", "Tables 3 and 4, Figs. 9 and 10: stiffness and damping from records"),
+    Experiment("fig12", "Fig. 12: distribution of the DTE at the nominal design"),
+    Experiment("table6", "Table 6, Figs 14 and 15: five prototypes, predicted and measured"),
+    Experiment("sensitivity", "Sobol indices of the DTE: which tolerance deserves money"),
+    Experiment("crosscheck", "chaospy beside ours, and accuracy per model run: is 1024 needed?"),
+    Experiment("dte_map", "DTE over input speed and load, with the resonances of each preset"),
+    Experiment(
+        "calibration",
+        "Which effects the printed equations lack: a ladder of fitted models",
+        reads_outcome=True,
+    ),
+    Experiment(
+        "blind",
+        "Blind campaigns: what the discrepancy workflow finds of what is hidden",
+        reads_outcome=True,
+    ),
+    Experiment("emps", "EMPS: friction of a positioning system, measured by others"),
+    Experiment("kinova", "Kinova Gen3: friction and ripple of a robot joint, measured by others"),
+    Experiment(
+        "peers",
+        "The elitist swarm against the best algorithms of other libraries",
+        reads_outcome=True,
+        has_small_version=True,
+    ),
+    Experiment(
+        "swarm_parts",
+        "What each part of the elitist swarm is worth",
+        reads_outcome=True,
+        has_small_version=True,
+    ),
+    Experiment(
+        "reliability",
+        "Ten thousand wrong inputs, kills at any moment, full disks, memory",
+        reads_outcome=True,
+        has_small_version=True,
+    ),
+    Experiment("benchmark", "Speed ratios and agreement with integration", by_default=False),
+    Experiment(
+        "reference_front",
+        "The true fronts, computed anew and compared: 35 minutes",
+        by_default=False,
+    ),
+)
+"""In the order in which they run and are reported."""

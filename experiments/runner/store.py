@@ -1,0 +1,146 @@
+"""Results on disk: JSON for the report, CSV and PNG for everybody else."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.runner.provenance import report_fingerprint
+from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
+from pymoo_hdte.reports.csv_text import csv_text
+
+RESULT = "result.json"
+TIMES = "times"
+"""Folder of wall times: the only results that differ from run to run."""
+_INFINITE = {significant(value, 1): value for value in (math.inf, -math.inf)}
+
+
+@dataclass(frozen=True)
+class StoredPicture:
+    """A figure read back: its PNG bytes and caption."""
+
+    name: str
+    caption: str
+    png: bytes
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """A result read back, with the fingerprint of the source that made it."""
+
+    name: str
+    title: str
+    command: str
+    paragraphs: tuple[str, ...]
+    tables: tuple[Table, ...]
+    pictures: tuple[StoredPicture, ...]
+    notes: tuple[str, ...]
+    headline: str
+    made_by: str
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file that is either complete or not there, whenever the program is interrupted."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        temporary.write_bytes(content)
+        os.replace(temporary, path)
+    finally:
+        # A full disk leaves a part behind, which would keep it full.
+        temporary.unlink(missing_ok=True)
+
+
+def save(out: Path, name: str, result: Result) -> None:
+    """Store ``result`` of the experiment ``name`` under ``out``.
+
+    Tables go to CSV and figures to PNG in ``out/name``; tables of wall times to ``out/times/name``.
+    ``result.json`` is written last, so it never names a file that is missing.
+    """
+    timed = [table for table in result.tables if table.wall_times]
+    steady = [table for table in result.tables if not table.wall_times]
+    for folder, tables in ((out / name, steady), (out / TIMES / name, timed)):
+        for table in tables:
+            heading = [column.heading for column in table.columns]
+            content = csv_text(heading, table.rows).encode()
+            write_atomically(folder / f"{table.name}.csv", content)
+    for picture in result.pictures:
+        write_atomically(out / name / f"{picture.name}.png", png_bytes(picture))
+    described = {
+        "title": result.title,
+        "command": result.command,
+        "paragraphs": result.paragraphs,
+        "tables": [asdict(table) for table in steady],
+        "pictures": [{"name": p.name, "caption": p.caption} for p in result.pictures],
+        "notes": result.notes,
+        "headline": result.headline,
+        "made_by": report_fingerprint(),
+    }
+    _write_json(out / TIMES / name / RESULT, [asdict(table) for table in timed])
+    _write_json(out / name / RESULT, described)
+
+
+def load(out: Path, name: str) -> StoredResult | None:
+    """Read the stored result of the experiment ``name``; None if there is none."""
+    described_in = out / name / RESULT
+    if not described_in.is_file():
+        return None
+    described = json.loads(described_in.read_text())
+    timed_in = out / TIMES / name / RESULT
+    timed = json.loads(timed_in.read_text()) if timed_in.is_file() else []
+    return StoredResult(
+        name=name,
+        title=described["title"],
+        command=described["command"],
+        paragraphs=tuple(described["paragraphs"]),
+        tables=tuple(_table(entry) for entry in described["tables"] + timed),
+        pictures=tuple(
+            StoredPicture(p["name"], p["caption"], (out / name / f"{p['name']}.png").read_bytes())
+            for p in described["pictures"]
+        ),
+        notes=tuple(described["notes"]),
+        headline=described["headline"],
+        made_by=described["made_by"],
+    )
+
+
+def png_bytes(picture: Picture) -> bytes:
+    """Draw the figure; the same figure gives the same bytes."""
+    buffer = io.BytesIO()
+    # Without this, the file would name the version of matplotlib that drew it.
+    picture.figure.savefig(buffer, format="png", dpi=140, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def _write_json(path: Path, content: Any) -> None:
+    text = json.dumps(_writable(content), indent=1, ensure_ascii=False, allow_nan=False)
+    write_atomically(path, f"{text}\n".encode())
+
+
+def _writable(content: Any) -> Any:
+    """Return the content with None and "∞" in the place of what JSON cannot write."""
+    if isinstance(content, dict):
+        return {name: _writable(entry) for name, entry in content.items()}
+    if isinstance(content, list | tuple):
+        return [_writable(entry) for entry in content]
+    if isinstance(content, float) and not math.isfinite(content):
+        return None if math.isnan(content) else significant(content, 1)
+    return content
+
+
+def _table(entry: dict[str, Any]) -> Table:
+    return Table(
+        **entry
+        | {
+            "columns": tuple(Column(**column) for column in entry["columns"]),
+            "rows": tuple(
+                tuple(_INFINITE.get(cell, cell) for cell in row) for row in entry["rows"]
+            ),
+            "findings": tuple(Finding(**finding) for finding in entry["findings"]),
+        }
+    )

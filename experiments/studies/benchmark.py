@@ -1,0 +1,216 @@
+"""Speed as ratios measured in one run, and agreement of the steady state with integration."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.evaluator import Evaluator
+from tqdm import tqdm
+
+from experiments.comparison.runs import robust_problem
+from experiments.paper.models import model_sentences
+from experiments.runner.machine import machine_table
+from experiments.runner.registry import Context
+from experiments.runner.result import Column, Finding, Result, Table
+from experiments.studies.benchmark_parts import ratios_of_parts
+from experiments.studies.timing import Ratio, best_time, ratio_table
+from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
+from pymoo_hdte.drive import PARAMETERS, PRESETS, DriveModel, preset, simulate
+from pymoo_hdte.drive.solve import harmonic_balance
+from pymoo_hdte.drive.solve.time_domain import ANGLES, METHODS
+from pymoo_hdte.problems import RobustDTE
+from pymoo_hdte.units import ARCSEC
+
+N_DESIGNS = 100
+N_SAMPLES = 1000
+N_NODES = 1024
+N_TIMED = 10
+GENERATIONS = 100
+REPEATS = 5
+AGREEMENT = 1e-4
+AGREEMENT_RESONANT_FREE = 1e-2
+"""Where a resonance lies between the orders the input angle itself fluctuates, which Hill's method
+leaves out and the harmonic balance does not."""
+RESONANT = ("calibrated", "resonant")
+
+
+def run(context: Context) -> Result:
+    """Measure all ratios and the agreement; minutes, on one core."""
+    agreement = tuple(_agreement())
+    ratios = [*_moments(), *_steady_state(), *_algorithms(), *ratios_of_parts()]
+    return Result(
+        title="Benchmark: speed ratios and agreement with integration",
+        command="python -m experiments benchmark",
+        paragraphs=(
+            "Times are the least of several repetitions on one core; only their ratios within this "
+            "run mean anything.",
+            *model_sentences("calibrated", "resonant"),
+        ),
+        tables=(ratio_table(ratios), machine_table(), _agreement_table(agreement)),
+    )
+
+
+def _moments() -> Iterator[Ratio]:
+    exact, sampled = robust_problem("calibrated"), RobustDTE(moments="sample", n_samples=N_SAMPLES)
+    rng = np.random.default_rng(1)
+    designs = rng.uniform(exact.xl, exact.xu, (N_DESIGNS, exact.n_var))
+    polynomial = sampled.surrogate.polynomial
+    cube = rng.uniform(-1.0, 1.0, (len(PARAMETERS), N_DESIGNS * N_SAMPLES))
+    exact_seconds = best_time(lambda: exact.moments(designs), 200 * REPEATS)
+    sampled_seconds = best_time(lambda: sampled.moments(designs), 4 * REPEATS)
+    bare_seconds = best_time(lambda: polynomial(cube), 4 * REPEATS)
+    yield Ratio(
+        f"moments of {N_DESIGNS} designs",
+        f"Monte Carlo, {N_SAMPLES} common samples",
+        sampled_seconds,
+        "exact",
+        exact_seconds,
+        "at least 300",
+        sampled_seconds >= 300.0 * exact_seconds,
+    )
+    yield Ratio(
+        f"surrogate at {N_DESIGNS * N_SAMPLES} points",
+        "sampled moments",
+        sampled_seconds,
+        "bare tensor contraction",
+        bare_seconds,
+        "at most 2",
+        sampled_seconds <= 2.0 * bare_seconds,
+    )
+
+
+def _steady_state() -> Iterator[Ratio]:
+    for name in PRESETS:
+        model = preset(name)
+        nodes = _random_designs(model, N_NODES)
+        steady = best_time(lambda m=model, n=nodes: m.dte_arcsec(n), REPEATS)  # type: ignore[misc]
+        by_method = {
+            method: _integration_time(model, nodes[:1], method)
+            for method in tqdm(METHODS, desc=f"integrators, {name}", leave=False)
+        }
+        best = min(by_method, key=by_method.__getitem__)
+        scaled = _integration_time(model, nodes[:N_TIMED], best) * N_NODES / N_TIMED
+        yield Ratio(
+            f"{N_NODES} nodes of {name}",
+            f"{best}, rtol 1e-8, {N_TIMED} nodes scaled",
+            scaled,
+            "steady state",
+            steady,
+            "at least 1000, fast side below 1 s",
+            scaled >= 1000.0 * steady and steady < 1.0,
+        )
+
+
+def _integration_time(model: DriveModel, designs: NDArray[np.float64], method: str) -> float:
+    begin = time.perf_counter()
+    for design in designs:
+        simulate(model, design, method=method)
+    return time.perf_counter() - begin
+
+
+class TimedEvaluator(Evaluator):
+    """Adds up the seconds spent on evaluating, which are not the algorithm's own."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seconds = 0.0
+
+    def eval(self, *args: object, **kwargs: object) -> object:
+        """Evaluate as pymoo does, with the clock running."""
+        begin = time.perf_counter()
+        try:
+            return super().eval(*args, **kwargs)
+        finally:
+            self.seconds += time.perf_counter() - begin
+
+
+def _algorithms() -> Iterator[Ratio]:
+    problem = robust_problem("calibrated")
+    makers: dict[str, Callable[[], Algorithm]] = {
+        "NSGA-II": lambda: NSGA2(pop_size=100),
+        "AMP-MOPSO": lambda: AMPMOPSO(pop_size=100, archive_size=50),
+        "ElitistSwarm": lambda: ElitistSwarm(pop_size=100),
+    }
+    own, total = (
+        {
+            name: min(_seconds_per_generation(problem, make())[kind] for _ in range(REPEATS))
+            for name, make in makers.items()
+        }
+        for kind in range(2)
+    )
+    ours = [name for name in makers if name != "NSGA-II"]
+    for (label, seconds), name in product((("own cost", own), ("with evaluation", total)), ours):
+        yield Ratio(
+            f"one generation of 100, {label}",
+            "NSGA-II of pymoo",
+            seconds["NSGA-II"],
+            name,
+            seconds[name],
+            "at least 3" if label == "own cost" else "",
+            seconds["NSGA-II"] >= 3.0 * seconds[name] or label != "own cost",
+        )
+
+
+def _seconds_per_generation(problem: RobustDTE, algorithm: Algorithm) -> tuple[float, float]:
+    """Return the seconds per generation without and with evaluation."""
+    algorithm.setup(problem, termination=("n_gen", GENERATIONS), seed=1)
+    algorithm.evaluator = TimedEvaluator()
+    begin = time.perf_counter()
+    algorithm.run()
+    total = time.perf_counter() - begin
+    return (total - algorithm.evaluator.seconds) / GENERATIONS, total / GENERATIONS
+
+
+def _agreement() -> Iterator[tuple[str, str, float, float]]:
+    """Yield preset, method and angle, largest relative difference and what is allowed."""
+    cases = list(product(PRESETS, ANGLES))
+    for name, angle in tqdm(cases, desc="agreement", unit="case"):
+        model = preset(name)
+        designs = np.vstack([model.nominal, _random_designs(model, N_TIMED)])
+        expected = model.dte_arcsec(designs)
+        found = [simulate(model, design, angle=angle).dte_arcsec() for design in designs]
+        loose = name in RESONANT and angle == "free"
+        allowed = AGREEMENT_RESONANT_FREE if loose else AGREEMENT
+        yield name, f"steady state, angle {angle}", _largest(found, expected), allowed
+        if angle == "free":
+            balance = harmonic_balance(model.coefficients(designs)).spectrum()
+            balanced = balance.peak_to_peak(model.sheet.ratio) / ARCSEC
+            yield name, "harmonic balance, angle free", _largest(found, balanced), AGREEMENT
+
+
+def _largest(found: list[float], expected: NDArray[np.float64]) -> float:
+    return float(np.max(np.abs(np.array(found) / expected - 1.0)))
+
+
+def _random_designs(model: DriveModel, n: int) -> NDArray[np.float64]:
+    box = robust_problem(model.name).surrogate.box
+    return np.random.default_rng(2).uniform(box.lower, box.upper, (n, len(PARAMETERS)))
+
+
+def _agreement_table(rows: tuple[tuple[str, str, float, float], ...]) -> Table:
+    return Table(
+        "agreement",
+        f"Steady state against integration from rest, nominal and {N_TIMED} random designs",
+        (
+            Column("model"),
+            Column("method, angle in theta_s and stiffness"),
+            Column("largest relative difference of the DTE", "", 2),
+            Column("allowed", "", 1),
+        ),
+        rows,
+        findings=tuple(
+            Finding(
+                difference <= allowed,
+                f"{name}, {method}: the DTE differs by {difference:.1e} at most; "
+                f"{allowed:.0e} is allowed.",
+                check=True,
+            )
+            for name, method, difference, allowed in rows
+        ),
+    )

@@ -1,0 +1,129 @@
+"""Speed of the other parts: imports, surrogate, solvers, sorting, discrepancy workflow."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from subprocess import run
+
+import numpy as np
+from moocore import pareto_rank
+from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+from experiments.blind.cases import BELIEVED, RIG
+from experiments.comparison.runs import robust_problem
+from experiments.studies.timing import Ratio, best_time
+from pymoo_hdte.algorithms.crowding import least_crowded
+from pymoo_hdte.algorithms.spread import most_spread
+from pymoo_hdte.discrepancy.drive.analysis import analyse
+from pymoo_hdte.drive import preset, simulate
+from pymoo_hdte.drive.solve import harmonic_balance
+from pymoo_hdte.virtual.hidden_forms import draw_effect
+from pymoo_hdte.virtual.rig import draw_rig, run_campaign
+
+N_POINTS = 1000
+SORTED = 200
+REPEATS = 5
+OUR_STUDY = (
+    "from pymoo_hdte.algorithms import ElitistSwarm; from pymoo_hdte.problems import RobustDTE; "
+    "from pymoo.optimize import minimize"
+)
+THEIR_STUDY = "from pymoo.algorithms.moo.nsga2 import NSGA2; from pymoo.optimize import minimize"
+
+
+def ratios_of_parts() -> Iterator[Ratio]:
+    """Measure one ratio a part."""
+    yield _imports()
+    yield _surrogate()
+    yield _harmonic_balance()
+    yield from _sorting()
+    yield _discrepancy()
+
+
+def _imports() -> Ratio:
+    ours, theirs = (_seconds_of(code) for code in (OUR_STUDY, THEIR_STUDY))
+    return Ratio(
+        "imports of a study, from Python's start",
+        "RobustDTE and ElitistSwarm",
+        ours,
+        "minimize and NSGA-II of pymoo",
+        theirs,
+        "less than 2",
+        ours < 2.0 * theirs,
+    )
+
+
+def _seconds_of(code: str) -> float:
+    return best_time(lambda: run([sys.executable, "-c", code], check=True), REPEATS)
+
+
+def _surrogate() -> Ratio:
+    problem = robust_problem("calibrated")
+    model, box = problem.model, problem.surrogate.box
+    points = np.random.default_rng(3).uniform(box.lower, box.upper, (N_POINTS, len(box)))
+    integrated = best_time(lambda: simulate(model, points[0]), 2)
+    return Ratio(
+        f"one DTE of {model.name} (paper: 49,000)",
+        "integration from rest",
+        integrated,
+        f"surrogate, {N_POINTS} points at once",
+        best_time(lambda: problem.surrogate(points), 20 * REPEATS) / N_POINTS,
+        "",
+        True,
+    )
+
+
+def _harmonic_balance() -> Ratio:
+    model = preset("resonant")
+    coefficients = model.coefficients(model.nominal[None])
+    return Ratio(
+        "steady state with a free input angle",
+        "integration from rest",
+        best_time(lambda: simulate(model, model.nominal), 2),
+        "harmonic balance",
+        best_time(lambda: harmonic_balance(coefficients), REPEATS),
+        "",
+        True,
+    )
+
+
+def _sorting() -> Iterator[Ratio]:
+    F = np.random.default_rng(4).random((SORTED, 3))
+    yield Ratio(
+        f"ranks of {SORTED} points",
+        "sorting of pymoo",
+        best_time(lambda: NonDominatedSorting().do(F), 20 * REPEATS),
+        "moocore",
+        best_time(lambda: pareto_rank(F), 20 * REPEATS),
+        "",
+        True,
+    )
+    yield Ratio(
+        f"{SORTED} points thinned out to half",
+        "crowding distance, Python",
+        best_time(lambda: least_crowded(F, SORTED // 2), 4 * REPEATS),
+        "nearest neighbours, compiled",
+        best_time(lambda: most_spread(F, SORTED // 2), 4 * REPEATS),
+        "",
+        True,
+    )
+
+
+def _discrepancy() -> Ratio:
+    rng = np.random.default_rng(5)
+    rig = draw_rig(BELIEVED, (draw_effect("torque_ripple", BELIEVED, rng),), rng)
+    begin = time.perf_counter()
+    campaign = run_campaign(rig, BELIEVED, RIG, rng)
+    recorded = time.perf_counter() - begin
+    begin = time.perf_counter()
+    analyse(campaign)
+    return Ratio(
+        f"a campaign of {len(campaign.running)} records with a hidden ripple",
+        "integrating the rig once",
+        recorded,
+        "the whole verdict",
+        time.perf_counter() - begin,
+        "",
+        True,
+    )

@@ -1,0 +1,119 @@
+"""``pymoo-hdte discrepancy``: from a folder of records to a verdict on what the model lacks."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.cli.command import Command, Outcome, Say
+from pymoo_hdte.reports.folder import PAGE_FILE
+
+_DETAILS = """example:
+  pymoo-hdte discrepancy campaigns/rig-01 --out reports/rig-01
+
+The campaign is a folder with campaign.toml and its records, of a harmonic drive, or with rig.toml
+and its records, of any other mechanism. DIR gets verdict.json, revised_model.toml and report.html;
+an earlier report there is replaced, anything else refused.
+Exit codes: 0 a verdict was reached, whatever it is; 2 the input is at fault."""
+
+
+def _add_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN", help="folder of the campaign")
+    parser.add_argument(
+        "--data", type=Path, metavar="DIR", help="folder of the records that rig.toml names"
+    )
+
+
+def _run(options: argparse.Namespace, say: Say) -> Outcome:
+    document = _analysed(options.campaign, options.out, options.data, say)
+    return Outcome(document, _summary(document, options.out))
+
+
+def _analysed(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
+    """Analyse a campaign or a rig and write its report; return the verdict's document."""
+    from pymoo_hdte.discrepancy.campaign.format import CAMPAIGN_FILE
+    from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE
+    from pymoo_hdte.discrepancy.report.write import FOLDER
+
+    FOLDER.check(out)
+    if (folder / RIG_FILE).is_file() or folder.suffix == ".toml":
+        return _of_mechanism(folder, out, data, say)
+    if data is not None:
+        raise InvalidInput("--data", str(data), f"none without a {RIG_FILE}")
+    if folder.is_dir() and not (folder / CAMPAIGN_FILE).is_file():
+        allowed = f"a folder with {CAMPAIGN_FILE}, of a harmonic drive, or {RIG_FILE}, of another"
+        raise InvalidInput("CAMPAIGN", str(folder), allowed)
+    return _of_drive(folder, out, say)
+
+
+def _of_mechanism(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
+    from threadpoolctl import threadpool_limits
+
+    from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+    from pymoo_hdte.discrepancy.mechanism.files import read_rig
+    from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
+
+    say("reading the records")
+    rig = read_rig(folder, data)
+    with threadpool_limits(limits=1):
+        say("looking for what is missing")
+        finding = investigate(rig.mechanism, rig.records, rig.cutoff, rig.effects)
+        say("proving it on the records that were held out")
+        return write_measured_report(rig.title, finding, out)
+
+
+def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
+    from threadpoolctl import threadpool_limits
+
+    from pymoo_hdte.cli.optimum_shift import optimum_shift
+    from pymoo_hdte.discrepancy import read_campaign
+    from pymoo_hdte.discrepancy.drive.analysis import analyse
+    from pymoo_hdte.discrepancy.drive.location import locate
+    from pymoo_hdte.discrepancy.drive.next_test import next_experiment
+    from pymoo_hdte.discrepancy.drive.proof import prove
+    from pymoo_hdte.discrepancy.report.write import write_report
+
+    say("reading the records")
+    campaign = read_campaign(folder)
+    say("looking for what is missing")
+    analysis = analyse(campaign)
+    with threadpool_limits(limits=1):
+        say("locating the misfit")
+        location = locate(analysis)
+        say("proving it on the records that were held out")
+        proof = prove(analysis)
+        say("choosing the next test and writing the report")
+        proposal = next_experiment(analysis)
+        return write_report(analysis, location, proof, proposal, optimum_shift, out)
+
+
+def _summary(document: dict[str, Any], out: Path) -> str:
+    from pymoo_hdte.discrepancy.report.document import in_words
+
+    names = " + ".join(_name(one) for one in document["effects"])
+    lines = [
+        f"{document['status']}{': ' + names if names else ''}",
+        document["sentence"],
+        document["location"]["sentence"],
+        *document["limits"],
+        f"Next: {in_words(document['next_experiment']['description'])}",
+        f"Report: {out / PAGE_FILE}",
+    ]
+    return "\n".join(lines)
+
+
+def _name(effect: dict[str, Any]) -> str:
+    if effect["name"] == "parameter":
+        return str(effect["port"]).replace("_", " ")
+    return f"{effect['name']} at the {effect['port']}"
+
+
+DISCREPANCY = Command(
+    "discrepancy",
+    "find where model and measurement disagree, name the effect and prove it",
+    _DETAILS,
+    _add_arguments,
+    _run,
+)

@@ -1,0 +1,138 @@
+"""A campaign: records of one rig in one session, with what is believed about it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
+from pymoo_hdte.discrepancy.campaign.plausibility import (
+    check_believed,
+    check_noise,
+    check_running,
+    check_torsion,
+)
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
+
+__all__ = ["Believed", "Campaign", "Rig", "RunningRecord", "TorsionRecord"]
+
+
+@dataclass(frozen=True, eq=False)
+class Campaign:
+    """Running and torsion records of one rig.
+
+    Attributes
+    ----------
+    title, drive : str
+        One line of printable text each.
+    believed : Believed
+        Drive and load, as they are thought to be.
+    rig : Rig
+        Speed loop and sensors.
+    running : tuple of RunningRecord
+        At least one.
+    torsion : tuple of TorsionRecord
+        May be empty.
+
+    Raises
+    ------
+    InvalidInput
+        For no running record, a name used twice, the same measurement under two names, beliefs that
+        no drive can have, or a record that contradicts them or the stated noise (see
+        `plausibility`).
+    """
+
+    title: str
+    drive: str
+    believed: Believed
+    rig: Rig
+    running: tuple[RunningRecord, ...]
+    torsion: tuple[TorsionRecord, ...]
+
+    def __post_init__(self) -> None:
+        for field in ("title", "drive"):
+            text = getattr(self, field)
+            if not isinstance(text, str) or not text.strip() or not text.isprintable():
+                raise InvalidInput(field, text, "one line of printable text")
+        if not self.running:
+            raise InvalidInput("running records", 0, "at least one")
+        self._check_each_once()
+        check_believed(self.believed)
+        largest_load = max(abs(record.load_torque) for record in self.running)
+        for record in self.running:
+            with _named(record.name):
+                check_running(record, self.believed, self.rig, largest_load)
+        for sweep in self.torsion:
+            with _named(sweep.name):
+                check_torsion(sweep, self.believed)
+        check_noise(self.running, self.torsion, self.believed, self.rig)
+
+    @property
+    def train(self) -> tuple[RunningRecord, ...]:
+        """Running records to fit; may be empty."""
+        return tuple(record for record in self.running if record.role == "train")
+
+    @property
+    def held_out(self) -> tuple[RunningRecord, ...]:
+        """Running records to judge by; empty where nothing can be said about new conditions."""
+        return tuple(record for record in self.running if record.role == "held_out")
+
+    @property
+    def torque_scale(self) -> float:
+        """Torques beside those that the library of effects is sized for, dimensionless.
+
+        See `pymoo_hdte.discrepancy.campaign.campaign`.
+        """
+        return torque_scale([record.load_torque for record in self.running], self.believed)
+
+    def _check_each_once(self) -> None:
+        names: set[str] = set()
+        measurements: dict[bytes, str] = {}
+        records: list[RunningRecord | TorsionRecord] = [*self.running, *self.torsion]
+        for record in records:
+            if record.name in names:
+                raise InvalidInput("name of a record", record.name, "each name once")
+            names.add(record.name)
+            # A copy among the held-out records would prove whatever was fitted to its twin.
+            twin = measurements.setdefault(record.output_angle.tobytes(), record.name)
+            if twin != record.name:
+                allowed = f"each measurement once; it repeats {twin}"
+                raise InvalidInput("record", record.name, allowed)
+
+
+@contextmanager
+def _named(name: str) -> Iterator[None]:
+    try:
+        yield
+    except InvalidInput as error:
+        raise InvalidInput(f"{name}: {error.field}", error.value, error.allowed) from None
+
+
+RATED_TORQUE = 40.0
+"""N.m at the output of the drive that the effects are sized for."""
+
+
+RATED_STIFFNESS = 2.583e4
+"""N.m/rad of its mesh."""
+
+
+def torque_scale(loads: Sequence[float], believed: Believed) -> float:
+    """Return the size of a drive in torque: 1 for rigs near `RATED_TORQUE`, a power of two.
+
+    The larger of what was loaded and what the stiffness lets expect, since the friction of a drive
+    that was tested with light loads, or with none, is still that of its size. In steps of two,
+    because only the size counts; and multiplying by a power of two does not round.
+
+    Parameters
+    ----------
+    loads : sequence of float
+        Of the running records, N.m.
+    believed : Believed
+        For the stiffness.
+    """
+    largest = max(abs(load) for load in loads)
+    size = max(largest / RATED_TORQUE, believed.stiffness / RATED_STIFFNESS)
+    return 2.0 ** round(math.log2(size))

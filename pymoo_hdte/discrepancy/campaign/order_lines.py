@@ -1,0 +1,297 @@
+"""Order lines of a running record: phasors of every channel over the measured input angle.
+
+A channel is fitted by a straight line in time and by lines at the given orders::
+
+    value(t) = mean + slope (t - t_mid) + Re sum_j phasor_j exp(i order_j theta_in)
+
+so that lines that do not close over the record (order 2.02) do not leak into each other. theta_in
+is the measured, absolute input angle; its noise counts as noise of all channels: of the two that
+hold it, and of each by the slope of its lines, order x |phasor| x N x angle_noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import factorial
+
+from pymoo_hdte.checks import InvalidInput, finite_array, real_number
+from pymoo_hdte.discrepancy.campaign.believed import Rig
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+
+CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
+
+HIGHEST_ORDER = 14.0
+"""Of the residual spectrum, cycles per input turn."""
+
+LARGEST_CONDITION = 1e3
+"""Of the matrix of the fit; beyond it the noise of the lines has grown a thousandfold."""
+
+LEAST_SEPARATION = 0.1
+"""Share of a line's power that the fitted lines must leave to it."""
+
+BLOCK = 64
+"""Lines of the residual spectrum worked on at once, to bound the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrderLines:
+    """Order lines of one record.
+
+    The channels are transmission error (rad), input torque (N.m), output torque (N.m) and input
+    angle (rad), in this order.
+
+    Attributes
+    ----------
+    orders : ndarray, shape (m,)
+        Cycles per input turn.
+    mean : ndarray, shape (4,)
+        Value of the straight line at the middle of the record, rad or N.m.
+    slope : ndarray, shape (4,)
+        Of the straight line, rad/s or N.m/s; that of the input angle is the mean input speed.
+    phasors : ndarray of complex, shape (4, m)
+        With the loss by averaging undone, rad or N.m.
+    covariance : ndarray, shape (4, 1 + 2 m, 1 + 2 m)
+        Of (mean, Re phasors, Im phasors) of each channel, from sensor noise and quantisation, in
+        the square of its unit.
+    row_covariance : ndarray, shape (4, 4)
+        Of the noise of one row between channels, in the product of their units. The covariance of
+        channel a with channel b is ``covariance[a] * row_covariance[a, b] / row_covariance[a, a]``:
+        the input encoder stands in the transmission error, in the input angle, and in the slopes of
+        all lines.
+    bends : ndarray of complex, shape (3, 1 + m)
+        Mean and phasors, in s^k, that signals (t - t_mid)^k / k!, k = 2, 3, 4, leave: a drift is no
+        straight line in a record of ten minutes, and an order that turns once in it takes what is
+        bent.
+    """
+
+    orders: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    slope: NDArray[np.float64]
+    phasors: NDArray[np.complex128]
+    covariance: NDArray[np.float64]
+    row_covariance: NDArray[np.float64]
+    bends: NDArray[np.complex128]
+
+
+def order_lines(
+    record: RunningRecord, rig: Rig, ratio: float, orders: ArrayLike | Sequence[float]
+) -> OrderLines:
+    """Fit order lines to every channel of a record by least squares.
+
+    Sinusoids at known frequencies that need not be periodic in the record, with a straight line:
+    the model of a least-squares spectrum (Lomb, Astrophysics and Space Science 39, 1976), all lines
+    at once.
+
+    Parameters
+    ----------
+    record : RunningRecord
+        Of a drive at constant speed.
+    rig : Rig
+        For the noise.
+    ratio : float
+        Transmission ratio N, dimensionless.
+    orders : array_like, shape (m,)
+        Cycles per input turn, above zero, below the Nyquist order of the record.
+
+    Returns
+    -------
+    OrderLines
+
+    Raises
+    ------
+    InvalidInput
+        For orders out of range or closer together than the record can tell apart.
+    """
+    fit = _Fit.of(record, ratio, orders)
+    gains = averaging_gain(fit.orders, record)
+    m = len(gains)
+    real, imaginary = fit.coefficients[2 : 2 + m].T, fit.coefficients[2 + m :].T
+    inverse = np.linalg.inv(fit.triangle)
+    kept = np.r_[0, 2 : 2 + 2 * m]
+    scales = 1.0 / np.concatenate([[1.0], gains, gains])
+    unit = (inverse @ inverse.T)[np.ix_(kept, kept)] * np.outer(scales, scales)
+    phasors = np.asarray((real + 1j * imaginary) / gains, dtype=complex)
+    noise = row_covariance(rig, ratio, record.samples_averaged)
+    # The angle's noise stands in the exponent too, where a line is steep; it is as good as white.
+    steepness = fit.orders * phasors
+    noise = noise + 0.5 * (steepness @ steepness.conj().T).real * noise[3, 3]
+    bends = inverse @ (fit.basis.T @ _bent(record))
+    lines = (bends[2 : 2 + m] + 1j * bends[2 + m :]).T / gains
+    return OrderLines(
+        orders=fit.orders,
+        mean=fit.coefficients[0],
+        slope=fit.coefficients[1],
+        phasors=phasors,
+        covariance=np.diag(noise)[:, None, None] * unit,
+        row_covariance=noise,
+        bends=np.column_stack([bends[0], lines]),
+    )
+
+
+def averaging_gain(orders: ArrayLike, record: RunningRecord) -> NDArray[np.float64]:
+    """Return by how much the averaging of raw samples shrinks lines, shape (m,).
+
+    The mean of n samples, Delta apart, of exp(i w t) is exp(i w t_mid) times
+    ``sin(n w Delta / 2) / (n sin(w Delta / 2))``, with w = order x mean input speed.
+    """
+    n = record.samples_averaged
+    half = np.asarray(orders) * _speed(record) / (2.0 * n * record.sample_rate)
+    return np.sin(n * half) / (n * np.sin(half))
+
+
+def row_covariance(rig: Rig, ratio: float, samples_averaged: int) -> NDArray[np.float64]:
+    """Return the covariance of the noise of one row between `CHANNELS`, shape (4, 4).
+
+    An encoder has the variance ``angle_noise**2 + angle_quantisation**2 / 12``, referred to the
+    output; the transmission error carries that of both.
+    """
+    encoder = rig.angle_noise**2 + rig.angle_quantisation**2 / 12.0
+    covariance = np.diag(
+        [2.0 * encoder, rig.input_torque_noise**2, rig.output_torque_noise**2, ratio**2 * encoder]
+    )
+    covariance[0, 3] = covariance[3, 0] = ratio * encoder
+    return covariance / samples_averaged
+
+
+def residual_spectrum(
+    record: RunningRecord, rig: Rig, ratio: float, orders: ArrayLike | Sequence[float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what the order lines leave, at multiples of 1/N and of 1, in units of the noise.
+
+    What turns with the output repeats in an output turn and what turns with the input in an input
+    turn; with a ratio that is no whole number, these are not the same orders.
+
+    Each line is fitted to the residual after it, too, was cleared of the fitted lines, so that
+    these do not leak into it. Orders too close to a fitted line are left out. Under noise
+    alone the power is exponential (Scargle, Astrophysical Journal 263, 1982).
+
+    Parameters
+    ----------
+    record, rig, ratio, orders
+        As in `order_lines`.
+
+    Returns
+    -------
+    orders : ndarray, shape (k,)
+        Cycles per input turn, up to 14 or the Nyquist order.
+    amplitudes : ndarray, shape (4, k)
+        Dimensionless, by channel as in `OrderLines`: over their root mean square under noise alone.
+        The square is then exponential with mean 1: a line exceeds x by chance with probability
+        exp(-x**2).
+
+    Raises
+    ------
+    InvalidInput
+        As `order_lines`.
+    """
+    fit = _Fit.of(record, ratio, orders)
+    highest = min(HIGHEST_ORDER, _nyquist_order(record))
+    multiples = np.arange(1, int(np.ceil(highest * ratio - 1e-9)))
+    whole = ratio * np.arange(1, int(np.ceil(highest - 1e-9)))
+    whole = whole[np.abs(whole - whole.round()) > 1e-9]
+    sigma = np.sqrt(np.diag(row_covariance(rig, ratio, record.samples_averaged)))
+    residual = (fit.values - fit.basis @ (fit.basis.T @ fit.values)) / sigma
+    rows = np.hstack([fit.basis, residual]).T
+    angle = record.input_angle[:, None] / ratio
+    found, amplitudes = [], []
+    for block, waves in _waves(angle, multiples, whole):
+        # As real numbers: a product of real and complex matrices would copy the real one.
+        products = (rows @ waves.view(float)).view(complex)
+        separate, amplitude = _amplitudes(waves, *np.split(products, [fit.basis.shape[1]]))
+        found.append(block[separate] / ratio)
+        amplitudes.append(amplitude)
+    searched = np.concatenate(found)
+    rising = np.argsort(searched)
+    return searched[rising], np.concatenate(amplitudes, axis=1)[:, rising]
+
+
+def _waves(
+    angle: NDArray[np.float64], multiples: NDArray[np.int_], others: NDArray[np.floating[Any]]
+) -> Iterator[tuple[NDArray[Any], NDArray[np.complex128]]]:
+    """Yield consecutive multiples in blocks, then others, with their waves over angles (n, 1)."""
+    powers = np.exp(1j * angle * np.arange(BLOCK))
+    for block in np.split(multiples, range(BLOCK, len(multiples), BLOCK)):
+        yield block, powers[:, : len(block)] * np.exp(1j * angle * block[0])
+    yield others, np.exp(1j * angle * others)
+
+
+def _amplitudes(
+    waves: NDArray[np.complex128],
+    shared: NDArray[np.complex128],
+    products: NDArray[np.complex128],
+) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Fit cosine and sine of each wave, cleared of the basis, to residuals of unit variance.
+
+    ``waves`` has shape (n, k), ``shared``, their part in the basis, (p, k), and ``products`` with
+    the residuals (4, k).
+    """
+    power = len(waves) - np.sum(np.abs(shared) ** 2, axis=0)
+    square = np.einsum("nk,nk->k", waves, waves) - np.sum(shared**2, axis=0)
+    separate = power - np.abs(square) > LEAST_SEPARATION * len(waves)
+    power, square, products = power[separate], square[separate], products[:, separate]
+    # Normal equations of the two columns: c'c = (power + Re square)/2, s's = (power - Re square)/2,
+    # c's = Im square / 2; their chi-square of two degrees of freedom has mean 2.
+    chi_square = 2.0 * (np.abs(products) ** 2 * power - np.real(products**2 * np.conj(square)))
+    chi_square /= power**2 - np.abs(square) ** 2
+    return separate, np.sqrt(chi_square / 2.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Least squares by QR: ``values = basis @ triangle @ coefficients + residual``."""
+
+    orders: NDArray[np.float64]
+    values: NDArray[np.float64]
+    basis: NDArray[np.float64]
+    triangle: NDArray[np.float64]
+    coefficients: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, record: RunningRecord, ratio: float, orders: ArrayLike) -> _Fit:
+        checked = finite_array("orders", orders, (None,))
+        for order in checked:
+            real_number("orders", float(order), above=0.0, below=_nyquist_order(record))
+        angle = np.outer(record.input_angle, checked)
+        time = _centred(record)
+        design = np.column_stack([np.ones_like(time), time, np.cos(angle), -np.sin(angle)])
+        scale = np.linalg.norm(design, axis=0)
+        basis, triangle = np.linalg.qr(design / scale)
+        if design.shape[0] <= design.shape[1] or np.linalg.cond(triangle) > LARGEST_CONDITION:
+            allowed = "orders that a record of this length can tell apart"
+            raise InvalidInput("orders", checked.tolist(), allowed)
+        values = np.column_stack(
+            [
+                record.transmission_error(ratio),
+                record.input_torque,
+                record.output_torque,
+                record.input_angle,
+            ]
+        )
+        triangle = triangle * scale
+        coefficients = np.linalg.solve(triangle, basis.T @ values)
+        return cls(checked, values, basis, triangle, coefficients)
+
+
+def _centred(record: RunningRecord) -> NDArray[np.float64]:
+    return np.asarray(record.time - (record.time[0] + record.time[-1]) / 2.0)
+
+
+def _bent(record: RunningRecord) -> NDArray[np.float64]:
+    """Return (t - t_mid)^k / k! for k = 2, 3, 4, shape (n, 3)."""
+    powers = np.arange(2, 5)
+    return np.asarray(_centred(record)[:, None] ** powers / factorial(powers))
+
+
+def _speed(record: RunningRecord) -> float:
+    travel = record.input_angle[-1] - record.input_angle[0]
+    return abs(float(travel / (record.time[-1] - record.time[0])))
+
+
+def _nyquist_order(record: RunningRecord) -> float:
+    """Return the order at half the rate of the rows, in cycles per input turn."""
+    return float(np.pi * record.sample_rate / _speed(record))

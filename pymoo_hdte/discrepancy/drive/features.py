@@ -1,0 +1,162 @@
+"""What a campaign's running records say, as numbers with a full covariance.
+
+A record's features are the means of transmission error and input torque, then real and imaginary
+parts of the order lines of every channel. Their covariance is that of the sensors (both encoders
+share the input's noise) plus that of the repeatability: the static error changes a little from one
+record to the next, and the drive's own response carries that to all channels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.campaign.believed import Rig
+from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS, OrderLines, order_lines
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.drive.prediction import Conditions, Prediction
+
+MEANS = (0, 1)
+"""Channels whose mean is a feature; the others' means are conditions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """Features of r records.
+
+    Attributes
+    ----------
+    records : tuple of RunningRecord
+    conditions : Conditions
+    orders : ndarray, shape (m,)
+        Cycles per input turn.
+    values : ndarray, shape (r, n_features)
+    covariance : ndarray, shape (r, n_features, n_features)
+        Of the sensors' noise only.
+    """
+
+    records: tuple[RunningRecord, ...]
+    conditions: Conditions
+    orders: NDArray[np.float64]
+    values: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+    def rows(self, rows: NDArray[np.int_]) -> Features:
+        """Return the features of some of the records."""
+        conditions = Conditions(
+            self.conditions.input_speed[rows],
+            self.conditions.output_torque[rows],
+            self.conditions.elapsed[rows],
+            self.conditions.bends[rows],
+        )
+        records = tuple(self.records[row] for row in rows)
+        return Features(records, conditions, self.orders, self.values[rows], self.covariance[rows])
+
+    def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
+        """Return predicted features, shape (v, r, n_features)."""
+        return stack(prediction.mean, prediction.phasors)
+
+    def places(self, channel: int) -> NDArray[np.int_]:
+        """Return the places (m, 2) of a channel's real and imaginary parts among the features."""
+        m = len(self.orders)
+        first = len(MEANS) + 2 * m * channel
+        return first + np.array([np.arange(m), m + np.arange(m)]).T
+
+
+def stack(mean: NDArray[np.float64], phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Return means (..., 4) and phasors (..., 4, m) as features (..., n_features)."""
+    lines = np.concatenate([phasors.real, phasors.imag], axis=-1)
+    flat = lines.reshape(*lines.shape[:-2], -1)
+    return np.concatenate([mean[..., list(MEANS)], flat], axis=-1)
+
+
+def measure(
+    campaign: Campaign, records: Sequence[RunningRecord], orders: Sequence[float]
+) -> Features:
+    """Return the features of records at these orders.
+
+    Raises
+    ------
+    InvalidInput
+        For orders that a record cannot tell apart or that lie beyond its Nyquist order.
+    """
+    ratio, rig = campaign.believed.ratio, campaign.rig
+    lines = [order_lines(record, rig, ratio, orders) for record in records]
+    conditions = Conditions(
+        input_speed=np.array([line.slope[3] for line in lines]),
+        output_torque=np.array([line.mean[2] for line in lines]),
+        elapsed=np.array([_middle(record) for record in records]),
+        bends=np.array([line.bends for line in lines]),
+    )
+    values = np.array([stack(line.mean, line.phasors) for line in lines])
+    stiffness = campaign.believed.stiffness
+    covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
+    return Features(tuple(records), conditions, np.array(orders), values, covariance)
+
+
+def _middle(record: RunningRecord) -> float:
+    """Return the time from the start of the session to the middle of a record, s."""
+    # The first row is the mean of samples that end within a row's time: what is later or earlier
+    # is another clock, of the session or of the world.
+    own_clock = abs(record.time[0]) * record.sample_rate <= 1.0
+    start = 0.0 if own_clock else record.time[0]
+    return float(record.elapsed + (record.time[0] + record.time[-1]) / 2.0 - start)
+
+
+def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[np.float64]:
+    """Return the covariance of one record's features, shape (n_features, n_features)."""
+    m = len(line.orders)
+    size = len(MEANS) + 2 * m * len(CHANNELS)
+    covariance = np.zeros((size, size))
+    # Where the mean (0) and the lines (1 .. 2 m) of each channel stand among the features.
+    places = [
+        np.concatenate([[channel] if channel in MEANS else [-1], len(MEANS) + 2 * m * channel
+                        + np.arange(2 * m)])
+        for channel in range(len(CHANNELS))
+    ]  # fmt: skip
+    for one, first in enumerate(places):
+        for other, second in enumerate(places):
+            share = line.row_covariance[one, other] / line.row_covariance[one, one]
+            block = share * line.covariance[one]
+            rows, columns = first >= 0, second >= 0
+            covariance[np.ix_(first[rows], second[columns])] += block[np.ix_(rows, columns)]
+    # The load is taken from the output torque: its error winds the drive up.
+    covariance[0, 0] += line.covariance[2, 0, 0] / stiffness**2
+    return covariance
+
+
+def degrees_of_freedom(data: Data) -> Values:
+    """Return those of each cell, shape (4, 1 + m)."""
+    freedom = np.full((len(CHANNELS), 1 + len(data.features.orders)), 2.0)
+    freedom[:, 0] = 1.0
+    return freedom
+
+
+def cell_chi_square(data: Data, difference: Values) -> Values:
+    """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m)."""
+    covariance = data.covariance
+    found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            found[:, channel, 0] = difference[:, channel] ** 2 / covariance[:, channel, channel]
+        for line, pair in enumerate(data.features.places(channel)):
+            block = covariance[:, pair[:, None], pair]
+            part = difference[:, pair, None]
+            solved = np.linalg.solve(block, part)
+            found[:, channel, 1 + line] = np.sum(part * solved, axis=(1, 2))
+    return found
+
+
+def as_lines(data: Data, difference: Values) -> NDArray[np.complex128]:
+    """Return differences of features (r, f) as phasors of cells (r, 4, 1 + m)."""
+    found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan, dtype=complex)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            found[:, channel, 0] = difference[:, channel]
+        real, imaginary = data.features.places(channel).T
+        found[:, channel, 1:] = difference[:, real] + 1j * difference[:, imaginary]
+    return found

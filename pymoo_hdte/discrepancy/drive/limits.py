@@ -1,0 +1,116 @@
+"""What a campaign cannot tell: conditions that no record varies, lines that are not looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.drive.analysis import Analysis, highest_order
+from pymoo_hdte.discrepancy.engine.candidate import harmonics_among
+from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
+
+_SAME_SPEED = 1.1
+"""Ratio of the largest to the smallest speed up to which records run at one speed."""
+_SAME_LOAD = 0.1
+"""Range of loads, as a share of the largest, up to which records carry one load."""
+_SAME_ORDER = 1e-6
+"""Largest distance at which a line is that of an order: one beside it is not predicted for it."""
+
+
+def limits(analysis: Analysis) -> list[str]:
+    """Return a sentence for everything that the records of a campaign cannot tell.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of `workflow.analyse`.
+    """
+    return [*_unproven(analysis), *_unvaried(analysis), *_unseen(analysis), *_too_high(analysis)]
+
+
+def _unproven(analysis: Analysis) -> list[str]:
+    found = []
+    if not analysis.campaign.held_out:
+        found.append("No record was held out: nothing is proven about conditions not fitted.")
+    fitted = {record.name for record in analysis.data.features.records}
+    if analysis.campaign.held_out and (held_out := analysis.held_out) is None:
+        found.append("All held-out records rattle: nothing is proven about conditions not fitted.")
+    elif analysis.campaign.held_out and held_out is not None:
+        fitted |= {record.name for record in held_out.features.records}
+    left_out = [record.name for record in analysis.campaign.running if record.name not in fitted]
+    if left_out:
+        found.append(
+            "Neither fitted nor predicted, because the load does not hold the tooth flanks "
+            f"together: {', '.join(left_out)}."
+        )
+    return found
+
+
+def _unvaried(analysis: Analysis) -> list[str]:
+    records, found = analysis.data.features.records, []
+    speeds = np.array([record.input_speed for record in records])
+    loads = np.array([record.load_torque for record in records])
+    if np.abs(speeds).max() <= _SAME_SPEED * np.abs(speeds).min():
+        found.append(
+            "All fitted records run at one speed: dry friction, friction that changes with speed "
+            "and damping cannot be told apart."
+        )
+    if np.ptp(loads) <= _SAME_LOAD * np.abs(loads).max():
+        found.append(
+            "All fitted records carry one load: an error that grows with load cannot be told from "
+            "one that does not."
+        )
+    if np.all(speeds > 0.0) or np.all(speeds < 0.0):
+        found.append(
+            "All fitted records turn one way: only the stated zero error of the input torque "
+            f"sensor, {analysis.campaign.rig.input_torque_zero:g} N.m, tells dry friction at the "
+            "input from it."
+        )
+    if np.ptp([record.elapsed for record in records]) == 0.0:
+        found.append("All fitted records stand at one time of the session: no drift can be seen.")
+    if not analysis.data.torsion:
+        found.append(
+            "No torsion sweep was fitted: a clearance cannot be told from a soft wind-up, nor "
+            "hysteresis from damping, where the running records do not pass through zero torque."
+        )
+    return found
+
+
+def _unseen(analysis: Analysis) -> list[str]:
+    orders, highest = analysis.data.features.orders, highest_order(analysis.campaign)
+    believed = analysis.campaign.believed
+    unseen = [
+        order
+        for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True)
+        if amplitude != 0.0 and np.abs(orders - order).min() > _SAME_ORDER
+    ]
+    found = []
+    if mixed := _named([order for order in unseen if order <= highest]):
+        found.append(f"The records do not resolve the believed static error of order {mixed}.")
+    if high := _named([order for order in unseen if order > highest]):
+        found.append(
+            f"The believed static error of order {high} is not looked at: lines are compared up to "
+            f"order {highest:.3g}."
+        )
+    return found
+
+
+def _too_high(analysis: Analysis) -> list[str]:
+    verdict, highest = analysis.verdict, highest_order(analysis.campaign)
+    if verdict.chosen is None or not verdict.leaves_more_than_noise:
+        return []
+    seen = analysis.data.features.orders.tolist()
+    orders = {one.order for one in verdict.chosen.candidates if one.order is not None}
+    values = ", which may shift the values of the effect" if verdict.status in EXPLAINED else ""
+    # A line that nobody expects is searched strictly below the highest order.
+    return [
+        f"Order {2.0 * order:.4g}, the second harmonic of order {order:.4g}, is not looked at: "
+        f"lines are searched below order {highest:.3g}. What is left may be that harmonic{values}."
+        for order in sorted(orders)
+        if 2.0 * order >= highest and harmonics_among(seen, order, 2) == 1
+    ]
+
+
+def _named(orders: Sequence[float]) -> str:
+    return ", ".join(f"{order:.4g}" for order in orders)

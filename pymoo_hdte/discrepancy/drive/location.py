@@ -1,0 +1,184 @@
+"""Where the model is wrong: the map channel x order x speed x load, and where it may be trusted.
+
+A cell's misfit is weighed by its own marginal covariance, so that it stays in its cell, and held
+against base parameters that the misfit did not bias: those of the model with its named effects,
+refitted to the cells that it explains. Flagged is what the named effects move by more than the
+noise, and what the model with them still gets wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import lsq_linear
+from scipy.stats import chi2
+
+from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.drive.features import (
+    MEANS,
+    as_lines,
+    cell_chi_square,
+    degrees_of_freedom,
+)
+from pymoo_hdte.discrepancy.drive.misfit_map import (
+    FALSE_DISCOVERIES,
+    Flags,
+    Location,
+    Values,
+    benjamini_hochberg,
+)
+from pymoo_hdte.discrepancy.drive.misfit_words import sentences
+from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
+from pymoo_hdte.discrepancy.drive.revision import accepted_fit
+from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
+from pymoo_hdte.drive import Effect
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
+
+__all__ = ["Location", "locate", "refit_clean"]
+
+_LINEARISATIONS = 2
+_ROUNDS = 15
+"""Of renewed weights, for one linearisation."""
+_EVALUATIONS = 10
+"""Of the residuals, when the weights stand."""
+_SETTLED = 0.05
+"""Relative change of all weights that ends the rounds."""
+_CAUCHY = 4.0
+"""Square of the scale of Cauchy's weights, in variances."""
+_LEFT_OUT = 1e8
+"""Factor on the variance of a cell that is left out of a fit."""
+
+
+def locate(analysis: Analysis) -> Location:
+    """Return the map of the misfit with its sentences.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of `workflow.analyse`.
+    """
+    data = analysis.data
+    clean = refit_clean(data, accepted_fit(analysis.verdict))
+    base = clean.values[None, : len(data.base)]
+    without, complete = data.predict(base, ())[0], data.predict(base, clean.effects)[0]
+    freedom = degrees_of_freedom(data)
+    chi_square = cell_chi_square(data, data.features.values - without)
+    moved = cell_chi_square(data, complete - without)
+    left = cell_chi_square(data, data.features.values - complete)
+    sweep = _sweep_p_value(data, clean.values, ())
+    conditions = data.features.conditions
+    found = Location(
+        records=tuple(record.name for record in data.features.records),
+        speed_rpm=conditions.input_speed / REVOLUTION_PER_MINUTE,
+        load_torque=conditions.output_torque,
+        orders=np.concatenate([[0.0], data.features.orders]),
+        misfit=as_lines(data, data.features.values - without),
+        chi_square=chi_square,
+        p_value=chi2.sf(chi_square, freedom),
+        moved=moved,
+        flagged=(moved > freedom) | _significant(left, freedom),
+        sweep_p_value=sweep,
+        sweep_flagged=_wrong(sweep),
+        named=bool(clean.candidates),
+    )
+    sentence, trusted = sentences(found, data, analysis.unexpected)
+    return replace(found, sentence=sentence, trusted=trusted)
+
+
+def refit_clean(data: Data, fitted: Fit) -> Fit:
+    """Refit a model within its bounds to the cells that it does not contradict.
+
+    First with the weights of Cauchy's distribution, because a misfit that the fit has spread over
+    all cells makes clean ones look wrong; then with the cells that are still wrong left out. A
+    torsion sweep that contradicts the running records is left out too.
+
+    Parameters
+    ----------
+    data : Data
+    fitted : Fit
+        Its effects are kept; returned as it is where it contradicts nothing.
+    """
+    freedom = degrees_of_freedom(data)
+    chi_square, sweep = _misfit(data, fitted)
+    if not (_significant(chi_square, freedom).any() or _wrong(sweep)):
+        return fitted
+    values = fitted.values
+    for _ in range(_LINEARISATIONS):
+        values = _robust_step(data, replace(fitted, values=values))
+    fitted = replace(fitted, values=values)
+    chi_square, sweep = _misfit(data, fitted)
+    factor = np.where(_significant(chi_square, freedom), _LEFT_OUT, 1.0)
+    weakened = _weakened(data, factor, _wrong(sweep))
+    return fit(weakened, fitted.candidates, values, _EVALUATIONS, fitted.slopes)
+
+
+def _robust_step(data: Data, fitted: Fit) -> Values:
+    """Return values with which the linearised model misses least by Cauchy's measure.
+
+    Weights are renewed after every solution of the bounded linear problem until they settle.
+    """
+    freedom = degrees_of_freedom(data)
+    _, sweep = _misfit(data, fitted)
+    kept = replace(data, torsion=()) if _wrong(sweep) else data
+    objective = Objective(kept, fitted.candidates, fitted.slopes)
+    difference, others = objective.differences(fitted.values)
+    slopes, others_slopes = objective.derivatives(fitted.values)
+    lower = (objective.lower - fitted.values) / objective.scale
+    upper = (objective.upper - fitted.values) / objective.scale
+    step, factor = np.zeros(len(lower)), np.full((len(difference), *freedom.shape), np.inf)
+    for _ in range(_ROUNDS):
+        missed = difference + np.tensordot(step, slopes, 1)
+        before, factor = factor, 1.0 + cell_chi_square(data, missed) / (_CAUCHY * freedom)
+        if np.allclose(before, factor, rtol=_SETTLED, atol=0.0, equal_nan=True):
+            break
+        weakened = _weakened(data, factor, False)
+        matrix = np.concatenate([weakened.whiten(slopes), others_slopes], axis=1).T
+        right = -np.concatenate([weakened.whiten(difference), others])
+        # Values may lie at a bound, and beyond it by rounding.
+        step = lsq_linear(matrix, right, (np.minimum(lower, 0.0), np.maximum(upper, 0.0))).x
+    return np.clip(fitted.values + step * objective.scale, objective.lower, objective.upper)
+
+
+def _misfit(data: Data, fitted: Fit) -> tuple[Values, float | None]:
+    """Return the chi-square of all cells and the p-value of the sweep."""
+    predicted = data.predict(fitted.values[None, : len(data.base)], fitted.effects)[0]
+    chi_square = cell_chi_square(data, data.features.values - predicted)
+    return chi_square, _sweep_p_value(data, fitted.values, fitted.effects)
+
+
+def _significant(chi_square: Values, freedom: Values) -> Flags:
+    return benjamini_hochberg(chi2.sf(chi_square, freedom), FALSE_DISCOVERIES)
+
+
+def _wrong(sweep: float | None) -> bool:
+    return sweep is not None and sweep < FALSE_DISCOVERIES
+
+
+def _weakened(data: Data, factor: Values, without_sweep: bool) -> Data:
+    """Return the data with the variances of cells (r, 4, 1 + m) multiplied by a factor."""
+    features = data.features
+    by_feature = np.ones_like(features.values)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            by_feature[:, channel] = factor[:, channel, 0]
+        for part in features.places(channel).T:
+            by_feature[:, part] = factor[:, channel, 1:]
+    covariance = features.covariance.copy()
+    diagonal = np.arange(features.values.shape[1])
+    # Added to the whole covariance, that of the repeatability included, not to the sensors' alone.
+    variance = np.diagonal(data.covariance, axis1=1, axis2=2)
+    covariance[:, diagonal, diagonal] += (by_feature - 1.0) * variance
+    weakened = replace(features, covariance=covariance)
+    return replace(data, features=weakened, torsion=() if without_sweep else data.torsion)
+
+
+def _sweep_p_value(data: Data, values: Values, effects: tuple[Effect, ...]) -> float | None:
+    """Return the chance of a larger misfit of the torsion sweeps; None where there is none."""
+    residuals = data.torsion_residuals(values[None, : len(data.base)], effects)[0]
+    if not residuals.size:
+        return None
+    known = np.nan_to_num(residuals, nan=LOST)
+    return float(chi2.sf(known @ known, known.size))

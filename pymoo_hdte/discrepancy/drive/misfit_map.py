@@ -1,0 +1,105 @@
+"""The map of a misfit: one cell for the mean or one order line of one channel in one record."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+
+if TYPE_CHECKING:
+    pass
+
+FALSE_DISCOVERIES = 0.01
+"""Share of flagged cells that may be clean, after Benjamini and Hochberg (J. R. Stat. Soc. B 1995);
+their rule holds for the positive dependence that shared parameters give neighbouring cells."""
+
+Values = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Location:
+    """Where the misfit lives. Cells have shape (r, 4, 1 + m): record, channel, order.
+
+    Channels are those of `order_lines.CHANNELS`. Order 0 is the mean.
+
+    Attributes
+    ----------
+    records : tuple of str, length r
+    speed_rpm, load_torque : ndarray, shape (r,)
+        r/min of the input, N.m.
+    orders : ndarray, shape (1 + m,)
+        Cycles per input turn.
+    misfit : complex ndarray, shape (r, 4, 1 + m)
+        Measured minus base model, rad and N.m; nan where a mean is a condition.
+    chi_square : ndarray, shape (r, 4, 1 + m)
+        Of the misfit: two degrees of freedom for a line, one for a mean.
+    p_value : ndarray, shape (r, 4, 1 + m)
+    moved : ndarray, shape (r, 4, 1 + m)
+        Chi-square of what the named effects change; zero where none is named.
+    flagged : ndarray of bool, shape (r, 4, 1 + m)
+        Cells that the named effects move by more than the root mean square of the noise, and
+        those whose misfit the model with them leaves significant at `FALSE_DISCOVERIES`.
+    sweep_p_value : float or None
+        Of the torsion sweep, None without one.
+    sweep_flagged : bool
+    named : bool
+        Whether there are named effects.
+    sentence, trusted : str
+        Where the misfit lives, and where the model may be trusted as it is.
+    """
+
+    records: tuple[str, ...]
+    speed_rpm: Values
+    load_torque: Values
+    orders: Values
+    misfit: NDArray[np.complex128]
+    chi_square: Values
+    p_value: Values
+    moved: Values
+    flagged: Flags
+    sweep_p_value: float | None
+    sweep_flagged: bool
+    named: bool
+    sentence: str = ""
+    trusted: str = ""
+
+    @property
+    def cells(self) -> int:
+        """Number of cells of the map."""
+        return int(np.isfinite(self.chi_square).sum())
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ``verdict.json`` says of it, as plain types."""
+        flagged = [
+            {
+                "record": self.records[record],
+                "speed_rpm": float(self.speed_rpm[record]),
+                "load_Nm": float(self.load_torque[record]),
+                "channel": CHANNELS[channel],
+                "order": float(self.orders[order]),
+                "chi_square": float(self.chi_square[record, channel, order]),
+                "p_value": float(self.p_value[record, channel, order]),
+            }
+            for record, channel, order in np.argwhere(self.flagged)
+        ]
+        return {
+            "sentence": self.sentence,
+            "trusted": self.trusted,
+            "cells": self.cells,
+            "rule": "moved by the named effects, or wrong at a false discovery rate of 1 %",
+            "flagged": flagged,
+            "torsion_sweep": {"p_value": self.sweep_p_value, "flagged": self.sweep_flagged},
+        }
+
+
+def benjamini_hochberg(p_value: Values, rate: float) -> Flags:
+    """Return which hypotheses are rejected at a false discovery rate; nan never is."""
+    ordered = np.sort(p_value[np.isfinite(p_value)])
+    passed = np.flatnonzero(ordered <= rate * np.arange(1, len(ordered) + 1) / len(ordered))
+    limit = ordered[passed[-1]] if passed.size else -1.0
+    return np.asarray(p_value <= limit, dtype=bool)

@@ -1,0 +1,176 @@
+"""What kind of misfit it is: of a torque, a compliance or the kinematics.
+
+At low speed, where inertia is small, the torsion is the torque over the stiffness. A transmission
+error that follows the torques measured is therefore caused by them, and one that does not is made
+in the mesh or in an encoder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS, residual_spectrum
+from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.drive.misfit_map import Location
+
+_SLOW_SHARE = 0.1
+"""Share of the misfit in the slower half of the records below which it counts as one of speed."""
+_EXPLAINED = 0.25
+"""Share of the power that may remain of a misfit that another one causes."""
+_GROWTH = 2.0
+"""Ratio of amplitudes between the upper and lower half of the conditions that counts as growth."""
+
+Values = NDArray[np.float64]
+
+
+def sizes(location: Location) -> Values:
+    """Return the flagged cells in standard deviations, zero elsewhere.
+
+    Not as chi-square, of which a single cell of a quiet sensor would make up nearly all.
+    """
+    size = np.maximum(np.nan_to_num(location.chi_square), np.nan_to_num(location.moved))
+    return np.where(location.flagged, np.sqrt(size), 0.0)
+
+
+def growth(power: Values, condition: Values) -> float | None:
+    """Return the ratio of amplitudes in the upper half of a condition to the lower, or None.
+
+    None stands for a condition that was not varied.
+    """
+    condition = np.abs(condition)
+    upper = condition > (condition.min() + condition.max()) / 2.0
+    if upper.all() or not upper.any() or np.ptp(condition) < 0.05 * condition.max():
+        return None
+    return float(np.sqrt(power[upper].mean() / max(power[~upper].mean(), 1e-300)))
+
+
+def changes(ratio: float | None, name: str) -> str:
+    """Return in words how a misfit changes with a condition."""
+    if ratio is None:
+        return f"was seen at one {name} only"
+    if ratio > _GROWTH:
+        return f"grows with {name}" + (f" ({ratio:.2g}-fold)" if ratio < 100.0 else "")
+    if ratio < 1.0 / _GROWTH:
+        return f"falls with {name}" + (f" ({1.0 / ratio:.2g}-fold)" if ratio > 0.01 else "")
+    return f"hardly changes with {name}"
+
+
+def nature(location: Location, believed: Believed) -> str:
+    """Return in words what kind of misfit it is."""
+    speed = np.abs(location.speed_rpm)
+    slow = speed <= np.median(speed)
+    size = sizes(location)[:, :3].sum(axis=(1, 2))
+    if size[slow].sum() <= _SLOW_SHARE * size.sum():
+        return "It shows at speed only, as a torque of inertia or damping does"
+    misfit = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)[slow]
+    # As twists: what the torques do to the torsion through the stiffness.
+    error = misfit[:, 0]
+    from_input = misfit[:, 1] * believed.ratio / believed.stiffness
+    from_output = misfit[:, 2] / believed.stiffness
+    if _power(error) <= _EXPLAINED * max(_power(from_input), _power(from_output)):
+        return _torque(from_input, from_output)
+    seen = location.flagged[slow, 0]
+    if _power((error - from_output)[seen]) <= _EXPLAINED * _power(error):
+        return _torque(from_input, from_output)
+    if _power((error - from_input)[seen]) <= _EXPLAINED * _power(error):
+        return "It is torque-like and acts on the output of the drive: the input has to supply it"
+    if location.sweep_flagged:
+        return "It is in the torsion: the sweep with the input locked shows it, too"
+    ratio = growth(np.sum(np.abs(error) ** 2, axis=1), location.load_torque[slow])
+    if ratio is not None and ratio > _GROWTH:
+        return "It is a compliance: the torsion under load is not what the stiffness says"
+    return "It is kinematic: no torque goes with it, as for an error of teeth or encoders"
+
+
+def _torque(from_input: NDArray[np.complex128], from_output: NDArray[np.complex128]) -> str:
+    """Return the words for a torque, with the side on which it acts.
+
+    One on the output has to pass through the drive and shows on both sides.
+    """
+    if _power(from_output) < _EXPLAINED * _power(from_input):
+        return "It is torque-like and acts on the input: the output torque hardly shows it"
+    return "It is torque-like and comes from the load: the torsion merely follows it"
+
+
+def _power(lines: NDArray[np.complex128]) -> float:
+    return float(np.sum(np.abs(lines) ** 2))
+
+
+_FALSE_LINES = 1e-3
+"""Chance that noise alone shows a line beyond the expected ones in a whole campaign."""
+
+
+_SAME_FREQUENCY = 0.02
+
+
+_FEWEST = 3
+"""Records that must share a frequency before it is called fixed."""
+
+
+_BROAD = 8.0
+"""Lines that share the power from which on a band is broad; one line that leaks fills two."""
+
+
+@dataclass(frozen=True)
+class StrayLines:
+    """Lines that are no orders.
+
+    Attributes
+    ----------
+    frequency : float or None
+        Hz, of a line that records at several speeds share.
+    broad : tuple of str
+        Channels in which many neighbouring lines share the power.
+    """
+
+    frequency: float | None = None
+    broad: tuple[str, ...] = ()
+
+
+def stray_lines(data: Data, unexpected: Sequence[float]) -> StrayLines:
+    """Return the lines of a campaign that are no orders.
+
+    Parameters
+    ----------
+    data : Data
+    unexpected : sequence of float
+        Orders of the features that are there only because records showed something at them.
+    """
+    if not unexpected:
+        return StrayLines()
+    ratio, rig, features = data.campaign.believed.ratio, data.campaign.rig, data.features
+    known = [order for order in features.orders if np.abs(order - unexpected).min() > 1e-6]
+    speeds = np.abs(features.conditions.input_speed)
+    peaks, widths = [], []
+    for record, speed in zip(features.records, speeds, strict=True):
+        orders, amplitudes = residual_spectrum(record, rig, ratio, known)
+        power = amplitudes**2
+        power[power < np.log(power.size * len(speeds) / _FALSE_LINES)] = 0.0
+        widths.append(_lines_in_effect(power))
+        if power.any():
+            strongest = int(np.argmax(power.max(axis=0)))
+            peaks.append((orders[strongest] * speed / (2.0 * np.pi), speed))
+    broad = np.median(widths, axis=0) > _BROAD
+    names = tuple(name for name, wide in zip(CHANNELS, broad, strict=True) if wide)
+    return StrayLines(None if names else _shared(np.array(peaks).reshape(-1, 2)), names)
+
+
+def _lines_in_effect(power: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how many lines share the power (4, k) of each channel: (sum p)^2 / sum p^2."""
+    square = np.maximum(np.sum(power**2, axis=1), np.finfo(float).tiny)
+    return np.asarray(np.sum(power, axis=1) ** 2 / square)
+
+
+def _shared(peaks: NDArray[np.float64]) -> float | None:
+    """Return the frequency that peaks (k, 2), in Hz at a speed, have in common at many speeds."""
+    frequencies, speeds = peaks.T
+    for frequency in frequencies:
+        same = np.abs(frequencies / frequency - 1.0) < _SAME_FREQUENCY
+        if same.sum() >= _FEWEST and np.ptp(speeds[same]) > 0.1 * speeds[same].max():
+            return float(np.median(frequencies[same]))
+    return None

@@ -1,0 +1,195 @@
+"""The next experiment: the test that best tells the named effect from its nearest rivals.
+
+Two models that fit all that was measured are held against each other in tests within the range of
+conditions measured, new ones and repeats: a further record of a known condition still averages its
+noise, and is called a repeat. Their difference is weighed by the noise and by what either model
+leaves uncertain there, after Hunter and Reiner (Technometrics 1965) and Box and Hill (Technometrics
+1967). Where nothing is missing, the most uncertain prediction is what a further record would teach
+most about.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.features import MEANS
+from pymoo_hdte.discrepancy.drive.line_candidates import ENCODER_LINE
+from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
+from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.drive import LawAtPort
+from pymoo_hdte.laws.friction import CoulombFriction
+
+TESTS = ("running", "torsion_sweep", "reclocked_encoder")
+
+SEPARATED = 9.0
+"""Least expected chi-square, three standard deviations, at which a test tells two models apart."""
+_RIVALS = 2
+OF_ENCODER = ("eccentricity", ENCODER_LINE)
+LARGEST_TURNS = 100
+"""Cycles per output turn; faster lines of the drive betray themselves by its response."""
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What to measure next.
+
+    Attributes
+    ----------
+    description : str
+        For the report.
+    test : str
+        One of `TESTS`.
+    speed_rpm, load_torque : float or None
+        r/min of the input, negative in reverse, and N.m; None for a sweep.
+    separates : tuple of str, or None
+        Labels of the two models; None where the aim is a less uncertain prediction.
+    expected_separation : float
+        Chi-square between the two models, or of the uncertain prediction.
+    """
+
+    description: str
+    test: str
+    speed_rpm: float | None
+    load_torque: float | None
+    separates: tuple[str, str] | None
+    expected_separation: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain types."""
+        return asdict(self) | {"separates": list(self.separates) if self.separates else None}
+
+
+def next_experiment(analysis: Analysis) -> Proposal:
+    """Return the test to make next.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        Of `workflow.analyse`.
+    """
+    verdict, grid = analysis.verdict, Grid.of(analysis)
+    if verdict.chosen is None:
+        return _most_uncertain(grid, grid.model(verdict.base))
+    chosen = verdict.chosen.fit
+    twin = _encoder_twin(grid, chosen) or _zero_twin(grid, analysis, chosen)
+    if twin is not None and verdict.status != "unlisted":
+        return twin
+    model = grid.model(chosen)
+    rivals = [grid.model(fitted) for fitted in nearest_rivals(verdict)]
+    if not rivals:
+        return _most_uncertain(grid, model)
+    separations = np.array([separation(model, rival) for rival in rivals])
+    test = int(np.argmax(separations.min(axis=0)))
+    closest = int(np.argmin(separations[:, test]))
+    labels = model.label, rivals[closest].label
+    return _proposal(grid, test, labels, float(separations[closest, test]), verdict)
+
+
+def nearest_rivals(verdict: Verdict) -> list[Fit]:
+    """Return the fits of other effects that come nearest to the chosen ones, nearest first."""
+    if verdict.chosen is None:
+        return []
+    names = {candidate.name for candidate in verdict.chosen.candidates}
+    others = [*verdict.equivalent, *sorted(verdict.alternatives, key=lambda rival: rival.bic)]
+    found: dict[frozenset[str], Fit] = {}
+    for rival in others:
+        theirs = frozenset(candidate.name for candidate in rival.candidates)
+        # One effect more is no rival: it explains at least as much wherever one looks.
+        if not names <= theirs:
+            found.setdefault(theirs, rival.fit)
+    return list(found.values())[:_RIVALS]
+
+
+def _proposal(
+    grid: Grid, test: int, labels: tuple[str, str], expected: float, verdict: Verdict
+) -> Proposal:
+    one, other = labels
+    what, speed, load, kind = grid.condition(test)
+    if verdict.status == "unlisted":
+        said = f"Neither {one} nor {other} explains the data; they differ most in"
+    elif expected < SEPARATED:
+        said = f"{one} and {other} predict nearly the same in every test; they differ most in"
+    elif verdict.equivalent:
+        said = f"The data cannot tell {one} from {other}; what can is"
+    else:
+        said = f"The data tell {one} from its rivals; the best further proof against {other} is"
+    return Proposal(f"{said} {what}.", kind, speed, load, labels, expected)
+
+
+def _most_uncertain(grid: Grid, model: Model) -> Proposal:
+    """Return the running record whose prediction the fit leaves most uncertain."""
+    variance = np.sum(model.influence[: len(grid.speed_rpm)] ** 2, axis=(1, 2))
+    test = int(np.argmax(variance))
+    what, speed, load, kind = grid.condition(test)
+    text = f"The model is least certain of {what}: make it."
+    return Proposal(text, kind, speed, load, None, float(variance[test]))
+
+
+def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
+    """Return the test for a line of whole cycles per output turn: of the drive, or the encoder."""
+    ratio = grid.data.campaign.believed.ratio
+    for place, candidate in enumerate(chosen.candidates):
+        if candidate.order is None or candidate.name not in (*OF_ENCODER, "kinematic_error"):
+            continue
+        turns = round(candidate.order * ratio)
+        if turns > LARGEST_TURNS or abs(candidate.order * ratio - turns) > 1e-6:
+            continue
+        of_encoder = "eccentricity" if turns == 1 else ENCODER_LINE
+        twin = "kinematic_error:mesh" if candidate.name in OF_ENCODER else f"{of_encoder}:sensor"
+        twin = f"{twin}@{candidate.order:.4g}"
+        parts = chosen.effects_by_candidate
+        base = chosen.values[: len(grid.data.base)]
+        others = [effect for k, part in enumerate(parts) if k != place for effect in part]
+        without = grid.predict(base, others)
+        # Half a period reverses the encoder's line and leaves the drive's.
+        change = 2.0 * (grid.predict(base, chosen.effects) - without)[: len(grid.speed_rpm)]
+        expected = np.sum(change**2, axis=1)
+        test = int(np.argmax(expected))
+        _, speed, load, _ = grid.condition(test)
+        text = (
+            f"{candidate.label} and {twin} predict nearly the same in every record: turn the disc "
+            f"of the output encoder by {180.0 / turns:.3g} degrees on its shaft and repeat a "
+            f"record at {speed:.4g} r/min with {load:.3g} N.m. The line turns with the encoder, or "
+            "it stays."
+        )
+        labels = (candidate.label, twin)
+        return Proposal(text, "reclocked_encoder", speed, load, labels, float(expected[test]))
+    return None
+
+
+def _zero_twin(grid: Grid, analysis: Analysis, chosen: Fit) -> Proposal | None:
+    """Return the test for dry friction at the input: friction, or a zero error of the sensor.
+
+    In reverse friction changes its sign and a zero error does not. All else is mirrored, so that
+    the forward record says how well the rest of the mean input torque is known.
+    """
+    one_way = len({record.input_speed > 0.0 for record in analysis.campaign.train}) == 1
+    for candidate, parts in zip(chosen.candidates, chosen.effects_by_candidate, strict=True):
+        effect = parts[0] if parts else None
+        if not (one_way and isinstance(effect, LawAtPort) and effect.port == "input"):
+            continue
+        if not isinstance(effect.law, CoulombFriction):
+            continue
+        level = abs(effect.law.level)
+        triangles = grid.data.whiteners
+        row = triangles[:, MEANS.index(CHANNELS.index("input_torque"))]
+        influence = grid.model(chosen).influence[: len(row)]
+        known = np.sum(np.einsum("rf,rfp->rp", row, influence) ** 2, axis=1)
+        expected = (2.0 * level) ** 2 / (np.sum(row**2, axis=1) + known)
+        test = int(np.argmax(expected))
+        speed, load = float(grid.speed_rpm[test]), float(grid.load_torque[test])
+        twin = "zero error of the input torque sensor"
+        text = (
+            f"{candidate.label} and a {twin} of {level:.2g} N.m predict the same as long as the "
+            f"input turns one way: repeat the record at {speed:.4g} r/min with {load:.3g} N.m in "
+            "reverse, or tare the sensor with the motor uncoupled."
+        )
+        labels = (candidate.label, twin)
+        return Proposal(text, "running", -speed, 0.0 - load, labels, float(expected[test]))
+    return None

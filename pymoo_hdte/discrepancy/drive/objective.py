@@ -1,0 +1,108 @@
+"""Whitened residuals of a model and their derivatives, as a fit needs them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Unknowns, Vector, built
+from pymoo_hdte.drive import Balance, Effect
+
+if TYPE_CHECKING:
+    from pymoo_hdte.discrepancy.drive.evidence import Data
+LOST = 1e3
+"""Residual of a point at which the model cannot carry the torque."""
+
+
+class Objective(Unknowns):
+    """Whitened residuals and their Jacobian for a set of candidates.
+
+    Parameters
+    ----------
+    data : Data
+    candidates : sequence of Candidate
+    slopes : ndarray, shape (n_base, r, f), optional
+        Derivatives of the features by base parameters, kept where they are given. Those of a model
+        without an effect serve with it: an effect changes features far more than their slopes, and
+        what slopes are wrong by slows a search down but moves its end little.
+    """
+
+    def __init__(
+        self,
+        data: Data,
+        candidates: Sequence[Candidate],
+        slopes: NDArray[np.float64] | None = None,
+    ) -> None:
+        super().__init__(data.base, candidates)
+        self.data = data
+        self.slopes = slopes
+        self.nearby: Balance | None = None
+
+    def residuals(self, values: Vector) -> Vector:
+        """Return residuals at values (n,), those of sweeps and priors last."""
+        difference, others = self.differences(values)
+        return np.nan_to_num(np.concatenate([self.data.whiten(difference), others]), nan=LOST)
+
+    def differences(self, values: Vector) -> tuple[NDArray[np.float64], Vector]:
+        """Return predicted minus measured features (r, f), and residuals of sweeps and priors."""
+        base, effects = self._parts(values)
+        difference = self._features(base, effects)[0] - self.data.features.values
+        torsion = self._torsion(base, effects)[0]
+        return difference, np.concatenate([torsion, self.priors(values)])
+
+    def jacobian(self, values: Vector) -> NDArray[np.float64]:
+        """Return the derivatives of the residuals by parameters in units of their scale."""
+        features, others = self.derivatives(values)
+        return np.concatenate([self.data.whiten(features), others], axis=1).T
+
+    def derivatives(self, values: Vector) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return derivatives by parameters in units of their scale.
+
+        Of the features, not whitened, (n, r, f); of sweeps and priors, whitened, (n, n_others).
+        """
+        n_base, steps = len(self.data.base), self.steps(values)
+        slopes = self.slopes_at(values) if self.slopes is None else self.slopes
+        moved = values + np.diag(steps * self.scale)
+        base, effects = self._parts(values)
+        torsion = self._torsion(np.vstack([base, moved[:n_base, :n_base]]), effects)
+        features, sweeps = list(slopes), list((torsion[1:] - torsion[0]) / steps[:n_base, None])
+        here = self._features(base, effects)[0]
+        for place in range(n_base, len(values)):
+            base, effects = self._parts(moved[place])
+            features.append((self._features(base, effects)[0] - here) / steps[place])
+            sweeps.append((self._torsion(base, effects)[0] - torsion[0]) / steps[place])
+        priors = np.diag(self.scale / self.prior)[:, self.bounded]
+        return np.array(features), np.concatenate([np.array(sweeps), priors], axis=1)
+
+    def _torsion(
+        self, vectors: NDArray[np.float64], effects: tuple[Effect, ...]
+    ) -> NDArray[np.float64]:
+        return np.nan_to_num(self.data.torsion_residuals(vectors, effects), nan=LOST)
+
+    def slopes_at(self, values: Vector) -> NDArray[np.float64]:
+        """Return derivatives of the features by base parameters in units of their scale."""
+        base, effects = self._parts(values)
+        n_base = base.shape[1]
+        steps = self.steps(values)[:n_base]
+        features = self._features(
+            np.vstack([base, base + np.diag(steps * self.scale[:n_base])]), effects
+        )
+        return (features[1:] - features[0]) / steps[:, None, None]
+
+    def _parts(self, values: Vector) -> tuple[NDArray[np.float64], tuple[Effect, ...]]:
+        """Return the base parameters as one row, and the effects."""
+        n_base = len(self.data.base)
+        parts = built(self.candidates, values[n_base:])
+        return values[None, :n_base], tuple(effect for part in parts for effect in part)
+
+    def _features(
+        self, vectors: NDArray[np.float64], effects: tuple[Effect, ...]
+    ) -> NDArray[np.float64]:
+        """Return predicted features, the first vector's steady states being kept to begin from."""
+        prediction = self.data.prediction(vectors, effects, self.nearby)
+        self.nearby = prediction.balance.rows(slice(len(self.data.features.records)))
+        return self.data.features.of_prediction(prediction)

@@ -1,0 +1,68 @@
+"""What a fit may change: base parameters within their tolerances, sensor errors, effect parameters.
+
+Base parameters keep hard bounds: with a Gaussian prior they would run many standard deviations and
+hide an effect. The errors of torque sensors are unknown constants with a prior of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
+from pymoo_hdte.discrepancy.engine.candidate import Parameter
+
+MECHANICAL = (
+    "stiffness",
+    "damping",
+    "input_inertia",
+    "input_damping",
+    "output_damping",
+    "load_inertia",
+)
+"""Fields of `Believed` that are fitted; J_out, 1/100 of the load's inertia, is not."""
+
+READING = (
+    "offset",
+    "input_torque_gain",
+    "input_torque_zero",
+    "output_torque_gain",
+    "output_torque_zero",
+)
+"""Constant of the transmission error (rad), gains (relative) and zeros (N.m) of torque sensors."""
+
+
+def base_parameters(
+    believed: Believed, rig: Rig, phases: Sequence[float], offset: float
+) -> tuple[Parameter, ...]:
+    """Return the unknowns of a drive without any further effect.
+
+    Parameters
+    ----------
+    believed : Believed
+    rig : Rig
+    phases : sequence of float, length n_lines
+        First guess of the phases of the static error, rad.
+    offset : float
+        First guess of the constant of the transmission error, rad.
+    """
+    found = [_within(name, getattr(believed, name), believed.tolerance) for name in MECHANICAL]
+    for line, amplitude in enumerate(believed.error_amplitudes):
+        found.append(_within(f"error_amplitude_{line}", amplitude, believed.error_tolerance))
+        phase = phases[line]
+        found.append(Parameter(f"error_phase_{line}", phase, phase - 9.0, phase + 9.0, 0.1))
+    found.append(Parameter("offset", offset, offset - 1.0, offset + 1.0, 1e-5))
+    # A stiffness that varies with the input angle is not its mean where the input was locked.
+    locked = _within("locked_stiffness", 1.0, believed.tolerance)
+    # The prior only keeps it in place where no sweep speaks of it.
+    found.append(replace(locked, prior=locked.scale))
+    for name in READING[1:]:
+        # What rigs are said to keep is taken for a standard deviation: sensors exceed it.
+        size = max(float(getattr(rig, name)), 1e-9)
+        found.append(Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size))
+    return tuple(found)
+
+
+def _within(name: str, value: float, tolerance: float) -> Parameter:
+    reach = max(tolerance * value, 1e-12)
+    return Parameter(name, value, value - reach, value + reach, reach)

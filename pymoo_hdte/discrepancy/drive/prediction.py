@@ -1,0 +1,252 @@
+"""From parameters to what the rig's sensors would show: order lines and means of every channel.
+
+One call of the harmonic balance serves all records of a campaign and all vectors of parameters
+that share their effects. Loads are not those of the plan but those that the sensor measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
+from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
+from pymoo_hdte.drive import (
+    Balance,
+    Coefficients,
+    Eccentricity,
+    Effect,
+    LawAtPort,
+    SpeedLoop,
+    ThermalDrift,
+)
+from pymoo_hdte.drive.solve import harmonic_balance
+from pymoo_hdte.drive.solve.harmonic_balance import torus_of
+from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
+from pymoo_hdte.drive.solve.steady_motion import BY_CASE
+from pymoo_hdte.drive.solve.torus import Torus
+from pymoo_hdte.laws.friction import PeriodicTorque
+from pymoo_hdte.laws.stiffness import DeadZone, PeriodicClearance
+
+CLEARANCES = (DeadZone, PeriodicClearance)
+TOLERANCE = 1e-7
+"""Of the harmonic balance: far below the noise, and twice as fast as full precision."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Operating conditions of r records, arrays of shape (r,).
+
+    Attributes
+    ----------
+    input_speed : ndarray
+        Measured mean, rad/s.
+    output_torque : ndarray
+        Measured mean, N.m: load with the sensor's gain and zero.
+    elapsed : ndarray
+        Middle of the record within the session, s.
+    bends : complex ndarray, shape (r, 3, 1 + m)
+        What a drift that bends within a record leaves in it: see `OrderLines`.
+    """
+
+    input_speed: NDArray[np.float64]
+    output_torque: NDArray[np.float64]
+    elapsed: NDArray[np.float64]
+    bends: NDArray[np.complex128]
+
+    def __len__(self) -> int:
+        return len(self.input_speed)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Means, shape (v, r, 4), and phasors, (v, r, 4, m), of `CHANNELS` for v vectors, r records.
+
+    SI. The mean of the output torque and of the input angle are conditions, not predictions.
+    ``balance`` has the steady states, vectors outermost.
+    """
+
+    mean: NDArray[np.float64]
+    phasors: NDArray[np.complex128]
+    balance: Balance
+
+
+def predict(
+    believed: Believed,
+    rig: Rig,
+    conditions: Conditions,
+    orders: Sequence[float],
+    values: dict[str, NDArray[np.float64]],
+    effects: Sequence[Effect] = (),
+    start: Balance | None = None,
+) -> Prediction:
+    """Return what the sensors would show.
+
+    Parameters
+    ----------
+    believed, rig
+    conditions : Conditions
+    orders : sequence of float, length m
+        Lines asked for, in cycles per input turn.
+    values : dict of ndarray, shape (v,)
+        Parameters by name, those of `parameters.base_parameters`.
+    effects : sequence of Effect
+        Shared by all vectors.
+    start : Balance, optional
+        Steady states of the records for nearby values, to begin from.
+    """
+    count, records = len(values["offset"]), len(conditions)
+    gain = 1.0 + values["output_torque_gain"][:, None]
+    load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
+    coefficients = coefficients_of(believed, values, effects, records)
+    near = None if start is None else start.rows(np.tile(np.arange(records), count))
+    speed = np.tile(conditions.input_speed, count)
+    balance = steady_state(coefficients, speed, load.ravel(), rig, near)
+    channels = [
+        balance.transmission_error,
+        balance.motor_torque + _driving(balance, effects),
+        balance.coupling_torque,
+        balance.lead,
+    ]
+    lines = np.array([[_line(balance, channel, order) for order in orders] for channel in channels])
+    means = np.array([channel[:, 0].real for channel in channels])
+    phasors = np.moveaxis(lines, -1, 0).reshape(count, records, len(CHANNELS), len(orders))
+    mean = means.T.reshape(count, records, len(CHANNELS))
+    _read(believed, conditions, orders, values, effects, mean, phasors)
+    return Prediction(mean, phasors, balance)
+
+
+def steady_state(
+    coefficients: Coefficients,
+    speed: NDArray[np.float64],
+    load: NDArray[np.float64],
+    rig: Rig,
+    start: Balance | None = None,
+) -> Balance:
+    """Return the steady state of all rows.
+
+    Where a clearance would open because the load does not hold the flanks together, there is none:
+    the drive rattles. Such a record, or one for which none is found, cannot speak for or against
+    the laws and is predicted without them.
+    """
+    motor = SpeedLoop(rig.proportional, rig.integral)
+
+    def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> Balance:
+        return harmonic_balance(
+            coefficients.rows(rows),
+            input_speed=speed[rows],
+            load_torque=load[rows],
+            motor=motor,
+            torus=torus,
+            tolerance=TOLERANCE,
+            start=None if start is None else start.rows(rows),
+        )
+
+    torus, every = torus_of(coefficients), np.arange(len(speed))
+    if not any(isinstance(law, CLEARANCES) for _, law in coefficients.laws):
+        balance = solve(coefficients, every, torus)
+        if np.all(balance.converged):
+            return balance
+        held = balance.converged
+        plain = solve(replace(coefficients, laws=()), np.flatnonzero(~held), torus)
+        return _merged(balance.rows(held), plain, held)
+    plain = solve(replace(coefficients, laws=()), every, torus)
+    swing = np.abs(plain.torsion[:, 1:]).sum(axis=1)
+    held = np.abs(plain.torsion[:, 0]) > swing
+    balance = solve(coefficients, np.flatnonzero(held), torus)
+    held[held] = balance.converged
+    return _merged(balance.rows(balance.converged), plain.rows(~held), held)
+
+
+def _merged(held: Balance, plain: Balance, places: NDArray[np.bool_]) -> Balance:
+    """Put rows together again: ``held`` where ``places``, ``plain`` elsewhere."""
+    order = np.argsort(np.concatenate([np.flatnonzero(places), np.flatnonzero(~places)]))
+    joined = [
+        np.concatenate([getattr(held, name), getattr(plain, name)])[order] for name in BY_CASE
+    ]
+    return Balance(held.torus, *joined)
+
+
+def coefficients_of(
+    believed: Believed,
+    values: dict[str, NDArray[np.float64]],
+    effects: Sequence[Effect],
+    records: int,
+) -> Coefficients:
+    """Return the coefficients of all rows, vectors outermost."""
+    rows = {name: np.repeat(values[name], records) for name in MECHANICAL}
+    lines = [
+        sine_phasor(values[f"error_amplitude_{line}"], values[f"error_phase_{line}"])
+        for line in range(len(believed.error_orders))
+    ]
+    coefficients = Coefficients(
+        ratio=believed.ratio,
+        input_speed=0.0,
+        load_torque=0.0,
+        stiffness=rows["stiffness"],
+        damping=rows["damping"],
+        stiffness_depth=0.0,
+        stiffness_phase=0.0,
+        input_inertia=rows["input_inertia"],
+        input_damping=rows["input_damping"],
+        output_inertia=believed.output_inertia + rows["load_inertia"],
+        output_damping=rows["output_damping"],
+        error_orders=np.array(believed.error_orders),
+        error_phasors=np.repeat(np.array(lines).T, records, axis=0),
+        load_inertia=rows["load_inertia"],
+    )
+    for effect in effects:
+        coefficients = effect.apply(coefficients)
+    return coefficients
+
+
+def _line(
+    balance: Balance, phasors: NDArray[np.complex128], order: float
+) -> NDArray[np.complex128]:
+    """Return the phasors of one order, (n,); zero where the balance has no such order."""
+    place = balance.torus.find(order)
+    if place is None:
+        return np.zeros(len(phasors), dtype=complex)
+    column, conjugate = place
+    return phasors[:, column].conj() if conjugate else phasors[:, column]
+
+
+def _driving(balance: Balance, effects: Sequence[Effect]) -> NDArray[np.complex128]:
+    """Return the harmonics of a motor's ripple, which its torque sensor sees; (1, n_harmonics)."""
+    total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
+    for effect in effects:
+        if isinstance(effect, LawAtPort) and isinstance(law := effect.law, PeriodicTorque):
+            column, conjugate = balance.torus.place(law.order)
+            phasor = law.amplitude * np.exp(1j * law.phase)
+            total[:, column] += phasor.conjugate() if conjugate else phasor
+    return total
+
+
+def _read(
+    believed: Believed,
+    conditions: Conditions,
+    orders: Sequence[float],
+    values: dict[str, NDArray[np.float64]],
+    effects: Sequence[Effect],
+    mean: NDArray[np.float64],
+    phasors: NDArray[np.complex128],
+) -> None:
+    """Add in place what the sensors add: offset, drift, eccentricity, gains and zeros."""
+    mean[..., 0] += values["offset"][:, None]
+    for effect in effects:
+        if isinstance(effect, ThermalDrift):
+            left = np.einsum("kr,rkm->rm", effect.bends(conditions.elapsed), conditions.bends)
+            mean[..., 0] -= effect.after(conditions.elapsed) + left[:, 0].real
+            phasors[..., 0, :] -= left[:, 1:]
+        if isinstance(effect, Eccentricity):
+            line = np.isclose(orders, effect.order / believed.ratio)
+            # theta_out is theta_in / N but for the transmission error, a part in 10^3.
+            phasors[..., 0, line] -= effect.amplitude * np.exp(1j * effect.phase)
+    for channel, name in ((1, "input_torque"), (2, "output_torque")):
+        gain = 1.0 + values[f"{name}_gain"][:, None]
+        mean[..., channel] = gain * mean[..., channel] + values[f"{name}_zero"][:, None]
+        phasors[..., channel, :] *= gain[..., None]

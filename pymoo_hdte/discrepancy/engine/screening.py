@@ -1,0 +1,119 @@
+"""Which candidates could explain a misfit at all: their signatures held against what is left.
+
+A candidate of typical strength changes the features by its signature. What the base parameters can
+imitate of it is taken out; the share of the misfit along the rest is what the candidate could
+remove, to first order, were its strength free. Wrong only for strongly curved effects, which is why
+several strengths are tried and the best few candidates are fitted in earnest afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.engine.candidate import HARMONIC_NAMES, Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A candidate, what it could remove of chi-square, and where to start its fit.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    reduction : float
+        Of the whole chi-square.
+    start : tuple of float
+    by_part : tuple of float
+        Of that of each part of the data alone; empty for a parameter out of tolerance.
+    """
+
+    candidate: Candidate
+    reduction: float
+    start: tuple[float, ...]
+    by_part: tuple[float, ...] = ()
+
+
+def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
+    """Return all candidates, the most promising first.
+
+    Parameters
+    ----------
+    data : Evidence
+    fitted : Fit
+        What stands so far, perhaps with effects; its misfit is to be explained.
+    candidates : sequence of Candidate
+    """
+    # A parameter at its bound cannot give way any further.
+    orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
+    left = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
+    response, parts = data.response(fitted), data.rows_of_parts()
+    found = []
+    for candidate in candidates:
+        if candidate.frees is not None:
+            found.append(_freed(candidate, fitted, orthonormal, left))
+            continue
+        signatures = []
+        for start in candidate.starts:
+            signature = response(candidate.build(start))
+            signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
+        every = np.array(signatures)
+        by_part = tuple(
+            _best_start(candidate, every[:, rows], left[rows]).reduction for rows in parts
+        )
+        found.append(replace(_best_start(candidate, every, left), by_part=by_part))
+    return sorted(found, key=lambda one: -one.reduction)
+
+
+def _freed(
+    candidate: Candidate,
+    fitted: Fit,
+    orthonormal: NDArray[np.float64],
+    left: NDArray[np.float64],
+) -> Screened:
+    """Return what a parameter at its bound could remove if it went beyond."""
+    place = [parameter.name for parameter in fitted.parameters].index(str(candidate.frees))
+    signature = fitted.jacobian[:, place] * fitted.bound_sides[place]
+    signature = signature - orthonormal @ (orthonormal.T @ signature)
+    along, size = float(-signature @ left), float(signature @ signature)
+    return Screened(candidate, along**2 / size if along > 0.0 and size > 0.0 else 0.0, ())
+
+
+def _best_start(
+    candidate: Candidate, signatures: NDArray[np.float64], left: NDArray[np.float64]
+) -> Screened:
+    """Return what the candidate could remove, and its strengths that would do so."""
+    starts = np.array(candidate.starts)
+    lower = np.array([parameter.lower for parameter in candidate.parameters])
+    upper = np.array([parameter.upper for parameter in candidate.parameters])
+    if candidate.linear:
+        best, reduction = _least_squares(signatures, starts, left)
+        harmonic = [one.name.startswith(HARMONIC_NAMES[1:]) for one in candidate.parameters]
+        lines = np.hypot(*best[harmonic].reshape(-1, 2).T)
+        if lines.size and lines.max() > np.hypot(*best[:2]):
+            # A line that is weaker than its harmonic is not what the harmonic belongs to.
+            kept = np.flatnonzero(~np.array(harmonic))
+            best, reduction = _least_squares(signatures[kept], starts[kept], left)
+    else:
+        sizes = np.einsum("ij,ij->i", signatures, signatures)
+        along = -signatures @ left
+        strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
+        gains = np.where((strengths > 0.0) | (lower[0] < 0.0), along * strengths, 0.0)
+        place = int(np.argmax(gains))
+        reduction, best = float(gains[place]), starts[place].copy()
+        # The first parameter is the strength; the others are shapes.
+        best[0] *= np.clip(strengths[place], 0.2, 10.0) if lower[0] >= 0.0 else strengths[place]
+    return Screened(candidate, reduction, tuple(np.clip(best, lower, upper).tolist()))
+
+
+def _least_squares(
+    signatures: NDArray[np.float64], starts: NDArray[np.float64], left: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    """Return the values along the starts that remove most, and what they remove."""
+    solution, *_ = np.linalg.lstsq(signatures.T, -left, rcond=1e-10)
+    rest = left + signatures.T @ solution
+    return solution @ starts, float(left @ left - rest @ rest)

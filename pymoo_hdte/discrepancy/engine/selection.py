@@ -1,0 +1,195 @@
+"""A second effect beside the first: looked for where the first leaves most, and to be earned.
+
+What is left of one part of the data may drown in another, and what a law of no exact form leaves
+may be its form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.excess import Excess
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    EVALUATIONS,
+    PART_SHARE,
+    SHARE,
+    Rival,
+    alike,
+    down_to_noise,
+    explains,
+    fit_all,
+    refined,
+    rival,
+    varied,
+)
+from pymoo_hdte.discrepancy.engine.screening import Screened, screen
+
+SECOND_SHARE = 0.8
+"""Least share of the excess left by a first effect of no exact form that a second one removes;
+beside an exact one it is `SHARE`."""
+SECOND_LEAST = 0.05
+"""Least share of the base's excess in some part of the data that a second one removes at the port
+of a first law of no exact form: less may be that form."""
+SECONDS = 2
+"""Names of second effects fitted beside the first, and as many for one part of the data."""
+HOPE = 0.5
+"""Least share of what is left that a second effect must remove to first order to be fitted."""
+
+
+def with_second(
+    data: Evidence, base: Fit, singles: list[Rival], candidates: Sequence[Candidate]
+) -> tuple[Rival, list[Rival]]:
+    """Return the set to be named, and all that were fitted: a second effect has to be earned."""
+    freedom = len(base.residuals) - len(base.values)
+    excess = base.chi_square - freedom
+    best = singles[0]
+    if not _second_could_count(data, best, freedom):
+        return best, singles
+    # Slopes with the first effect in place, which those of pairs are close to.
+    best = refined(data, best, excess)
+    singles = [best, *singles[1:]]
+    pairs = _pairs(data, base, best, candidates, excess)
+    for place, pair in enumerate(pairs):
+        if pair.bic >= best.bic:
+            break
+        if _promising(pair, best, freedom):
+            pairs[place] = pair = refined(data, pair, excess)
+        if not _second_earned(data, pair, singles, base, freedom):
+            continue
+        singles = _with_second_alone(data, base, pair, singles, excess)
+        if _second_earned(data, pair, singles, base, freedom):
+            found = [pair, *_exchanged(data, pair, singles, freedom, excess)]
+            rivals = sorted([*singles, *pairs, *found[1:]], key=lambda one: one.bic)
+            return min(found, key=lambda one: one.bic), rivals
+    rivals = sorted([*singles, *pairs], key=lambda one: one.bic)
+    if explains(data, singles[0], base, freedom):
+        return singles[0], rivals
+    does = [pair for pair in pairs if explains(data, pair, base, freedom)]
+    return (does[0] if does else singles[0]), rivals
+
+
+def _second_could_count(data: Evidence, single: Rival, freedom: int) -> bool:
+    """Tell whether a second effect beside this one could be earned at all."""
+    if down_to_noise(single.fit, freedom):
+        return False
+    return single.exact or bool(data.excess(single.fit).significant.any())
+
+
+def _promising(pair: Rival, single: Rival, freedom: int) -> bool:
+    """Tell whether a second effect removes so much that its fit is worth being finished."""
+    left = single.fit.chi_square - freedom
+    return single.fit.chi_square - pair.fit.chi_square >= PART_SHARE * left
+
+
+def _with_second_alone(
+    data: Evidence, base: Fit, pair: Rival, singles: list[Rival], excess: float
+) -> list[Rival]:
+    """Return single effects with the second of a pair among them: it may do alone.
+
+    What the screening puts first is not always what fits best.
+    """
+    second = pair.candidates[1]
+    if any(one.candidates == (second,) for one in singles):
+        return singles
+    start = np.concatenate([base.values, pair.fit.values[-len(second.parameters) :]])
+    alone = rival(fit(data, (second,), start, EVALUATIONS[1], base.slopes), excess)
+    return sorted([*singles, alone], key=lambda one: one.bic)
+
+
+def _exchanged(
+    data: Evidence, pair: Rival, singles: Sequence[Rival], freedom: int, excess: float
+) -> list[Rival]:
+    """Return the pair with its first effect exchanged for those that do as well alone."""
+    first, second = pair.candidates
+    (best,) = (one for one in singles if one.candidates == (first,))
+    found = []
+    for other in singles:
+        (candidate,) = other.candidates
+        if alike(other, best, freedom) and candidate.frees is None and candidate.goes_with(second):
+            start = np.append(other.fit.values, pair.fit.values[-len(second.parameters) :])
+            effects = (candidate, second)
+            fitted = fit(data, effects, start, EVALUATIONS[2], other.fit.slopes)
+            found.append(rival(fitted, excess))
+    return found
+
+
+def _pairs(
+    data: Evidence, base: Fit, single: Rival, candidates: Sequence[Candidate], excess: float
+) -> list[Rival]:
+    """Return the best pairs that contain the best single effect.
+
+    Seconds are taken from what would remove most of all that is left, and most of what is left of
+    the parts of the data that the first explains ill: either may drown in the other.
+    """
+    (first,) = single.candidates
+    others = [one for one in candidates if one.frees is None and first.goes_with(one)]
+    before, after = (data.excess(one) for one in (base, single.fit))
+    ill = [] if single.exact else _ill_explained(before, after)
+    whole, rest = before.of_parts, after.of_parts
+    if not single.exact:
+        shares = [rest.sum() / whole.sum(), *rest[ill] / whole[ill]]
+        others = [one for one in others if max(shares) >= _least(data, first, one)]
+    screened = screen(data, single.fit, others)
+    left = single.fit.chi_square - (base.chi_square - excess)
+    chosen = _hopeful(screened, [one.reduction for one in screened], left)
+    for part in ill:
+        of_part = _hopeful(screened, [one.by_part[part] for one in screened], float(rest[part]))
+        chosen += [one for one in of_part if one not in chosen]
+    return fit_all(data, single.fit, chosen, excess)
+
+
+def _least(data: Evidence, first: Candidate, second: Candidate) -> float:
+    """Return the least share of the base's excess that a second effect removes."""
+    return SECOND_LEAST if first.port == second.port else data.remainder
+
+
+def _hopeful(
+    screened: Sequence[Screened], reductions: Sequence[float], left: float
+) -> list[Screened]:
+    """Return the best candidates, to first order, if they remove enough of what is left."""
+    order = np.argsort([-reduction for reduction in reductions], kind="stable")
+    enough = [screened[k] for k in order if reductions[k] >= HOPE * left]
+    return varied(enough, 1)[:SECONDS]
+
+
+def _ill_explained(before: Excess, after: Excess) -> list[int]:
+    """Return the parts of the data that contradict both a base and a fit, the worst first.
+
+    The worst, and what else the fit explains no better than by half.
+    """
+    wrong = np.flatnonzero(before.significant & after.significant)
+    left = after.of_parts[wrong] / before.of_parts[wrong]
+    ranked = wrong[np.argsort(-left)].tolist()
+    return ranked[: max(1, int(np.sum(left > 1.0 - PART_SHARE)))]
+
+
+def _second_earned(
+    data: Evidence, pair: Rival, singles: Sequence[Rival], base: Fit, freedom: int
+) -> bool:
+    """Tell whether the second effect removes most of what the better of the two leaves alone.
+
+    What a law of no exact form leaves may be its form: a second one at its port must also count
+    beside the base's excess, and one at another port beside what is numerical.
+    """
+    labels = {candidate.label for candidate in pair.candidates}
+    first = min(
+        (single for single in singles if single.candidates[0].label in labels),
+        key=lambda single: single.fit.chi_square,
+    )
+    if first.exact:
+        left = first.fit.chi_square - freedom
+        return left > 0.0 and first.fit.chi_square - pair.fit.chi_square >= SHARE * left
+    before, alone, both = (data.excess(one) for one in (base, first.fit, pair.fit))
+    parts = _ill_explained(before, alone)
+    if not parts:
+        return False
+    least = _least(data, *pair.candidates)
+    for part in (slice(None), parts[0]):
+        whole, left, rest = (np.sum(one.of_parts[part]) for one in (before, alone, both))
+        if left - rest >= max(SECOND_SHARE * left, least * whole):
+            return True
+    return False

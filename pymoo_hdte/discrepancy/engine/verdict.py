@@ -1,0 +1,147 @@
+"""The verdict: is anything missing, which effect is it, and how sure is that answer.
+
+The base is fitted within its tolerances first. If it is not adequate, candidates are screened, the
+best few are fitted jointly with the base, and the one with the least BIC is named, provided that it
+removes most of the excess, in no part of the data less than half of it. What the data cannot tell
+from it is named beside it. A second effect must remove most of what the first leaves, in all or in
+the part that the first explains worst.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Rival,
+    alike,
+    down_to_noise,
+    explains,
+    fit_all,
+    refined,
+    rival,
+    varied,
+)
+from pymoo_hdte.discrepancy.engine.screening import Screened, screen
+from pymoo_hdte.discrepancy.engine.selection import with_second
+
+STATUSES = ("adequate", "named", "class", "parameter", "unlisted")
+EXPLAINED = ("named", "class", "parameter")
+"""Statuses that say what is missing."""
+
+GAIN = 25.0
+"""Reduction of chi-square, to first order, by which some candidate makes a base inadequate though
+its total looks well: one line of one channel is lost among a thousand features."""
+GENEROUS = 5.0
+"""Multiple of these distances within which a rival is fitted to the end before it is judged."""
+FITTED = 5
+"""Most candidates fitted in earnest after the screening."""
+OF_ONE_NAME = 2
+"""Most of them of one name: a law that holds another as a special case must not crowd it out."""
+PROMISING = 0.2
+"""Least reduction, as a share of the most promising candidate's, with which one is fitted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What is missing.
+
+    Attributes
+    ----------
+    status : str
+        One of `STATUSES`.
+    base : Fit
+        Without any effect.
+    chosen : Rival or None
+    alternatives : tuple of Rival
+        Other sets that were fitted.
+    equivalent : tuple of Rival
+        Those of them that explain the data too and that these cannot tell from the chosen one.
+    degrees_of_freedom : int
+    """
+
+    status: str
+    base: Fit
+    chosen: Rival | None
+    alternatives: tuple[Rival, ...]
+    equivalent: tuple[Rival, ...]
+    degrees_of_freedom: int
+
+    @property
+    def leaves_more_than_noise(self) -> bool:
+        """Whether the chosen effects do not explain the data down to the noise."""
+        chosen = self.chosen
+        return chosen is not None and not down_to_noise(chosen.fit, self.degrees_of_freedom)
+
+
+def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
+    """Return the verdict on a fitted base."""
+    freedom = len(base.residuals) - len(base.values)
+    candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
+    screened = screen(data, base, candidates)
+    excess = base.chi_square - freedom
+    if down_to_noise(base, freedom) and screened[0].reduction < GAIN:
+        return Verdict("adequate", base, None, (), (), freedom)
+    singles = _fit_best(data, base, screened, excess)
+    if not explains(data, singles[0], base, freedom):
+        singles[0] = _searched(data, base, singles[0], excess)
+    chosen, rivals = with_second(data, base, singles, candidates)
+    others = [rival for rival in rivals if rival is not chosen]
+    chosen = refined(data, chosen, excess)
+    if not explains(data, chosen, base, freedom):
+        return Verdict("unlisted", base, chosen, tuple(others), (), freedom)
+    near = [alike(rival, chosen, freedom, GENEROUS) for rival in others]
+    others = [
+        refined(data, rival, excess) if flag else rival
+        for rival, flag in zip(others, near, strict=True)
+    ]
+    equivalent = tuple(
+        rival
+        for rival in others
+        if alike(rival, chosen, freedom) and explains(data, rival, base, freedom)
+    )
+    listed = [rival for rival in equivalent if rival.listed]
+    if not chosen.listed and listed:
+        others = [chosen if rival is listed[0] else rival for rival in others]
+        equivalent = tuple(chosen if rival is listed[0] else rival for rival in equivalent)
+        chosen = listed[0]
+    return Verdict(_status(chosen, equivalent), base, chosen, tuple(others), equivalent, freedom)
+
+
+def _status(chosen: Rival, equivalent: Sequence[Rival]) -> str:
+    """Return the status of a set that explains what is wrong."""
+    if not chosen.listed:
+        return "unlisted"
+    if equivalent:
+        return "class"
+    out = all(candidate.name == "parameter" for candidate in chosen.candidates)
+    return "parameter" if out else "named"
+
+
+def _searched(data: Evidence, base: Fit, single: Rival, excess: float) -> Rival:
+    """Return the best of fits from all starts of a single effect, with slopes of their own.
+
+    An inertia that is half as large again moves a resonance past lines: the way there is not
+    downhill from everywhere.
+    """
+    found = [refined(data, single, excess)]
+    (candidate,) = single.candidates
+    if len(candidate.starts) > 1 and not candidate.linear:
+        begins = [np.concatenate([base.values, start]) for start in candidate.starts]
+        fits = [fit(data, single.candidates, begin) for begin in begins]
+        found += [rival(fitted, excess) for fitted in fits]
+    return min(found, key=lambda one: one.bic)
+
+
+def _fit_best(
+    data: Evidence, base: Fit, screened: Sequence[Screened], excess: float
+) -> list[Rival]:
+    """Fit the most promising candidates jointly with what stands; by rising BIC."""
+    least = PROMISING * screened[0].reduction
+    promising = [one for one in screened if one.reduction >= least]
+    chosen = varied(promising, OF_ONE_NAME)[:FITTED]
+    return fit_all(data, base, chosen, excess)

@@ -1,0 +1,318 @@
+"""From records of a mechanism to a verdict: what is missing, and how much nobody explains.
+
+The rules are those of `discrepancy.naming`. Because no model of a real machine meets the noise of
+its sensors, they are held against the rest: what the two best effects leave. A verdict therefore
+names what stands out of everything that is known to be able to explain it, and says what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    SHARE,
+    Rival,
+    down_to_noise,
+    fit_all,
+    rival,
+    varied,
+)
+from pymoo_hdte.discrepancy.engine.screening import screen
+from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED, FITTED, OF_ONE_NAME, Verdict, judge
+from pymoo_hdte.discrepancy.mechanism.candidates import CONTAINED, mechanism_candidates
+from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy.mechanism.orders import position_orders
+from pymoo_hdte.discrepancy.mechanism.preconditions import (
+    check_sampling,
+    check_scale,
+    check_signals,
+    usual_cutoff,
+)
+from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+
+MAIN_SHARE = 0.5
+"""Least share of the power of a misfit beyond the sensors' noise that a named effect removes."""
+REST = 2.0
+"""Ratio of powers up to which a misfit may be of the sensors, whose noise is an estimate."""
+PARSIMONY = 1.1
+"""Ratio of powers of what two models leave up to which the one with fewer unknowns is named."""
+_ROUNDS = 2
+_SECONDS = 3
+"""Second effects tried beside each of as many first ones to find what nobody explains."""
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What the workflow finds in measured records.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        Without the effects that were to be found.
+    records : tuple of Record
+        All that were given, training and held out.
+    cutoff : float
+        Hz, up to which the motion is known.
+    data : MeasuredData
+        Training records; their noise is the rest that nobody explains.
+    verdict : Verdict
+        What is missing: its ``status`` is ``"adequate"``, ``"named"``, ``"class"``,
+        ``"parameter"`` or ``"unlisted"``.
+    """
+
+    mechanism: Mechanism
+    records: tuple[Record, ...]
+    cutoff: float
+    data: MeasuredData
+    verdict: Verdict
+
+    @property
+    def accepted(self) -> Fit:
+        """The fit with the effects that the verdict names, or that of the base."""
+        chosen = self.verdict.chosen
+        return chosen.fit if chosen and self.verdict.status in EXPLAINED else self.verdict.base
+
+    @property
+    def sensors(self) -> MeasuredData:
+        """The data with the noise of their sensors only."""
+        return replace(self.data, deviation=tuple(one.noise for one in self.data.spectra))
+
+    @property
+    def share_removed(self) -> float:
+        """Share of the power of the misfit beyond the sensors' noise that the effects remove.
+
+        Dimensionless, 0 to 1.
+        """
+        return share_removed(self.sensors, self.data, self.verdict.base, self.accepted)
+
+    @property
+    def sensor_noise(self) -> NDArray[np.float64]:
+        """Root mean square of the sensors' noise in each balance, shape (n_balances,), N or N.m."""
+        return root_mean_square(self.sensors, np.ones_like(self.verdict.base.residuals))
+
+    @property
+    def base_misfit(self) -> NDArray[np.float64]:
+        """Root mean square of what the base leaves of each balance.
+
+        Shape (n_balances,), N or N.m.
+        """
+        return root_mean_square(self.data, self.verdict.base.residuals)
+
+    @property
+    def remainder(self) -> NDArray[np.float64]:
+        """Root mean square of what the accepted model leaves of each balance.
+
+        Shape (n_balances,), N or N.m.
+        """
+        return root_mean_square(self.data, self.accepted.residuals)
+
+
+def investigate(
+    mechanism: Mechanism,
+    records: Sequence[Record],
+    cutoff: float | None = None,
+    known: Sequence[LawAt] = (),
+) -> Finding:
+    """Return the verdict on records of a mechanism.
+
+    By inverse dynamics, for which every coordinate has to be measured (of robots: Janot,
+    Vandanjon and Gautier, IEEE Trans. Control Systems Technology 22, 2014). Candidate effects are
+    compared by the Bayesian information criterion (Schwarz, Annals of Statistics 6, 1978).
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Without the effects that are to be found.
+    records : sequence of Record
+        At least one of them of role ``train``.
+    cutoff : float, optional
+        Hz, up to which the motion is known; by default where it ceases to stand out of its noise.
+    known : sequence of LawAt
+        Effects that the mechanism is known to have.
+
+    Returns
+    -------
+    Finding
+
+    Raises
+    ------
+    InvalidInput
+        If no record is to be fitted, a record, of either role, lacks a channel, is too short or too
+        slowly sampled or does not move, two have one name, the mechanism has no port, or no
+        quantity sets the scale: none is known, or the input whose gain is known is only noise.
+    """
+    train = [record for record in records if record.role == "train"]
+    if not train:
+        raise InvalidInput("number of train records", 0, "at least 1")
+    check_signals(mechanism, records)
+    cutoff = usual_cutoff(mechanism, train) if cutoff is None else cutoff
+    check_sampling(mechanism, records, cutoff)
+    sensors = measured_data(mechanism, train, cutoff, known)
+    check_scale(sensors)
+    base = fit(sensors)
+    candidates = _candidates(sensors, base)
+    data = _with_rest(sensors, base, candidates)
+    verdict = _judged(sensors, data, candidates)
+    return Finding(mechanism, tuple(records), cutoff, data, verdict)
+
+
+def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
+    left = dict(zip(data.names, root_mean_square(data, base.residuals), strict=True))
+    forces = {
+        port.name: left[port.name]
+        if port.read
+        else max(left[name] / abs(share) for name, share in port.motion.items() if share)
+        for port in data.mechanism.ports
+    }
+    return mechanism_candidates(data, forces, position_orders(data, base))
+
+
+def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:
+    """Return the data with what the two best effects leave as the noise.
+
+    Which these are depends on the noise; after a few rounds it no longer does.
+    """
+    freedom = len(base.residuals) - len(base.values)
+    if down_to_noise(base, freedom):
+        return sensors
+    data = sensors.with_rest(base.residuals)
+    for _ in range(_ROUNDS):
+        best = _best_two(data, candidates)
+        data = sensors.with_rest(_in_units_of(sensors, data, best.fit.residuals))
+    return data
+
+
+def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Rival:
+    """Return the best model with up to two effects, by BIC."""
+    base = fit(data)
+    excess = base.chi_square - (len(base.residuals) - len(base.values))
+    promising = varied(screen(data, base, candidates), OF_ONE_NAME)[:FITTED]
+    singles = fit_all(data, base, promising, excess)
+    found = [rival(base, excess), *singles]
+    for single in singles[:_SECONDS]:
+        (first,) = single.candidates
+        others = [one for one in candidates if first.goes_with(one)]
+        seconds = varied(screen(data, single.fit, others), 1)[:_SECONDS]
+        found += fit_all(data, single.fit, seconds, excess)
+    return min(found, key=lambda one: one.bic)
+
+
+def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
+    """Return the verdict in units of the rest, if it stands before what the sensors would show."""
+    base = fit(data)
+    verdict = _with_true_rivals(data, _simplest(data, judge(data, base, candidates)))
+    before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
+    if verdict.chosen is None:
+        return verdict if np.all(before <= REST * noise) else _as_unlisted(verdict, None)
+    removed = share_removed(sensors, data, base, verdict.chosen.fit)
+    freed = [one.frees for one in verdict.chosen.candidates]
+    out = any(one in verdict.chosen.fit.at_bounds for one in freed if one)
+    if removed < (SHARE if verdict.status == "parameter" else MAIN_SHARE) or out:
+        return _as_unlisted(verdict, verdict.chosen)
+    return verdict
+
+
+def share_removed(sensors: MeasuredData, data: MeasuredData, base: Fit, fitted: Fit) -> float:
+    """Return the share of the power beyond the sensors' noise that a fit removes, 0 to 1.
+
+    Each balance in units of its rest, so that N and N.m may stand side by side.
+    """
+    noise = float(np.sum((_in_units_of(data, sensors, np.ones_like(base.residuals))) ** 2))
+    beyond = base.chi_square - noise
+    gain = base.chi_square - max(fitted.chi_square, noise)
+    return float(np.clip(gain / beyond, 0.0, 1.0)) if beyond > 0.0 else 0.0
+
+
+def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with the model of fewest unknowns that leaves hardly more than the best.
+
+    With many samples the evidence prefers a richer law, or a second effect, for a hair's breadth of
+    a rest that is no noise.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in ("named", "class"):
+        return verdict
+    most = PARSIMONY * data.power(chosen.fit.residuals)
+    near = [
+        one
+        for one in verdict.alternatives
+        if all(candidate.frees is None for candidate in one.candidates)
+        and _unknowns(one) < _unknowns(chosen)
+        and np.all(data.power(one.fit.residuals) <= most)
+    ]
+    if not near:
+        return verdict
+    simplest = min(near, key=lambda one: (_unknowns(one), one.bic))
+    others = tuple(one for one in (chosen, *verdict.alternatives) if one is not simplest)
+    equivalent = tuple(
+        one
+        for one in verdict.equivalent
+        if one is not simplest and len(one.candidates) == len(simplest.candidates)
+    )
+    status = "class" if equivalent else "named"
+    return Verdict(status, verdict.base, simplest, others, equivalent, verdict.degrees_of_freedom)
+
+
+def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict without rivals that leave more of some balance, or are the same and more.
+
+    A law that contains the chosen one and does no better is no other explanation.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status != "class":
+        return verdict
+    most = PARSIMONY * data.power(chosen.fit.residuals)
+    equivalent = tuple(
+        one
+        for one in verdict.equivalent
+        if np.all(data.power(one.fit.residuals) <= most) and not _contains(one, chosen)
+    )
+    status = "class" if equivalent else "named"
+    return replace(verdict, status=status, equivalent=equivalent)
+
+
+def _contains(one: Rival, chosen: Rival) -> bool:
+    """Tell whether a set of effects differs from another by laws that contain the other's only."""
+    return all(
+        candidate.port == other.port
+        and (candidate.name == other.name or candidate.name in CONTAINED.get(other.name, ()))
+        for candidate, other in zip(
+            *(sorted(each.candidates, key=lambda c: c.port) for each in (one, chosen)), strict=True
+        )
+    )
+
+
+def _unknowns(one: Rival) -> int:
+    return sum(candidate.unknowns for candidate in one.candidates)
+
+
+def _as_unlisted(verdict: Verdict, nearest: Rival | None) -> Verdict:
+    return Verdict(
+        "unlisted", verdict.base, nearest, verdict.alternatives, (), verdict.degrees_of_freedom
+    )
+
+
+def _in_units_of(
+    wanted: MeasuredData, given: MeasuredData, residuals: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return whitened residuals as whitened by the deviation of other data."""
+    ratio = [
+        (one / other)[balance.kept]
+        for one, other, balance in zip(
+            given.deviation, wanted.deviation, wanted.spectra, strict=True
+        )
+    ]
+    return residuals * np.concatenate(ratio)
+
+
+def root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the root mean square of each balance, N or N.m, for whitened residuals (n,)."""
+    samples = sum(len(balance.time) for balance in data.spectra)
+    return np.sqrt(data.power(residuals) / samples)

@@ -1,0 +1,284 @@
+"""Force balances of measured records, whitened, and the rest that counts as their noise.
+
+The noise of the sensors is estimated from the records. No model of a real machine meets it: what
+the best model leaves, the rest, then counts as noise, as Birge's ratio has it (Physical Review 40,
+1932).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter, out_of_tolerance
+from pymoo_hdte.discrepancy.engine.excess import Excess
+from pymoo_hdte.discrepancy.engine.fitting import Fit, Response, Unknowns, Vector, built
+from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
+
+Values = NDArray[np.float64]
+
+REMAINDER = 0.05
+"""Share of the base's excess up to which what is left is nobody's effect."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredData:
+    """Force balances of records as `discrepancy.evidence.Evidence` wants them.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    spectra : tuple of Balance
+        Of the records.
+    deviation : tuple of ndarray, shape (n_balances, n_bins)
+        Standard deviation that counts as noise, by record.
+    known : tuple of LawAt
+        Effects that the base has.
+    """
+
+    mechanism: Mechanism
+    spectra: tuple[Balance, ...]
+    deviation: tuple[Values, ...]
+    known: tuple[LawAt, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the balances."""
+        return balance_names(self.mechanism)
+
+    def what(self, part: str) -> str:
+        """Return in words what a part is."""
+        return (
+            f"force balance of {part}" if part in self.mechanism.coordinates else f"reading {part}"
+        )
+
+    @property
+    def remainder(self) -> float:
+        """Share of the base's excess up to which what is left is nobody's effect."""
+        return REMAINDER
+
+    @cached_property
+    def base(self) -> tuple[Parameter, ...]:
+        """Quantities that are not known exactly, within their tolerances, and sensors' zeros."""
+        found = []
+        for name, one in self.mechanism.quantities.items():
+            if one.tolerance > 0.0:
+                reach = one.tolerance * one.value
+                found.append(
+                    Parameter(name, one.value, one.value - reach, one.value + reach, reach)
+                )
+        for port in self.mechanism.ports:
+            if port.read:
+                largest = max(
+                    float(np.abs(one.record.channels[port.name]).max()) for one in self.spectra
+                )
+                size = max(largest, 1e-12)
+                found.append(Parameter(f"zero of {port.name}", 0.0, -2.0 * size, 2.0 * size, size))
+        return tuple(found)
+
+    @cached_property
+    def _linear(self) -> tuple[Vector, Values]:
+        """Whitened residuals without the base's parameters, (n,), and their slopes, (n, n_base)."""
+        quantities = quantity_names(self.mechanism)
+        places = [quantities.index(parameter.name) for parameter in self.base]
+        known = np.zeros(len(quantities))
+        for name, one in self.mechanism.quantities.items():
+            known[quantities.index(name)] = one.value
+        known[places] = 0.0
+        constants, slopes = [], []
+        for balance, deviation in zip(self.spectra, self.deviation, strict=True):
+            constant = balance.constant.copy()
+            constant += np.einsum("bqk,q->bk", balance.terms, known)
+            constants.append((constant / deviation)[balance.kept])
+            terms = balance.terms[:, places] / deviation[:, None]
+            slopes.append(np.moveaxis(terms, 1, 2)[balance.kept])
+        return np.concatenate(constants), np.concatenate(slopes)
+
+    def whitened_forces(self, base: Vector, effects: Sequence[LawAt]) -> Vector:
+        """Return what effects take from whitened residuals, (n,), at base parameters (n_base,)."""
+        prefix = "stiffness of "
+        stiffness = {
+            one.name.removeprefix(prefix): float(value)
+            for one, value in zip(self.base, base, strict=True)
+            if one.name.startswith(prefix)
+        }
+        return np.concatenate(
+            [
+                (balance.forces(effects, stiffness) / deviation)[balance.kept]
+                for balance, deviation in zip(self.spectra, self.deviation, strict=True)
+            ]
+        )
+
+    def residuals(self, base: Vector, effects: Sequence[LawAt]) -> Vector:
+        """Return whitened residuals, shape (n,), at base parameters (n_base,) with effects."""
+        constant, slopes = self._linear
+        return constant + slopes @ base - self.whitened_forces(base, (*self.known, *effects))
+
+    def objective(
+        self, candidates: Sequence[Candidate], slopes: Values | None = None
+    ) -> BalanceObjective:
+        """Return whitened residuals with candidates; slopes are known, they need not be given."""
+        return BalanceObjective(self, candidates)
+
+    def response(self, fitted: Fit) -> Response:
+        """Return how the whitened residuals of a fit respond to further effects."""
+        base = fitted.values[: len(self.base)]
+        return lambda added: -self.whitened_forces(base, added)
+
+    def rows_of_parts(self) -> list[NDArray[np.int_]]:
+        """Return where the residuals of each part stand."""
+        return [np.flatnonzero(self._part == part) for part in range(len(self.names))]
+
+    def excess(self, fitted: Fit) -> Excess:
+        """Return the excess chi-square of a fit by record and part, shape (r, n_parts)."""
+        chi_square, freedom = self._chi_square(fitted.residuals), self._coefficients
+        return Excess(chi_square - freedom, freedom)
+
+    def known_over_noise(self) -> float:
+        """Return by how much what is known exactly stands out of the noise.
+
+        The largest ratio of powers in the force balance of a coordinate in a record. Without a
+        force that is known exactly all others may be a multiple of what they are. What is the same
+        in all records at rest may be the zero of a sensor and does not count.
+        """
+        believed = np.array([parameter.start for parameter in self.base])
+        known = self._linear[0] - self.whitened_forces(believed, self.known)
+        for part in range(len(self.names)):
+            still = (self.frequency == 0.0) & (self._part == part)
+            known[still] -= known[still].mean() if still.any() else 0.0
+        ratios = self._chi_square(known) / self._coefficients
+        return float(ratios[:, : len(self.mechanism.coordinates)].max())
+
+    def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
+        """Return a candidate for each quantity of the mechanism that a fit left at a bound."""
+        return [
+            out_of_tolerance(name, name) for name in at_bounds if name in self.mechanism.quantities
+        ]
+
+    def with_rest(self, residuals: Vector) -> MeasuredData:
+        """Return the data with what whitened residuals (n,) show beyond the sensors as more noise.
+
+        White, one level for each part of a record: with weights by frequency a model that is
+        wrong at low frequencies would be fitted to the others.
+        """
+        found = []
+        for left, one in zip(self.coefficients(residuals), self.spectra, strict=True):
+            beyond = np.sum(left**2 - one.noise**2 * one.kept, axis=1, keepdims=True)
+            level = np.maximum(beyond, 0.0) / one.kept.sum(axis=1, keepdims=True)
+            found.append(np.sqrt(one.noise**2 + level))
+        return replace(self, deviation=tuple(found))
+
+    def coefficients(self, residuals: Vector) -> list[Values]:
+        """Return whitened residuals (n,) as coefficients (n_parts, n_bins) of each record.
+
+        SI; zero where a part is not known.
+        """
+        found, start = [], 0
+        for balance, deviation in zip(self.spectra, self.deviation, strict=True):
+            whole, end = np.zeros(deviation.shape), start + int(balance.kept.sum())
+            whole[balance.kept] = residuals[start:end]
+            found.append(whole * deviation)
+            start = end
+        return found
+
+    def power(self, residuals: Vector) -> Vector:
+        """Return the sum of squares of whitened residuals (n,) by part, in squares of its unit."""
+        return np.sum([np.sum(one**2, axis=1) for one in self.coefficients(residuals)], axis=0)
+
+    @cached_property
+    def frequency(self) -> Vector:
+        """Frequency of each residual, Hz, shape (n,)."""
+        return np.concatenate(
+            [np.broadcast_to(one.frequency, one.kept.shape)[one.kept] for one in self.spectra]
+        )
+
+    def _chi_square(self, residuals: Vector) -> Values:
+        """Return the sum of squares of whitened residuals (n,) by record and part."""
+        found = np.zeros((len(self.spectra), len(self.names)))
+        np.add.at(found, (self._record, self._part), residuals**2)
+        return found
+
+    @property
+    def _coefficients(self) -> Values:
+        """Number of coefficients by record and part."""
+        return np.array([one.kept.sum(axis=1) for one in self.spectra], dtype=float)
+
+    @cached_property
+    def _part(self) -> NDArray[np.int_]:
+        return np.concatenate([np.nonzero(one.kept)[0] for one in self.spectra])
+
+    @cached_property
+    def _record(self) -> NDArray[np.int_]:
+        sizes = [int(one.kept.sum()) for one in self.spectra]
+        return np.repeat(np.arange(len(sizes)), sizes)
+
+
+class BalanceObjective(Unknowns):
+    """Whitened residuals of force balances and their derivatives for a set of candidates."""
+
+    def __init__(self, data: MeasuredData, candidates: Sequence[Candidate]) -> None:
+        super().__init__(data.base, candidates)
+        self.data = data
+
+    def residuals(self, values: Vector) -> Vector:
+        """Return residuals at values (n_parameters,)."""
+        n_base = len(self.data.base)
+        return self.data.residuals(values[:n_base], self._effects(values[n_base:]))
+
+    def jacobian(self, values: Vector) -> Values:
+        """Return derivatives (n, n_parameters) by parameters in units of their scale."""
+        n_base, steps = len(self.data.base), self.steps(values)
+        found = np.zeros((len(self.data.frequency), len(values)))
+        found[:, :n_base] = self.data._linear[1] * self.scale[:n_base]
+        stands = self._forces(values)
+        for place, parameter in enumerate(self.parameters):
+            # A law may hang on the stiffness of its port; masses and dampers are no law's.
+            if place >= n_base or parameter.name.startswith("stiffness of "):
+                moved = values.copy()
+                moved[place] += steps[place] * self.scale[place]
+                found[:, place] -= (self._forces(moved) - stands) / steps[place]
+        return found
+
+    def _forces(self, values: Vector) -> Vector:
+        n_base = len(self.data.base)
+        effects = (*self.data.known, *self._effects(values[n_base:]))
+        return self.data.whitened_forces(values[:n_base], effects)
+
+    def slopes_at(self, values: Vector) -> Values:
+        """Return derivatives by base parameters, which do not depend on the values."""
+        return self.data._linear[1].T
+
+    def _effects(self, values: Vector) -> tuple[LawAt, ...]:
+        parts = built(self.candidates, values)
+        return tuple(effect for part in parts for effect in part)  # type: ignore[misc]
+
+
+def measured_data(
+    mechanism: Mechanism,
+    records: Sequence[Record],
+    cutoff: float,
+    known: Sequence[LawAt] = (),
+) -> MeasuredData:
+    """Return records of a mechanism with the noise of their sensors.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    records : sequence of Record
+    cutoff : float
+        Hz, up to which the motion is known.
+    known : sequence of LawAt
+        Effects that the mechanism has.
+
+    Raises
+    ------
+    InvalidInput
+        See `Balance`.
+    """
+    spectra = tuple(Balance(mechanism, record, cutoff) for record in records)
+    return MeasuredData(mechanism, spectra, tuple(one.noise for one in spectra), tuple(known))

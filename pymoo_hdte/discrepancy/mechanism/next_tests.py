@@ -1,0 +1,172 @@
+"""Which test to run next: the repetition of a record that best separates what is still in doubt.
+
+Records repeated at another size, speed or direction, with the motion scaled as it is, are compared
+by how far apart the forces of two explanations then lie beyond what the mechanism's own quantities
+could take up (after Hunter and Reiner, Technometrics 7, 1965).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.mechanism.analysis import Finding
+from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
+from pymoo_hdte.discrepancy.report.document import in_words
+from pymoo_hdte.mechanism.motion import PortMotion, law_force
+
+Values = NDArray[np.float64]
+
+SIZES = (0.3, 1.0, 3.0)
+RATES = (0.3, 1.0, 3.0)
+_NEAR = 4.0
+"""Times what the chosen explanation leaves, up to which another one is a rival."""
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """A test and what it is good for.
+
+    Attributes
+    ----------
+    record : str
+        Training record to be repeated.
+    size, rate : float
+        Factors of its motion and of its speed; a negative rate is the reverse direction.
+    separates : tuple of str
+        What it tells apart.
+    separation : float
+        Root mean square of the difference, in units of what the model leaves; 0 where it is not
+        a matter of degree.
+    description : str
+    """
+
+    record: str
+    size: float
+    rate: float
+    separates: tuple[str, ...]
+    separation: float
+    description: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        return {
+            "record": self.record,
+            "size": self.size,
+            "rate": self.rate,
+            "separates": list(self.separates),
+            "separation": self.separation,
+            "description": self.description,
+        }
+
+
+def next_test(finding: Finding) -> NextTest:
+    """Return the test that says most about what the verdict leaves open."""
+    one_way = [
+        port.name
+        for port in finding.mechanism.ports
+        if not port.read and not turns_back(finding.data, port.name)
+    ]
+    first = finding.data.spectra[0].record.name
+    chosen = finding.verdict.chosen
+    if one_way:
+        return NextTest(
+            first,
+            1.0,
+            -1.0,
+            ("coulomb_friction", "force_offset", "direction_dependent_friction"),
+            0.0,
+            f"Run the same speeds in the reverse direction: the {one_way[0]} moves one way only, "
+            "in which dry friction cannot be told from a constant force.",
+        )
+    rival = _nearest(finding)
+    if chosen is None or rival is None:
+        why = {
+            "adequate": "an effect too small to be seen may grow with the motion",
+            "unlisted": "how what is left grows with the motion says what it may be",
+        }.get(
+            finding.verdict.status,
+            "no rival is left, and what was found is to be proved beyond where it was found",
+        )
+        text = f"Repeat {first} at three times its size: {why}."
+        return NextTest(first, 3.0, 1.0, (), 0.0, text)
+    return _best_repetition(finding, chosen, rival)
+
+
+def _nearest(finding: Finding) -> Rival | None:
+    """Return the explanation that comes closest to the chosen one and differs from it."""
+    chosen = finding.verdict.chosen
+    others = [
+        one
+        for one in (*finding.verdict.equivalent, *finding.verdict.alternatives)
+        if chosen is not None and one.names != chosen.names and one.fit.effects
+    ]
+    equivalent = [one for one in others if one in finding.verdict.equivalent]
+    near = [
+        one
+        for one in others
+        if chosen is not None and one.fit.chi_square <= _NEAR * chosen.fit.chi_square
+    ]
+    return min(equivalent or near, key=lambda one: one.bic, default=None)
+
+
+def _best_repetition(finding: Finding, chosen: Rival, rival: Rival) -> NextTest:
+    best: tuple[float, int, float, float] = (-1.0, 0, 1.0, 1.0)
+    for place, size, rate in product(range(len(finding.data.spectra)), SIZES, RATES):
+        best = max(
+            best, (_separation(finding, chosen, rival, place, size, rate), place, size, rate)
+        )
+    separation, place, size, rate = best
+    name = finding.data.spectra[place].record.name
+    how = " and ".join(
+        text
+        for factor, text in (
+            (size, f"{size:g} times its size"),
+            (rate, f"{rate:g} times its speed"),
+        )
+        if factor != 1.0
+    )
+    told = f"{in_words(chosen.label)} and {in_words(rival.label)}"
+    if separation < 1.0:
+        description = (
+            "No repetition of these records at another size or speed separates "
+            f"{told}: it takes another motion."
+        )
+    else:
+        description = (
+            f"Repeat {name} at {how or 'the same size, for longer'}: there {told} differ by "
+            f"{separation:.2g} times what the model leaves now."
+        )
+    return NextTest(name, size, rate, (chosen.label, rival.label), separation, description)
+
+
+def _separation(
+    finding: Finding, chosen: Rival, rival: Rival, place: int, size: float, rate: float
+) -> float:
+    """Return how far two explanations lie apart when a record is repeated, beyond the base."""
+    balance = finding.data.spectra[place]
+    power, rest = 0.0, finding.remainder
+    for row, name in enumerate(finding.data.names):
+        difference = np.zeros(len(balance.time))
+        imitated = [np.ones(len(balance.time))]
+        for port in finding.mechanism.ports:
+            share = (port.name == name) if port.read else port.motion.get(name, 0.0)
+            if share:
+                motion = balance.ports[port.name]
+                position, speed = size * motion.position, size * rate * motion.speed
+                imitated += [position, speed, np.gradient(speed)]
+                for sign, one in ((1.0, chosen), (-1.0, rival)):
+                    for effect in one.fit.effects:
+                        if effect.port == port.name:  # type: ignore[attr-defined]
+                            scaled = PortMotion(position, speed)
+                            force = law_force(effect.law, scaled, port.stiffness.value)  # type: ignore[attr-defined]
+                            difference += sign * share * force
+        base = np.column_stack(imitated)
+        left = difference - base @ np.linalg.lstsq(base, difference, rcond=None)[0]
+        power += float(np.mean(left**2)) / max(float(rest[row]) ** 2, 1e-300)
+    return float(np.sqrt(power))

@@ -1,0 +1,256 @@
+"""The verdict as a document of plain types, for ``verdict.json``: SI values with their units."""
+
+from __future__ import annotations
+
+import platform
+import re
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.misfit_map import Location
+from pymoo_hdte.discrepancy.drive.next_test import Proposal
+from pymoo_hdte.discrepancy.drive.revision import accepted_fit
+from pymoo_hdte.discrepancy.engine.candidate import (
+    HARMONIC_NAMES,
+    Candidate,
+    Parameter,
+    line_with_variance,
+)
+from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+
+_DEVIATIONS = 1.959964
+"""Half-width of a central 95 % interval of a normal value, in standard deviations."""
+
+_SAYS_LITTLE = 0.8
+"""Width of an interval, as a share of the bounds', from which these and not the records give it."""
+UNITS = {
+    "stiffness": "N.m/rad",
+    "damping": "N.m.s/rad",
+    "input_inertia": "kg.m2",
+    "input_damping": "N.m.s/rad",
+    "output_damping": "N.m.s/rad",
+    "load_inertia": "kg.m2",
+    "offset": "rad",
+    "locked_stiffness": "1",
+    "input_torque_gain": "1",
+    "input_torque_zero": "N.m",
+    "output_torque_gain": "1",
+    "output_torque_zero": "N.m",
+    "error_amplitude": "rad",
+    "error_phase": "rad",
+    "coefficient": "N.m/rad3",
+    "softening": "1",
+    "stiffening": "1",
+    "sharpness": "1",
+    "spread": "1",
+    "torsion": "rad",
+    "half_width": "rad",
+    "force": "N.m",
+    "depth": "1",
+    "level": "N.m",
+    "mean": "N.m",
+    "narrowest": "rad",
+    "locked": "rad",
+    "variation": "rad",
+    "excess": "N.m",
+    "fading": "rad/s",
+    "amplitude": "rad",
+    "share": "1",
+    "inertia": "kg.m2",
+    "factor": "1",
+    "rate": "rad/s",
+    "time": "s",
+    "phase": "rad",
+    "torque_ripple.amplitude": "N.m",
+    "nonlinear_drag.coefficient": "N.m.s2/rad2",
+}
+"""Of parameters, by name or, where the name has several meanings, by effect and name."""
+
+
+def verdict_document(
+    analysis: Analysis,
+    location: Location,
+    held_out: Mapping[str, Any] | None,
+    proposal: Proposal,
+) -> dict[str, Any]:
+    """Return the verdict with all that supports it; `json.dumps` takes it as it is.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    location : Location
+    held_out : mapping or None
+        ``before``, ``after``, ``noise_floor``, ``unit`` and more, of plain types; None where no
+        record was held out.
+    proposal : Proposal
+    """
+    verdict = analysis.verdict
+    absent = {"reason": "no held-out record can be predicted, so that nothing can be proved"}
+    return {
+        "campaign": analysis.campaign.title,
+        "status": verdict.status,
+        "sentence": sentence(verdict),
+        "effects": _effects(verdict),
+        "alternatives": _alternatives(verdict),
+        "base": {
+            "chi_square": verdict.base.chi_square,
+            "degrees_of_freedom": verdict.degrees_of_freedom,
+            "parameters": base_parameters(accepted_fit(verdict)),
+        },
+        "held_out": absent if held_out is None else dict(held_out),
+        "next_experiment": proposal.as_dict(),
+        "location": location.summary(),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy", "numba")},
+        },
+    }
+
+
+def sentence(verdict: Verdict) -> str:
+    """Return the verdict in words."""
+    chosen = verdict.chosen
+    if verdict.status == "adequate" or chosen is None:
+        return "Nothing is missing: the believed drive explains the records within its tolerances."
+    what = " ".join(candidate.sentence for candidate in chosen.candidates)
+    if not chosen.listed:
+        return f"Something is missing that is none of the known effects. {what}"
+    if verdict.status == "unlisted":
+        return (
+            "Something is missing that no known effect explains. The nearest is "
+            f"{in_words(chosen.label)}."
+        )
+    if verdict.status == "class":
+        others = "; or ".join(in_words(rival.label) for rival in verdict.equivalent)
+        return f"{what} Or, which these data cannot tell from it: {others}."
+    return what
+
+
+def _effects(verdict: Verdict) -> list[dict[str, Any]]:
+    """Return the accepted effects; none unless the verdict names or classes them."""
+    fitted, found = accepted_fit(verdict), []
+    start = len(fitted.values) - sum(len(one.parameters) for one in fitted.candidates)
+    for candidate in fitted.candidates:
+        rows = np.arange(start, start + len(candidate.parameters))
+        start += len(candidate.parameters)
+        bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
+        found.append(
+            {
+                "name": candidate.name,
+                "port": candidate.port,
+                "order": candidate.order,
+                "sentence": candidate.sentence,
+                "parameters": _parameters(candidate, fitted, rows),
+                "at_bound": bounded,
+                "share": verdict.chosen.share if verdict.chosen else None,
+            }
+        )
+    return found
+
+
+def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> dict[str, Any]:
+    """Return values with intervals; cosine and sine part as amplitude and phase.
+
+    For a base parameter out of tolerance, its fitted value.
+
+    The phase is that of amplitude cos(order theta_in + phase), in the direction of the part fitted.
+    """
+    found: dict[str, Any] = {}
+    if candidate.frees is not None:
+        rows = np.array([[one.name for one in fitted.parameters].index(candidate.frees)])
+    for row in rows:
+        name, variance = fitted.parameters[row].name, fitted.covariance[row, row]
+        if name.endswith("_cosine"):
+            found |= _line(name.removesuffix("_cosine"), candidate.name, fitted, row)
+        elif not name.endswith("_sine"):
+            found[name] = quantity(fitted.values[row], variance, candidate.name, name)
+    return found
+
+
+def _line(name: str, effect: str, fitted: Fit, row: int) -> dict[str, Any]:
+    """Return amplitude and phase, with intervals, of the cosine part at a row and the sine next."""
+    rows = np.array([row, row + 1])
+    covariance = fitted.covariance[np.ix_(rows, rows)]
+    cosine, sine = fitted.values[rows]
+    amplitude, phase = line_with_variance(cosine, sine, covariance)
+    prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
+    quantity_name = name.removeprefix(prefix)
+    return {
+        name: quantity(*amplitude, effect, quantity_name),
+        f"{prefix}phase": quantity(*phase, effect, "phase"),
+    }
+
+
+def quantity(value: float, variance: float, effect: str, name: str) -> dict[str, Any]:
+    """Return a value with its unit and its 95 % interval."""
+    half = _DEVIATIONS * float(np.sqrt(max(variance, 0.0)))
+    unit = UNITS.get(f"{effect}.{name}", UNITS.get(name, ""))
+    return {
+        "value": float(value),
+        "unit": unit,
+        "interval95": [float(value) - half, float(value) + half],
+    }
+
+
+def base_parameters(fitted: Fit) -> dict[str, Any]:
+    """Return the base values of a fit with units, intervals and whether they ended at a bound."""
+    added = sum(len(candidate.parameters) for candidate in fitted.candidates)
+    found = {}
+    for row, parameter in enumerate(fitted.parameters[: len(fitted.parameters) - added]):
+        kind = parameter.name.rstrip("0123456789").rstrip("_")
+        entry = quantity(fitted.values[row], fitted.covariance[row, row], "base", kind)
+        entry["interval95"] = _within_bounds(parameter, entry["interval95"])
+        found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
+    return found
+
+
+def _within_bounds(parameter: Parameter, interval: list[float]) -> list[float]:
+    """Return an interval cut at the bounds; all between them where the records say little."""
+    lower, upper = parameter.lower, parameter.upper
+    if interval[1] - interval[0] > _SAYS_LITTLE * (upper - lower):
+        return [lower, upper]
+    return [max(interval[0], lower), min(interval[1], upper)]
+
+
+def _alternatives(verdict: Verdict) -> list[dict[str, Any]]:
+    """Return the other sets of effects with their evidence, by rising BIC."""
+    chosen = verdict.chosen
+
+    def evidence(rival: Rival) -> dict[str, Any]:
+        return {
+            "effects": [
+                {"name": one.name, "port": one.port, "order": one.order} for one in rival.candidates
+            ],
+            "bic": rival.bic,
+            "bic_gap": rival.bic - chosen.bic if chosen else None,
+            "chi_square": rival.fit.chi_square,
+            "share": rival.share,
+            "at_bound": list(rival.fit.at_bounds),
+            "equivalent": rival in verdict.equivalent,
+        }
+
+    return [evidence(rival) for rival in sorted(verdict.alternatives, key=lambda one: one.bic)]
+
+
+_PORT = r"([A-Za-z]\w*(?: of \w+)?)"
+
+
+_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
+
+
+def in_words(text: str) -> str:
+    """Return a text with all labels of candidates, such as ``torque_ripple:input@6``, in words."""
+    return _LABEL.sub(_words, text).replace(")+", ") and ")
+
+
+def _words(label: re.Match[str]) -> str:
+    name, form, port, order = label.groups()
+    details = [port.replace("_", " "), form, None if order is None else f"order {order}"]
+    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"

@@ -1,0 +1,253 @@
+"""``verdict.json`` of measured records, and the sentences of their report."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, line_with_variance
+from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.mechanism.analysis import Finding
+from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
+from pymoo_hdte.discrepancy.mechanism.intervals import Spread
+from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
+from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
+from pymoo_hdte.discrepancy.report.document import in_words, sentence
+
+_OFFERED = 6.0
+"""Gain of BIC with which a second effect that is not named is mentioned."""
+_MEANINGFUL = 0.05
+"""Least share of what is left that it removes."""
+
+
+def measured_document(
+    title: str, finding: Finding, gaps: Sequence[MeasuredGap], test: NextTest
+) -> dict[str, Any]:
+    """Return the verdict as plain types.
+
+    Parameters
+    ----------
+    title : str
+    finding : Finding
+    gaps : sequence of MeasuredGap
+        Of held-out records; empty where there are none.
+    test : NextTest
+    """
+    verdict = finding.verdict
+    return {
+        "campaign": title,
+        "status": verdict.status,
+        "sentence": _sentence(verdict),
+        "effects": effects(finding),
+        "offered": offered(finding),
+        "alternatives": [
+            _evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
+        ],
+        "base": quantities(finding),
+        "location": location(finding),
+        "remainder": remainder(finding),
+        "limits": limits(finding),
+        "held_out": [gap.as_dict() for gap in gaps]
+        or {"reason": "no record was held out, so that nothing can be proved"},
+        "next_experiment": test.as_dict(),
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy")},
+        },
+    }
+
+
+def _sentence(verdict: Verdict) -> str:
+    if verdict.status == "adequate":
+        return (
+            "Nothing is missing: the believed mechanism explains the records within its tolerances."
+        )
+    if verdict.chosen is None:
+        return "Something is missing that no known effect explains."
+    return sentence(verdict)
+
+
+def effects(finding: Finding) -> list[dict[str, Any]]:
+    """Return the accepted effects with values and 95 % intervals."""
+    fitted = finding.accepted
+    spread = Spread(finding.data, fitted)
+    start, found = len(finding.data.base), []
+    for candidate in fitted.candidates:
+        rows = range(start, start + len(candidate.parameters))
+        start = rows.stop
+        found.append(
+            {
+                "name": candidate.name,
+                "port": candidate.port,
+                "sentence": candidate.sentence,
+                "parameters": _parameters(fitted, spread, _rows(fitted, candidate, rows)),
+                "at_bound": [
+                    fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0
+                ],
+            }
+        )
+    return found
+
+
+def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
+    """Return the rows of a candidate's parameters, or of the quantity that it sets free."""
+    if candidate.frees is None:
+        return rows
+    place = [one.name for one in fitted.parameters].index(candidate.frees)
+    return range(place, place + 1)
+
+
+def offered(finding: Finding) -> list[dict[str, Any]]:
+    """Return second effects beside the named one that the data speak for, though not loudly.
+
+    They make the fit better than chance does, but remove too little to be named.
+    """
+    chosen = finding.verdict.chosen
+    if chosen is None or finding.accepted is not chosen.fit or len(chosen.candidates) > 1:
+        return []
+    found = []
+    for one in sorted(finding.verdict.alternatives, key=_by_bic):
+        seconds = [c for c in one.candidates if c is not chosen.candidates[0]]
+        removes = 1.0 - one.fit.chi_square / chosen.fit.chi_square
+        if len(seconds) == 1 < len(one.candidates):
+            gain = chosen.bic - one.bic
+            if gain > _OFFERED and removes > _MEANINGFUL:
+                found.append({"name": seconds[0].name, "port": seconds[0].port, "removes": removes})
+    return found
+
+
+def location(finding: Finding) -> dict[str, Any]:
+    """Return in which balance the base is wrong, and by how much."""
+    before, noise = finding.base_misfit, finding.sensor_noise
+    wrong = [
+        name
+        for name, one, floor in zip(finding.data.names, before, noise, strict=True)
+        if one**2 > 2.0 * floor**2
+    ]
+    if finding.verdict.status == "adequate":
+        words = "Nowhere: what the model leaves is that of its sensors, or near it."
+    else:
+        parts = [
+            f"the {finding.data.what(name)} (off by {before[k]:.3g}, sensors {noise[k]:.2g})"
+            for k, name in enumerate(finding.data.names)
+            if name in wrong
+        ]
+        words = f"In {' and '.join(parts) or 'no balance by itself'}."
+    return {
+        "sentence": words,
+        "base_misfit": dict(zip(finding.data.names, before.tolist(), strict=True)),
+        "sensor_noise": dict(zip(finding.data.names, noise.tolist(), strict=True)),
+    }
+
+
+def remainder(finding: Finding) -> dict[str, Any]:
+    """Return what the accepted model leaves, and in words how much of the misfit that is."""
+    after, noise = finding.remainder, finding.sensor_noise
+    size = ", ".join(
+        f"{one:.3g} in the {finding.data.what(name)} ({one / max(floor, 1e-300):.2g} times the "
+        "sensors' noise)"
+        for name, one, floor in zip(finding.data.names, after, noise, strict=True)
+    )
+    named = bool(finding.accepted.candidates)
+    removed = finding.share_removed if named else 0.0
+    words = f"The model leaves {size}."
+    if named:
+        left = "What is left is" if np.all(after <= noise) else "What nobody explains is"
+        words = (
+            f"It removes {100.0 * removed:.3g} % of the power of the misfit beyond the sensors' "
+            f"noise. {left} {size}."
+        )
+    return {
+        "sentence": words,
+        "share_removed": removed,
+        "left": dict(zip(finding.data.names, after.tolist(), strict=True)),
+    }
+
+
+def limits(finding: Finding) -> list[str]:
+    """Return what these records cannot tell, in sentences."""
+    found = [
+        f"The {port.name} moves in one direction only: these records cannot separate Coulomb "
+        "friction from a constant force or a sensor's offset."
+        for port in finding.mechanism.ports
+        if not port.read and not turns_back(finding.data, port.name)
+    ]
+    found += [
+        f"Rows of {record.name} with values that are not finite: {record.dropped}. They are left "
+        "out at the ends and interpolated inside."
+        for record in finding.records
+        if record.dropped
+    ]
+    if not any(record.role == "held_out" for record in finding.records):
+        found.append("No record was held out: the correction is not proved where it was not made.")
+    if any(finding.accepted.bound_sides[: len(finding.data.base)]):
+        names = [n for n in finding.accepted.at_bounds if n in finding.mechanism.quantities]
+        if names:
+            found.append(f"At the bound of its tolerance: {', '.join(names)}.")
+    return found
+
+
+def _by_bic(one: Rival) -> float:
+    return one.bic
+
+
+def _evidence(finding: Finding, one: Rival) -> dict[str, Any]:
+    chosen = finding.verdict.chosen
+    return {
+        "effects": [{"name": c.name, "port": c.port} for c in one.candidates],
+        "label": in_words(one.label),
+        "bic_gap": one.bic - chosen.bic if chosen else None,
+        "share": one.share,
+        "equivalent": one in finding.verdict.equivalent,
+        "role": _role(finding, one),
+    }
+
+
+def _role(finding: Finding, one: Rival) -> str:
+    chosen = finding.verdict.chosen
+    if one in finding.verdict.equivalent:
+        return "as good"
+    return "richer, hardly better" if chosen and one.bic < chosen.bic else "rejected"
+
+
+def quantities(finding: Finding) -> dict[str, Any]:
+    """Return the fitted values of the mechanism with 95 % intervals."""
+    spread = Spread(finding.data, finding.accepted)
+    return _parameters(finding.accepted, spread, range(len(finding.data.base)))
+
+
+def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
+    """Return values with intervals, SI; cosine and sine parts as amplitude and phase."""
+    found: dict[str, Any] = {}
+    for row in rows:
+        parameter, value = fitted.parameters[row], float(fitted.values[row])
+        name, reach = parameter.name, float(spread.reach[row])
+        if name.endswith("_sine"):
+            continue
+        if not name.endswith("_cosine"):
+            # The fit was not free to leave its bounds.
+            bounds = parameter.lower, parameter.upper
+            found[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
+            continue
+        pair = slice(row, row + 2)
+        cosine, sine = fitted.values[pair]
+        amplitude, phase = line_with_variance(cosine, sine, spread.covariance[pair, pair])
+        reach = float(spread.reach[pair].max())
+        name = name.removesuffix("_cosine")
+        found[name] = _with_interval(*amplitude, reach, lower=0.0)
+        found[f"{name}_phase"] = _with_interval(*phase, reach)
+    return found
+
+
+def _with_interval(
+    value: float, variance: float, reach: float, lower: float = -np.inf, upper: float = np.inf
+) -> dict[str, Any]:
+    half = reach * float(np.sqrt(max(variance, 0.0)))
+    interval = np.clip([value - half, value + half], lower, upper)
+    return {"value": value, "unit": "SI", "interval95": interval.tolist()}

@@ -1,0 +1,90 @@
+"""What the correction does to the robust optimum, as the report tells it.
+
+Who optimises stands above the workflow: `pymoo_hdte.cli.optimum_shift`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+_SAME_MOMENTS = 2e-3
+"""Relative difference up to which two designs are as good: some neighbours on a front of 100."""
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The design chosen under one preference, before and after the correction.
+
+    Attributes
+    ----------
+    preference : str
+        A key of `pymoo_hdte.decision.PREFERENCES`.
+    before, after : ndarray, shape (4,)
+        Factors on K, J_in, B_in, B_fc of the drive as it stands.
+    distance : float
+        Relative distance of the two designs, Eq. (42); also along directions that do not matter.
+    promised : ndarray, shape (2,)
+        Mean and standard deviation of the DTE, arcsec, of the old design by the old model.
+    delivered : ndarray, shape (2,)
+        Of the old design by the new model.
+    reached : ndarray, shape (2,)
+        Of the new design by the new model.
+    """
+
+    preference: str
+    before: Values
+    after: Values
+    distance: float
+    promised: Values
+    delivered: Values
+    reached: Values
+
+    @property
+    def stays(self) -> bool:
+        """Whether the old design is still as good as any by the new model."""
+        return bool(np.allclose(self.delivered, self.reached, rtol=_SAME_MOMENTS, atol=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class OptimumShift:
+    """The choices, or why there are none.
+
+    Attributes
+    ----------
+    choices : tuple of Choice
+    obstacle : str
+        Empty unless a model cannot be optimised.
+    fronts : tuple of ndarray, shape (n, 2)
+        Mean and standard deviation of the DTE, arcsec, of the designs found before and after;
+        empty where there are no choices.
+    method : str
+        What found them, in words.
+    """
+
+    choices: tuple[Choice, ...]
+    obstacle: str = ""
+    fronts: tuple[Values, ...] = ()
+    method: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """How the optimum moved, in words, for the balanced preference."""
+        if not self.choices:
+            return self.obstacle
+        choice = next(one for one in self.choices if one.preference == "balanced")
+        promised, delivered, reached = (
+            f"mean {mean:.3g} and standard deviation {std:.3g} arcsec"
+            for mean, std in (choice.promised, choice.delivered, choice.reached)
+        )
+        judged = (
+            f"The old balanced design was promised {promised}; by the revised model it has "
+            f"{delivered}"
+        )
+        if choice.stays:
+            return f"{judged}, as good as the best. The balanced design stays where it was."
+        return f"{judged}, and the new one reaches {reached}."

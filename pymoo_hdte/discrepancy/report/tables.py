@@ -1,0 +1,301 @@
+"""Words and table rows of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.evidence import PARTS
+from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
+from pymoo_hdte.discrepancy.drive.revision import accepted_fit
+from pymoo_hdte.discrepancy.engine.candidate import Parameter
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    EXACT_SHARE,
+    SHARE,
+    Rival,
+    adequate,
+    unexplained,
+)
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.report.document import UNITS, in_words
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+
+METRICS = {
+    "mae": "mean absolute error",
+    "rmse": "root mean square error",
+    "mape_percent": "mean absolute error [%]",
+    "max_error": "largest error",
+    "r2": "R²",
+    "mean_error": "mean error",
+}
+
+STATUSES = {
+    "adequate": "nothing missing",
+    "named": "found",
+    "class": "one of several",
+    "parameter": "believed value wrong",
+    "unlisted": "unknown effect",
+}
+"""Those of a verdict, for the reader."""
+
+_NORMAL_95 = 1.96
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A fitted base parameter; ``None`` where nothing was believed or no bound is meant."""
+
+    name: str
+    unit: str
+    believed: float | None
+    value: float
+    half_width: float
+    lower: float | None
+    upper: float | None
+    at_bound: bool
+
+
+@dataclass(frozen=True)
+class EffectRow:
+    """A parameter of a named effect with its 95 % interval."""
+
+    effect: str
+    parameter: str
+    value: float
+    lower: float
+    upper: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class RivalRow:
+    """Evidence for a set of effects; ``bic`` above that of the best, share in words."""
+
+    label: str
+    role: str
+    chi_square: float
+    share: str
+    bic: float
+    at_bounds: str
+
+
+def certainty(analysis: Analysis) -> str:
+    """Return how sure the verdict is, in words."""
+    verdict = analysis.verdict
+    limit = adequate(verdict.degrees_of_freedom)
+    left = verdict.base.chi_square / verdict.degrees_of_freedom
+    if verdict.status == "adequate" or verdict.chosen is None:
+        return (
+            f"The misfit of the believed drive, fitted within its tolerances, has {left:.2f} times "
+            f"the variance of the noise; up to {limit:.2f} counts as noise. An effect too small "
+            "for these records may still be there."
+        )
+    share = _percent(verdict.chosen.share)
+    if not verdict.chosen.listed:
+        return (
+            f"No effect of the list is as likely: this explains {share} of the misfit. An error of "
+            "the encoder takes no part in the motion of the drive."
+        )
+    if verdict.status == "unlisted":
+        return (
+            "That something is missing is certain; what it is, is not. The nearest known effect "
+            f"explains {share} of the misfit, {_too_little(analysis, verdict.chosen)}."
+        )
+    return " ".join(_evidence(verdict, verdict.chosen, share))
+
+
+def _too_little(analysis: Analysis, nearest: Rival) -> str:
+    """Return why an effect is not named though it is the nearest."""
+    left = unexplained(analysis.data, analysis.verdict.base, nearest.fit)
+    if left.any():
+        parts = [part.replace("_", " ") for part, missed in zip(PARTS, left, strict=True) if missed]
+        return f"but not what shows in {' and '.join(f'the {part}' for part in parts)}"
+    share = EXACT_SHARE if nearest.exact else SHARE
+    return f"where a name takes {100.0 * share:g} %, or what is left to be noise"
+
+
+def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
+    after = chosen.fit.chi_square / verdict.degrees_of_freedom
+    words = [
+        f"It explains {share} of the misfit that is not noise; what is left has {after:.3g} times "
+        "the variance of the noise."
+    ]
+    if verdict.leaves_more_than_noise:
+        words.append(
+            "That is more than noise: its form is not quite right or more is missing, and values "
+            "may be off by more than their intervals say."
+        )
+    rivals = [
+        rival
+        for rival in verdict.alternatives
+        if _names(rival) != _names(chosen) and len(rival.candidates) == len(chosen.candidates)
+    ]
+    if verdict.equivalent:
+        shares = ", ".join(_percent(rival.share) for rival in verdict.equivalent)
+        words.append(f"What these data cannot tell from it explains {shares}.")
+    elif rivals:
+        best = min(rivals, key=lambda rival: rival.bic)
+        words.append(f"The next best, {in_words(best.label)}, explains {_percent(best.share)}.")
+    if chosen.fit.at_bounds:
+        names = ", ".join(name.replace("_", " ") for name in chosen.fit.at_bounds)
+        words.append(f"At the edge of what was allowed, so judge with care: {names}.")
+    return words
+
+
+def gap_sentence(analysis: Analysis, proof: Proof | None) -> str:
+    """Return how much the gap shrank on held-out records, in words."""
+    if proof is None:
+        return "No record was held out, so nothing can be said about conditions not fitted."
+    gap, error = proof.channels[proof.leading], proof.channels["transmission_error"]
+    where = f"{len(proof.records)} held-out records, {proof.leading.replace('_', ' ')}"
+    noise = f"noise alone {gap.noise_floor:.3g} {gap.unit}"
+    if not accepted_fit(analysis.verdict).candidates:
+        return f"Nothing was added. On {where}: off by {gap.before:.3g} {gap.unit}, {noise}."
+    words = f"On {where}: off by {gap.before:.3g} before, {gap.after:.3g} after, {noise}"
+    if gap.after > gap.before or proof.overall.after > proof.overall.before:
+        return f"{words}. The revised model is worse there: do not use it."
+    if gap.shrinkage is not None:
+        words += f"; {_percent(min(gap.shrinkage, 1.0))} of what the noise does not explain is gone"
+    if error is not gap:
+        words += f". Transmission error: {error.before:.3g} before, {error.after:.3g} after, "
+        words += f"noise alone {error.noise_floor:.3g} {error.unit}"
+    if error.after > max(error.before, 1.5 * error.noise_floor):
+        words += ". So the transmission error is met less well than before"
+    return f"{words}."
+
+
+def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
+    """Return the parameters of the effects of a verdict document; angles in arcsec."""
+    rows = []
+    for effect in effects:
+        where = "" if effect["order"] is None else f", order {effect['order']:.4g}"
+        for name, quantity in effect["parameters"].items():
+            angle = quantity["unit"] == "rad" and not name.endswith("phase")
+            size, unit = (ARCSEC, "arcsec") if angle else (1.0, _shown(quantity["unit"]))
+            value, low, high = (
+                number / size for number in (quantity["value"], *quantity["interval95"])
+            )
+            label = f"{effect['name'].replace('_', ' ')} ({effect['port']}{where})"
+            rows.append(EffectRow(label, name.replace("_", " "), value, low, high, unit))
+    return rows
+
+
+def rival_rows(verdict: Verdict) -> list[RivalRow]:
+    """Return the evidence of all that was fitted, the chosen first."""
+    rivals = [] if verdict.chosen is None else [verdict.chosen]
+    rivals += [rival for rival in verdict.alternatives if rival is not verdict.chosen]
+    if not rivals:
+        return []
+    best = min(rival.bic for rival in rivals)
+    return [
+        RivalRow(
+            in_words(rival.label),
+            _role(verdict, rival),
+            rival.fit.chi_square,
+            _percent(rival.share),
+            rival.bic - best,
+            ", ".join(name.replace("_", " ") for name in rival.fit.at_bounds) or "none",
+        )
+        for rival in rivals
+    ]
+
+
+def parameter_rows(analysis: Analysis) -> list[ParameterRow]:
+    """Return the base parameters of the accepted fit."""
+    fitted = accepted_fit(analysis.verdict)
+    # What no residual depends on has no interval, and variances near zero may round below it.
+    known = np.any(fitted.jacobian != 0.0, axis=0)
+    variances = np.where(known, np.maximum(np.diag(fitted.covariance), 0.0), np.nan)
+    half_widths = _NORMAL_95 * np.sqrt(variances)
+    base = fitted.parameters[: len(analysis.data.base)]
+    return [
+        _parameter_row(analysis.campaign, parameter, value, half_width, fitted.at_bounds)
+        for parameter, value, half_width in zip(
+            base, fitted.values.tolist(), half_widths.tolist(), strict=False
+        )
+    ]
+
+
+def metric_rows(proof: Proof | None) -> list[tuple[str, float, float]]:
+    """Return the paper's metrics of the peak-to-peak: name, before, after."""
+    if proof is None or proof.metrics is None:
+        return []
+    before, after = proof.metrics
+    rows = [(word, getattr(before, name), getattr(after, name)) for name, word in METRICS.items()]
+    ends = zip(
+        ("lower", "upper"), before.mean_error_interval, after.mean_error_interval, strict=True
+    )
+    return rows + [(f"mean error, {end} end (95 %)", one, two) for end, one, two in ends]
+
+
+def record_rows(
+    campaign: Campaign, proof: Proof | None
+) -> list[tuple[str, str, float, float, int, Gap | None]]:
+    """Return name, role, speed (r/min), load (N m), rows and, where held out, gap of records."""
+    gaps = {} if proof is None else dict(zip(proof.records, proof.by_record, strict=True))
+    return [
+        (
+            record.name,
+            record.role.replace("_", " "),
+            record.input_speed / REVOLUTION_PER_MINUTE,
+            record.load_torque,
+            len(record.time),
+            gaps.get(record.name),
+        )
+        for record in campaign.running
+    ]
+
+
+def _parameter_row(
+    campaign: Campaign,
+    parameter: Parameter,
+    value: float,
+    half_width: float,
+    at_bounds: tuple[str, ...],
+) -> ParameterRow:
+    name, unit, size = parameter.name, _shown(UNITS.get(parameter.name, "")), 1.0
+    if name.startswith(("error_amplitude_", "error_phase_")):
+        kind, line = name.rsplit("_", 1)
+        unit, size = ("arcsec", ARCSEC) if kind == "error_amplitude" else ("rad", 1.0)
+        name = f"{kind} of order {campaign.believed.error_orders[int(line)]:g}"
+    elif name == "offset":
+        unit, size = "arcsec", ARCSEC
+    # Phases and the constant of the encoders are found, not believed.
+    free = parameter.name == "offset" or parameter.name.startswith("error_phase_")
+    return ParameterRow(
+        name.replace("_", " "),
+        unit,
+        None if free else parameter.start / size,
+        value / size,
+        half_width / size,
+        None if free else parameter.lower / size,
+        None if free else parameter.upper / size,
+        parameter.name in at_bounds,
+    )
+
+
+def _shown(unit: str) -> str:
+    """Return a unit such as N.m.s2/rad2 as a reader knows it."""
+    if unit == "1":
+        return ""
+    return unit.replace(".", " ").replace("2", "²").replace("3", "³")
+
+
+def _role(verdict: Verdict, rival: Rival) -> str:
+    if rival is verdict.chosen:
+        return "best known, but not enough" if verdict.status == "unlisted" else "chosen"
+    return "cannot be told apart" if rival in verdict.equivalent else "rejected"
+
+
+def _names(rival: Rival) -> set[str]:
+    return {candidate.name for candidate in rival.candidates}
+
+
+def _percent(share: float) -> str:
+    """Return a share rounded down: 100 % is not said of less."""
+    return f"{np.floor(1000.0 * share + 1e-9) / 10.0:g} %"

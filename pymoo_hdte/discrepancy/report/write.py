@@ -1,0 +1,174 @@
+"""The report on a campaign: verdict, revised model and a self-contained page, all or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.limits import limits
+from pymoo_hdte.discrepancy.drive.misfit_map import Location
+from pymoo_hdte.discrepancy.drive.next_test import Proposal
+from pymoo_hdte.discrepancy.drive.proof import Proof
+from pymoo_hdte.discrepancy.drive.revision import (
+    MODEL_FILE,
+    SHEET_FILE,
+    accepted_fit,
+    drive_model,
+    revised_model,
+)
+from pymoo_hdte.discrepancy.report.document import in_words, verdict_document
+from pymoo_hdte.discrepancy.report.figures import (
+    gap_by_channel,
+    gap_by_order,
+    misfit_map,
+    misfit_overview,
+    optimum_fronts,
+    overlay,
+)
+from pymoo_hdte.discrepancy.report.optimum import OptimumShift
+from pymoo_hdte.discrepancy.report.tables import (
+    STATUSES,
+    certainty,
+    effect_rows,
+    gap_sentence,
+    metric_rows,
+    parameter_rows,
+    record_rows,
+    rival_rows,
+)
+from pymoo_hdte.drive import DriveModel
+from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
+from pymoo_hdte.reports.figures import data_uri
+from pymoo_hdte.reports.folder import ReportFolder
+from pymoo_hdte.reports.page import page
+
+OptimumOf = Callable[[DriveModel, DriveModel], OptimumShift]
+"""Says how the robust optimum moves from one drive model to another."""
+
+
+def write_report(
+    analysis: Analysis,
+    location: Location,
+    proof: Proof | None,
+    proposal: Proposal,
+    optimum_shift: OptimumOf,
+    out: str | Path,
+) -> dict[str, Any]:
+    """Write a report with verdict and revised model; return the verdict's document.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    location : Location
+    proof : Proof or None
+        None where no record was held out.
+    proposal : Proposal
+    optimum_shift : callable
+        Of the fitted base and the revised model; asked only where an effect was added. That of
+        `pymoo_hdte.cli.optimum_shift` optimises both.
+    out : str or Path
+        New, empty, or an earlier report, which is replaced. Without a revised model, for a drive
+        that a data sheet cannot hold, its two files are missing and the verdict says why.
+
+    Returns
+    -------
+    dict
+        What ``verdict.json`` holds.
+
+    Raises
+    ------
+    InvalidInput
+        If ``out`` holds anything else.
+    OSError
+        If it cannot be written.
+    """
+    FOLDER.check(Path(out))
+    document = verdict_document(
+        analysis, location, None if proof is None else proof.as_dict(), proposal
+    )
+    document["limits"] = limits(analysis)
+    model_files, shift = _revision(analysis, optimum_shift)
+    document["revised_model"] = {"file": MODEL_FILE if model_files else None}
+    document["robust_optimum"] = _shift_document(shift)
+    html = _page(analysis, location, proof, document, shift)
+    FOLDER.write(Path(out), html, document, model_files)
+    return document
+
+
+def _revision(analysis: Analysis, optimum_shift: OptimumOf) -> tuple[dict[str, str], OptimumShift]:
+    """Return the files of the revised model, and what it does to the robust optimum."""
+    try:
+        model = revised_model(analysis)
+        before = drive_model(analysis.campaign, analysis.verdict.base, "before", "the fitted base")
+    except InvalidInput as error:
+        return {}, OptimumShift((), f"The revised drive is no drive model: {error}.")
+    how_to_read = f'# Read it with load_model("{MODEL_FILE}", load_datasheet("{SHEET_FILE}")).\n'
+    files = {MODEL_FILE: how_to_read + model_toml(model), SHEET_FILE: sheet_toml(model.sheet)}
+    if not accepted_fit(analysis.verdict).candidates:
+        return files, OptimumShift((), "No effect was added, so the optimum stays where it was.")
+    return files, optimum_shift(before, model)
+
+
+def _shift_document(shift: OptimumShift) -> dict[str, Any]:
+    names = ("promised", "delivered", "reached")
+    return {
+        "sentence": shift.sentence,
+        "obstacle": shift.obstacle,
+        "choices": [
+            {
+                "preference": choice.preference,
+                "distance": choice.distance,
+                "factors_before": choice.before.tolist(),
+                "factors_after": choice.after.tolist(),
+            }
+            | {f"{name}_mean_std_arcsec": getattr(choice, name).tolist() for name in names}
+            for choice in shift.choices
+        ],
+    }
+
+
+def _page(
+    analysis: Analysis,
+    location: Location,
+    proof: Proof | None,
+    document: dict[str, Any],
+    shift: OptimumShift,
+) -> str:
+    pictures = {
+        "overview": data_uri(misfit_overview(location)),
+        "map": data_uri(misfit_map(location)),
+    }
+    if proof is not None:
+        pictures |= {
+            "channels": data_uri(gap_by_channel(proof)),
+            "orders": data_uri(gap_by_order(proof)),
+            "overlay": data_uri(overlay(proof)),
+        }
+    if shift.choices:
+        pictures["optimum"] = data_uri(optimum_fronts(shift))
+    return page(
+        "pymoo_hdte.discrepancy",
+        "report.html.j2",
+        campaign=analysis.campaign,
+        verdict=analysis.verdict,
+        document=document,
+        location=location,
+        proof=proof,
+        status=STATUSES[analysis.verdict.status],
+        effects=effect_rows(document["effects"]),
+        certainty=certainty(analysis),
+        gap=gap_sentence(analysis, proof),
+        next_test=in_words(document["next_experiment"]["description"]),
+        pictures=pictures,
+        rivals=rival_rows(analysis.verdict),
+        parameters=parameter_rows(analysis),
+        metrics=metric_rows(proof),
+        records=record_rows(analysis.campaign, proof),
+        shift=shift,
+    )
+
+
+FOLDER = ReportFolder("verdict.json", optional=(MODEL_FILE, SHEET_FILE))

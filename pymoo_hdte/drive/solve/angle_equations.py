@@ -1,0 +1,257 @@
+"""The full equations of motion, laws at ports included, over the input angle instead of time.
+
+Static error, stiffness and periodic laws are exactly periodic in the input angle alpha, although
+the input speed w fluctuates. Unknown are the torsion d(alpha) and E(alpha) = w^2 / 2, with which
+th_in'' = E' and th_d'' = 2 E th_d'' + E' th_d' (primes on the right: by alpha), so that
+
+    J_in E' + B_in w + f_in + T (1/N - r th_s') = T_motor
+    J_out (E'/N - 2 E th_d'' - E' th_d') + B_out (w/N - w th_d') + f_out - T = -T_L
+    T = k d + c w d' + f_mesh,    th_d = th_s + d
+
+The mean of 1/w is that of the wanted speed, whose sign w has: a drive may turn either way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.steady_motion import CONSTANT_TORQUE, Phasors, SpeedLoop
+from pymoo_hdte.drive.solve.torus import Matrices, Torus
+from pymoo_hdte.laws.hysteresis import MaxwellSlip
+from pymoo_hdte.laws.law import PortState, Response
+
+_STATIC_STEPS = 8
+
+Values = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A torsion and a speed on the grid of the torus, with what follows; arrays (n, G).
+
+    ``mesh_slope`` and ``mesh_damping`` are the derivatives of ``mesh_torque`` by torsion and by its
+    rate, ``output_loss`` that of ``output_friction`` by speed.
+    """
+
+    angular_speed: Values
+    energy_slope: Values
+    output_speed: Values
+    output_acceleration: Values
+    mesh_torque: Values
+    mesh_slope: Values
+    mesh_damping: Values
+    output_friction: Values
+    output_loss: Values
+
+
+class AngleEquations:
+    """The equations of n rows, each at a speed (rad/s, either sign) and a load (N.m) of its own."""
+
+    def __init__(
+        self,
+        coefficients: Coefficients,
+        speed: Values,
+        load: Values,
+        motor: SpeedLoop,
+        torus: Torus,
+    ) -> None:
+        self.coefficients, self.motor, self.torus = coefficients, motor, torus
+        self.speed, self.load = speed[:, None], load[:, None]
+        self.output_inertia = np.reshape(coefficients.output_inertia, (-1, 1))
+        self.output_damping = np.reshape(coefficients.output_damping, (-1, 1))
+        self.static = np.zeros((len(speed), len(torus.orders)), dtype=complex)
+        for order, phasor in zip(
+            coefficients.error_orders, coefficients.error_phasors.T, strict=True
+        ):
+            place, conjugate = torus.place(float(order))
+            self.static[:, place] += phasor.conj() if conjugate else phasor
+        self._static_slope = torus.signal(torus.derivative(self.static))
+        angle = 2.0 * torus.phase(1.0) + coefficients.stiffness_phase
+        self._varying = 1.0 + coefficients.stiffness_depth * np.cos(angle)
+        self._backward = speed < 0.0
+
+    def rows(self, rows: NDArray[np.int_]) -> AngleEquations:
+        """Return the equations of some of the rows."""
+        speed, load = self.speed[rows, 0], self.load[rows, 0]
+        return AngleEquations(self.coefficients.rows(rows), speed, load, self.motor, self.torus)
+
+    def static_torsion(self) -> Values:
+        """Return the mean torsion, shape (n,), that holds load and bearing friction at rest."""
+        stiffness = self.coefficients.stiffness
+        torque = self.coefficients.torque_at(self.speed[:, 0], self.load[:, 0])
+        found = torque / stiffness
+        if not any(port == "mesh" for port, _ in self.coefficients.laws):
+            return found
+        still = np.zeros((len(found), self.torus.size))
+        for _ in range(_STATIC_STEPS):
+            position = np.broadcast_to(found[:, None], still.shape)
+            added = mean(self._laws("mesh", position, still).torque)[:, 0]
+            found = found + (torque - stiffness * found - added) / stiffness
+        return found
+
+    def at_wanted_speed(self, energy: Phasors) -> Phasors:
+        """Return E scaled such that the mean of 1/w is that of the wanted speed."""
+        return energy * (self.speed * mean(1.0 / self._angular_speed(energy))) ** 2
+
+    def _angular_speed(self, energy: Phasors) -> Values:
+        size = np.sqrt(2.0 * np.maximum(self.torus.signal(energy), 1e-12))
+        return np.copysign(size, self.speed)
+
+    def motion(self, torsion: Phasors, energy: Phasors) -> Motion:
+        """Put torsion and E on the grid, with the torques that follow."""
+        torus, coefficients = self.torus, self.coefficients
+        angular_speed = self._angular_speed(energy)
+        energy_slope = torus.signal(torus.derivative(energy))
+        error = self.static + torsion
+        error_slope = torus.signal(torus.derivative(error))
+        error_curvature = torus.signal(torus.derivative(torus.derivative(error)))
+        output_acceleration = (
+            energy_slope / coefficients.ratio
+            - angular_speed**2 * error_curvature
+            - energy_slope * error_slope
+        )
+        output_speed = angular_speed * (1.0 / coefficients.ratio - error_slope)
+        position = torus.signal(torsion)
+        rate = angular_speed * torus.signal(torus.derivative(torsion))
+        stiffness = coefficients.stiffness[:, None] * self._varying
+        damping = coefficients.damping[:, None]
+        mesh = self._laws("mesh", position, rate)
+        output = self._laws("output", np.zeros_like(output_speed), output_speed)
+        return Motion(
+            angular_speed=angular_speed,
+            energy_slope=energy_slope,
+            output_speed=output_speed,
+            output_acceleration=output_acceleration,
+            mesh_torque=stiffness * position + damping * rate + mesh.torque,
+            mesh_slope=np.broadcast_to(stiffness + mesh.slope, position.shape),
+            mesh_damping=damping + np.asarray(mesh.damping),
+            output_friction=output.torque,
+            output_loss=np.asarray(output.damping),
+        )
+
+    def _laws(self, port: str, position: Values, speed: Values) -> Response:
+        """Return the sum of the laws at a port."""
+        # The output's own small fluctuation is left out of the angle its periodic laws follow.
+        slower = self.coefficients.ratio if port == "output" else 1.0
+
+        def phase(order: float) -> Values:
+            return self.torus.phase(order / slower)
+
+        stiffness = self.coefficients.stiffness[:, None]
+        state = PortState(position, speed, phase, stiffness, self._path, self._back)
+        total = Response(np.zeros_like(speed))
+        for place, law in self.coefficients.laws:
+            if place == port:
+                one = law.respond(state)
+                total = Response(
+                    total.torque + one.torque,
+                    total.slope + one.slope,
+                    total.damping + one.damping,
+                )
+        return total
+
+    def _path(self, values: Values) -> Values:
+        """Return grid values in the order in which a row passes them, twice over."""
+        along = self.torus.path(values)
+        return np.where(self._backward[:, None], along[:, ::-1], along)
+
+    def _back(self, along: Values) -> Values:
+        """Return the second passage of values along `_path` on the grid."""
+        second = along[:, self.torus.size :]
+        second = np.where(self._backward[:, None], second[:, ::-1], second)
+        return self.torus.back(np.hstack([second, second]))
+
+    def recall_matrix(self, torsion: Phasors) -> Matrices | None:
+        """Return how the mesh torque hangs on the torsion elsewhere, if a law has memory.
+
+        Shape (n, 2 H, 2 H), to be added to what ``mesh_slope`` gives.
+        """
+        springs = [law for _, law in self.coefficients.laws if isinstance(law, MaxwellSlip)]
+        if not springs:
+            return None
+        along = self._path(self.torus.signal(torsion))
+        every = np.arange(self.torus.size, dtype=float)
+        passed = self._path(np.tile(every, (len(along), 1)))
+        total = np.zeros((len(along), *[2 * len(self.torus.orders)] * 2))
+        for law in springs:
+            weights, steps = law.recall(along)
+            places = np.take_along_axis(np.broadcast_to(passed, steps.shape), steps, axis=2)
+            on_grid = np.array([self._back(one) for one in weights])
+            elsewhere = np.array([self._back(one) for one in places]).astype(int)
+            total -= self.torus.recall_matrix(on_grid, elsewhere)
+        return total
+
+    def output_residual(self, motion: Motion) -> Phasors:
+        """Return what is left of the second equation, N.m."""
+        return self.torus.phasors(
+            self.output_inertia * motion.output_acceleration
+            + self.output_damping * motion.output_speed
+            + motion.output_friction
+            - motion.mesh_torque
+            + self.load
+        )
+
+    def input_residual(self, motion: Motion) -> Phasors:
+        """Return what is left of the first equation, N.m; its mean is the motor's constant."""
+        coefficients = self.coefficients
+        reaction = coefficients.reaction * self._static_slope
+        still = np.zeros_like(motion.angular_speed)
+        friction = self._laws("input", still, motion.angular_speed)
+        resisting = (
+            coefficients.input_inertia[:, None] * motion.energy_slope
+            + coefficients.input_damping[:, None] * motion.angular_speed
+            + friction.torque
+            + motion.mesh_torque * (1.0 / coefficients.ratio - reaction)
+        )
+        return self.torus.phasors(resisting - self.loop_torque(motion))
+
+    def lead(self, motion: Motion) -> Phasors:
+        """Return alpha - Omega t."""
+        return -self.torus.integral(self.torus.phasors(self.speed / motion.angular_speed))
+
+    def loop_torque(self, motion: Motion) -> Values:
+        """Return the motor's torque but for its constant."""
+        motor = self.motor
+        if motor == CONSTANT_TORQUE:
+            return np.zeros_like(motion.angular_speed)
+        # The integral of w_set - w is Omega t - alpha.
+        late = -self.torus.signal(self.lead(motion))
+        return motor.proportional * (self.speed - motion.angular_speed) + motor.integral * late
+
+    def input_operator(self) -> Phasors:
+        """Return A, motor torque per unit of E of the free input, linear in E; 1 for the mean."""
+        coefficients, motor = self.coefficients, self.motor
+        orders = np.where(self.torus.orders == 0.0, 1.0, self.torus.orders)
+        damping = coefficients.input_damping[:, None] + motor.proportional
+        operator = (
+            1j * orders * coefficients.input_inertia[:, None]
+            + damping / self.speed
+            + motor.integral / (1j * orders * self.speed**2)
+        )
+        operator[:, 0] = 1.0
+        return operator
+
+    def impedance(self, friction: Values, operator: Phasors) -> tuple[Phasors, Phasors, Phasors]:
+        """Return mesh torque per transmission error P of the free inertias, C, and 1 + C / (N A).
+
+        C is the output's torque per unit of E, A the motor's (`input_operator`); ``friction`` is
+        the damping (n, 1) of the laws at the output, and ``operator`` is N A.
+        """
+        frequency = self.torus.orders * self.speed
+        damping = self.output_damping + friction
+        inertia = self.output_inertia
+        output = inertia * frequency**2 - 1j * frequency * damping
+        coupling = 1j * self.torus.orders * inertia + damping / self.speed
+        coupling = coupling / self.coefficients.ratio
+        share = 1.0 + coupling / operator
+        share[:, 0] = 1.0
+        return output / share, coupling, share
+
+
+def mean(values: Values | float) -> Values:
+    """Return the mean over the grid, shape (n, 1)."""
+    return np.atleast_2d(np.mean(np.atleast_2d(values), axis=1)).T

@@ -1,0 +1,136 @@
+"""Coefficients of the equations of motion, Eq. (9) with the terms that effects add to it.
+
+    J_in  th_in''  + B_in  th_in'  + (k d + c d') / N = T_in(t)
+    J_out th_out'' + B_out th_out' - (k d + c d')     = -T_L(t)
+    d = th_in / N - th_out - th_s(th_in),   k = K (1 + kappa cos(2 th_in + psi))
+
+and laws at ports, which add their torques, and the reaction of theta_s on the input.
+`steady_state`, `harmonic_balance` and `time_domain` all solve these equations, so a term stands
+here once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.laws.law import Law
+from pymoo_hdte.laws.stiffness import PeriodicStiffness
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Coefficients of Eq. (9), with what effects add to it, of n designs under one condition.
+
+    Attributes
+    ----------
+    ratio : float
+        Transmission ratio N, dimensionless.
+    input_speed : float
+        Mean speed of the input, rad/s.
+    load_torque : float
+        T_L, N.m at the output.
+    stiffness : ndarray, shape (n,)
+        Mean K between input (referred to the output) and output, N.m/rad.
+    damping : ndarray, shape (n,)
+        c beside it, N.m.s/rad.
+    stiffness_depth : float
+        kappa of the stiffness variation, dimensionless; 0 where the stiffness is constant.
+    stiffness_phase : float
+        psi of the stiffness variation, rad.
+    input_inertia : ndarray, shape (n,)
+        J_in, kg.m2.
+    input_damping : ndarray, shape (n,)
+        B_in, N.m.s/rad.
+    output_inertia : float or ndarray, shape (n,)
+        J_out with all that turns with it, kg.m2.
+    output_damping : float or ndarray, shape (n,)
+        B_out, N.m.s/rad.
+    error_orders : ndarray, shape (n_orders,)
+        Orders of theta_s in cycles per input turn.
+    error_phasors : ndarray of complex, shape (n, n_orders)
+        theta_s = Re sum phasor exp(i order theta_in), rad.
+    load_inertia : float or ndarray, shape (n,)
+        The part of ``output_inertia`` beyond the output coupling, kg.m2.
+    laws : tuple of (str, Law)
+        Ports, each with a law whose torque is added there.
+    reaction : float
+        Share of the mesh torque's reaction on the input through the slope of theta_s: 0 in
+        Eq. (9), 1 by the principle of virtual work; dimensionless.
+    """
+
+    ratio: float
+    input_speed: float
+    load_torque: float
+    stiffness: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    stiffness_depth: float
+    stiffness_phase: float
+    input_inertia: NDArray[np.float64]
+    input_damping: NDArray[np.float64]
+    output_inertia: float | NDArray[np.float64]
+    output_damping: float | NDArray[np.float64]
+    error_orders: NDArray[np.float64]
+    error_phasors: NDArray[np.complex128]
+    load_inertia: float | NDArray[np.float64] = 0.0
+    laws: tuple[tuple[str, Law], ...] = ()
+    reaction: float = 0.0
+
+    def rows(self, rows: slice | NDArray[np.int_]) -> Coefficients:
+        """Return the coefficients of some of the designs.
+
+        Parameters
+        ----------
+        rows : slice or ndarray of int, shape (m,)
+            Places of the designs.
+
+        Returns
+        -------
+        Coefficients
+        """
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        parts = {k: v[rows] for k, v in values.items() if k in _BY_DESIGN and np.ndim(v)}
+        return replace(self, **parts)
+
+    def torque_at(
+        self, input_speed: NDArray[np.float64], load_torque: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the mean mesh torque without laws at n operating conditions, one a design.
+
+        Parameters
+        ----------
+        input_speed : ndarray, shape (n,)
+            rad/s.
+        load_torque : ndarray, shape (n,)
+            N.m at the output.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Load and bearing friction, N.m at the output.
+        """
+        return load_torque + self.output_damping * input_speed / self.ratio
+
+    @property
+    def mean_mesh_torque(self) -> float | NDArray[np.float64]:
+        """Mean of k d + c d' in steady state: load and bearing friction, N.m at the output.
+
+        A float, or of shape (n,) where `output_damping` is.
+        """
+        return self.load_torque + self.output_damping * self.input_speed / self.ratio
+
+    @property
+    def stiffness_variations(self) -> tuple[PeriodicStiffness, ...]:
+        """All that the stiffness varies by with the input angle: its own order 2, and laws."""
+        laws = tuple(law for _, law in self.laws if isinstance(law, PeriodicStiffness))
+        if self.stiffness_depth == 0.0:
+            return laws
+        return (PeriodicStiffness(2.0, self.stiffness_phase, self.stiffness_depth), *laws)
+
+
+_BY_DESIGN = (
+    "stiffness", "damping", "input_inertia", "input_damping", "output_inertia", "output_damping",
+    "error_phasors", "load_inertia",
+)  # fmt: skip

@@ -1,0 +1,246 @@
+"""Steady state of the full equations, laws at ports included, by harmonic balance over the angle.
+
+The terms of `angle_equations` are evaluated on a grid (`torus`) and brought to zero harmonic by
+harmonic (Newton's method; alternating time and frequency, Cameron and Griffin, J. Applied Mechanics
+56, 1989); what couples speed and torsion is weak and followed by iteration. Hysteresis enters the
+step with its memory: the torque of a spring that sticks hangs on the torsion where it last slipped.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Motion, Values, mean
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.steady_motion import (
+    BY_CASE,
+    CONSTANT_TORQUE,
+    Balance,
+    Phasors,
+    SpeedLoop,
+)
+from pymoo_hdte.drive.solve.torus import (
+    Matrices,
+    Torus,
+    fundamental_orders,
+    largest_multiples,
+    multiplication,
+    shared_torus,
+    stacked,
+    unstacked,
+)
+
+HIGHEST = 8
+"""Least number of harmonics of the input turn that are kept."""
+_STEPS = 50
+_WITHOUT_MEMORY = 10
+"""Steps before those that heed the memory of hysteresis, which cost ten times as much."""
+_NEARLY_CONSTANT = 0.02
+"""Variation of the mesh stiffness, relative, up to which its mean serves in Newton's step."""
+_SHRINKS = 0.9
+"""A step is followed in full again only where it is shorter than this share of the one before."""
+_LEAST_PART = 0.1
+_ROWS_AT_ONCE = 64
+
+
+def torus_of(coefficients: Coefficients) -> Torus:
+    """Return a torus that holds all excited orders with room for their combinations."""
+    excited = [float(order) for order in coefficients.error_orders]
+    for port, law in coefficients.laws:
+        scale = 1.0 / coefficients.ratio if port == "output" else 1.0
+        excited += [scale * order for order in law.orders]
+    fundamentals = fundamental_orders(excited)
+    needed = largest_multiples(fundamentals, excited)
+    # A line that the input angle itself shakes has a strong second harmonic over that angle.
+    whole = max(HIGHEST, 2 * int(np.ceil(max(excited, default=0.0))) + 1)
+    # The first fraction is that of the static error, whose beat the stiffness may modulate.
+    fractions = [most + (place == 0) for place, most in enumerate(needed[1:])]
+    return shared_torus(fundamentals, (whole, *fractions))
+
+
+def harmonic_balance(
+    coefficients: Coefficients,
+    *,
+    input_speed: Values | None = None,
+    load_torque: Values | None = None,
+    motor: SpeedLoop = CONSTANT_TORQUE,
+    torus: Torus | None = None,
+    tolerance: float = 1e-11,
+    start: Balance | None = None,
+) -> Balance:
+    """Return the steady state of the n designs of ``coefficients``, laws at ports included.
+
+    Newton's method on the harmonics over the input angle; the torques are evaluated on a grid
+    (alternating time and frequency, Cameron and Griffin, J. Applied Mechanics 56, 1989).
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of n designs.
+    input_speed, load_torque : ndarray, shape (n,), optional
+        An operating condition for each row, rad/s and N.m, in place of that of ``coefficients``. A
+        negative speed is the reverse direction; a load keeps its sense in space.
+    motor : SpeedLoop
+        What holds the speed; by default a constant torque.
+    torus : Torus, optional
+        Harmonics that are kept; by default all excited orders and their combinations.
+    tolerance : float
+        Largest change of the torsion, relative to its size, at which the iteration ends.
+    start : Balance, optional
+        Nearby cases, a row each, to begin from; ignored if their torus is another.
+
+    Returns
+    -------
+    Balance
+        A row a design; one without a steady state is marked as not converged.
+
+    Raises
+    ------
+    InvalidInput
+        If a speed is 0: a drive at rest has no steady state over its angle.
+    """
+    n = len(coefficients.stiffness)
+    speed = np.broadcast_to(coefficients.input_speed if input_speed is None else input_speed, n)
+    load = np.broadcast_to(coefficients.load_torque if load_torque is None else load_torque, n)
+    if np.any(speed == 0.0):
+        raise InvalidInput("input_speed", 0.0, "other than 0")
+    torus = torus_of(coefficients) if torus is None else torus
+    parts = []
+    for first in range(0, max(n, 1), _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE)
+        equations = AngleEquations(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
+        solver = _Solver(equations)
+        if start is not None and np.array_equal(start.torus.orders, torus.orders):
+            solver.begin(start.rows(rows))
+        # A row that runs away is marked as not converged, and says no more than that.
+        with np.errstate(over="ignore", invalid="ignore"):
+            solver.solve(tolerance)
+        parts.append(solver.result())
+    return Balance(
+        torus, *(np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE)
+    )
+
+
+class _Solver:
+    """Newton's iteration for one block of rows."""
+
+    def __init__(self, equations: AngleEquations) -> None:
+        self.equations = equations
+        self.torsion = np.zeros_like(equations.static)
+        self.torsion[:, 0] = equations.static_torsion()
+        self.energy = np.zeros_like(equations.static)
+        self.energy[:, :1] = equations.speed**2 / 2.0
+        self.converged = np.zeros(len(self.torsion), dtype=bool)
+
+    def begin(self, near: Balance) -> None:
+        """Begin from nearby cases that have converged."""
+        kept = near.converged[:, None]
+        self.torsion = np.where(kept, near.torsion, self.torsion)
+        self.energy = self.equations.at_wanted_speed(np.where(kept, near.energy, self.energy))
+
+    def solve(self, tolerance: float) -> None:
+        """Iterate until the torsion stands still; rows that never do are marked."""
+        equations, left = self.equations, np.arange(len(self.torsion))
+        size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
+        before, part = np.full_like(size, np.inf), np.ones_like(size)
+        for step in range(_STEPS):
+            torsion, energy = self.torsion[left], self.energy[left]
+            if step == _WITHOUT_MEMORY:
+                before[left], part[left] = np.inf, 1.0
+            recall = equations.recall_matrix(torsion) if step >= _WITHOUT_MEMORY else None
+            change, energy_change = _newton_step(equations, torsion, energy, size[left], recall)
+            longest = np.abs(change).max(axis=1, keepdims=True)
+            part[left] = _part(part[left], longest <= _SHRINKS * before[left])
+            before[left] = longest
+            self.torsion[left] = torsion + part[left] * change
+            self.energy[left] = equations.at_wanted_speed(energy + part[left] * energy_change)
+            settled = longest[:, 0] <= tolerance * size[left, 0]
+            self.converged[left] = settled
+            if np.all(settled):
+                break
+            # A few stubborn rows need not take the others along.
+            if 2 * np.sum(settled) >= len(left):
+                left = left[~settled]
+                equations = self.equations.rows(left)
+
+    def result(self) -> Balance:
+        """Return the steady state as it is now."""
+        equations = self.equations
+        motion = equations.motion(self.torsion, self.energy)
+        torus, coefficients = equations.torus, equations.coefficients
+        inertia = np.reshape(coefficients.load_inertia, (-1, 1))
+        constant = equations.input_residual(motion)[:, :1].real
+        return Balance(
+            torus=torus,
+            transmission_error=equations.static + self.torsion,
+            torsion=self.torsion,
+            motor_torque=torus.phasors(equations.loop_torque(motion) + constant),
+            coupling_torque=torus.phasors(equations.load + inertia * motion.output_acceleration),
+            lead=equations.lead(motion),
+            energy=self.energy,
+            converged=self.converged,
+        )
+
+
+def _part(part: Values, shrinks: NDArray[np.bool_]) -> Values:
+    """Return the part of a step to take: between kinks, full ones may go round in circles."""
+    longer, shorter = np.minimum(2.0 * part, 1.0), np.maximum(0.5 * part, _LEAST_PART)
+    return np.where(shrinks, longer, shorter)
+
+
+def _newton_step(
+    equations: AngleEquations,
+    torsion: Phasors,
+    energy: Phasors,
+    size: Values,
+    recall: Matrices | None,
+) -> tuple[Phasors, Phasors]:
+    """Return a Newton step of torsion and E together, at most ``size`` (n, 1) of the torsion.
+
+    ``recall`` is what laws with a memory add to its matrix.
+
+    E is eliminated: near the steady state it answers to the mesh torque harmonic by harmonic.
+    """
+    motion = equations.motion(torsion, energy)
+    operator = equations.coefficients.ratio * equations.input_operator()
+    impedance, coupling, share = equations.impedance(mean(motion.output_loss), operator)
+    energy_change = -equations.coefficients.ratio * equations.input_residual(motion) / operator
+    energy_change[:, 0] = 0.0
+    right = (equations.output_residual(motion) + coupling * energy_change) / share
+    change = _torsion_change(equations, motion, impedance, recall, right)
+    # Where a law takes the stiffness away, a full step may lead far off.
+    longest = np.abs(change).max(axis=1, keepdims=True)
+    change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
+    energy_change[:, 1:] -= ((right + impedance * change) / operator)[:, 1:]
+    # Nor may the speed come near zero on the way.
+    largest = np.abs(energy_change).sum(axis=1, keepdims=True)
+    slowest = 0.5 * energy[:, :1].real
+    energy_change *= np.minimum(1.0, slowest / np.maximum(largest, 1e-300))
+    return change, energy_change
+
+
+def _torsion_change(
+    equations: AngleEquations,
+    motion: Motion,
+    impedance: Phasors,
+    recall: Matrices | None,
+    right: Phasors,
+) -> Phasors:
+    """Return the change of the torsion that the linearised mesh answers ``right`` with."""
+    orders, slope = equations.torus.orders, motion.mesh_slope
+    viscous = 1j * orders * equations.speed * mean(motion.mesh_damping) - impedance
+    level = mean(slope)
+    nearly_constant = np.all(np.abs(slope - level) <= _NEARLY_CONSTANT * np.abs(level))
+    if nearly_constant and recall is None:
+        return right / (level + viscous)
+    matrix = equations.torus.product_matrix(slope) + multiplication(viscous)
+    if recall is not None:
+        matrix += recall
+    # The mean has no imaginary part: an equation for it must not be missing.
+    empty = len(orders)
+    matrix[:, empty, empty] = np.abs(matrix[:, 0, 0])
+    real = stacked(right)
+    real[:, empty] = 0.0
+    return unstacked(np.asarray(np.linalg.solve(matrix, real[:, :, None])[:, :, 0]))

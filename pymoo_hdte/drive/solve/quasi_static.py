@@ -1,0 +1,209 @@
+"""Torsion of a drive with locked input whose output is loaded and unloaded slowly.
+
+Between two turning points of the mesh torque the torsion moves one way only. A law with memory then
+follows from the torsions at the turning points, which makes each leg one vectorised root search.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pymoo_hdte.checks import finite_array
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.laws.friction import CoulombFriction, StribeckFriction
+from pymoo_hdte.laws.law import Law, PortState, Response, Values, periodic_phase
+from pymoo_hdte.laws.stiffness import DeadZone, PeriodicClearance, PeriodicStiffness
+
+_STEPS = 100
+_TOLERANCE = 1e-12
+"""Largest change of the torsion, relative to the way of the leg, that ends the root search."""
+_DOUBLINGS = 20
+_LEAST_WAY = 1e-7
+"""rad. The search starts no smaller: within a clearance hardly any torque is a long way."""
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+"""For the integral of torque over the torsion of one interval; its kinks need this many nodes."""
+
+
+def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
+    """Return the torsion d along a path of slow load with the input locked, from rest.
+
+    Laws at the mesh answer as they stand. Dry friction at the output, its level with all of the
+    Stribeck excess, holds the mesh torque until the load has left it by that much, whichever way.
+    Where a clearance leaves the torsion free, it moves no further than it must.
+
+    The angle of the locked input is not known: a stiffness and clearances that vary with it are
+    taken at their means, which is wrong by up to the depth of the variation and by up to half the
+    clearance, and angle-periodic friction as none. The static error is a constant and is left out.
+    The test is that of Section 3.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        n rows, of which ``stiffness`` and ``laws`` count.
+    torque : ndarray, shape (b,)
+        Load at the output in the order of the path, which comes from zero, N.m.
+
+    Returns
+    -------
+    ndarray, shape (n, b)
+        rad; not a number where the mesh cannot carry the torque.
+
+    Raises
+    ------
+    InvalidInput
+        For a torque that is not finite or of another shape.
+    """
+    return np.hstack([_none(coefficients), *(leg.torsion for leg in _legs(coefficients, torque))])
+
+
+def mean_torsion(coefficients: Coefficients, torque: Values) -> Values:
+    """Return the mean torsion between consecutive points of the path, the load growing steadily.
+
+    By parts, the integral of d over T is one of T over d: the jump of a clearance and the rest
+    before breakaway are averaged as they are, however wide apart the points.
+
+    Parameters, errors and limits are those of `quasi_static_torsion`; b is the number of points.
+
+    Returns
+    -------
+    ndarray, shape (n, b - 1)
+        rad.
+    """
+    parts = [_none(coefficients)]
+    for leg in _legs(coefficients, torque):
+        half = np.diff(leg.torsion, prepend=leg.before) / 2.0
+        low = leg.torsion - 2.0 * half
+        inside = (low + half)[..., None] + half[..., None] * _NODES
+        carried = leg.mesh.respond(inside.reshape(len(inside), -1), leg.turns).torque
+        missing = leg.held[:, None] - carried.reshape(inside.shape)
+        area = half * (missing @ _WEIGHTS)
+        steady = np.divide(area, leg.steps, out=np.zeros_like(area), where=leg.steps != 0.0)
+        parts.append(low + steady)
+    return np.hstack(parts)[:, 1:]
+
+
+def _none(coefficients: Coefficients) -> Values:
+    return np.empty((len(coefficients.stiffness), 0))
+
+
+@dataclass(frozen=True)
+class _Mesh:
+    """Mesh torque over torsion with the input locked."""
+
+    stiffness: Values
+    laws: tuple[Law, ...]
+
+    def respond(self, torsion: Values, turns: Values) -> Response:
+        """Return the torque at torsions (n, m) that each follow the turning points (n, k)."""
+        earlier = np.repeat(turns, torsion.shape[1], axis=0)
+
+        def path(values: Values) -> Values:
+            return np.column_stack([earlier, values.ravel()])
+
+        def back(values: Values) -> Values:
+            return values[:, -1].reshape(torsion.shape)
+
+        still = np.zeros_like(torsion)
+        state = PortState(torsion, still, periodic_phase(0.0), self.stiffness, path, back)
+        torque, slope = self.stiffness * torsion, self.stiffness + still
+        for law in self.laws:
+            one = law.respond(state)
+            torque, slope = torque + one.torque, slope + one.slope
+        return Response(torque, slope)
+
+    def torsion_at(self, held: Values, before: Values, turns: Values, direction: float) -> Values:
+        """Return the first torsions beyond ``before`` (n, 1) that carry the torques (m,).
+
+        Newton's method in a bracket; a step that would leave it, as at a kink, halves it instead.
+        """
+
+        def beyond(way: Values) -> tuple[Values, Values]:
+            response = self.respond(before + direction * way, turns)
+            return direction * (response.torque - held), np.asarray(response.slope)
+
+        low = np.zeros((len(before), len(held)))
+        way = np.abs(beyond(low)[0]) / self.stiffness
+        high = np.maximum(way, _LEAST_WAY)
+        for _ in range(_DOUBLINGS):
+            short = beyond(high)[0] < 0.0
+            if not short.any():
+                break
+            high = np.where(short, 2.0 * high, high)
+        tolerance = _TOLERANCE * high
+        for _ in range(_STEPS):
+            excess, slope = beyond(way)
+            low, high = np.where(excess < 0.0, way, low), np.where(excess < 0.0, high, way)
+            step = np.divide(excess, slope, out=np.full_like(way, np.inf), where=slope > 0.0)
+            inside = (way - step >= low) & (way - step <= high)
+            moved = np.where(inside, way - step, (low + high) / 2.0)
+            unsettled = np.any(np.abs(moved - way) > tolerance)
+            way = moved
+            if not unsettled:
+                break
+        return np.where(short, np.nan, before + direction * way)
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """Part of the path on which the mesh torque moves one way.
+
+    ``steps`` of the load (m,), N.m; ``held`` (m,) is the mesh torque, N.m; ``torsion`` (n, m) and
+    that ``before`` the leg (n, 1), rad; ``turns`` (n, k) are the torsions at the turning points.
+    """
+
+    mesh: _Mesh
+    steps: Values
+    held: Values
+    torsion: Values
+    before: Values
+    turns: Values
+
+
+def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
+    """Yield the legs of the path from rest."""
+    torque = finite_array("torque", torque, (None,))
+    mesh_laws = tuple(
+        _at_mean(law)
+        for port, law in coefficients.laws
+        if port == "mesh" and not isinstance(law, PeriodicStiffness)
+    )
+    mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
+    held = _play(
+        torque, sum(_breakaway(law) for port, law in coefficients.laws if port == "output")
+    )
+    steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
+    moving = np.flatnonzero(moves)
+    turning = moving[1:][moves[moving[1:]] * moves[moving[:-1]] < 0.0]
+    before, turns = np.zeros((len(mesh.stiffness), 1)), _none(coefficients)
+    for rows in np.split(np.arange(len(torque)), turning):
+        direction = 1.0 if moves[rows].sum() >= 0.0 else -1.0
+        torsion = mesh.torsion_at(held[rows], before, turns, direction)
+        yield _Leg(mesh, steps[rows], held[rows], torsion, before, turns)
+        before = torsion[:, -1:]
+        turns = np.hstack([turns, before])
+
+
+def _at_mean(law: Law) -> Law:
+    return DeadZone(law.at_rest) if isinstance(law, PeriodicClearance) else law
+
+
+def _breakaway(law: Law) -> float:
+    """Return the torque at which dry friction gives way, N.m."""
+    match law:
+        case StribeckFriction():
+            return max(law.level + law.excess, 0.0)
+        case CoulombFriction():
+            return max(law.level, 0.0)
+    return 0.0
+
+
+def _play(torque: Values, breakaway: float) -> Values:
+    """Return the torque that dry friction lets through to the mesh, from rest."""
+    held = np.empty_like(torque)
+    last = 0.0
+    for sample, load in enumerate(torque):
+        held[sample] = last = min(max(last, load - breakaway), load + breakaway)
+    return held

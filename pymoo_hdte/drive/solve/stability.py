@@ -1,0 +1,128 @@
+"""Parametric stability of a drive with varying stiffness, by Floquet multipliers.
+
+Hill's method answers for an unstable drive too, so its callers ask here first.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+
+_LEAST_STEPS = 64
+_MOST_STEPS = 4096
+"""Of each cycle of the fastest variation."""
+_LARGEST_DENOMINATOR = 1000
+_PHASE_PER_STEP = 1.0
+"""Radians of the fastest torsional vibration that one step may span."""
+_ROUNDING = 1e-9
+
+
+class UnstableDrive(ArithmeticError):
+    """The motion of a drive grows from period to period: it has no steady state."""
+
+
+def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
+    """Return the multipliers over one period of the stiffness, shape (n, 3).
+
+    The period is that of all orders together: half an input turn for order 2, and for a constant
+    stiffness. Other laws are left out. The state is (th_in', d', d). The transition matrix is a
+    product of steps with the stiffness of their midpoints, each the (2, 2) Pade approximant of the
+    exponential: it is A-stable, so stiff damping costs no small steps, and of second order in the
+    step. Steps resolve the torsional vibration; see `require_stable` for drives so slow that they
+    cannot. Floquet theory: Nayfeh and Mook, Nonlinear Oscillations, Wiley 1979; Pade approximants:
+    Moler and Van Loan, SIAM Review 20, 1978.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of n designs.
+
+    Returns
+    -------
+    ndarray of complex, shape (n, 3)
+        Dimensionless; a modulus above 1 is a motion that grows.
+    """
+    period, cycles = _period(coefficients)
+    least, most = _LEAST_STEPS * cycles, _MOST_STEPS * cycles
+    steps = int(np.clip(np.ceil(_phase(coefficients, period)), least, most))
+    step = period / coefficients.input_speed / steps
+    identity = np.eye(3)
+    transition = np.tile(identity, (len(coefficients.stiffness), 1, 1))
+    for index in range(steps):
+        angle = (index + 0.5) * period / steps
+        scaled = step * _state_matrix(coefficients, angle)
+        square = scaled @ scaled / 12.0
+        forward, backward = identity + scaled / 2.0 + square, identity - scaled / 2.0 + square
+        transition[:] = np.linalg.solve(backward, forward @ transition)
+    return np.linalg.eigvals(transition).astype(np.complex128)
+
+
+def _period(coefficients: Coefficients) -> tuple[float, int]:
+    """Return the input angle in which the stiffness repeats, and its fastest cycles therein."""
+    orders = [
+        Fraction(law.order).limit_denominator(_LARGEST_DENOMINATOR)
+        for law in coefficients.stiffness_variations
+    ] or [Fraction(2)]
+    common = Fraction(
+        math.gcd(*(order.numerator for order in orders)),
+        math.lcm(*(order.denominator for order in orders)),
+    )
+    return 2.0 * math.pi / float(common), int(max(orders) / common)
+
+
+def _phase(coefficients: Coefficients, period: float) -> float:
+    """Return the phase of the fastest torsional vibration in one period, in `_PHASE_PER_STEP`."""
+    compliance = 1.0 / (coefficients.input_inertia * coefficients.ratio**2)
+    compliance += 1.0 / coefficients.output_inertia
+    depth = sum(law.depth for law in coefficients.stiffness_variations)
+    stiffest = coefficients.stiffness * (1.0 + depth)
+    fastest = np.sqrt(np.max(stiffest * compliance, initial=0.0))
+    return float(fastest * period / coefficients.input_speed / _PHASE_PER_STEP)
+
+
+def require_stable(coefficients: Coefficients) -> None:
+    """Raise `UnstableDrive`, naming the design, if a multiplier lies outside the unit circle.
+
+    A stiffness that varies a thousand times more slowly than the drive vibrates pumps no energy
+    into it (tongues of parametric resonance shrink exponentially with their order), so such drives
+    pass as stable without integration, as does a constant stiffness.
+    """
+    if not (len(coefficients.stiffness) and coefficients.stiffness_variations):
+        return
+    period, cycles = _period(coefficients)
+    if _phase(coefficients, period) > 2.0 * _MOST_STEPS * cycles:
+        return
+    largest = np.abs(floquet_multipliers(coefficients)).max(axis=1)
+    worst = int(np.argmax(largest))
+    if largest[worst] > 1.0 + _ROUNDING:
+        raise UnstableDrive(
+            f"design {worst} (K = {coefficients.stiffness[worst]:g} N.m/rad, "
+            f"c = {coefficients.damping[worst]:g} N.m.s/rad) has a Floquet multiplier of modulus "
+            f"{largest[worst]:.6f}, allowed: at most 1"
+        )
+
+
+def _state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.float64]:
+    variation = sum(
+        law.depth * np.cos(law.order * input_angle + law.phase)
+        for law in coefficients.stiffness_variations
+    )
+    stiffness = coefficients.stiffness * (1.0 + variation)
+    ratio, damping = coefficients.ratio, coefficients.damping
+    bearing = coefficients.output_damping
+    matrix = np.zeros((len(stiffness), 3, 3))
+    matrix[:, 0, 0] = -coefficients.input_damping / coefficients.input_inertia
+    matrix[:, 0, 1] = -damping / ratio / coefficients.input_inertia
+    matrix[:, 0, 2] = -stiffness / ratio / coefficients.input_inertia
+    # d'' = th_in''/N - th_out'' with th_out' = th_in'/N - d'.
+    matrix[:, 1] = matrix[:, 0] / ratio
+    matrix[:, 1, 0] += bearing / ratio / coefficients.output_inertia
+    matrix[:, 1, 1] -= (damping + bearing) / coefficients.output_inertia
+    matrix[:, 1, 2] -= stiffness / coefficients.output_inertia
+    matrix[:, 2, 1] = 1.0
+    return matrix

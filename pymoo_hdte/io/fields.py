@@ -1,0 +1,201 @@
+"""Checked fields with units, read from TOML tables: for data sheets and model files."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+
+UNITS: dict[str, dict[str, float]] = {
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0, "arcsec": ARCSEC},
+    "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
+    "angle rate": {"rad/s": 1.0},
+    "time": {"s": 1.0},
+    "speed": {"rad/s": 1.0, "r/min": REVOLUTION_PER_MINUTE},
+    "torque": {"N.m": 1.0},
+    "stiffness": {"N.m/rad": 1.0},
+    "inertia": {"kg.m2": 1.0},
+    "damping": {"N.m.s/rad": 1.0},
+    "cubic stiffness": {"N.m/rad3": 1.0},
+    "quadratic drag": {"N.m.s2/rad2": 1.0},
+}
+"""For each quantity the units it may be given in, with the factor to SI."""
+
+
+class Fields:
+    """One TOML table that is emptied field by field, so that what is left over is an error.
+
+    Parameters
+    ----------
+    table : mapping
+        The parsed table.
+    path : str
+        Where the table stands, for error messages (``"hs_20_100.toml: nominal"``).
+
+    Raises
+    ------
+    InvalidInput
+        By every method: for a missing, misspelt, unit-less, non-finite or out-of-range field.
+    """
+
+    def __init__(self, table: Any, path: str) -> None:
+        if not isinstance(table, Mapping):
+            raise InvalidInput(path, table, "a table of fields")
+        self._left = dict(table)
+        self._path = path
+
+    def _name(self, field: str) -> str:
+        return f"{self._path}.{field}"
+
+    def take(self, field: str, allowed: str) -> Any:
+        """Return the raw value of a field that must be there; ``allowed`` words the error."""
+        if field not in self._left:
+            near = get_close_matches(field, self._left, 1)
+            what = f"missing; is it {near[0]!r}?" if near else "missing"
+            raise InvalidInput(self._name(field), None, f"{allowed} (the field is {what})")
+        return self._left.pop(field)
+
+    def table(self, field: str) -> Fields:
+        """Return a nested table."""
+        return Fields(self.take(field, "a table of fields"), self._name(field))
+
+    def tables(self, field: str) -> list[Fields]:
+        """Return a non-empty array of tables."""
+        rows = self.take(field, "an array of tables")
+        if not isinstance(rows, list) or not rows:
+            raise InvalidInput(self._name(field), rows, "a non-empty array of tables")
+        return [Fields(row, f"{self._name(field)}[{index}]") for index, row in enumerate(rows)]
+
+    def text(self, field: str) -> str:
+        """Return a non-empty string."""
+        value = self.take(field, "a non-empty string")
+        if not isinstance(value, str) or not value.strip():
+            raise InvalidInput(self._name(field), value, "a non-empty string")
+        return value
+
+    def choice(self, field: str, words: Collection[str]) -> str:
+        """Return a string that is one of ``words``."""
+        return one_of(self._name(field), self.take(field, f"one of {', '.join(words)}"), words)
+
+    def whole(self, field: str, at_least: int) -> int:
+        """Return a whole number."""
+        allowed = f"a whole number of at least {at_least}"
+        return whole_number(self._name(field), self.take(field, allowed), at_least)
+
+    def number(self, field: str, **limits: float) -> float:
+        """Return a dimensionless finite number within ``limits`` (see `checks.real_number`)."""
+        return real_number(self._name(field), self.take(field, "a finite number"), **limits)
+
+    def numbers(self, field: str) -> tuple[float, ...]:
+        """Return a list of finite numbers."""
+        raw = self.take(field, "a list of numbers")
+        if not isinstance(raw, list):
+            raise InvalidInput(self._name(field), raw, "a list of numbers")
+        return tuple(
+            real_number(f"{self._name(field)}[{index}]", value) for index, value in enumerate(raw)
+        )
+
+    def quantity(self, field: str, kind: str, **limits: float) -> float:
+        """Return a quantity in SI units, given as ``{ value = ..., unit = "..." }``."""
+        units = UNITS[kind]
+        allowed = f'{{ value = ..., unit = "..." }} with a unit among {", ".join(units)}'
+        raw = self.take(field, allowed)
+        if not isinstance(raw, Mapping) or set(raw) != {"value", "unit"}:
+            raise InvalidInput(self._name(field), raw, allowed)
+        if not isinstance(raw["unit"], str) or raw["unit"] not in units:
+            raise InvalidInput(f"{self._name(field)}.unit", raw["unit"], ", ".join(units))
+        return (
+            real_number(f"{self._name(field)}.value", raw["value"], **limits) * units[raw["unit"]]
+        )
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the fields that are left."""
+        return tuple(self._left)
+
+    def has(self, field: str) -> bool:
+        """Tell whether an optional field is there."""
+        return field in self._left
+
+    def finish(self) -> None:
+        """Raise `InvalidInput` if a field was not asked for: it is misspelt or misplaced."""
+        if self._left:
+            field = next(iter(self._left))
+            raise InvalidInput(self._name(field), self._left[field], "no such field here")
+
+
+def read_toml(path: Path) -> Fields:
+    """Return the top table of a TOML file.
+
+    Raises
+    ------
+    InvalidInput
+        If the file is not valid TOML.
+    OSError
+        If it cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return Fields(tomllib.load(file), path.name)
+    except (ValueError, RecursionError) as error:
+        # Beside what is no TOML: too many digits for Python, and brackets nested too deeply.
+        raise InvalidInput(str(path), str(error), "valid TOML") from None
+
+
+@contextmanager
+def toml_with_lines(path: Path) -> Iterator[Fields]:
+    """Give the top table of a file; errors about its fields leave the block with their line.
+
+    Raises
+    ------
+    InvalidInput
+        If the file is not valid TOML, or whatever is raised inside the block.
+    OSError
+        If it cannot be read.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        table = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput(path.name, str(error), "valid TOML in UTF-8") from None
+    try:
+        yield Fields(table, path.name)
+    except InvalidInput as error:
+        if not error.field.startswith(f"{path.name}."):
+            raise
+        key = error.field.removeprefix(f"{path.name}.")
+        field = f"{path.name}, line {_line_of(text, key)}: {key}"
+        raise InvalidInput(field, error.value, error.allowed) from None
+
+
+def _line_of(text: str, key: str) -> int:
+    """Return the line of ``table[index].field``, or of its table if the field is absent."""
+    lines = _lines_of_keys(text)
+    while key not in lines and key:
+        key = re.sub(r"(^|[.\[: ])[^.\[: ]*$", "", key)
+    return lines.get(key, 1)
+
+
+def _lines_of_keys(text: str) -> dict[str, int]:
+    lines: dict[str, int] = {}
+    counts: dict[str, int] = {}
+    table = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := re.match(r"\s*\[\[([^]]+)]]", line):
+            name = header[1].strip()
+            table = f"{name}[{counts.get(name, 0)}]"
+            counts[name] = counts.get(name, 0) + 1
+            lines[table] = number
+        elif header := re.match(r"\s*\[([^]]+)]", line):
+            table = header[1].strip()
+            lines[table] = number
+        elif field := re.match(r"\s*([\w-]+)\s*=", line):
+            lines.setdefault(f"{table}.{field[1]}".lstrip("."), number)
+    return lines

@@ -1,5 +1,0 @@
-"""Measured records of any lumped mechanism: what its model lacks, named and proved."""
-
-from pymoo_hdte.measured.investigate import Finding, investigate
-
-__all__ = ["Finding", "investigate"]
