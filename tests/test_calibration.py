@@ -19,8 +19,8 @@ from experiments.paper.calibrating.predictions import (
     uncertain_box,
 )
 from experiments.paper.calibrating.trade_off import TRAITS, front_traits
-from experiments.paper.published_values import TABLE_9
 from experiments.paper.scatter import dte_samples
+from experiments.published_values import TABLE_9
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context

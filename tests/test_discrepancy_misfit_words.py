@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.misfit_map import Location
 from pymoo_hdte.discrepancy.drive.misfit_nature import StrayLines, stray_lines
 from pymoo_hdte.discrepancy.drive.misfit_words import sentences
-from pymoo_hdte.discrepancy.report.document import in_words
+from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 CONDITIONS = [(rpm, load) for rpm in (10.0, 200.0, 1000.0, 2000.0) for load in (0.0, 10.0, 40.0)]

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pymoo_hdte.drive import LawAtPort, SpeedLoop, preset
-from pymoo_hdte.drive.solve import harmonic_balance
+from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations
 from pymoo_hdte.drive.solve.harmonic_balance import torus_of
 from pymoo_hdte.drive.solve.torus import stacked, unstacked

@@ -9,9 +9,8 @@ from law_cases import memoryless
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import MeshStiffnessVariation, SpeedLoop, preset
+from pymoo_hdte.drive import MeshStiffnessVariation, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.port_effects import LAWS, LawAtPort
-from pymoo_hdte.drive.solve import harmonic_balance
 from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction
 from pymoo_hdte.laws.law import Periodic

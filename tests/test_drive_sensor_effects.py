@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import Eccentricity, ThermalDrift, preset
+from pymoo_hdte.drive import Eccentricity, ThermalDrift, harmonic_balance, preset
 from pymoo_hdte.drive.effects import EFFECT_NAMES, effect_from_fields
-from pymoo_hdte.drive.solve import harmonic_balance
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.units import ARCSEC
 

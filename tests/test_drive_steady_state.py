@@ -14,12 +14,12 @@ from pymoo_hdte.drive import (
     MeshStiffnessVariation,
     UnstableDrive,
     floquet_multipliers,
+    harmonic_balance,
     preset,
     simulate,
+    steady_state,
     transfer_function,
 )
-from pymoo_hdte.drive.solve import harmonic_balance
-from pymoo_hdte.drive.solve import hill as steady_state
 from pymoo_hdte.drive.solve.stability import require_stable
 from pymoo_hdte.units import ARCSEC
 

@@ -12,12 +12,12 @@ from pymoo_hdte.drive import (
     MeshStiffnessVariation,
     UnstableDrive,
     floquet_multipliers,
+    harmonic_balance,
     preset,
     quasi_static_torsion,
     simulate,
 )
 from pymoo_hdte.drive.effects import effect_from_fields
-from pymoo_hdte.drive.solve import harmonic_balance
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.laws.stiffness import PeriodicStiffness
 from pymoo_hdte.units import ARCSEC

@@ -7,7 +7,6 @@ from scipy import stats
 from experiments.comparison.rates import at_least
 from experiments.paper import table2, table3
 from experiments.paper.bench_campaign import draw_campaign, slope_error_per_noise, summaries
-from experiments.paper.published_values import TABLE_2, TABLE_3, TABLE_6
 from experiments.paper.static_error import statistics as static_error_statistics
 from experiments.paper.static_error.normality import (
     pooled_rejection_rate,
@@ -29,6 +28,7 @@ from experiments.paper.static_error.statistics import (
     statistics,
     tooth_order_error,
 )
+from experiments.published_values import TABLE_2, TABLE_3, TABLE_6
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from pymoo_hdte.drive import hs_20_100

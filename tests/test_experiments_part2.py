@@ -28,7 +28,6 @@ from experiments.paper.prototypes.printed_validation import (
     nearest_assignment,
 )
 from experiments.paper.prototypes.records import record
-from experiments.paper.published_values import TABLE_6, Moments
 from experiments.paper.scatter import exact_moments
 from experiments.paper.shares import (
     design_indices,
@@ -36,6 +35,7 @@ from experiments.paper.shares import (
     scatter_indices,
     study_designs,
 )
+from experiments.published_values import TABLE_6, Moments
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.store import load, png_bytes, save

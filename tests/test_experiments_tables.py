@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from experiments.comparison.runs import ALGORITHMS, OptimisationRun, robust_problem
-from experiments.paper.published_values import TABLE_6, TABLE_9
 from experiments.paper.scatter import dte_samples, exact_moments
+from experiments.published_values import TABLE_6, TABLE_9
 from experiments.runner.campaign import Campaign
 from pymoo_hdte.decision import deviation_degree
 

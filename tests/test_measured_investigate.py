@@ -9,7 +9,7 @@ from measured_oscillator import bouc_wen, cubic, nothing, swinging_stiffness
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+from pymoo_hdte.discrepancy.mechanism import investigate
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test

@@ -10,7 +10,7 @@ from scipy.stats import t
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
-from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+from pymoo_hdte.discrepancy.mechanism import investigate
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test

@@ -13,14 +13,8 @@ from pymoo_hdte.laws.linear import ConstantForce, DirectionalFriction, LinearDam
 from pymoo_hdte.laws.stiffness import HardeningStiffness
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
-from pymoo_hdte.mechanism.motion import (
-    highest_frequency,
-    law_force,
-    motion_of,
-    noise_of,
-    smooth,
-    timing_noise,
-)
+from pymoo_hdte.mechanism.motion import highest_frequency, motion_of, noise_of, smooth, timing_noise
+from pymoo_hdte.mechanism.port_motion import law_force
 
 STEP = 1e-3
 TIME = np.arange(0.0, 8.0, STEP)

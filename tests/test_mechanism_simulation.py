@@ -10,9 +10,9 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import LawAtPort, preset
+from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset
 from pymoo_hdte.drive.port_effects import KinematicReaction
-from pymoo_hdte.drive.solve import harmonic_balance, time_domain
+from pymoo_hdte.drive.solve import time_domain
 from pymoo_hdte.laws import friction
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
 from pymoo_hdte.laws.hysteresis import MaxwellSlip

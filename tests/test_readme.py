@@ -31,7 +31,7 @@ from experiments.contest.peers_rivals import (
 )
 from experiments.contest.peers_tables import NAMES, median_ranks
 from experiments.paper import fig12, table5
-from experiments.paper.published_values import TABLE_7
+from experiments.published_values import TABLE_7
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context

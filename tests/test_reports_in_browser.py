@@ -15,7 +15,7 @@ from experiments.runner.report import write_report
 from experiments.runner.store import save
 from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.discrepancy import write_campaign
-from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+from pymoo_hdte.discrepancy.mechanism import investigate
 from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
 from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port
 

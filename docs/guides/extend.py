@@ -20,8 +20,7 @@ from pymoo.optimize import minimize
 from pymoo_hdte.algorithms import ElitistSwarm, EntropyWeight, Flat, LinearDecrease, ParticleSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange
-from pymoo_hdte.drive import preset, simulate
-from pymoo_hdte.drive.solve import harmonic_balance
+from pymoo_hdte.drive import harmonic_balance, preset, simulate
 from pymoo_hdte.laws.law import Aperiodic, Response
 from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.simulation import simulate as simulate_mechanism

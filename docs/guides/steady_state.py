@@ -19,10 +19,10 @@ from pymoo_hdte.drive import (
     LoadInertia,
     MeshStiffnessVariation,
     floquet_multipliers,
+    harmonic_balance,
     preset,
     simulate,
 )
-from pymoo_hdte.drive.solve import harmonic_balance
 from pymoo_hdte.units import ARCSEC
 
 # %%

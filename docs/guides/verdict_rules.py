@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+from pymoo_hdte.discrepancy.mechanism import investigate
 from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port, Record
 
 # %%
@@ -230,8 +230,9 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
     print(f"{mark} {one.label:56}{gain:10.0f}{one.share:9.4f}{one.fit.evidence:12.0f}")
 
 # %%
-# Of another machine than a drive, no model meets the noise of its sensors. There all of this is
-# measured in units of the *rest*, which is what the two best effects leave, and three rules are
-# added (``pymoo_hdte.discrepancy.mechanism.analysis``): a named effect removes at least half of the power of
-# the misfit beyond the noise of the sensors; of models that leave about as much, the one with the
-# fewest unknowns is named; and a rival that merely contains the named law is no other explanation.
+# Of another machine than a drive, no model meets the noise of its sensors. There all of this
+# is measured in units of the *rest*, which is what the two best effects leave, and three rules
+# are added (``pymoo_hdte.discrepancy.mechanism.analysis``): a named effect removes at least half
+# of the power of the misfit beyond the noise of the sensors; of models that leave about as much,
+# the one with the fewest unknowns is named; and a rival that merely contains the named law is no
+# other explanation.

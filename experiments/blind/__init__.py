@@ -1,1 +1,1 @@
-"""TODO."""
+"""Blind campaigns: what the discrepancy workflow finds of what a virtual rig hides."""

@@ -22,8 +22,8 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.drive.analysis import Analysis
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.features import as_lines, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.drive.objective import LOST
+from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine.candidate import Layout, Parameter
 

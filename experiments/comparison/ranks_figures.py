@@ -31,7 +31,7 @@ def critical_difference_plot(
     average_ranks : array_like, shape (algorithms,)
         1 is the best.
     difference : float
-        Critical difference of two average ranks, from `experiments.comparison.ranks.nemenyi_difference`.
+        Critical difference of two average ranks, from `ranks.nemenyi_difference`.
     highlight : str
         Algorithm to draw in bold.
 

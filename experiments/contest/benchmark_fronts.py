@@ -8,7 +8,6 @@ OSY and TNK (Deb 2001, section 8.3).
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from moocore import is_nondominated
@@ -19,13 +18,14 @@ from scipy.optimize import minimize
 
 from experiments.comparison.quality import GAP
 from experiments.contest.problems import BENCHMARKS, problem_of
+from experiments.runner.committed import DATA
 
 N_POINTS = 1000
 """Of a front with two objectives; those with three have thousands."""
 
 _PARTITIONS = 99
 
-WELDED_BEAM = Path(__file__).parent / "data" / "front_welded_beam.csv"
+WELDED_BEAM = DATA / "front_welded_beam.csv"
 _STIFFEST = 2.1952 / (10.0**3 * 5.0)
 WELDED_BEAM_LEVELS = _STIFFEST * np.concatenate([[1.0], np.geomspace(1.0 + 1e-4, 36.0, 1200)])
 """Deflections, in inches, from that of the stiffest beam to that of the cheapest."""

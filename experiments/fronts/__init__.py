@@ -1,1 +1,1 @@
-"""TODO."""
+"""The stored fronts of the robust problems: computed, refined and compared."""

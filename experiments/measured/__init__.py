@@ -1,1 +1,1 @@
-"""TODO."""
+"""Machines that others measured, beside what is known of them."""

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.runner.committed import DATA
 from experiments.runner.result import Column, Picture, Result, Table
-from pymoo_hdte.discrepancy.mechanism import Finding
-from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+from pymoo_hdte.discrepancy.mechanism import Finding, investigate
 from pymoo_hdte.discrepancy.mechanism.files import Rig, read_rig
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
@@ -26,9 +26,9 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
 )
 from pymoo_hdte.discrepancy.report.mechanism_figures import misfit_over_motion, overlay
 
-MEASURED = Path(__file__).resolve().parents[2] / "shared" / "measured"
+MEASURED = Path(__file__).resolve().parents[3] / "shared" / "measured"
 """Where the measurements lie, which are not part of the project."""
-RIGS = Path(__file__).parent / "data"
+RIGS = DATA
 _BANDS = 12
 
 

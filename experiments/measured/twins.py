@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from experiments.measured.rigs import Study, coloured_rest
 from experiments.runner.result import Column, Table
 from experiments.runner.result import Finding as Agreement
-from pymoo_hdte.discrepancy.mechanism import Finding
-from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+from pymoo_hdte.discrepancy.mechanism import Finding, investigate
 from pymoo_hdte.discrepancy.mechanism.proof import fitted_mechanism
 from pymoo_hdte.laws.friction import NonlinearDrag
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import Balance
-from pymoo_hdte.mechanism.motion import law_force, noise_of
+from pymoo_hdte.mechanism.motion import noise_of
+from pymoo_hdte.mechanism.port_motion import law_force
 
 SEED = 5
 

@@ -15,7 +15,7 @@ from experiments.paper.comparison_tables import (
     quality_table,
     runs_table,
 )
-from experiments.paper.published_values import TABLE_7
+from experiments.published_values import TABLE_7
 from experiments.runner.registry import Context
 from experiments.runner.result import Finding, Picture, Result, significant
 

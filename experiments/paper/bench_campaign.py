@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.paper.published_values import TABLE_3, TABLE_6
+from experiments.published_values import TABLE_3, TABLE_6
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.identification import (
     LinearFit,

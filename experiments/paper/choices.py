@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from experiments.comparison.paired import designs, objectives
 from experiments.comparison.runs import OptimisationRun, robust_problem
-from experiments.paper.published_values import TABLE_9, Moments
 from experiments.paper.scatter import dte_samples, exact_moments
+from experiments.published_values import TABLE_9, Moments
 from experiments.runner.campaign import Campaign
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems.drive_response import SURROGATE_BOX

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from experiments.comparison.paired import Comparison
 from experiments.comparison.statistics import summary
 from experiments.paper.models import model_sentences
-from experiments.paper.published_values import AlgorithmQuality
+from experiments.published_values import AlgorithmQuality
 from experiments.runner.result import Cell, Column, Finding, Table, significant
 
 WHO = (Column("problem"), Column("algorithm"))

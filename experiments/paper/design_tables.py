@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from experiments.comparison.runs import robust_problem
 from experiments.paper.choices import BAND, MODEL, TRUE_FRONT, Choice
-from experiments.paper.published_values import TABLE_6, TABLE_9
 from experiments.paper.shares import design_indices
+from experiments.published_values import TABLE_6, TABLE_9
 from experiments.runner.result import Cell, Column, Finding, Table, signed_percent, significant
 from pymoo_hdte.decision import deviation_degree, tolerance_band
 

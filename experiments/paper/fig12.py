@@ -14,9 +14,9 @@ from scipy.stats import gaussian_kde, norm, skew
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.comparison.runs import robust_problem
 from experiments.paper.models import FITTED, model_sentences
-from experiments.paper.published_values import TABLE_8, Moments
 from experiments.paper.scatter import dte_samples
 from experiments.paper.shares import scatter_indices
+from experiments.published_values import TABLE_8, Moments
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.drive import PRESETS

@@ -11,7 +11,7 @@ from tqdm import tqdm
 
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.paper.models import model_sentences
-from experiments.paper.published_values import TABLE_8
+from experiments.published_values import TABLE_8
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table
 from pymoo_hdte.drive import (

@@ -8,8 +8,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from experiments.paper.published_values import Moments
 from experiments.paper.quadrature import tensor_rule, weighted_moments
+from experiments.published_values import Moments
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
 

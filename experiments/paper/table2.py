@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from experiments.comparison.rates import at_least
-from experiments.paper.published_values import TABLE_2
 from experiments.paper.static_error.figures import heat_maps
 from experiments.paper.static_error.normality import (
     pooled_rejection_rate,
@@ -37,6 +36,7 @@ from experiments.paper.static_error.tables import (
     statistic_table,
     total_picture,
 )
+from experiments.published_values import TABLE_2
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.drive import hs_20_100

@@ -21,8 +21,8 @@ from experiments.paper.bench_campaign import (
     slope_error_per_noise,
     summaries,
 )
-from experiments.paper.published_values import TABLE_3, TABLE_6
 from experiments.paper.table3_figures import damping_lines, torsion_loop
+from experiments.published_values import TABLE_3, TABLE_6
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.drive import hs_20_100

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from experiments.comparison.figures import BLUE, grid, reference_line
 from experiments.comparison.runs import robust_problem
 from experiments.paper.models import model_sentences
-from experiments.paper.published_values import TABLE_5
+from experiments.published_values import TABLE_5
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.surrogate import Accuracy, ChebyshevSurrogate, accuracy, latin_hypercube

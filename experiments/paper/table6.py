@@ -16,7 +16,7 @@ from experiments.paper.prototypes.consistency import (
 from experiments.paper.prototypes.figures import bars, records_figure
 from experiments.paper.prototypes.printed_validation import HIGHEST, LOWEST, NUMBERS
 from experiments.paper.prototypes.records import Record, record
-from experiments.paper.published_values import TABLE_6
+from experiments.published_values import TABLE_6
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.drive import PRESETS

@@ -23,7 +23,7 @@ from experiments.paper.choices import (
 )
 from experiments.paper.design_tables import deviation_table, influence_note, optima_table
 from experiments.paper.models import FITTED, model_sentences
-from experiments.paper.published_values import REEVALUATION_LIMITS, TABLE_8
+from experiments.published_values import REEVALUATION_LIMITS, TABLE_8
 from experiments.runner.registry import Context
 from experiments.runner.result import (
     Cell,

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Wrong inputs, kills at any moment, full disks, limits of memory."""

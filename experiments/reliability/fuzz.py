@@ -40,7 +40,7 @@ START_SECONDS = 120.0
 """For imports, and to make the original."""
 READY = "ready"
 OUTCOME_LINE = rb"(?m)^outcome (\d+)\n"
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from experiments.runner.campaign import Run
 from experiments.runner.store import TIMES
 
 SEED = 20261123
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 EXPERIMENT = ("table7", "--seeds", "1")
 """Six jobs, five tables and two figures in a few seconds."""
 STEPS = 48

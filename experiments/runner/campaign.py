@@ -244,7 +244,11 @@ def _undisturbed(job: Job) -> Run:
 
 
 def _package(job: Job) -> Path:
-    return Path(inspect.getfile(type(job))).parent
+    """Return the folder of the outermost package of a job's module, or that of a lone module."""
+    folder = Path(inspect.getfile(type(job))).parent
+    while (folder.parent / "__init__.py").is_file():
+        folder = folder.parent
+    return folder
 
 
 @cache
@@ -254,5 +258,5 @@ def origin(package: Path) -> dict[str, str]:
     A job's outcome may depend on any module of its package, not only on its own. The answer is
     kept, because what a process has loaded outlives a change of the files.
     """
-    source = fingerprint(*sorted(package.glob("*.py")))
+    source = fingerprint(*sorted(package.rglob("*.py")))
     return {SOURCE: source, **environment(), "processor": arithmetic()}

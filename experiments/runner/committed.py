@@ -16,7 +16,7 @@ from experiments.runner.provenance import environment
 from experiments.runner.registry import Context
 from pymoo_hdte.reports.csv_text import csv_text
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[1] / "data"
 _ORIGIN = "# {"
 
 

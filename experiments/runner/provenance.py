@@ -10,6 +10,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+import experiments
 import pymoo_hdte
 
 PACKAGES = ("numpy", "scipy", "numba", "pymoo", "moocore", "chaospy", "matplotlib")
@@ -45,7 +46,7 @@ def report_fingerprint() -> str:
 
     That is the source, and the stored outcomes and the template of the page beside it.
     """
-    return fingerprint(*_files(Path(__file__).parent))
+    return fingerprint(*_files(Path(experiments.__file__).parent))
 
 
 def _files(folder: Path) -> list[Path]:

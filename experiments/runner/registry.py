@@ -60,10 +60,16 @@ class Context:
 
 @dataclass(frozen=True)
 class Experiment:
-    """A module ``experiments.<name>`` with ``run(context: Context) -> Result``.
+    """A module of this package with ``run(context: Context) -> Result``.
 
     Attributes
     ----------
+    name
+        What the command line calls it.
+    module
+        Where it stands, below ``experiments``.
+    summary
+        One line of the list of experiments.
     by_default
         Whether it belongs to the set that runs when no name is given.
     reads_outcome
@@ -75,6 +81,7 @@ class Experiment:
     """
 
     name: str
+    module: str
     summary: str
     by_default: bool = True
     reads_outcome: bool = False
@@ -83,61 +90,114 @@ class Experiment:
 
     def run(self, context: Context) -> Result:
         """Import the module and run it; nothing is imported for ``--list``."""
-        return import_module(f"experiments.{self.name}").run(context)
+        return import_module(f"experiments.{self.module}").run(context)
 
 
 EXPERIMENTS = (
     Experiment(
-        "table7", "Table 7 and Fig. 18: AMP-MOPSO against MOPSO and NSGA-II", takes_seeds=True
+        "table7",
+        "paper.table7",
+        "Table 7 and Fig. 18: AMP-MOPSO against MOPSO and NSGA-II",
+        takes_seeds=True,
     ),
     Experiment(
         "ablation",
+        "paper.ablation",
         "Fig. 17: AMP-MOPSO without its pyramid, its entropy weight, or both",
         takes_seeds=True,
     ),
-    Experiment("table5", "Table 5 and Fig. 11: accuracy of the Chebyshev surrogate by order"),
-    Experiment("table8", "Tables 8 and 9, Fig. 19: the designs that three preferences choose"),
-    Experiment("published", "What Eq. (9) gives as printed, order by order, beside an integrator"),
-    Experiment("table2", "Table 2, Figs. 4 and 5: error statistics and the static error"),
-    Experiment("table3", "Tables 3 and 4, Figs. 9 and 10: stiffness and damping from records"),
-    Experiment("fig12", "Fig. 12: distribution of the DTE at the nominal design"),
-    Experiment("table6", "Table 6, Figs 14 and 15: five prototypes, predicted and measured"),
-    Experiment("sensitivity", "Sobol indices of the DTE: which tolerance deserves money"),
-    Experiment("crosscheck", "chaospy beside ours, and accuracy per model run: is 1024 needed?"),
-    Experiment("dte_map", "DTE over input speed and load, with the resonances of each preset"),
+    Experiment(
+        "table5",
+        "paper.table5",
+        "Table 5 and Fig. 11: accuracy of the Chebyshev surrogate by order",
+    ),
+    Experiment(
+        "table8",
+        "paper.table8",
+        "Tables 8 and 9, Fig. 19: the designs that three preferences choose",
+    ),
+    Experiment(
+        "published",
+        "paper.published",
+        "What Eq. (9) gives as printed, order by order, beside an integrator",
+    ),
+    Experiment(
+        "table2", "paper.table2", "Table 2, Figs. 4 and 5: error statistics and the static error"
+    ),
+    Experiment(
+        "table3",
+        "paper.table3",
+        "Tables 3 and 4, Figs. 9 and 10: stiffness and damping from records",
+    ),
+    Experiment("fig12", "paper.fig12", "Fig. 12: distribution of the DTE at the nominal design"),
+    Experiment(
+        "table6", "paper.table6", "Table 6, Figs 14 and 15: five prototypes, predicted and measured"
+    ),
+    Experiment(
+        "sensitivity",
+        "studies.sensitivity",
+        "Sobol indices of the DTE: which tolerance deserves money",
+    ),
+    Experiment(
+        "crosscheck",
+        "studies.crosscheck",
+        "chaospy beside ours, and accuracy per model run: is 1024 needed?",
+    ),
+    Experiment(
+        "dte_map",
+        "studies.dte_map",
+        "DTE over input speed and load, with the resonances of each preset",
+    ),
     Experiment(
         "calibration",
+        "paper.calibrating.experiment",
         "Which effects the printed equations lack: a ladder of fitted models",
         reads_outcome=True,
     ),
     Experiment(
         "blind",
+        "blind.experiment",
         "Blind campaigns: what the discrepancy workflow finds of what is hidden",
         reads_outcome=True,
     ),
-    Experiment("emps", "EMPS: friction of a positioning system, measured by others"),
-    Experiment("kinova", "Kinova Gen3: friction and ripple of a robot joint, measured by others"),
+    Experiment(
+        "emps", "measured.emps", "EMPS: friction of a positioning system, measured by others"
+    ),
+    Experiment(
+        "kinova",
+        "measured.kinova",
+        "Kinova Gen3: friction and ripple of a robot joint, measured by others",
+    ),
     Experiment(
         "peers",
+        "contest.peers",
         "The elitist swarm against the best algorithms of other libraries",
         reads_outcome=True,
         has_small_version=True,
     ),
     Experiment(
         "swarm_parts",
+        "contest.swarm_parts",
         "What each part of the elitist swarm is worth",
         reads_outcome=True,
         has_small_version=True,
     ),
     Experiment(
         "reliability",
+        "reliability.experiment",
         "Ten thousand wrong inputs, kills at any moment, full disks, memory",
         reads_outcome=True,
         has_small_version=True,
     ),
-    Experiment("benchmark", "Speed ratios and agreement with integration", by_default=False),
+    Experiment(
+        "benchmark",
+        "studies.benchmark",
+        "Speed ratios and agreement with integration",
+        by_default=False,
+    ),
     Experiment(
         "reference_front",
+        "fronts.reference_front",
         "The true fronts, computed anew and compared: 35 minutes",
         by_default=False,
     ),

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Accuracy, sensitivity and speed of the package's own parts."""

@@ -10,7 +10,7 @@ from tqdm import tqdm
 
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
 from experiments.comparison.runs import robust_problem
-from experiments.paper.published_values import TABLE_5
+from experiments.published_values import TABLE_5
 from experiments.runner.result import Cell, Column, Finding, Table
 from experiments.studies.rival_surrogates import FAMILIES, TENSOR, rivals
 from pymoo_hdte.surrogate import accuracy, latin_hypercube

@@ -21,9 +21,8 @@ from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
 from experiments.studies.timing import Ratio, best_time, ratio_table
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
-from pymoo_hdte.drive import PARAMETERS, PRESETS, DriveModel, preset, simulate
-from pymoo_hdte.drive.solve import harmonic_balance
-from pymoo_hdte.drive.solve.time_domain import ANGLES, METHODS
+from pymoo_hdte.drive import PARAMETERS, PRESETS, DriveModel, harmonic_balance, preset, simulate
+from pymoo_hdte.drive.simulation import ANGLES, METHODS
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.units import ARCSEC
 

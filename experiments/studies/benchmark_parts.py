@@ -17,8 +17,7 @@ from experiments.studies.timing import Ratio, best_time
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.discrepancy.drive.analysis import analyse
-from pymoo_hdte.drive import preset, simulate
-from pymoo_hdte.drive.solve import harmonic_balance
+from pymoo_hdte.drive import harmonic_balance, preset, simulate
 from pymoo_hdte.virtual.hidden_forms import draw_effect
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from experiments.comparison.runs import robust_problem
 from experiments.paper.models import model_sentences
-from experiments.paper.published_values import REEVALUATION_LIMITS
 from experiments.paper.scatter import theta_s_of
 from experiments.paper.shares import study_designs
+from experiments.published_values import REEVALUATION_LIMITS
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
 from experiments.studies.accuracy_per_run import (

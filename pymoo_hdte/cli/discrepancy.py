@@ -51,7 +51,7 @@ def _analysed(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str,
 def _of_mechanism(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
     from threadpoolctl import threadpool_limits
 
-    from pymoo_hdte.discrepancy.mechanism import analysis as investigate
+    from pymoo_hdte.discrepancy.mechanism import investigate
     from pymoo_hdte.discrepancy.mechanism.files import read_rig
     from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
 
@@ -90,7 +90,7 @@ def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
 
 
 def _summary(document: dict[str, Any], out: Path) -> str:
-    from pymoo_hdte.discrepancy.report.document import in_words
+    from pymoo_hdte.discrepancy.engine.candidate import in_words
 
     names = " + ".join(_name(one) for one in document["effects"])
     lines = [

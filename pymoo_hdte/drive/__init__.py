@@ -14,6 +14,7 @@ from pymoo_hdte.drive.model import (
 )
 from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
 from pymoo_hdte.drive.sensor_effects import Eccentricity, ThermalDrift
+from pymoo_hdte.drive.simulation import Run, simulate
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.harmonic_balance import harmonic_balance
 from pymoo_hdte.drive.solve.hill import steady_state, transfer_function
@@ -21,7 +22,6 @@ from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.solve.quasi_static import mean_torsion, quasi_static_torsion
 from pymoo_hdte.drive.solve.stability import UnstableDrive, floquet_multipliers
 from pymoo_hdte.drive.solve.steady_motion import Balance, SpeedLoop
-from pymoo_hdte.drive.solve.time_domain import Run, simulate
 from pymoo_hdte.drive.static_error import StaticErrorSample, class_amplitudes, sample_static_error
 
 __all__ = [

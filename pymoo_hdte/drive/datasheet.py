@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from importlib.resources import as_file, files
 from pathlib import Path
+from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.drive.port_effects import with_unit
 from pymoo_hdte.io.fields import Fields, read_toml
 
 ERROR_CLASSES = ("e_m", "e_g", "e_w", "e_p", "e_h")
@@ -274,3 +276,41 @@ def _error_source(row: Fields) -> ErrorSource:
     )
     row.finish()
     return source
+
+
+def sheet_table(sheet: DataSheet) -> dict[str, Any]:
+    """Return the table of a data sheet, from which `datasheet_from_fields` makes it again."""
+    nominal = asdict(sheet.nominal)
+    return {
+        "name": sheet.name,
+        "source": sheet.source,
+        "teeth": {
+            "flexspline": sheet.flexspline_teeth,
+            "circular_spline": sheet.circular_spline_teeth,
+        },
+        "rated": {
+            "input_speed": with_unit(sheet.input_speed, "speed"),
+            "load_torque": with_unit(sheet.load_torque, "torque"),
+        },
+        "nominal": {
+            name: with_unit(nominal[name], quantity)
+            for name, quantity in NOMINAL_QUANTITIES.items()
+        },
+        "mesh": {
+            "error_influence": sheet.mesh.error_influence,
+            "teeth_in_mesh": sheet.mesh.teeth_in_mesh,
+            "pitch_diameter": with_unit(sheet.mesh.pitch_diameter, "length"),
+            "pressure_angle": with_unit(sheet.mesh.pressure_angle, "angle"),
+        },
+        "error_source": [
+            {
+                "component": source.component,
+                "symbol": source.symbol,
+                "description": source.description,
+                "class": source.error_class,
+                "mean": with_unit(source.mean, "length"),
+                "std": with_unit(source.std, "length"),
+            }
+            for source in sheet.error_sources
+        ],
+    }

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of
-from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100
+from pymoo_hdte.drive.datasheet import DataSheet, datasheet_from_fields, hs_20_100, sheet_table
 from pymoo_hdte.drive.effects import Effect, effect_from_fields, place_of
 from pymoo_hdte.drive.kinematic_error import KinematicError
-from pymoo_hdte.drive.model_file import FORMAT, model_tables, parts_of
+from pymoo_hdte.drive.port_effects import with_unit
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.hill import steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
+from pymoo_hdte.io.archive import FileFormat
 from pymoo_hdte.io.fields import Fields, read_toml
 from pymoo_hdte.units import ARCSEC
 
@@ -28,6 +29,8 @@ PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")
 
 PARAMETER_UNITS = ("rad", "N.m/rad", "kg.m2", "N.m.s/rad", "N.m.s/rad")
 """Units of `PARAMETERS`, one for each."""
+
+FORMAT = FileFormat("pymoo_hdte drive model", version=1, fields=("data_sheet", "model"))
 
 PRESETS = ("published", "calibrated", "resonant")
 """Names of the models that `preset` returns."""
@@ -311,3 +314,38 @@ def preset(name: str) -> DriveModel:
     one_of("model", name, PRESETS)
     with as_file(files("pymoo_hdte.drive") / "data" / f"{name}.toml") as path:
         return load_model(path, hs_20_100())
+
+
+def model_tables(model: DriveModel) -> dict[str, Any]:
+    """Return the header's tables: ``data_sheet`` and ``model``, as in the files of ``drive/data``.
+
+    Quantities are in the SI unit of `toml_fields.UNITS` whose factor is 1, so no bit is lost.
+    """
+    error = model.kinematic_error
+    table = {
+        "name": model.name,
+        "description": model.description,
+        "provenance": model.provenance,
+        "kinematic_error": {
+            "orders": list(error.orders),
+            "amplitudes": list(error.amplitudes),
+            "phases": list(error.phases),
+            "reading": error.reading,
+            "std": with_unit(error.std, "angle"),
+        },
+    }
+    # TOML has no empty array of tables.
+    effects = {"effect": [effect.to_dict() for effect in model.effects]} if model.effects else {}
+    return {"data_sheet": sheet_table(model.sheet), "model": table | effects}
+
+
+def parts_of(tables: dict[str, Any]) -> tuple[Fields, DataSheet]:
+    """Return the fields of the model and the data sheet that `model_tables` were made from.
+
+    Raises
+    ------
+    InvalidInput
+        For a wrong, missing or superfluous field of the data sheet.
+    """
+    sheet = datasheet_from_fields(Fields(tables["data_sheet"], "data_sheet"))
+    return Fields(tables["model"], "model"), sheet

@@ -6,9 +6,8 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from pymoo_hdte.drive.datasheet import DataSheet
-from pymoo_hdte.drive.model import DriveModel
-from pymoo_hdte.drive.model_file import model_tables, sheet_table
+from pymoo_hdte.drive.datasheet import DataSheet, sheet_table
+from pymoo_hdte.drive.model import DriveModel, model_tables
 
 
 def model_toml(model: DriveModel) -> str:

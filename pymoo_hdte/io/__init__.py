@@ -1,1 +1,1 @@
-"""TODO."""
+"""Reading and writing: fields and files in TOML, tables, archives."""

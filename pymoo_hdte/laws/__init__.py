@@ -1,1 +1,1 @@
-"""TODO."""
+"""Laws of force over motion, for the ports of any machine."""

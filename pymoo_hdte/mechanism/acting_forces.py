@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.law import Law, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Loop, Mechanism, Port
-from pymoo_hdte.mechanism.motion import PortMotion, law_force
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]

@@ -16,15 +16,8 @@ from scipy.fft import dct
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
-from pymoo_hdte.mechanism.motion import (
-    PortMotion,
-    finer_than,
-    law_force,
-    motion_of,
-    port_motion,
-    smooth,
-    smoothed_noise,
-)
+from pymoo_hdte.mechanism.motion import finer_than, motion_of, smooth, smoothed_noise
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force, port_motion
 from pymoo_hdte.mechanism.records import Record
 from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, working_rows
 

@@ -14,9 +14,6 @@ from scipy.ndimage import median_filter
 from scipy.signal import butter, savgol_filter, sosfiltfilt, welch
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.law import Law, PortState, periodic_phase
-from pymoo_hdte.mechanism.mechanism import Port
 
 Values = NDArray[np.float64]
 
@@ -157,43 +154,3 @@ def motion_of(position: Values, step: float, cutoff: float) -> Motion:
         savgol_filter(smoothed, _STENCIL, _STENCIL - 1, deriv=order, delta=step) for order in (1, 2)
     )
     return Motion(smoothed, speed, acceleration)
-
-
-Values = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class PortMotion:
-    """Position and speed at a port, shape (n,); SI."""
-
-    position: Values
-    speed: Values
-
-
-def port_motion(port: Port, position: dict[str, Values], speed: dict[str, Values]) -> PortMotion:
-    """Return the motion at a port, with its kinematic error, of coordinates of shape (n,)."""
-    here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
-    rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
-    for line in port.error:
-        angle = line.order * position[line.coordinate] + line.phase
-        here = here + line.amplitude * np.sin(angle)
-        rate = rate + line.amplitude * line.order * np.cos(angle) * speed[line.coordinate]
-    return PortMotion(here, rate)
-
-
-def law_force(law: Law, motion: PortMotion | Motion, stiffness: float) -> Values:
-    """Return the force of a law against a motion in time, shape (n,).
-
-    ``stiffness`` is that of its port, N/m or N.m/rad.
-    """
-    # Springs that slip start unstretched, wherever the position has its zero.
-    rests = isinstance(law, MaxwellSlip)
-    state = PortState(
-        motion.position - rests * motion.position[0],
-        motion.speed,
-        periodic_phase(motion.position),
-        np.full(1, stiffness),
-        path=lambda values: values[None, :],
-        back=lambda values: values[0],
-    )
-    return np.broadcast_to(law.respond(state).torque, motion.position.shape)

@@ -1,7 +1,7 @@
 """Stored true Pareto fronts: reading, writing, and telling to which problem a front belongs.
 
-`experiments/fronts/reference_front.py` computes them. A file is a CSV with one header comment that holds
-the settings of the problem as JSON; a front is only used for a problem of the same settings.
+`experiments/fronts/reference_front.py` computes them. A file is a CSV with one header comment that
+holds the settings of the problem as JSON; a front is only used for a problem of the same settings.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Which effects the printed equations lack: a ladder of models fitted to published numbers."""

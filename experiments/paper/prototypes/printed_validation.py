@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from experiments.paper.published_values import TABLE_6
+from experiments.published_values import TABLE_6
 
 MAE = 7.761
 RMSE = 7.968

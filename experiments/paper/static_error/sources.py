@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from experiments.paper.published_values import TABLE_2
+from experiments.published_values import TABLE_2
 from pymoo_hdte.identification import (
     ErrorStatistics,
     detectable_correlation,

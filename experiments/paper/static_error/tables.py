@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from scipy.stats import chi2, gaussian_kde, shapiro
 
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, YELLOW, grid
-from experiments.paper.published_values import TABLE_6
 from experiments.paper.static_error.statistics import (
     ANGLES,
     ASSUMED_ANGLE,
@@ -23,6 +22,7 @@ from experiments.paper.static_error.statistics import (
     statistics,
     tooth_order_error,
 )
+from experiments.published_values import TABLE_6
 from experiments.runner.result import Cell, Column, Finding, Picture, Table, significant
 from pymoo_hdte.drive import StaticErrorSample, hs_20_100
 from pymoo_hdte.units import ARCSEC

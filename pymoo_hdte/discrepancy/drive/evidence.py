@@ -1,41 +1,29 @@
-"""What a campaign offers a fit: its features with their whole covariance, and its torsion sweeps.
-
-Residuals are whitened by that covariance, so that their sum of squares is a chi-square. The small
-changes of the static error from record to record count as noise that the drive's own response
-carries to all channels.
-"""
+"""What a campaign offers a fit: its observations as evidence, record by record and part by part."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy.drive.features import (
-    MEANS,
-    Features,
+from pymoo_hdte.discrepancy.drive.features import MEANS, Features
+from pymoo_hdte.discrepancy.drive.objective import Objective
+from pymoo_hdte.discrepancy.drive.observations import (
+    Observations,
     cell_chi_square,
     degrees_of_freedom,
 )
-from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
-from pymoo_hdte.discrepancy.drive.prediction import Prediction, coefficients_of, predict
-from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints, torsion_points
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout, Parameter
+from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter
 from pymoo_hdte.discrepancy.engine.excess import Excess
-from pymoo_hdte.discrepancy.engine.fitting import Response
-from pymoo_hdte.drive import Balance, Effect, mean_torsion
-
-if TYPE_CHECKING:
-    from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.fitting import Fit, Response
+from pymoo_hdte.drive import Effect
 
 Vector = NDArray[np.float64]
 
@@ -46,107 +34,8 @@ NUMERICAL = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
-    """Features to fit, whitened, for a campaign.
-
-    Attributes
-    ----------
-    campaign : Campaign
-    features : Features
-    base : tuple of Parameter
-    torsion : tuple of TorsionPoints
-        Sweeps with the input locked.
-    reference : ndarray, shape (n_base,), optional
-        Base values at which the repeatability is carried to all channels; by default the starts.
-    reference_effects : tuple of Effect
-        Effects that are there then: a resonance that they move magnifies what does not repeat.
-    """
-
-    campaign: Campaign
-    features: Features
-    base: tuple[Parameter, ...]
-    torsion: tuple[TorsionPoints, ...] = ()
-    reference: Vector | None = None
-    reference_effects: tuple[Effect, ...] = ()
-
-    @cached_property
-    def whiteners(self) -> NDArray[np.float64]:
-        """Lower triangles L, shape (r, f, f), of the `covariance` L L^T of each record."""
-        return np.asarray(np.linalg.cholesky(self.covariance), dtype=np.float64)
-
-    @cached_property
-    def covariance(self) -> NDArray[np.float64]:
-        """Of the features of each record, sensors and repeatability, shape (r, f, f)."""
-        layout = Layout(self.base)
-        start = layout.array("start") if self.reference is None else self.reference
-        return self.features.covariance + self._repeatability(layout, start)
-
-    def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
-        """Return the covariance that small changes of the static error give each record."""
-        rig, believed = self.campaign.rig, self.campaign.believed
-        lines = range(len(believed.error_orders))
-        spread = rig.repeatability / max(len(lines), 1) ** 0.5
-        moved = [start]
-        for line in lines:
-            places = [layout.index(f"error_{part}_{line}") for part in ("amplitude", "phase")]
-            amplitude, phase = start[places]
-            for step in (spread, 1j * spread):
-                shifted = start.copy()
-                phasor = amplitude * np.exp(1j * phase) + step
-                shifted[places] = np.abs(phasor), np.angle(phasor)
-                moved.append(shifted)
-        predicted = self.predict(np.array(moved), self.reference_effects)
-        change = predicted[1:] - predicted[0]
-        covariance = np.einsum("vri,vrj->rij", change, change)
-        covariance[:, 0, 0] += spread**2
-        return covariance
-
-    def predict(
-        self, vectors: Vector, effects: Sequence[Effect], start: Balance | None = None
-    ) -> NDArray[np.float64]:
-        """Return features, shape (v, r, f), of vectors (v, n_base) of base parameters."""
-        return self.features.of_prediction(self.prediction(vectors, effects, start))
-
-    def prediction(
-        self, vectors: Vector, effects: Sequence[Effect], start: Balance | None = None
-    ) -> Prediction:
-        """Return what `predict` is made of, steady states included."""
-        values = self._named(vectors)
-        believed, rig = self.campaign.believed, self.campaign.rig
-        features = self.features
-        orders = features.orders.tolist()
-        return predict(believed, rig, features.conditions, orders, values, effects, start)
-
-    def _named(self, vectors: Vector) -> dict[str, Vector]:
-        return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}
-
-    def torsion_residuals(self, vectors: Vector, effects: Sequence[Effect]) -> NDArray[np.float64]:
-        """Return whitened residuals (v, n_points) of the sweeps; none where there is no sweep."""
-        values = self._named(vectors)
-        coefficients = coefficients_of(self.campaign.believed, values, effects, 1)
-        stiffness = coefficients.stiffness * values["locked_stiffness"]
-        coefficients = replace(coefficients, stiffness=stiffness)
-        sensor = np.column_stack([values["output_torque_gain"], values["output_torque_zero"]])
-        found = [np.empty((len(vectors), 0))]
-        for points in self.torsion:
-            torsion = np.empty((len(vectors), len(points.angle)))
-            # Vectors that share the sensor's errors share the path of the torque.
-            for gain, zero in np.unique(sensor, axis=0):
-                rows = np.flatnonzero(np.all(sensor == (gain, zero), axis=1))
-                path = (points.path - zero) / (1.0 + gain)
-                torsion[rows] = mean_torsion(coefficients.rows(rows), path)[:, points.intervals]
-            found.append((torsion - points.angle) @ points.whitening.T)
-        return np.hstack(found)
-
-    def whiten(self, differences: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return whitened differences of features (..., r, f), flat: shape (..., r f)."""
-        white = np.empty_like(differences)
-        for record, triangle in enumerate(self.whiteners):
-            part = differences[..., record, :].reshape(-1, len(triangle)).T
-            # What is not known is not a number; it is counted as lost afterwards.
-            solved = solve_triangular(triangle, part, lower=True, check_finite=False)
-            white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
-        return white.reshape(*differences.shape[:-2], -1)
+class Data(Observations):
+    """The observations of a campaign as the engine's `Evidence`."""
 
     @property
     def remainder(self) -> float:

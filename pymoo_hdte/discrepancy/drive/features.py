@@ -127,36 +127,3 @@ def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[
     # The load is taken from the output torque: its error winds the drive up.
     covariance[0, 0] += line.covariance[2, 0, 0] / stiffness**2
     return covariance
-
-
-def degrees_of_freedom(data: Data) -> Values:
-    """Return those of each cell, shape (4, 1 + m)."""
-    freedom = np.full((len(CHANNELS), 1 + len(data.features.orders)), 2.0)
-    freedom[:, 0] = 1.0
-    return freedom
-
-
-def cell_chi_square(data: Data, difference: Values) -> Values:
-    """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m)."""
-    covariance = data.covariance
-    found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan)
-    for channel in range(len(CHANNELS)):
-        if channel in MEANS:
-            found[:, channel, 0] = difference[:, channel] ** 2 / covariance[:, channel, channel]
-        for line, pair in enumerate(data.features.places(channel)):
-            block = covariance[:, pair[:, None], pair]
-            part = difference[:, pair, None]
-            solved = np.linalg.solve(block, part)
-            found[:, channel, 1 + line] = np.sum(part * solved, axis=(1, 2))
-    return found
-
-
-def as_lines(data: Data, difference: Values) -> NDArray[np.complex128]:
-    """Return differences of features (r, f) as phasors of cells (r, 4, 1 + m)."""
-    found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan, dtype=complex)
-    for channel in range(len(CHANNELS)):
-        if channel in MEANS:
-            found[:, channel, 0] = difference[:, channel]
-        real, imaginary = data.features.places(channel).T
-        found[:, channel, 1:] = difference[:, real] + 1j * difference[:, imaginary]
-    return found

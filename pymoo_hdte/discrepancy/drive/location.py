@@ -17,12 +17,7 @@ from scipy.stats import chi2
 from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.drive.analysis import Analysis
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.features import (
-    MEANS,
-    as_lines,
-    cell_chi_square,
-    degrees_of_freedom,
-)
+from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.misfit_map import (
     FALSE_DISCOVERIES,
     Flags,
@@ -32,6 +27,7 @@ from pymoo_hdte.discrepancy.drive.misfit_map import (
 )
 from pymoo_hdte.discrepancy.drive.misfit_words import sentences
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
+from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.drive.revision import accepted_fit
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.drive import Effect

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
-
-if TYPE_CHECKING:
-    pass
 
 FALSE_DISCOVERIES = 0.01
 """Share of flagged cells that may be clean, after Benjamini and Hochberg (J. R. Stat. Soc. B 1995);

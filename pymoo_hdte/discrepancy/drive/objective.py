@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.drive.observations import Observations
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Unknowns, Vector, built
 from pymoo_hdte.drive import Balance, Effect
 
-if TYPE_CHECKING:
-    from pymoo_hdte.discrepancy.drive.evidence import Data
 LOST = 1e3
 """Residual of a point at which the model cannot carry the torque."""
 
@@ -23,7 +21,7 @@ class Objective(Unknowns):
 
     Parameters
     ----------
-    data : Data
+    data : Observations
     candidates : sequence of Candidate
     slopes : ndarray, shape (n_base, r, f), optional
         Derivatives of the features by base parameters, kept where they are given. Those of a model
@@ -33,7 +31,7 @@ class Objective(Unknowns):
 
     def __init__(
         self,
-        data: Data,
+        data: Observations,
         candidates: Sequence[Candidate],
         slopes: NDArray[np.float64] | None = None,
     ) -> None:

@@ -23,8 +23,8 @@ from pymoo_hdte.drive import (
     LawAtPort,
     SpeedLoop,
     ThermalDrift,
+    harmonic_balance,
 )
-from pymoo_hdte.drive.solve import harmonic_balance
 from pymoo_hdte.drive.solve.harmonic_balance import torus_of
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
 from pymoo_hdte.drive.solve.steady_motion import BY_CASE

@@ -22,7 +22,7 @@ _CLEAR = 4.0
 class TorsionPoints:
     """Means of consecutive rows of a torsion sweep, in the order of the path.
 
-    A model of them is `pymoo_hdte.drive.solve.quasi_static.mean_torsion` of ``path`` at ``intervals``.
+    A model of them is `pymoo_hdte.drive.mean_torsion` of ``path`` at ``intervals``.
     Gain and zero error of the torque sensor are not in the covariance: one value of each moves all
     points, so that they are parameters; the true path is (path - zero) / (1 + gain).
 

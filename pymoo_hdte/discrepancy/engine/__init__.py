@@ -1,1 +1,1 @@
-"""TODO."""
+"""Candidates, fits and the rules of a verdict; knows no machine."""

@@ -8,6 +8,7 @@ order 6 with a little of order 12 is one effect and not two.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -218,3 +219,20 @@ class Layout:
     def array(self, attribute: str) -> NDArray[np.float64]:
         """Return one attribute of all parameters, shape (n_parameters,)."""
         return np.array([getattr(parameter, attribute) for parameter in self.parameters])
+
+
+_PORT = r"([A-Za-z]\w*(?: of \w+)?)"
+
+
+_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
+
+
+def in_words(text: str) -> str:
+    """Return a text with all labels of candidates, such as ``torque_ripple:input@6``, in words."""
+    return _LABEL.sub(_words, text).replace(")+", ") and ")
+
+
+def _words(label: re.Match[str]) -> str:
+    name, form, port, order = label.groups()
+    details = [port.replace("_", " "), form, None if order is None else f"order {order}"]
+    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"

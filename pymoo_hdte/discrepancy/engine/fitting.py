@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,13 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout, Parameter
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.drive import Effect
 
+Vector = NDArray[np.float64]
+Response = Callable[[Sequence[Any]], Vector]
+"""From effects that are added to a fit to what its whitened residuals change by, shape (n,)."""
+_STEP = 1e-3
+"""Step of difference quotients, in units of a parameter's scale."""
+_FREED = 10.0
+"""Factor by which a base parameter whose tolerance is lifted may be off."""
 _EVALUATIONS = 25
 
 
@@ -140,17 +147,6 @@ def fit(
     return Fit(objective.candidates, objective.parameters, values, found.fun, found.jac, kept)
 
 
-if TYPE_CHECKING:
-    pass
-
-
-Vector = NDArray[np.float64]
-
-
-Response = Callable[[Sequence[Any]], Vector]
-"""From effects that are added to a fit to what its whitened residuals change by, shape (n,)."""
-
-
 class Residuals(Protocol):
     """Whitened residuals of a model with candidates, and their derivatives."""
 
@@ -216,17 +212,6 @@ class Evidence(Protocol):
     def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
         """Return a candidate for each base parameter that a fit left at a bound."""
         ...
-
-
-Vector = NDArray[np.float64]
-
-
-_STEP = 1e-3
-"""Step of difference quotients, in units of a parameter's scale."""
-
-
-_FREED = 10.0
-"""Factor by which a base parameter whose tolerance is lifted may be off."""
 
 
 class Unknowns:

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.mechanism.analysis import Finding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
-from pymoo_hdte.discrepancy.report.document import in_words
-from pymoo_hdte.mechanism.motion import PortMotion, law_force
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 
 Values = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Reports of a verdict: the document, tables, figures and pages."""

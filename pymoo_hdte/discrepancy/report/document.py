@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform
-import re
 from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
@@ -19,6 +18,7 @@ from pymoo_hdte.discrepancy.engine.candidate import (
     HARMONIC_NAMES,
     Candidate,
     Parameter,
+    in_words,
     line_with_variance,
 )
 from pymoo_hdte.discrepancy.engine.fitting import Fit
@@ -237,20 +237,3 @@ def _alternatives(verdict: Verdict) -> list[dict[str, Any]]:
         }
 
     return [evidence(rival) for rival in sorted(verdict.alternatives, key=lambda one: one.bic)]
-
-
-_PORT = r"([A-Za-z]\w*(?: of \w+)?)"
-
-
-_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
-
-
-def in_words(text: str) -> str:
-    """Return a text with all labels of candidates, such as ``torque_ripple:input@6``, in words."""
-    return _LABEL.sub(_words, text).replace(")+", ") and ")
-
-
-def _words(label: re.Match[str]) -> str:
-    name, form, port, order = label.groups()
-    details = [port.replace("_", " "), form, None if order is None else f"order {order}"]
-    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"

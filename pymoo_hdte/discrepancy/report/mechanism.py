@@ -77,8 +77,8 @@ def _page(finding: Finding, document: dict[str, Any], gaps: Sequence[MeasuredGap
     shown = _shown(gaps)
     pictures["overlay"] = data_uri(overlay(shown)) if shown else ""
     return page(
-        "pymoo_hdte.discrepancy.mechanism",
-        "report.html.j2",
+        "pymoo_hdte.discrepancy.report",
+        "mechanism.html.j2",
         document=document,
         status=STATUSES[finding.verdict.status],
         rows=rows,

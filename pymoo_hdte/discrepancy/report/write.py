@@ -19,7 +19,8 @@ from pymoo_hdte.discrepancy.drive.revision import (
     drive_model,
     revised_model,
 )
-from pymoo_hdte.discrepancy.report.document import in_words, verdict_document
+from pymoo_hdte.discrepancy.engine.candidate import in_words
+from pymoo_hdte.discrepancy.report.document import verdict_document
 from pymoo_hdte.discrepancy.report.figures import (
     gap_by_channel,
     gap_by_order,
@@ -150,7 +151,7 @@ def _page(
     if shift.choices:
         pictures["optimum"] = data_uri(optimum_fronts(shift))
     return page(
-        "pymoo_hdte.discrepancy",
+        "pymoo_hdte.discrepancy.report",
         "report.html.j2",
         campaign=analysis.campaign,
         verdict=analysis.verdict,

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Solvers of the drive's equations of motion: steady states, stability, time integration."""
