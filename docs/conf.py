@@ -40,7 +40,14 @@ numpydoc_xref_param_type = True
 numpydoc_xref_ignore = "all"
 numpydoc_xref_aliases = {
     name: f"pymoo_hdte.{package}.{name}"
-    for package in ("drive", "surrogate", "problems", "algorithms", "mechanism", "measured")
+    for package in (
+        "drive",
+        "surrogate",
+        "problems",
+        "algorithms",
+        "mechanism",
+        "discrepancy.mechanism",
+    )
     for name in import_module(f"pymoo_hdte.{package}").__all__
 } | {"InvalidInput": "pymoo_hdte.checks.InvalidInput"}
 

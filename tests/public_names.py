@@ -9,7 +9,7 @@ import sys
 
 PACKAGES = (
     "drive", "surrogate", "identification", "problems", "algorithms", "decision", "discrepancy",
-    "mechanism", "measured", "validation",
+    "discrepancy.mechanism", "mechanism", "validation",
 )  # fmt: skip
 
 HERE = ("pymoo_hdte", "test_public_docstrings")

@@ -7,8 +7,8 @@ import pytest
 from planted_features import analysed, known_data, listed, measured
 from scipy.stats import chi2
 
-from pymoo_hdte.discrepancy.drive.location import locate, refit_clean
-from pymoo_hdte.discrepancy.drive.misfit_map import benjamini_hochberg
+from pymoo_hdte.discrepancy.drive.misfit.location import locate, refit_clean
+from pymoo_hdte.discrepancy.drive.misfit.map import benjamini_hochberg
 from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit

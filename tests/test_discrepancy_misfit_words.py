@@ -9,9 +9,9 @@ from planted_features import known_data
 from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
-from pymoo_hdte.discrepancy.drive.misfit_map import Location
-from pymoo_hdte.discrepancy.drive.misfit_nature import StrayLines, stray_lines
-from pymoo_hdte.discrepancy.drive.misfit_words import sentences
+from pymoo_hdte.discrepancy.drive.misfit.map import Location
+from pymoo_hdte.discrepancy.drive.misfit.nature import StrayLines, stray_lines
+from pymoo_hdte.discrepancy.drive.misfit.words import sentences
 from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 

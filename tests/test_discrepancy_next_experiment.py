@@ -8,7 +8,7 @@ import pytest
 from planted_features import analysed, known_data, listed, measured
 
 from pymoo_hdte.discrepancy.drive.analysis import Analysis
-from pymoo_hdte.discrepancy.drive.location import locate
+from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import nearest_rivals, next_experiment
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.fitting import fit

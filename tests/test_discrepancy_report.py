@@ -14,7 +14,7 @@ from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.optimum_shift import optimum_shift
-from pymoo_hdte.discrepancy.drive.location import locate
+from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import accepted_fit, drive_model, revised_model

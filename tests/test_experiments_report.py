@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+import experiments
 from experiments.__main__ import main
 from experiments.runner import committed, provenance
 from experiments.runner.campaign import Campaign
@@ -172,7 +173,7 @@ def test_stored_outcomes_say_when_they_were_made(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda one: one.name)
 def test_whatever_reads_a_stored_outcome_says_so(experiment):
-    module = import_module(f"experiments.{experiment.name}")
+    module = import_module(f"experiments.{experiment.module}")
     assert hasattr(module, "stored_outcome") == experiment.reads_outcome
 
 
@@ -184,7 +185,7 @@ def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda one: one.name)
 def test_seeds_are_refused_where_they_would_change_nothing(experiment, tmp_path, capsys):
-    module = import_module(f"experiments.{experiment.name}")
+    module = import_module(f"experiments.{experiment.module}")
     asks = "context.seeds" in Path(module.__file__).read_text()
     assert experiment.takes_seeds == asks
     if asks:
@@ -286,11 +287,13 @@ def test_results_of_another_source_are_marked(out):
     assert "Made by another version" in write_report(out).read_text()
 
 
-@pytest.mark.parametrize("changed", ["report.py", "data/reliability.csv", "templates/index.html"])
+@pytest.mark.parametrize(
+    "changed", ["runner/report.py", "data/reliability.csv", "templates/index.html"]
+)
 def test_a_result_depends_on_source_stored_outcomes_and_template(changed, tmp_path, monkeypatch):
     folder = tmp_path / "experiments"
-    copytree(Path(provenance.__file__).parent, folder, ignore=ignore_patterns("__pycache__"))
-    monkeypatch.setattr(provenance, "__file__", str(folder / "provenance.py"))
+    copytree(Path(experiments.__file__).parent, folder, ignore=ignore_patterns("__pycache__"))
+    monkeypatch.setattr(experiments, "__file__", str(folder / "__init__.py"))
     before = provenance.report_fingerprint()
     provenance.fingerprint.cache_clear()
     assert provenance.report_fingerprint() == before
@@ -302,7 +305,7 @@ def test_a_result_depends_on_source_stored_outcomes_and_template(changed, tmp_pa
 
 def test_the_versions_are_those_of_all_that_computes_a_result():
     """Every package that the sources import, but for those that only run or show a computation."""
-    root = Path(provenance.__file__).parents[1]
+    root = Path(experiments.__file__).parents[1]
     imported = set()
     for path in [*(root / "pymoo_hdte").rglob("*.py"), *(root / "experiments").rglob("*.py")]:
         imported |= set(re.findall(r"^ *(?:import|from) (\w+)", path.read_text(), re.MULTILINE))

@@ -1,49 +1,100 @@
-"""Data flows one way: no part of the package imports one that stands above it."""
+"""Data flows one way: no room imports from one that stands above it, not even for types."""
 
 import ast
 from pathlib import Path
 
 import pytest
 
+import experiments
 import pymoo_hdte
 
 ROOT = Path(pymoo_hdte.__file__).parent
+EXPERIMENTS = Path(experiments.__file__).parent
 LOWEST_FIRST = (
-    *("__version__", "checks", "units", "compiled", "storage", "reports"),
-    *("drive", "surrogate", "validation", "identification", "mechanism", "discrepancy", "measured"),
-    *("problems", "algorithms", "decision", "commands", "cli"),
+    *("checks", "units", "compiled", "io", "laws", "reports"),
+    *("drive.solve", "drive", "mechanism", "surrogate", "validation", "identification"),
+    *(
+        "discrepancy.engine",
+        "discrepancy.campaign",
+        "discrepancy.drive",
+        "discrepancy.drive.misfit",
+        "discrepancy.mechanism",
+    ),
+    *("discrepancy", "discrepancy.report", "virtual"),
+    *("problems", "algorithms", "decision", "cli"),
 )
+"""Rooms of the package; a folder stands for the modules in it, not for the folders below it."""
+LOWEST_EXPERIMENTS_FIRST = (
+    *("published_values", "runner", "comparison", "fronts"),
+    *("paper.static_error", "paper.prototypes", "paper", "paper.calibrating"),
+    *("contest", "blind", "measured", "reliability", "studies", "__main__"),
+)
+MOST_FILES = 20
+OUTSIDE = ("experiments", "tests")
 
 
-def imported(path: Path) -> set[str]:
-    """Return the parts of the package, and the other packages, that a file imports anywhere."""
+def room_of(module: str, root: Path) -> str:
+    """Return the room of a module, of a package or of a name in one, by dotted path below root."""
+    parts = module.split(".")
+    while parts and not root.joinpath(*parts).is_dir():
+        inside = ".".join(parts[:-1])
+        if root.joinpath(*parts).with_suffix(".py").is_file():
+            return inside or parts[0]
+        parts.pop()
+    return ".".join(parts)
+
+
+def imported(path: Path, package: str, root: Path) -> set[str]:
+    """Return the rooms of a package that a file imports from anywhere, and other packages."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ImportFrom):
             assert not node.level, f"{path} imports relatively"
-            package, *rest = str(node.module).split(".")
-            names = {rest[0]} if rest else {alias.name for alias in node.names}
-            found |= names if package == "pymoo_hdte" else {package}
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
         elif isinstance(node, ast.Import):
-            found |= {alias.name.removeprefix("pymoo_hdte.").split(".")[0] for alias in node.names}
+            names = [alias.name for alias in node.names]
+        else:
+            continue
+        for name in names:
+            first, _, rest = name.partition(".")
+            found.add(room_of(rest, root) if first == package and rest else first)
     return found
 
 
-PARTS = sorted({path.relative_to(ROOT).parts[0].removesuffix(".py") for path in ROOT.rglob("*.py")})
+def rooms(root: Path, order: tuple[str, ...]) -> list[tuple[str, list[Path]]]:
+    """Return the files of each room, every file of the package being in one."""
+    found = [
+        (room, sorted(root.joinpath(*room.split(".")).glob("*.py")) or [root / f"{room}.py"])
+        for room in order
+    ]
+    inside = {path for _, paths in found for path in paths}
+    assert inside | {root / "__init__.py"} == set(root.rglob("*.py"))
+    return found
 
 
-@pytest.mark.parametrize("part", [part for part in PARTS if part != "__init__"])
-def test_no_import_runs_back(part):
-    files = (
-        [ROOT / f"{part}.py"] if (ROOT / f"{part}.py").is_file() else (ROOT / part).rglob("*.py")
-    )
-    names = set().union(*map(imported, files))
-    above = set(LOWEST_FIRST[LOWEST_FIRST.index(part) + 1 :])
-    assert not names & (above | {"experiments", "tests"})
+@pytest.mark.parametrize(
+    ("package", "root", "order"),
+    [
+        ("pymoo_hdte", ROOT, LOWEST_FIRST),
+        ("experiments", EXPERIMENTS, LOWEST_EXPERIMENTS_FIRST),
+    ],
+)
+def test_no_import_runs_back(package, root, order):
+    outside = set(OUTSIDE) - {package}
+    for place, (room, paths) in enumerate(rooms(root, order)):
+        names = set().union(*(imported(path, package, root) for path in paths))
+        assert not names & (set(order[place + 1 :]) | outside), f"{package}.{room}"
 
 
-@pytest.mark.parametrize("part", ["discrepancy", "measured"])
-def test_the_workflow_knows_nothing_of_optimisation(part):
-    names = set().union(*map(imported, (ROOT / part).rglob("*.py")))
-    assert "drive" in names
+def test_no_folder_is_crowded():
+    for folder in {path.parent for path in [*ROOT.rglob("*.py"), *EXPERIMENTS.rglob("*.py")]}:
+        assert len(list(folder.glob("*.py"))) <= MOST_FILES, folder
+
+
+@pytest.mark.parametrize(
+    "rooms_of_it", ["discrepancy.engine", "discrepancy.campaign", "discrepancy.drive"]
+)
+def test_the_workflow_knows_nothing_of_optimisation(rooms_of_it):
+    found = dict(rooms(ROOT, LOWEST_FIRST))[rooms_of_it]
+    names = set().union(*(imported(path, "pymoo_hdte", ROOT) for path in found))
     assert not names & {"surrogate", "problems", "algorithms", "decision", "pymoo"}

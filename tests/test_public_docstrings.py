@@ -69,7 +69,7 @@ SOURCES = {
     "discrepancy.residual_spectrum": "Scargle",
     "mechanism.Loop": "Astrom and Murray",
     "mechanism.Mechanism": "Eqs. (3) to (9)",
-    "measured.investigate": "Schwarz",
+    "discrepancy.mechanism.investigate": "Schwarz",
     "validation.validation_metrics": "Section 4",
 }
 """Methods that others published, or the paper's own, and a part of the source they must name."""

@@ -21,8 +21,8 @@ from pymoo_hdte.discrepancy import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import Analysis, analyse
 from pymoo_hdte.discrepancy.drive.evidence import training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
-from pymoo_hdte.discrepancy.drive.location import locate
-from pymoo_hdte.discrepancy.drive.misfit_map import Flags
+from pymoo_hdte.discrepancy.drive.misfit.location import locate
+from pymoo_hdte.discrepancy.drive.misfit.map import Flags
 from pymoo_hdte.discrepancy.drive.next_test import next_experiment
 from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL

@@ -70,7 +70,7 @@ def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
     from pymoo_hdte.cli.optimum_shift import optimum_shift
     from pymoo_hdte.discrepancy import read_campaign
     from pymoo_hdte.discrepancy.drive.analysis import analyse
-    from pymoo_hdte.discrepancy.drive.location import locate
+    from pymoo_hdte.discrepancy.drive.misfit.location import locate
     from pymoo_hdte.discrepancy.drive.next_test import next_experiment
     from pymoo_hdte.discrepancy.drive.proof import prove
     from pymoo_hdte.discrepancy.report.write import write_report

@@ -9,7 +9,7 @@ from typing import Any
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.drive.analysis import Analysis
 from pymoo_hdte.discrepancy.drive.limits import limits
-from pymoo_hdte.discrepancy.drive.misfit_map import Location
+from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.drive.revision import (

@@ -18,14 +18,14 @@ from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.drive.analysis import Analysis
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
-from pymoo_hdte.discrepancy.drive.misfit_map import (
+from pymoo_hdte.discrepancy.drive.misfit.map import (
     FALSE_DISCOVERIES,
     Flags,
     Location,
     Values,
     benjamini_hochberg,
 )
-from pymoo_hdte.discrepancy.drive.misfit_words import sentences
+from pymoo_hdte.discrepancy.drive.misfit.words import sentences
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
 from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.drive.revision import accepted_fit

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.believed import Believed
 from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS, residual_spectrum
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.misfit_map import Location
+from pymoo_hdte.discrepancy.drive.misfit.map import Location
 
 _SLOW_SHARE = 0.1
 """Share of the misfit in the slower half of the records below which it counts as one of speed."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.misfit_map import Flags, Location, Values
-from pymoo_hdte.discrepancy.drive.misfit_nature import (
+from pymoo_hdte.discrepancy.drive.misfit.map import Flags, Location, Values
+from pymoo_hdte.discrepancy.drive.misfit.nature import (
     StrayLines,
     changes,
     growth,
