@@ -25,9 +25,9 @@ LOWEST_FIRST = (
 )
 """Rooms of the package; a folder stands for the modules in it, not for the folders below it."""
 LOWEST_EXPERIMENTS_FIRST = (
-    *("published_values", "runner", "comparison", "fronts"),
+    *("published_values", "runner", "__main__", "comparison", "fronts"),
     *("paper.static_error", "paper.prototypes", "paper", "paper.calibrating"),
-    *("contest", "blind", "measured", "reliability", "studies", "__main__"),
+    *("contest", "blind", "measured", "reliability", "studies"),
 )
 MOST_FILES = 20
 OUTSIDE = ("experiments", "tests")

@@ -125,7 +125,7 @@ NOMINAL_QUANTITIES = {
     "output_inertia": "inertia",
     "output_damping": "damping",
 }
-"""The quantity, among `toml_fields.UNITS`, of every field of `Nominal`."""
+"""The quantity, among `fields.UNITS`, of every field of `Nominal`."""
 
 
 @dataclass(frozen=True)

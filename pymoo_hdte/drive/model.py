@@ -319,7 +319,7 @@ def preset(name: str) -> DriveModel:
 def model_tables(model: DriveModel) -> dict[str, Any]:
     """Return the header's tables: ``data_sheet`` and ``model``, as in the files of ``drive/data``.
 
-    Quantities are in the SI unit of `toml_fields.UNITS` whose factor is 1, so no bit is lost.
+    Quantities are in the SI unit of `fields.UNITS` whose factor is 1, so no bit is lost.
     """
     error = model.kinematic_error
     table = {

@@ -3,7 +3,7 @@
 A port is a place where two parts move against each other: ``input`` (wave generator against the
 housing), ``output`` (circular spline against the housing), ``mesh`` (the torsion d). A law answers
 with the torque that opposes the motion; which port it stands at decides which effect it is. The
-laws themselves are in `friction`, `mesh_laws` and `hysteresis`.
+laws themselves are in `friction`, `stiffness` and `hysteresis`.
 """
 
 from __future__ import annotations

@@ -63,8 +63,8 @@ class HiddenEffect:
     port : str
         "input", "output", "mesh" or "sensor".
     parameters : dict
-        Fields of `hidden_laws.Side` (input, output), `hidden_laws.Mesh` or
-        `rig_sensors.OutputEncoder` and their values, SI.
+        Fields of `laws.Side` (input, output), `laws.Mesh` or
+        `sensors.OutputEncoder` and their values, SI.
     """
 
     name: str

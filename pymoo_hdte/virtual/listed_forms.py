@@ -2,7 +2,7 @@
 
 Sizes are our own choice within what strain wave gears of this size and their rigs show; ``size``
 scales the strength of an effect, 1 being typical. Each function returns the port and the values of
-its fields (`hidden_laws.Side`, `hidden_laws.Mesh` or `rig_sensors.OutputEncoder`), SI.
+its fields (`laws.Side`, `laws.Mesh` or `sensors.OutputEncoder`), SI.
 """
 
 from __future__ import annotations

@@ -84,7 +84,7 @@ class Campaign:
     def torque_scale(self) -> float:
         """Torques beside those that the library of effects is sized for, dimensionless.
 
-        See `pymoo_hdte.discrepancy.campaign.campaign`.
+        See `campaign.torque_scale`.
         """
         return torque_scale([record.load_torque for record in self.running], self.believed)
 

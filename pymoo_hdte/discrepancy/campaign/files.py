@@ -1,4 +1,4 @@
-"""Campaigns on disk: a folder as `campaign_format` describes it, read, checked and written."""
+"""Campaigns on disk: a folder as `format` describes it, read, checked and written."""
 
 from __future__ import annotations
 

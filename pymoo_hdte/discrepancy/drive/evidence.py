@@ -30,7 +30,7 @@ Vector = NDArray[np.float64]
 PARTS = (*CHANNELS, "torsion_sweep")
 """Of the data, as an `Excess` has them: channels of the running records, and the sweeps."""
 NUMERICAL = 1e-4
-"""Share of an excess that may be of the integrator's steps: see `rival.EXACT_SHARE`."""
+"""Share of an excess that may be of the integrator's steps: see `hypothesis.EXACT_SHARE`."""
 
 
 @dataclass(frozen=True, eq=False)

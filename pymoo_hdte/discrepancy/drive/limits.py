@@ -24,7 +24,7 @@ def limits(analysis: Analysis) -> list[str]:
     Parameters
     ----------
     analysis : Analysis
-        Of `workflow.analyse`.
+        Of `analysis.analyse`.
     """
     return [*_unproven(analysis), *_unvaried(analysis), *_unseen(analysis), *_too_high(analysis)]
 

@@ -71,7 +71,7 @@ def next_experiment(analysis: Analysis) -> Proposal:
     Parameters
     ----------
     analysis : Analysis
-        Of `workflow.analyse`.
+        Of `analysis.analyse`.
     """
     verdict, grid = analysis.verdict, Grid.of(analysis)
     if verdict.chosen is None:

@@ -62,7 +62,7 @@ class TorsionPoints:
 
 
 def torsion_points(record: TorsionRecord, rig: Rig) -> TorsionPoints:
-    """Reduce a sweep to points, each the mean of about `torsion_legs.ROWS_A_POINT` rows.
+    """Reduce a sweep to points, each the mean of about `torsion_sweep.ROWS_A_POINT` rows.
 
     Parameters
     ----------

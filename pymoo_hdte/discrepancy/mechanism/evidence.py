@@ -28,7 +28,7 @@ REMAINDER = 0.05
 
 @dataclass(frozen=True, eq=False)
 class MeasuredData:
-    """Force balances of records as `discrepancy.evidence.Evidence` wants them.
+    """Force balances of records as `fitting.Evidence` wants them.
 
     Attributes
     ----------

@@ -54,7 +54,7 @@ def locate(analysis: Analysis) -> Location:
     Parameters
     ----------
     analysis : Analysis
-        Of `workflow.analyse`.
+        Of `analysis.analyse`.
     """
     data = analysis.data
     clean = refit_clean(data, accepted_fit(analysis.verdict))
