@@ -1,8 +1,9 @@
 """From records of a mechanism to a verdict: what is missing, and how much nobody explains.
 
-The rules are those of `discrepancy.engine.verdict`. Because no model of a real machine meets the noise of
-its sensors, they are held against the rest: what the two best effects leave. A verdict therefore
-names what stands out of everything that is known to be able to explain it, and says what is left.
+The rules are those of `discrepancy.engine.verdict`. Because no model of a real machine meets the
+noise of its sensors, they are held against the rest: what the two best effects leave. A verdict
+therefore names what stands out of everything that is known to be able to explain it, and says what
+is left.
 """
 
 from __future__ import annotations
