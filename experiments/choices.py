@@ -17,7 +17,7 @@ from pymoo_hdte.problems.drive_response import SURROGATE_BOX
 
 MODEL = "calibrated"
 INITIAL = "initial"
-TRUE_FRONT = "true front"
+TRUE_FRONT = "surrogate's true front"
 PAPER_DESIGN = "paper's design"
 BAND = 0.05
 """Tolerance of every optimised design."""
@@ -70,7 +70,7 @@ def paper_choices() -> list[Choice]:
 
 
 def preferred_choices(campaign: Campaign) -> list[Choice]:
-    """Return what every preference picks from AMP-MOPSO's archive, then from the true front."""
+    """Return what every preference picks from AMP-MOPSO's archive, then from `TRUE_FRONT`."""
     problem = robust_problem(MODEL)
     (archive,) = campaign.run([OptimisationRun(MODEL, "AMP-MOPSO", seed=1)], "table8")
     sources = {

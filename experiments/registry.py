@@ -138,7 +138,7 @@ EXPERIMENTS = (
     Experiment("benchmark", "Speed ratios and agreement with integration", by_default=False),
     Experiment(
         "reference_front",
-        "The true fronts, computed anew and compared: 35 minutes",
+        "The true fronts of the surrogates, computed anew and compared: 35 minutes",
         by_default=False,
     ),
 )

@@ -33,7 +33,7 @@ SETTING = (
     "counts as agreeing if it is significant and at least half of what the paper prints."
 )
 LOST = (
-    "A piece of the true front (parts separated by a gap above 0.02) counts as lost when no "
+    "A piece of that front (parts separated by a gap above 0.02) counts as lost when no "
     "solution lies within 0.05 of it, both in normalised objectives. Spacing alone misleads: a "
     "front crowded into one corner has a good one."
 )
@@ -57,7 +57,7 @@ def run(context: Context) -> Result:
         pictures=(
             Picture(
                 "fronts",
-                "As Fig. 18: for every algorithm the run of median IGD over the true front.",
+                "As Fig. 18: for every algorithm the run of median IGD over the surrogate's front.",
                 fronts(comparisons),
             ),
             Picture("igd", "IGD of every run; bars mark the medians.", igd_of_runs(comparisons)),
