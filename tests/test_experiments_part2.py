@@ -7,7 +7,7 @@ import pytest
 from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
-from experiments import dte_map, fig12, published, sensitivity, table8
+from experiments import design_tables, dte_map, fig12, published, sensitivity, table8
 from experiments.accuracy_per_run import Trial, needed_table
 from experiments.campaign import Campaign
 from experiments.chaospy_twins import chaos, compare
@@ -268,6 +268,17 @@ class TestFitted:
         table = table8._moments_table(initial_choices(), ours)
         at_theirs, at_ours, _ = table.findings
         assert (at_theirs.verdict, at_ours.verdict) == ("Fitted", "Agrees")
+
+    @pytest.mark.parametrize(
+        ("share", "words", "verdict"), [(5e-5, "0.0050 %", "Agrees"), (0.2, "20 %", "Differs")]
+    )
+    def test_optima_that_random_designs_dominate_are_not_of_this_model(
+        self, share, words, verdict, monkeypatch
+    ):
+        monkeypatch.setattr(design_tables, "dominating_shares", lambda _: {"balanced": share})
+        _, *found = design_tables.optima_table(paper_choices()).findings
+        assert [finding.verdict for finding in found] == [verdict] * len(FITTED)
+        assert all(f" is {words} (balanced)." in finding.sentence for finding in found)
 
     def test_which_prototype_is_nearest_hangs_on_a_variable_that_moves_nothing(self):
         problem = robust_problem("calibrated")

@@ -14,6 +14,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from pymoo.indicators.igd import IGD
+from pymoo.indicators.spacing import SpacingIndicator
+from pymoo.optimize import minimize
 from experiments import fig12, swarm_parts, table5
 from experiments.blind import OUTCOMES, SECONDS
 from experiments.blind_cases import MOST_WRONG_CONFIDENT
@@ -21,14 +24,16 @@ from experiments.blind_data import read_outcomes
 from experiments.blind_targets import select
 from experiments.campaign import Campaign
 from experiments.committed import committed_file
+from experiments.choices import dominating_shares
 from experiments.comparison import objectives, true_front
 from experiments.peers_data import committed_scores
 from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table, subsets_table
 from experiments.peers_tables import NAMES, median_ranks
-from experiments.published_values import TABLE_7
+from experiments.published_values import TABLE_7, TABLE_8, TABLE_9
 from experiments.quality import TrueFront
 from experiments.registry import Context
-from experiments.runs import OptimisationRun
+from experiments.runs import ALGORITHMS, OptimisationRun
+from experiments.scatter import dte_samples, exact_moments
 from pymoo_hdte import cli
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
@@ -187,7 +192,57 @@ class TestNumbersBesideThePaper:
         assert igd.max() < 1.02 * igd.min()
         assert igd.argmin() == 2
 
-    def test_best_balanced_design_of_the_true_front(self):
+    def test_comparison_at_a_small_budget(self):
+        problem = RobustDTE()
+        igd, spacing = IGD(problem.pareto_front()), SpacingIndicator()
+        found = {}
+        for name in ("NSGA-II", "MOPSO", "AMP-MOPSO"):
+            sets = [
+                minimize(problem, ALGORITHMS[name](10, 50), ("n_gen", 20), seed=seed).F
+                for seed in range(1, 13)
+            ]
+            found[name] = [np.mean([measure(F) for F in sets]) for measure in (igd, spacing)]
+            assert max(map(len, sets)) <= (10 if name == "NSGA-II" else 50)
+        of_igd, of_spacing = (
+            "{:.3f}, {:.3f} and {:.3f} arcsec".format(*column)
+            for column in zip(*found.values(), strict=True)
+        )
+        assert f"have an IGD of {of_igd} and a Spacing of {of_spacing}" in WORDS
+
+    def test_random_designs_dominate_the_published_optima(self):
+        for model, words in (
+            ("calibrated", "{:.0f} to {:.0f} % of random designs"),
+            ("resonant", "({:.1g} to {:.0f} % in `resonant`)"),
+        ):
+            percent = [100.0 * share for share in dominating_shares(model).values()]
+            assert words.format(min(percent), max(percent)) in WORDS
+
+    def test_the_step_between_two_published_optima(self):
+        names = ("accuracy_first", "balanced", "robustness_first")
+        problem, band = RobustDTE(), 0.05
+        ours = [exact_moments(problem, TABLE_9[name], band) for name in names]
+        for moments, words in (
+            ([TABLE_8[name] for name in names], "{:+.3f} arcsec in the mean and {:+.3f} in"),
+            (ours, "`calibrated` gives {:+.3f} and {:+.3f}."),
+        ):
+            assert words.format(*np.subtract(moments[2], moments[1])) in WORDS
+        drawn = [dte_samples(problem, TABLE_9[name], band, 200_000, 2) for name in names]
+        correlations = np.corrcoef(drawn)[np.triu_indices(3, 1)]
+        least, most = f"{correlations.min():.3f}"[1:], f"{correlations.max():.4f}"[1:]
+        assert f"correlate at {least} to {most} in `calibrated`" in WORDS
+        first, last = np.reshape(drawn[1:], (2, 200, 1000))
+        steps = last.mean(axis=1) - first.mean(axis=1), last.std(axis=1) - first.std(axis=1)
+        assert np.std(steps, axis=1) == pytest.approx(0.012, abs=0.002)
+        assert "known to some 0.012 arcsec" in WORDS
+
+    def test_the_front_of_order_3_is_dominated_at_order_5(self):
+        finer = RobustDTE(order=5)
+        front = finer.pareto_front()
+        values = finer.evaluate(RobustDTE().pareto_set())
+        assert "every design of the order-3 front of `calibrated` is dominated" in WORDS
+        assert all(np.any(np.all(front < row, axis=1)) for row in values)
+
+    def test_best_balanced_design_of_the_surrogates_front(self):
         front = RobustDTE().pareto_front()
         _, ours = row("best balanced design")
         best = front[WeightedUtopia(PREFERENCES["balanced"]).do(front)]
