@@ -7,24 +7,25 @@ import json
 import re
 import shlex
 import sys
+from itertools import product
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
-
 from pymoo.indicators.igd import IGD
 from pymoo.indicators.spacing import SpacingIndicator
 from pymoo.optimize import minimize
+
 from experiments import fig12, swarm_parts, table5
 from experiments.blind import OUTCOMES, SECONDS
 from experiments.blind_cases import MOST_WRONG_CONFIDENT
 from experiments.blind_data import read_outcomes
 from experiments.blind_targets import select
 from experiments.campaign import Campaign
-from experiments.committed import committed_file
 from experiments.choices import dominating_shares
+from experiments.committed import committed_file
 from experiments.comparison import objectives, true_front
 from experiments.peers_data import committed_scores
 from experiments.peers_rivals import FAITHFUL, must_reach_table, nearest_rival_table, subsets_table
@@ -36,8 +37,10 @@ from experiments.runs import ALGORITHMS, OptimisationRun
 from experiments.scatter import dte_samples, exact_moments
 from pymoo_hdte import cli
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+from pymoo_hdte.drive import harmonic_balance
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import accuracy, latin_hypercube
+from pymoo_hdte.units import ARCSEC
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -69,6 +72,22 @@ def test_both_solvers_of_the_drive_snippet_agree():
     steady, integrated = (float(line.strip("[]")) for line in output_of(SNIPPETS[2]).split("\n"))
     assert integrated == pytest.approx(steady, rel=5e-3)
     assert integrated != pytest.approx(steady, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("calibrated", "up to {} % over"), ("resonant", "({} % in `resonant`)")]
+)
+def test_how_much_the_input_angle_fluctuates(name, words):
+    problem = RobustDTE(name)
+    model = problem.model
+    corners = np.array(list(product(*zip(problem.xl, problem.xu, strict=True))))
+    inside = np.random.default_rng(1).uniform(problem.xl, problem.xu, (100, 4))
+    rows = np.vstack([problem.nominal, corners, inside])
+    designs = np.column_stack([np.full(len(rows), model.nominal[0]), rows])
+    free = harmonic_balance(model.coefficients(designs)).spectrum()
+    above = free.peak_to_peak(model.sheet.ratio) / ARCSEC / model.dte_arcsec(designs) - 1.0
+    assert words.format(f"{100.0 * np.abs(above).max():.2f}") in WORDS
+    assert name != "calibrated" or f"differ by {100.0 * above[0]:.2f} % here" in WORDS
 
 
 def test_every_snippet_is_run_here():
