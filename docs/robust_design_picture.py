@@ -24,7 +24,7 @@ def draw(target: Path = PICTURE) -> None:
     figure = Figure(figsize=(9.6, 3.4), layout="constrained")
     scatter, front = figure.subplots(1, 2)
     labels = []
-    front.plot(*problem.pareto_front().T, color="0.6", linewidth=5, label="true front")
+    front.plot(*problem.pareto_front().T, color="0.6", linewidth=5, label="front of the surrogate")
     front.plot(*found.F.T, ".", color=CHOSEN, markersize=4, label="ElitistSwarm")
     for name, design, colour, line in (
         ("data sheet", problem.nominal, DATA_SHEET, "--"),

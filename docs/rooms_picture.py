@@ -1,6 +1,6 @@
 """Draw docs/rooms.png, the picture of the architecture page: the package's rooms, from its imports.
 
-A room is a folder; the modules beside it in no folder of their own are the ground that all stand on.
+A room is a folder; modules in no folder of their own are the ground that all rooms stand on.
 An arrow means "imports from"; one that follows from others (a over b over c) is left out.
 """
 

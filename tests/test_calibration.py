@@ -139,7 +139,10 @@ def test_the_report_is_made_from_the_committed_ladder(tmp_path):
     result = calibration.run(Context(1, tmp_path, Campaign(tmp_path)))
     numbers = result.tables[0]
     assert [row[0] for row in numbers.rows] == [name.replace("_", " ") for name in PUBLISHED]
-    assert all(finding.agrees for finding in numbers.findings)
+    *checks, step = numbers.findings
+    assert all(finding.agrees for finding in checks)
+    assert step.verdict == "Missed by the fit"
+    assert "-0.022 and +0.021 arcsec by the best rung, by +0.468 and -0.136 in" in step.sentence
     assert len(result.tables[1].rows) == len(ladder())
 
 

@@ -8,7 +8,7 @@ from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
 from experiments.comparison.runs import robust_problem
-from experiments.paper import fig12, published, table8
+from experiments.paper import design_tables, fig12, published, table8
 from experiments.paper.choices import BAND, initial_choices, paper_choices
 from experiments.paper.design_tables import _idle_sweep, deviation_table
 from experiments.paper.models import FITTED
@@ -274,6 +274,17 @@ class TestFitted:
         table = table8._moments_table(initial_choices(), ours)
         at_theirs, at_ours, _ = table.findings
         assert (at_theirs.verdict, at_ours.verdict) == ("Fitted", "Agrees")
+
+    @pytest.mark.parametrize(
+        ("share", "words", "verdict"), [(5e-5, "0.0050 %", "Agrees"), (0.2, "20 %", "Differs")]
+    )
+    def test_optima_that_random_designs_dominate_are_not_of_this_model(
+        self, share, words, verdict, monkeypatch
+    ):
+        monkeypatch.setattr(design_tables, "dominating_shares", lambda _: {"balanced": share})
+        _, *found = design_tables.optima_table(paper_choices()).findings
+        assert [finding.verdict for finding in found] == [verdict] * len(FITTED)
+        assert all(f" is {words} (balanced)." in finding.sentence for finding in found)
 
     def test_which_prototype_is_nearest_hangs_on_a_variable_that_moves_nothing(self):
         problem = robust_problem("calibrated")

@@ -74,7 +74,7 @@ def test_guide_runs_and_its_checks_hold(guide):
         ("extend", "difference # N.m, in closed form # N.m", 1e-4),
         ("extend", "steady state #, integrated # arcsec", 5e-3),
         ("extend", "expected # Hz, # Hz counted", 1.0),
-        ("robust_study", "smallest mean # arcsec\ntrue front    # arcsec", 1e-4),
+        ("robust_study", "smallest mean    # arcsec\nend of the front # arcsec", 1e-4),
         ("drive_data_sheet", "model #, surrogate # arcsec", 0.1),
         ("verdict_rules", "standard deviation #, ordinary least squares #", 2e-4),
         ("verdict_rules", "evidence #, by integration #", 0.1),

@@ -79,6 +79,14 @@ def test_stored_fronts_are_on_the_problem_and_undominated(member):
     assert len(NonDominatedSorting().do(front, only_non_dominated_front=True)) == len(front)
 
 
+def test_fronts_have_as_many_pieces_as_the_family_says(member):
+    if member.n_obj == 2:
+        front = member.pareto_front()
+        steps = np.diff(front, axis=0) / np.ptp(front, axis=0)
+        gaps = np.count_nonzero(np.linalg.norm(steps, axis=1) > 0.02)
+        assert gaps == (member.variant in {"resonant", "calibrated_duty_cycle"})
+
+
 def test_nothing_undercuts_a_stored_front(member):
     front = member.pareto_front()
     evolved = minimize(member, NSGA2(pop_size=100), ("n_gen", 40), seed=1).F

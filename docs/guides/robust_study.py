@@ -9,9 +9,10 @@ scatters. :class:`~pymoo_hdte.problems.RobustDTE` asks for nominal values of fou
 (stiffness, inertia, two dampings) that give a small mean DTE and a small standard deviation over
 the series.
 
-It is an ordinary pymoo ``Problem`` with two objectives, four real variables and no constraint. Its
-true Pareto front is known, and an evaluation costs microseconds: it stands on a polynomial
-surrogate, whose moments are exact (:ref:`how <sphx_glr_auto_guides_exact_moments.py>`).
+It is an ordinary pymoo ``Problem`` with two objectives, four real variables and no constraint. It
+stands on a polynomial surrogate, whose moments are exact
+(:ref:`how <sphx_glr_auto_guides_exact_moments.py>`). The true Pareto front of that surrogate is
+known, and an evaluation costs microseconds.
 
 The drive behind it is ``calibrated``: the equations of the paper with three effects added, whose
 values were fitted to published statistics. As printed, the equations do not give the published DTE.
@@ -56,13 +57,16 @@ results = {
 }
 
 # %%
-# The true front
-# --------------
+# The true front of the surrogate
+# -------------------------------
 #
 # ``pareto_front()`` and ``pareto_set()`` hold 1000 points or more, found by gradients from many
 # starts and even in arc length. No algorithm that you may want to compare produced them. Indicators
 # need a scale: give the corners of the front once, and all runs are measured alike (pymoo scales
 # the reference point of the hypervolume too, so it is given in arcsec).
+#
+# The front is that of the surrogate, by default of order 3, and not that of the drive model:
+# evaluated on a surrogate of order 5, every one of its designs is dominated.
 
 front = problem.pareto_front()
 ideal, nadir = front.min(axis=0), front.max(axis=0)
@@ -70,7 +74,7 @@ igd = IGD(front, zero_to_one=True, ideal=ideal, nadir=nadir)
 corner = nadir + 0.1 * (nadir - ideal)
 hv = HV(ref_point=corner, zero_to_one=True, ideal=ideal, nadir=nadir)
 
-print(f"true front: {len(front)} points, hypervolume {hv(front):.4f}")
+print(f"front of the surrogate: {len(front)} points, hypervolume {hv(front):.4f}")
 for name, result in results.items():
     print(f"{name:12}  {len(result.F):3} points  IGD {igd(result.F):.4f}  HV {hv(result.F):.4f}")
 
@@ -80,7 +84,7 @@ for name, result in results.items():
 # ``AMPMOPSO`` holds 50, the others return up to 100.
 
 fig, ax = plt.subplots(figsize=(6.5, 4.0), layout="constrained")
-ax.plot(*front.T, color="0.6", lw=3, label="true front")
+ax.plot(*front.T, color="0.6", lw=3, label="front of the surrogate")
 for (name, result), marker in zip(results.items(), "ox+", strict=True):
     ax.plot(*result.F.T, marker, ms=5, fillstyle="none", label=name)
 ax.set(xlabel="mean DTE [arcsec]", ylabel="standard deviation of the DTE [arcsec]")
@@ -131,16 +135,16 @@ def mean_dte(scaled):
 
 found = minimize_one(mean_dte, np.full(4, 0.5), jac=True, bounds=[(0.0, 1.0)] * 4)
 print(f"found in less than 50 evaluations: {found.nfev < 50}")
-print(f"smallest mean {found.fun:.4f} arcsec")
-print(f"true front    {front[:, 0].min():.4f} arcsec")
+print(f"smallest mean    {found.fun:.4f} arcsec")
+print(f"end of the front {front[:, 0].min():.4f} arcsec")
 
 # %%
 # The family
 # ----------
 #
-# ``robust_dte_family()`` names all members with a stored true front. They differ in what makes a
-# problem hard: ``resonant`` has a front of several pieces, a duty cycle averages over speeds and
-# loads, and the last has three objectives.
+# ``robust_dte_family()`` names all members with a stored front of their surrogate. They differ in
+# what makes a problem hard: ``resonant`` has a front of two pieces at order 3, a duty cycle
+# averages over speeds and loads, and the last has three objectives.
 
 for name, build in robust_dte_family().items():
     if "_order" not in name:

@@ -38,7 +38,7 @@ def grid(
 
 
 def fronts(comparisons: Sequence[Comparison]) -> Figure:
-    """Draw the run of median IGD of every algorithm over the true front, one row a problem."""
+    """Draw the run of median IGD of every algorithm over the surrogate's front, one row each."""
     algorithms = comparisons[0].algorithms
     figure, axes = grid(len(comparisons), len(algorithms))
     for comparison, row in zip(comparisons, axes, strict=True):
@@ -55,9 +55,9 @@ def fronts(comparisons: Sequence[Comparison]) -> Figure:
 
 
 def draw_true_front(axis: Axes, pieces: Sequence[NDArray[np.float64]]) -> None:
-    """Draw the pieces (n, 2) of the true front as one grey line each."""
+    """Draw the pieces (n, 2) of the surrogate's true front as one grey line each."""
     for number, piece in enumerate(pieces):
-        label = "true front" if number == 0 else None
+        label = "surrogate's true front" if number == 0 else None
         axis.plot(*piece.T, color=GREY, linewidth=3, solid_capstyle="round", label=label)
 
 

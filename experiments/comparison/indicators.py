@@ -1,4 +1,4 @@
-"""How good a set is against a true front of any number of objectives, in normalised objectives."""
+"""How good a set is against a problem's true front, of any number of objectives, normalised."""
 
 from __future__ import annotations
 

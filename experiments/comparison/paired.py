@@ -1,4 +1,4 @@
-"""Algorithms compared on the same problems and seeds, against the true fronts."""
+"""Algorithms compared on the same problems and seeds, against the true fronts of the surrogates."""
 
 from __future__ import annotations
 
@@ -119,10 +119,10 @@ def compare(context: Context, algorithms: Sequence[str], title: str) -> list[Com
 
 
 def true_front(model: str) -> NDArray[np.float64]:
-    """Return the stored true front of the robust problem on a drive model, shape (n, 2)."""
+    """Return the stored true front of the surrogate of a drive model, shape (n, 2)."""
     front = robust_problem(model).pareto_front()
     if front is None:
-        raise RuntimeError(f"no true front of {model}: run python -m experiments reference_front")
+        raise RuntimeError(f"no stored front of {model}: run python -m experiments reference_front")
     return front
 
 

@@ -29,6 +29,8 @@ class Quality(NamedTuple):
 class TrueFront:
     """The true Pareto front of a problem, against which the fronts of algorithms are measured.
 
+    That of a robust DTE problem is the front of its surrogate, not of the drive model.
+
     Its ideal and nadir point normalise every front, so that a front cannot be measured by its own
     extent.
 

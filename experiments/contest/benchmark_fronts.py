@@ -1,5 +1,7 @@
 """True fronts of the benchmark problems: in closed form, stored, or as a solver found them.
 
+Those of `RobustDTE` are the fronts of its surrogate, which are not those of the drive model.
+
 Sources: ZDT and DTLZ (Deb, Thiele, Laumanns, Zitzler 2005) as pymoo has them; WFG (Huband,
 Hingston, Barone, While 2006, shapes of section VIII with all distance parameters at their optimum);
 OSY and TNK (Deb 2001, section 8.3).

@@ -46,9 +46,9 @@ SETTING = (
     "solutions, and spends the same number of evaluations, counted by the problem or by pymoo's "
     "evaluator. The feasible, non-dominated part of what it offers in the end is thinned out to "
     f"{FINAL_SIZE} by the same rule for all: the solution whose nearest neighbour is closest "
-    "leaves. Indicators are pymoo's, in objectives normalised by the true front, which no "
-    "algorithm here produced; the hypervolume counts up to 1.1 in each. Ranks are those of medians "
-    "over the seeds."
+    "leaves. Indicators are pymoo's, in objectives normalised by the true front (of RobustDTE: of "
+    "its surrogate), which no algorithm here produced; the hypervolume counts up to 1.1 in each. "
+    "Ranks are those of medians over the seeds."
 )
 HELD_OUT = (
     "The elitist swarm was tuned on ZDT, moved ZDT (optima at random interior points), DTLZ2 and "

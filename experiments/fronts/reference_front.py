@@ -1,4 +1,4 @@
-"""The true fronts of the robust DTE problems: computed twice, compared, held against the stored.
+"""True fronts of the robust DTE problems on their surrogates: computed twice, held against stored.
 
 Writes ``front_<name>.csv`` beside its report; copied to ``pymoo_hdte/problems/data`` it is what
 ``pareto_front()`` of that problem returns.
@@ -59,7 +59,8 @@ def run(context: Context) -> Result:
         if len(front) > 1:
             differ = _disagreement(problem, found, second)
             pieces = len(TrueFront(front).pieces) if problem.n_obj == 2 else None
-            pictures.append(Picture(name, f"True front of {name}.", _picture(found)))
+            caption = f"True front of the surrogate of {name}."
+            pictures.append(Picture(name, caption, _picture(found)))
         undercut = _undercut(problem, front)
         stored = _distance_to_stored(problem, front)
         span = np.ptp(front, axis=0)[:2]
@@ -82,10 +83,11 @@ def run(context: Context) -> Result:
         findings=tuple(findings),
     )
     return Result(
-        title="True fronts of the robust DTE problems",
+        title="True fronts of the robust DTE problems on their surrogates",
         command="python -m experiments reference_front",
         paragraphs=(
-            f"Each front is searched from two seeds; rivals are {_RANDOM_DESIGNS} random designs "
+            "Each front is that of a surrogate of the drive model, of order 3 if the name says no "
+            f"other. It is searched from two seeds; rivals are {_RANDOM_DESIGNS} random designs "
             f"and NSGA-II after {_RIVAL_GENERATIONS} generations. A negative number means that no "
             "rival undercuts the front. With a free tolerance there is a third objective, and the "
             f"front is a sheet: {POINTS} points at each of {TOLERANCES} tolerances, compared at "

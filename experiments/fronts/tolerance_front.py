@@ -1,4 +1,4 @@
-"""The true front of `RobustDTETolerance`: a front of two objectives at each of many tolerances.
+"""The true front of `RobustDTETolerance`, on its surrogate: one of two objectives per tolerance.
 
 The cost depends on the tolerance alone. At a given cost the problem is therefore one of two
 objectives in four variables, and the front is the union of those at all costs, less the points that

@@ -51,7 +51,7 @@ def run(context: Context) -> Result:
         pictures=(
             Picture(
                 "fronts",
-                "As Fig. 17: for every variant the run of median IGD over the true front.",
+                "As Fig. 17: for every variant the run of median IGD over the surrogate's front.",
                 fronts(comparisons),
             ),
             Picture("igd", "IGD of every run; bars mark the medians.", igd_of_runs(comparisons)),

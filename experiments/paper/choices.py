@@ -17,10 +17,11 @@ from pymoo_hdte.problems.drive_response import SURROGATE_BOX
 
 MODEL = "calibrated"
 INITIAL = "initial"
-TRUE_FRONT = "true front"
+TRUE_FRONT = "surrogate's true front"
 PAPER_DESIGN = "paper's design"
 BAND = 0.05
 """Tolerance of every optimised design."""
+RANDOM_DESIGNS = 100_000
 
 
 @dataclass(frozen=True)
@@ -60,17 +61,29 @@ def initial_choices() -> tuple[Choice, Choice]:
     return wide, narrow
 
 
-def paper_choices() -> list[Choice]:
-    """Return the paper's own optima (Table 9) as our model sees them."""
-    problem = robust_problem(MODEL)
+def paper_choices(model: str = MODEL) -> list[Choice]:
+    """Return the paper's own optima (Table 9) as a drive model sees them."""
+    problem = robust_problem(model)
     return [
         Choice(preference, PAPER_DESIGN, design, BAND, exact_moments(problem, design, BAND))
         for preference, design in TABLE_9.items()
     ]
 
 
+def dominating_shares(model: str) -> dict[str, float]:
+    """Return the share of random designs in the box that dominate each of the paper's optima."""
+    problem = robust_problem(model)
+    rng = np.random.default_rng(1)
+    drawn = rng.uniform(problem.xl, problem.xu, (RANDOM_DESIGNS, problem.n_var))
+    found = problem.evaluate(drawn)
+    return {
+        choice.name: float(np.mean(np.all(found < np.array(choice.moments), axis=1)))
+        for choice in paper_choices(model)
+    }
+
+
 def preferred_choices(campaign: Campaign) -> list[Choice]:
-    """Return what every preference picks from AMP-MOPSO's archive, then from the true front."""
+    """Return what every preference picks from AMP-MOPSO's archive, then from `TRUE_FRONT`."""
     problem = robust_problem(MODEL)
     (archive,) = campaign.run([OptimisationRun(MODEL, "AMP-MOPSO", seed=1)], "table8")
     sources = {

@@ -34,7 +34,7 @@ def quality_table(
     ]
     return Table(
         "quality",
-        "IGD and Spacing of the final sets, normalised by the true front; smaller is better",
+        "IGD and Spacing of the final sets, normalised by the surrogate's front; smaller is better",
         (*WHO, *columns),
         _rows(comparisons, cells),
         note=" ".join(model_sentences(*(comparison.model for comparison in comparisons))),
@@ -43,7 +43,7 @@ def quality_table(
 
 
 def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding] = ()) -> Table:
-    """Hypervolume, and pieces of the true front that no solution comes near."""
+    """Hypervolume, and pieces of the surrogate's front that no solution comes near."""
 
     def cells(comparison: Comparison, algorithm: str) -> Iterable[Cell]:
         lost = comparison.values(algorithm, "lost_pieces")
@@ -54,7 +54,7 @@ def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding
 
     columns = (
         *_summary_columns("hypervolume", digits=5),
-        Column("of the true front", group="pieces"),
+        Column("of the surrogate's front", group="pieces"),
         Column("lost in all runs", group="pieces"),
         Column("runs that lose one", group="pieces"),
     )

@@ -43,10 +43,11 @@ ALIKE_PERCENT = 1.0
 
 SETTING = (
     "Each preference picks one design by the weighted utopia distance, once from the archive of "
-    "AMP-MOPSO (seed 1) and once from the true front. The objectives of all designs hold for bands "
-    f"of ±{100 * BAND:g} %. The paper can be read as sampling its initial design over ±35 %; then "
-    "a part of the reductions it prints would come from the narrower band alone, so the initial "
-    "design is shown with both bands. The paper's own designs are shown as our model sees them. "
+    "AMP-MOPSO (seed 1) and once from the true front of the order-3 surrogate, which is not that "
+    f"of the drive model. The objectives of all designs hold for bands of ±{100 * BAND:g} %. The "
+    "paper can be read as sampling its initial design over ±35 %; then a part of the reductions it "
+    "prints would come from the narrower band alone, so the initial design is shown with both "
+    "bands. The paper's own designs are shown as our model sees them. "
     f"Means and standard deviations within {ALIKE_PERCENT:g} % count as agreeing."
 )
 

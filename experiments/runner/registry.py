@@ -198,7 +198,7 @@ EXPERIMENTS = (
     Experiment(
         "reference_front",
         "fronts.reference_front",
-        "The true fronts, computed anew and compared: 35 minutes",
+        "The true fronts of the surrogates, computed anew and compared: 35 minutes",
         by_default=False,
     ),
 )

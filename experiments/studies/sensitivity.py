@@ -37,7 +37,7 @@ SETTING = (
     "First-order Sobol indices are the shares of the variance of the DTE that one parameter causes "
     "by itself, total ones include its interactions. They are computed in closed form from the "
     "coefficients of the surrogate; no sample is drawn. Chosen designs are those that the three "
-    f"preferences pick from the true front; their bands are ±{100 * BAND:g} %."
+    f"preferences pick from the surrogate's front; their bands are ±{100 * BAND:g} %."
 )
 
 

@@ -299,8 +299,8 @@ def preset(name: str) -> DriveModel:
     ----------
     name : {"published", "calibrated", "resonant"}
         ``"published"`` is Eq. (9) with the printed values of Table 4; ``"calibrated"`` adds named
-        effects whose values were fitted to published statistics; ``"resonant"`` is an earlier fit
-        with a disconnected front, a harder benchmark.
+        effects whose values were fitted to published statistics; ``"resonant"`` is an earlier fit,
+        a harder benchmark, whose front is disconnected on a surrogate of order 3.
 
     Returns
     -------

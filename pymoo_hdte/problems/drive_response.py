@@ -39,7 +39,7 @@ UNITS |= dict.fromkeys(OBJECTIVES, "arcsec")
 """Of design variables and objectives, by name."""
 
 _SHARE_DECIMALS = 12
-"""Weights in other units have the same shares up to rounding, and the same true front."""
+"""Weights in other units have the same shares up to rounding, and the same front."""
 
 
 class DriveResponse:

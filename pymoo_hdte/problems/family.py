@@ -1,4 +1,4 @@
-"""The robust DTE problems with a stored true front, for studies that compare algorithms."""
+"""The robust DTE problems whose surrogates have a stored front, to compare algorithms on."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def robust_dte_family() -> dict[str, Member]:
 
     ======================== ==============================================================
     calibrated               one smooth front; the optimum moves along the bounds
-    resonant                 a front of several pieces, inside the search space
-    ..._order4, ..._order5   the same on finer surrogates (3125 and 7776 model runs)
-    calibrated_duty_cycle    mean DTE over four operating conditions
+    resonant                 a front of two pieces; K and J_in leave their bounds, B_fc does not
+    ..._order4, ..._order5   on finer surrogates (3125 and 7776 model runs); one piece each
+    calibrated_duty_cycle    mean DTE over four operating conditions; two pieces
     calibrated_tolerance     the tolerance is a variable, its cost an objective
     ======================== ==============================================================
     """

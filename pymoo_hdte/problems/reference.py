@@ -1,4 +1,4 @@
-"""Stored true Pareto fronts: reading, writing, and telling to which problem a front belongs.
+"""Stored fronts of surrogates: reading, writing, and telling to which problem a front belongs.
 
 `experiments/fronts/reference_front.py` computes them. A file is a CSV with one header comment that
 holds the settings of the problem as JSON; a front is only used for a problem of the same settings.
@@ -20,7 +20,9 @@ _FOLDER = files("pymoo_hdte.problems") / "data"
 
 @dataclass(frozen=True)
 class ReferenceFront:
-    """A true Pareto front and its set, row for row, sorted by the first of two objectives.
+    """The true Pareto front of a surrogate and its set, row for row.
+
+    Those of two objectives are sorted by the first.
 
     Attributes
     ----------
@@ -33,14 +35,14 @@ class ReferenceFront:
 
 
 class StoredFront:
-    """Mixin for a pymoo problem whose true front is stored.
+    """Mixin for a pymoo problem on a surrogate, the true front of which is stored.
 
     Parameters
     ----------
     variant : str
         The problem in a word; its front is stored under that name.
     settings : dict
-        What decides the true front, JSON-able.
+        What decides that front, JSON-able.
     """
 
     n_obj: int
@@ -51,7 +53,7 @@ class StoredFront:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What decides the true front, JSON-able: physics, surrogate, scatter, search space."""
+        """What decides the stored front, JSON-able: physics, surrogate, scatter, search space."""
         return dict(self._settings)
 
     def name(self) -> str:
@@ -62,7 +64,7 @@ class StoredFront:
         return load_reference(self.variant, self.settings, self.n_obj)
 
     def _calc_pareto_front(self) -> NDArray[np.float64] | None:
-        """Return the stored true front, shape (n, n_obj), or None for settings without one."""
+        """Return the surrogate's true front, shape (n, n_obj), or None if none is stored."""
         reference = self._reference()
         return None if reference is None else reference.front
 

@@ -76,8 +76,10 @@ class RobustDTE(StoredFront, RobustProblem):
 
     Notes
     -----
-    A true front is stored for every preset under the other defaults, and for the members of
-    `robust_dte_family`; with any other setting ``pareto_front()`` and ``pareto_set()`` return None.
+    ``pareto_front()`` and ``pareto_set()`` give the true front of the surrogate, not of the drive
+    model: evaluated at order 5, every design of that of ``calibrated`` at order 3 is dominated.
+    They are stored for every preset under the other defaults, and for the members of
+    `robust_dte_family`; with any other setting both return None.
 
     In a real drive K and B_fc cannot be chosen independently: wall thickness and preload move both.
     """

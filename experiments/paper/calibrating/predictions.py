@@ -51,7 +51,8 @@ PUBLISHED: dict[str, float] = {
 """Published values in arcsec, by the names that `predict` uses."""
 
 UNCERTAINTY: dict[str, float] = {
-    # Sampling errors of 1000 samples: std / sqrt(1000) and std / sqrt(2000).
+    # Sampling errors of 1000 samples: std / sqrt(1000) and std / sqrt(2000). They hold for each
+    # number alone: under the paper's common random numbers, differences are known far better.
     **{f"mean_{name}": row.std_arcsec / 1000**0.5 for name, row in TABLE_8.items()},
     **{f"std_{name}": row.std_arcsec / 2000**0.5 for name, row in TABLE_8.items()},
     # Half a unit of the last digit of R2, 0.989.
@@ -62,7 +63,7 @@ UNCERTAINTY: dict[str, float] = {
     # Anything between 9.31 -+ 1.80 fits the printed statistics.
     "prototypes_std": 1.8,
 }
-"""How exactly the printed number is known, arcsec; the unit of a residual."""
+"""How exactly each printed number alone is known, arcsec; the unit of a residual."""
 
 TABLE_8_AND_BOX = (*(key for key in PUBLISHED if key.startswith(("mean_", "std_"))), "box_std")
 TABLE_5_AND_PROTOTYPES = ("box_std", "rmse_2", "prototypes_mean", "prototypes_std")
