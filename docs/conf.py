@@ -46,7 +46,7 @@ numpydoc_xref_aliases = {
         "problems",
         "algorithms",
         "mechanism",
-        "discrepancy.mechanism",
+        "discrepancy",
     )
     for name in import_module(f"pymoo_hdte.{package}").__all__
 } | {"InvalidInput": "pymoo_hdte.checks.InvalidInput"}

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 from virtual_rig_cases import BELIEVED, PHASES, RIG
 
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
-from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
@@ -96,7 +96,7 @@ def with_sweep(data, effects=(), rng=None, **changes):
 
 def library(data, seen=()):
     """All candidates; lines of unexpected order at those that were seen."""
-    return candidates(data.campaign.believed, data.features.orders.tolist(), seen, 1.0)
+    return drive_candidates(data.campaign.believed, data.features.orders.tolist(), seen, 1.0)
 
 
 def listed(data, name, seen=()):
@@ -109,4 +109,4 @@ def analysed(data, status="unlisted", candidate=None, start=()):
     if candidate is not None:
         chosen = Rival(fit(data, (candidate,), np.concatenate([base.values, start])), 0.0, 1.0)
     verdict = Verdict(status, base, chosen, (), (), len(base.residuals) - len(base.values))
-    return Analysis(data.campaign, data, verdict, ())
+    return DriveFinding(data.campaign, data, verdict, ())

@@ -9,7 +9,7 @@ import sys
 
 PACKAGES = (
     "drive", "surrogate", "identification", "problems", "algorithms", "decision", "discrepancy",
-    "discrepancy.mechanism", "mechanism", "validation",
+    "mechanism", "validation",
 )  # fmt: skip
 
 HERE = ("pymoo_hdte", "test_public_docstrings")

@@ -11,14 +11,13 @@ from virtual_rig_cases import BELIEVED, RIG
 from pymoo_hdte.algorithms import AMOPSO, AMPMOPSO, MOPSO, MPMOPSO, ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.decision import WeightedUtopia
-from pymoo_hdte.discrepancy import Believed as DriveBelieved
-from pymoo_hdte.discrepancy import Rig, RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy import BelievedDrive, Rig, RunningRecord, TorsionRecord
 from pymoo_hdte.drive import hs_20_100, preset
 from pymoo_hdte.drive.model import KinematicError
 from pymoo_hdte.identification import NoLoadRun, TorsionLoop
-from pymoo_hdte.mechanism import Believed, ErrorLine, Record
+from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Record
 from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.problems.duty_cycle import OperatingCondition
+from pymoo_hdte.problems.operating_conditions import OperatingCondition
 from pymoo_hdte.surrogate import Box
 
 TIME = np.arange(20.0) / 100.0
@@ -52,7 +51,7 @@ VALID = {
         {"input_speed": 1.0, "load_torque": 0.0, "weight": 1.0},
     ),
     "Box": (Box, {"names": ("a", "b"), "lower": (0.0, 1.0), "upper": (1.0, 2.0)}),
-    "drive's Believed": (DriveBelieved, fields(BELIEVED)),
+    "BelievedDrive": (BelievedDrive, fields(BELIEVED)),
     "Rig": (Rig, fields(RIG)),
     "RunningRecord": (RunningRecord, RUNNING),
     "TorsionRecord": (
@@ -64,7 +63,7 @@ VALID = {
         {"torque": 40.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 40)), "torsion": np.arange(40.0)},
     ),
     "NoLoadRun": (NoLoadRun, {"speed": np.arange(1.0, 6.0), "torque": np.arange(5.0)}),
-    "Believed": (Believed, {"value": 1.0, "tolerance": 0.1}),
+    "BelievedValue": (BelievedValue, {"value": 1.0, "tolerance": 0.1}),
     "ErrorLine": (ErrorLine, {"coordinate": "q", "order": 2.0, "amplitude": 1e-4, "phase": 0.0}),
     "Record": (
         Record,

@@ -11,7 +11,7 @@ from scipy.stats import qmc, truncnorm
 
 from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.cli import optimum_report
-from pymoo_hdte.cli.design_study import Gain, Settings, _check, design_study
+from pymoo_hdte.cli.design_study import Gain, Settings, _check, run_design_study
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
@@ -35,7 +35,7 @@ def written(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def study():
-    return design_study(preset("calibrated"), "balanced", SETTINGS)
+    return run_design_study(preset("calibrated"), "balanced", SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +116,7 @@ def test_json_is_the_document(written, capsys, tmp_path, document):
 class TestCheck:
     def test_where_the_surrogate_is_exact_the_model_confirms_it(self):
         # As printed, the DTE is proportional to theta_s and next to constant in the design.
-        study = design_study(preset("published"), "balanced", SETTINGS)
+        study = run_design_study(preset("published"), "balanced", SETTINGS)
         check = study.optimum_check
         assert check.mean == pytest.approx(study.objectives[0], rel=1e-5)
         assert check.std == pytest.approx(study.objectives[1], rel=1e-4)

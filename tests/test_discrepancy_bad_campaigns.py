@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy import write_campaign
 from pymoo_hdte.discrepancy.drive import analysis as workflow
 from pymoo_hdte.discrepancy.report import write as report
 from pymoo_hdte.discrepancy.report.write import FOLDER
-from pymoo_hdte.drive import load_datasheet, load_model, simulate
+from pymoo_hdte.drive import load_datasheet, load_model, simulate_drive
 from pymoo_hdte.reports import folder as reports_folder
 from pymoo_hdte.reports.folder import PAGE_FILE
 
@@ -187,7 +187,7 @@ def no_analysis(monkeypatch):
     def fail(campaign):
         raise AssertionError("nobody should wait for this")
 
-    monkeypatch.setattr(workflow, "analyse", fail)
+    monkeypatch.setattr(workflow, "examine_drive", fail)
 
 
 @pytest.mark.parametrize("target", ["thesis", "thesis/text", "thesis/text/below", "rig", "."])
@@ -215,7 +215,7 @@ def test_a_target_without_permission_is_refused_before_the_analysis(
 
 @pytest.fixture(scope="module")
 def analysed(clean):
-    return workflow.analyse(clean)
+    return workflow.examine_drive(clean)
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_an_interrupted_run_leaves_nothing(
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(workflow, "analyse", lambda campaign: analysed)
+    monkeypatch.setattr(workflow, "examine_drive", lambda campaign: analysed)
     monkeypatch.setattr(module, stage, stop)
     assert run(folder, tmp_path / "deep" / "out") == cli.INTERRUPTED
     assert [path.name for path in tmp_path.iterdir()] == ["rig"]
@@ -322,4 +322,4 @@ def test_the_revised_model_is_read_and_simulated(reported):
     model = load_model(out / "revised_model.toml", sheet)
     assert any("ripple" in str(one.to_dict()) for one in model.effects)
     solved = float(model.dte_arcsec(model.nominal[None])[0])
-    assert simulate(model, model.nominal).dte_arcsec() == pytest.approx(solved, rel=0.02)
+    assert simulate_drive(model, model.nominal).dte_arcsec() == pytest.approx(solved, rel=0.02)

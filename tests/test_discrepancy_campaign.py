@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import (
-    Believed,
+    BelievedDrive,
     Campaign,
     Rig,
     RunningRecord,
@@ -25,7 +25,7 @@ from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 SHARED = Path("/work/shared/rig")
 
-BELIEVED = Believed(
+BELIEVED = BelievedDrive(
     ratio=50.0,
     stiffness=2.583e4,
     damping=4.5,

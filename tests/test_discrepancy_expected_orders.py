@@ -7,7 +7,7 @@ import pytest
 from quick_campaigns import quick_campaign
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.drive.analysis import analyse, expected_orders
+from pymoo_hdte.discrepancy.drive.analysis import examine_drive, expected_orders
 
 RATIO = 101.0
 
@@ -45,7 +45,7 @@ def folded(campaign, record, rate):
     return replace(campaign, running=tuple(running))
 
 
-@pytest.mark.parametrize("analysed", [expected_orders, analyse])
+@pytest.mark.parametrize("analysed", [expected_orders, examine_drive])
 def test_lines_that_merge_are_refused(campaign, analysed):
     with pytest.raises(InvalidInput) as refused:
         analysed(believing(campaign, 1.0, 2.0, 2.005))
@@ -62,7 +62,7 @@ def test_an_order_that_the_rows_fold_is_refused(campaign):
     shown = 0.9 * np.pi * 20.0 / record.input_speed
     assert 1.0 > shown > 0.8
     with pytest.raises(InvalidInput) as refused:
-        analyse(slow)
+        examine_drive(slow)
     assert (refused.value.field, refused.value.value) == ("believed.error_orders", 1.0)
     assert f"at most {shown:.4g}" in refused.value.allowed
     assert record.name in refused.value.allowed

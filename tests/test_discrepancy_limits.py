@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from quick_campaigns import quick_campaign
 
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import measure
-from pymoo_hdte.discrepancy.drive.limits import limits
+from pymoo_hdte.discrepancy.drive.limits import campaign_limits
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0]
@@ -31,7 +31,9 @@ def said(campaign, fitted=None, orders=ORDERS, chosen=None, status="named"):
     """Return all limits of a campaign of which some records, by default all, were fitted."""
     features = measure(campaign, fitted or campaign.train, orders)
     data = Data(campaign, features, (), campaign.torsion)
-    return limits(Analysis(campaign, data, Verdict(status, None, chosen, (), (), FREEDOM), ()))
+    return campaign_limits(
+        DriveFinding(campaign, data, Verdict(status, None, chosen, (), (), FREEDOM), ())
+    )
 
 
 def periodic(misfit, *orders):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from planted_features import analysed, known_data, listed, measured
 
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import nearest_rivals, next_experiment
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
@@ -21,7 +21,7 @@ from pymoo_hdte.units import ARCSEC
 def judged(data, chosen, *others, equivalent=()):
     base = fit(data)
     verdict = Verdict("named", base, chosen, others, equivalent, 1)
-    return Analysis(data.campaign, data, verdict, ())
+    return DriveFinding(data.campaign, data, verdict, ())
 
 
 def rival(data, candidate, start, bic=0.0):

@@ -10,7 +10,7 @@ from scipy.stats import chi2, kstest
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import Rig, RunningRecord, order_lines, residual_spectrum
-from pymoo_hdte.discrepancy.campaign.order_lines import averaging_gain, row_covariance
+from pymoo_hdte.discrepancy.campaign.line_fit import averaging_gain, row_covariance
 from pymoo_hdte.units import ARCSEC
 
 RATIO = 101.0

@@ -7,8 +7,8 @@ import pytest
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
-from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
@@ -37,7 +37,7 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
-LISTED = candidates(BELIEVED, [6.0], [6.0], 1.0)
+LISTED = drive_candidates(BELIEVED, [6.0], [6.0], 1.0)
 
 
 def analysed(campaign, label=None, status="named"):
@@ -51,7 +51,7 @@ def analysed(campaign, label=None, status="named"):
         start = np.concatenate([base.values, candidate.starts[0]])
         chosen = Rival(fit(data, (candidate,), start), 0.0, 1.0)
     freedom = len(base.residuals) - len(base.values)
-    return Analysis(campaign, data, Verdict(status, base, chosen, (), (), freedom), ())
+    return DriveFinding(campaign, data, Verdict(status, base, chosen, (), (), freedom), ())
 
 
 @pytest.fixture(scope="module")

@@ -13,15 +13,15 @@ from test_discrepancy_prove import CONDITIONS, analysed
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.cli.optimum_shift import optimum_shift
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.proof import prove
-from pymoo_hdte.discrepancy.drive.revision import accepted_fit, drive_model, revised_model
+from pymoo_hdte.discrepancy.drive.revision import drive_model, revised_model
 from pymoo_hdte.discrepancy.report import write as report
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
 from pymoo_hdte.discrepancy.report.tables import certainty, gap_sentence, parameter_rows
 from pymoo_hdte.discrepancy.report.write import FOLDER, write_report
+from pymoo_hdte.discrepancy.robust_optimum import optimum_shift
 from pymoo_hdte.drive import (
     LawAtPort,
     LoadInertia,
@@ -31,7 +31,7 @@ from pymoo_hdte.drive import (
     preset,
 )
 from pymoo_hdte.laws.stiffness import SoftWindup
-from pymoo_hdte.reports.page import digits, number
+from pymoo_hdte.reports.html import digits, number
 from pymoo_hdte.units import ARCSEC
 from pymoo_hdte.virtual.rig import run_campaign
 
@@ -163,7 +163,7 @@ def test_words_do_not_promise_what_is_not_there(ripple):
 
 def test_parameters_are_told_in_the_reader_s_units(ripple):
     rows = {row.name: row for row in parameter_rows(ripple)}
-    fitted = accepted_fit(ripple.verdict)
+    fitted = ripple.verdict.accepted
     amplitude = rows["error amplitude of order 2"]
     place = [parameter.name for parameter in fitted.parameters].index("error_amplitude_1")
     assert amplitude.value == pytest.approx(fitted.values[place] / ARCSEC)

@@ -7,7 +7,7 @@ import pytest
 from quick_campaigns import quick_campaign
 
 from pymoo_hdte.discrepancy.campaign.plausibility import LEAST_TOLERANCE
-from pymoo_hdte.discrepancy.drive.analysis import analyse
+from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
 from pymoo_hdte.discrepancy.engine import selection as second_effect
@@ -34,22 +34,22 @@ def unsearched(monkeypatch):
 
 def test_a_clean_drive_is_adequate(clean):
     """Fails when either safeguard is taken out of the code."""
-    assert analyse(clean).verdict.status == "adequate"
+    assert examine_drive(clean).verdict.status == "adequate"
 
 
 def test_a_clean_campaign_without_a_sweep_is_adequate(clean):
     without = replace(clean, torsion=())
-    assert analyse(without).verdict.status == "adequate"
+    assert examine_drive(without).verdict.status == "adequate"
 
 
 def test_a_frozen_base_makes_effects_of_its_own_errors(clean, unsearched):
     frozen = replace(clean.believed, tolerance=LEAST_TOLERANCE)
-    assert analyse(replace(clean, believed=frozen)).verdict.status != "adequate"
+    assert examine_drive(replace(clean, believed=frozen)).verdict.status != "adequate"
 
 
 def test_repeatability_left_out_is_a_false_alarm(clean, unsearched):
     exact = replace(clean.rig, repeatability=0.0)
-    assert analyse(replace(clean, rig=exact)).verdict.status != "adequate"
+    assert examine_drive(replace(clean, rig=exact)).verdict.status != "adequate"
 
 
 def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, monkeypatch):
@@ -61,4 +61,4 @@ def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, m
         return carried(self, layout, start) * np.outer(own, own)
 
     monkeypatch.setattr(Data, "_repeatability", of_the_transmission_error)
-    assert analyse(clean).verdict.status != "adequate"
+    assert examine_drive(clean).verdict.status != "adequate"

@@ -17,11 +17,11 @@ from pymoo_hdte.drive import (
     MeshStiffnessVariation,
     UnstableDrive,
     preset,
-    simulate,
+    simulate_drive,
 )
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.drive.port_effects import LAWS, KinematicErrorLine, KinematicReaction, LawAtPort
-from pymoo_hdte.drive.solve.harmonic_balance import harmonic_balance
+from pymoo_hdte.drive.solve.free_angle import harmonic_balance
 from pymoo_hdte.drive.solve.steady_motion import SpeedLoop
 from pymoo_hdte.drive.solve.torus import (
     Torus,
@@ -57,14 +57,16 @@ def test_presets_agree_with_the_integrator_though_the_angle_is_free(name):
     model = preset(name)
     balance = harmonic_balance(model.coefficients(model.nominal[None]))
     found = balance.spectrum().peak_to_peak(model.sheet.ratio)[0] / ARCSEC
-    assert found == pytest.approx(simulate(model, model.nominal, rtol=1e-9).dte_arcsec(), rel=1e-5)
+    assert found == pytest.approx(
+        simulate_drive(model, model.nominal, rtol=1e-9).dte_arcsec(), rel=1e-5
+    )
 
 
 @pytest.mark.parametrize("effect", MEMORYLESS, ids=lambda effect: effect.name)
 def test_every_law_agrees_with_the_integrator_along_the_whole_turn(effect):
     model = with_effects(preset("resonant"), effect)
     # What the start left over dies out with J_in / B_in = 1.2 s.
-    run = simulate(model, model.nominal, settle=12.0)
+    run = simulate_drive(model, model.nominal, settle=12.0)
     balance = harmonic_balance(model.coefficients(model.nominal[None]))
     expected = balance.spectrum().at(run.input_angle)[0]
     assert run.transmission_error == pytest.approx(expected, abs=1e-3 * ARCSEC)

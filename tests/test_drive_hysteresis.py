@@ -7,7 +7,7 @@ import pytest
 
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations
-from pymoo_hdte.drive.solve.harmonic_balance import torus_of
+from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.drive.solve.torus import stacked, unstacked
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.units import ARCSEC

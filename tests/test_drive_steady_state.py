@@ -15,9 +15,9 @@ from pymoo_hdte.drive import (
     UnstableDrive,
     floquet_multipliers,
     harmonic_balance,
+    hill_steady_state,
     preset,
-    simulate,
-    steady_state,
+    simulate_drive,
     transfer_function,
 )
 from pymoo_hdte.drive.solve.stability import require_stable
@@ -75,7 +75,7 @@ def test_hill_solution_satisfies_the_equations_of_motion(name, rng):
         factors = (1j * orders * speed) ** derivative
         return ((phasors * factors) @ np.exp(1j * np.outer(orders, angle))).real
 
-    error = steady_state(coefficients)
+    error = hill_steady_state(coefficients)
     static = coefficients.error_orders, coefficients.error_phasors
     torsion, torsion_rate = (
         series(error.orders, error.phasors, k) - series(*static, k) for k in (0, 1)
@@ -146,7 +146,7 @@ def test_integration_from_rest_reaches_the_steady_state(model, angle, rng):
     balance = harmonic_balance(model.coefficients(designs)).spectrum()
     balanced = balance.peak_to_peak(model.sheet.ratio) / ARCSEC
     for design, expected, exact in zip(designs, model.dte_arcsec(designs), balanced, strict=True):
-        run = simulate(model, design, angle=angle)
+        run = simulate_drive(model, design, angle=angle)
         assert run.dte_arcsec() == pytest.approx(expected, rel=tolerance)
         if angle == "free":
             assert run.dte_arcsec() == pytest.approx(exact, rel=1e-4)
@@ -181,7 +181,7 @@ def test_an_unstable_drive_is_refused_and_grows_when_integrated():
     with pytest.raises(UnstableDrive, match="Floquet multiplier"):
         model.dte_arcsec(model.nominal[None])
     largest = np.abs(floquet_multipliers(model.coefficients(model.nominal[None]))).max()
-    run = simulate(model, model.nominal, angle="prescribed", settle=0.3)
+    run = simulate_drive(model, model.nominal, angle="prescribed", settle=0.3)
     period = np.pi / 280.0
     apart = 60 * period
     early, late = (
@@ -224,8 +224,8 @@ def test_two_error_lines_of_one_order_add_up(rng):
             error_orders=np.array([2.0, 1.0, 2.0 + 4e-10]),
             error_phasors=np.array([[1e-4j, 1e-4 + 0j, 1e-4j]]),
         )
-        assert steady_state(halves).peak_to_peak(101.0) == pytest.approx(
-            steady_state(whole).peak_to_peak(101.0), rel=1e-6
+        assert hill_steady_state(halves).peak_to_peak(101.0) == pytest.approx(
+            hill_steady_state(whole).peak_to_peak(101.0), rel=1e-6
         )
 
 
@@ -233,7 +233,7 @@ def test_the_load_acts_even_if_the_error_has_odd_orders_only():
     model = preset("calibrated").at(5.0, 40.0)
     coefficients = model.coefficients(model.nominal[None])
     odd = replace(coefficients, error_orders=np.array([1.0]), error_phasors=np.array([[1e-9 + 0j]]))
-    amplitudes = steady_state(odd).amplitudes()
+    amplitudes = hill_steady_state(odd).amplitudes()
     quasi_static = coefficients.stiffness_depth * coefficients.mean_mesh_torque / 2.583e4
     assert amplitudes[2.0][0] == pytest.approx(quasi_static, rel=0.02)
 
@@ -243,7 +243,7 @@ def test_the_load_acts_even_if_the_error_has_odd_orders_only():
 def test_deep_variations_agree_with_integration(depth, speed):
     effects = (DampingReference(5.0), MeshStiffnessVariation(depth, 1.0))
     model = replace(preset("published"), effects=effects).at(speed, 40.0)
-    run = simulate(model, model.nominal, angle="prescribed")
+    run = simulate_drive(model, model.nominal, angle="prescribed")
     assert run.dte_arcsec() == pytest.approx(model.dte_arcsec(model.nominal[None])[0], rel=1e-4)
 
 

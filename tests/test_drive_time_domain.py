@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.signal import butter, sosfreqz
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import Run, low_pass, measured_dte, preset, simulate
+from pymoo_hdte.drive import Run, low_pass, measured_dte, preset, simulate_drive
 from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion, smooth_step
 
 
@@ -65,8 +65,8 @@ def test_equations_balance_power(model):
 
 def test_a_finer_tolerance_changes_the_dte_little():
     model = preset("resonant")
-    coarse = simulate(model, model.nominal).dte_arcsec()
-    fine = simulate(model, model.nominal, rtol=1e-11, method="DOP853").dte_arcsec()
+    coarse = simulate_drive(model, model.nominal).dte_arcsec()
+    fine = simulate_drive(model, model.nominal, rtol=1e-11, method="DOP853").dte_arcsec()
     assert coarse == pytest.approx(fine, rel=1e-5)
     assert coarse != fine
 
@@ -91,7 +91,7 @@ def test_peak_to_peak_of_a_run_counts_one_output_turn_only():
 def test_wrong_arguments_are_named(arguments, field):
     model = preset("published")
     with pytest.raises(InvalidInput, match=f"^{field} is"):
-        simulate(model, model.nominal, **arguments)
+        simulate_drive(model, model.nominal, **arguments)
 
 
 @pytest.mark.parametrize("frequency", [20.0, 66.7, 100.0, 250.0])

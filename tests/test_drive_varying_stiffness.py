@@ -15,7 +15,7 @@ from pymoo_hdte.drive import (
     harmonic_balance,
     preset,
     quasi_static_torsion,
-    simulate,
+    simulate_drive,
 )
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.io.fields import Fields
@@ -64,7 +64,7 @@ def test_order_two_as_a_law_is_order_two_as_a_coefficient():
 @pytest.mark.parametrize("order", [1.0, 4.0, 2.02])
 def test_other_orders_agree_with_the_integrator_along_the_whole_turn(order):
     model = varying(plain("resonant"), MeshStiffnessVariation(0.05, 0.7, order))
-    run = simulate(model, model.nominal, settle=12.0)
+    run = simulate_drive(model, model.nominal, settle=12.0)
     balance = harmonic_balance(nominal(model))
     expected = balance.spectrum().at(run.input_angle)[0]
     assert run.transmission_error == pytest.approx(expected, abs=1e-3 * ARCSEC)

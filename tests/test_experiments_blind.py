@@ -30,7 +30,7 @@ from experiments.runner import committed
 from experiments.runner.campaign import Campaign, Run
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.discrepancy.engine.candidate import Layout
@@ -138,7 +138,7 @@ def analysis_of(case):
     campaign = case.run(case.effects())
     features = measure(campaign, campaign.train, [1.0 / 101.0, 1.0, 2.0, 2.02])
     data = Data(campaign, features, start_parameters(campaign, features))
-    return Analysis(campaign, data, None, ())
+    return DriveFinding(campaign, data, None, ())
 
 
 def test_an_encoder_off_centre_moves_its_line_of_the_transmission_error_only(short):

@@ -51,13 +51,13 @@ from pymoo_hdte.drive import (
     floquet_multipliers,
     preset,
 )
-from pymoo_hdte.drive.measurement import CUTOFF, FILTER_ORDER, SAMPLING_RATE
-from pymoo_hdte.drive.speed_load_map import (
+from pymoo_hdte.drive.dte_map import (
     SpeedLoadMap,
     critical_speeds,
     speed_load_map,
     torsional_mode,
 )
+from pymoo_hdte.drive.measurement import CUTOFF, FILTER_ORDER, SAMPLING_RATE
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import (
     Box,

@@ -24,7 +24,7 @@ from experiments.runner.report import check_page, write_report
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
 from experiments.runner.store import load, png_bytes, save
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.reports.csv_text import csv_text
+from pymoo_hdte.reports.csv_table import csv_text
 
 HOSTILE = "<script>alert('x')</script>"
 

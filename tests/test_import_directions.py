@@ -11,7 +11,7 @@ import pymoo_hdte
 ROOT = Path(pymoo_hdte.__file__).parent
 EXPERIMENTS = Path(experiments.__file__).parent
 LOWEST_FIRST = (
-    *("checks", "units", "compiled", "io", "laws", "reports"),
+    *("checks", "lazy", "units", "compilation", "io", "laws", "reports"),
     *("drive.solve", "drive", "mechanism", "surrogate", "validation", "identification"),
     *(
         "discrepancy.engine",
@@ -20,10 +20,13 @@ LOWEST_FIRST = (
         "discrepancy.drive.misfit",
         "discrepancy.mechanism",
     ),
-    *("discrepancy", "discrepancy.report", "virtual"),
-    *("problems", "algorithms", "decision", "cli"),
+    *("discrepancy.report", "virtual"),
+    *("problems", "algorithms", "decision", "discrepancy", "cli"),
 )
-"""Rooms of the package; a folder stands for the modules in it, not for the folders below it."""
+"""Rooms of the package; a folder stands for the modules in it, not for the folders below it.
+
+The modules of `discrepancy` itself are what users call, above all that they put together.
+"""
 LOWEST_EXPERIMENTS_FIRST = (
     *("published_values", "runner", "__main__", "comparison", "fronts"),
     *("paper.static_error", "paper.prototypes", "paper", "paper.calibrating"),

@@ -9,7 +9,7 @@ from measured_oscillator import bouc_wen, cubic, nothing, swinging_stiffness
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.mechanism import investigate
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
@@ -23,11 +23,11 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
     remainder,
 )
 from pymoo_hdte.laws.friction import CoulombFriction
-from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 
 OSCILLATOR = Mechanism(
-    inertias={"x": Believed(1.0, 0.1)},
-    ports=[Port("spring", {"x": 1.0}, Believed(4100.0, 0.1), Believed(5.0, 0.5))],
+    inertias={"x": BelievedValue(1.0, 0.1)},
+    ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
     inputs=[Input("force", {"x": 1.0})],
 )
 
@@ -45,11 +45,11 @@ def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
     records = with_held_out(cubic)
     # What a user writes: no more than fifteen lines.
     oscillator = Mechanism(
-        inertias={"x": Believed(1.0, 0.1)},
-        ports=[Port("spring", {"x": 1.0}, Believed(4100.0, 0.1), Believed(5.0, 0.5))],
+        inertias={"x": BelievedValue(1.0, 0.1)},
+        ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
         inputs=[Input("force", {"x": 1.0})],
     )
-    finding = investigate(oscillator, records)
+    finding = examine_mechanism(oscillator, records)
     gaps = prove_measured(finding)
 
     assert finding.verdict.status == "named"
@@ -64,7 +64,7 @@ def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
 
 
 def test_hysteresis_of_another_form_is_named():
-    finding = investigate(OSCILLATOR, with_held_out(bouc_wen))
+    finding = examine_mechanism(OSCILLATOR, with_held_out(bouc_wen))
     assert [one["name"] for one in effects(finding)] == ["hysteresis"]
     simulated, balanced = prove_measured(finding)
     assert simulated.shrinkage > 0.95
@@ -75,7 +75,7 @@ def test_hysteresis_of_another_form_is_named():
 def test_nothing_hidden_is_adequate_and_proved_to_be():
     first, *others = with_held_out(nothing)
     holed = Record(first.name, first.role, first.time, first.channels, dropped=3)
-    finding = investigate(OSCILLATOR, [holed, *others])
+    finding = examine_mechanism(OSCILLATOR, [holed, *others])
     assert finding.verdict.status == "adequate"
     (told,) = limits(finding)
     assert "Rows of train 1 with values that are not finite: 3." in told
@@ -89,7 +89,7 @@ def test_nothing_hidden_is_adequate_and_proved_to_be():
 @pytest.mark.parametrize("force_noise", [1e-3, 1.0])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_force_that_jumps_between_samples_is_no_missing_effect(seed, force_noise):
-    finding = investigate(OSCILLATOR, [rig.relay_record(seed, force_noise)])
+    finding = examine_mechanism(OSCILLATOR, [rig.relay_record(seed, force_noise)])
     assert finding.verdict.status == "adequate"
     # The instants of the jumps are an error of the size that is said, not one of any size.
     assert np.all(finding.base_misfit > 0.5 * finding.sensor_noise)
@@ -97,8 +97,8 @@ def test_a_force_that_jumps_between_samples_is_no_missing_effect(seed, force_noi
 
 def test_a_force_that_jumps_finds_the_damper_that_was_forgotten():
     (port,) = OSCILLATOR.ports
-    forgetful = replace(OSCILLATOR, ports=(replace(port, damping=Believed(0.0)),))
-    (effect,) = effects(investigate(forgetful, [rig.relay_record(1)]))
+    forgetful = replace(OSCILLATOR, ports=(replace(port, damping=BelievedValue(0.0)),))
+    (effect,) = effects(examine_mechanism(forgetful, [rig.relay_record(1)]))
     assert effect["name"] == "viscous_friction"
     assert effect["parameters"]["coefficient"]["value"] == pytest.approx(rig.DAMPING, rel=0.03)
 
@@ -107,10 +107,10 @@ def test_a_force_that_jumps_finds_the_damper_that_was_forgotten():
 def test_a_known_gain_sets_no_scale_where_its_input_is_noise(force_noise):
     record = rig.decay_record(force_noise)
     with pytest.raises(InvalidInput, match=r"known exactly \(gain of force\) .* drive the mech"):
-        investigate(OSCILLATOR, [record], cutoff=15.0)
-    weighed = replace(OSCILLATOR, inertias={"x": Believed(rig.MASS)})
+        examine_mechanism(OSCILLATOR, [record], cutoff=15.0)
+    weighed = replace(OSCILLATOR, inertias={"x": BelievedValue(rig.MASS)})
     (port,) = OSCILLATOR.ports
-    sprung = replace(OSCILLATOR, ports=(replace(port, stiffness=Believed(rig.STIFFNESS)),))
+    sprung = replace(OSCILLATOR, ports=(replace(port, stiffness=BelievedValue(rig.STIFFNESS)),))
     for known in (weighed, sprung):
         check_scale(measured_data(known, [record], 15.0))
     # One record in which it drives is enough, among others in which it does not.
@@ -146,11 +146,11 @@ def test_a_held_out_record_that_cannot_be_judged_is_refused_by_name_at_once():
         return Record(name, "held_out", record.time[rows], channels)
 
     with pytest.raises(InvalidInput, match=r"sampling rate of record slow is 50.* a cutoff of at"):
-        investigate(OSCILLATOR, [record, held_out("slow", slice(None, None, 5))])
+        examine_mechanism(OSCILLATOR, [record, held_out("slow", slice(None, None, 5))])
     with pytest.raises(InvalidInput, match=r"duration of record brief .* at least"):
-        investigate(OSCILLATOR, [record, held_out("brief", slice(100))])
+        examine_mechanism(OSCILLATOR, [record, held_out("brief", slice(100))])
     with pytest.raises(InvalidInput, match=r"sampling rate of record train 1 is 250.*most 25 Hz"):
-        investigate(OSCILLATOR, [record], cutoff=26.0)
+        examine_mechanism(OSCILLATOR, [record], cutoff=26.0)
 
 
 def test_an_interval_does_not_leave_the_tolerance():
@@ -164,7 +164,7 @@ def test_an_interval_does_not_leave_the_tolerance():
 
 
 def test_what_no_law_explains_is_unlisted_and_described():
-    finding = investigate(OSCILLATOR, [rig.record_of(swinging_stiffness)])
+    finding = examine_mechanism(OSCILLATOR, [rig.record_of(swinging_stiffness)])
     assert finding.verdict.status == "unlisted"
     assert effects(finding) == []
     assert "force balance of x" in remainder(finding)["sentence"]
@@ -172,8 +172,8 @@ def test_what_no_law_explains_is_unlisted_and_described():
 
 
 def test_a_quantity_out_of_tolerance_is_a_parameter():
-    port = replace(OSCILLATOR.ports[0], stiffness=Believed(3000.0, 0.05))
-    finding = investigate(replace(OSCILLATOR, ports=(port,)), [rig.record_of(nothing)])
+    port = replace(OSCILLATOR.ports[0], stiffness=BelievedValue(3000.0, 0.05))
+    finding = examine_mechanism(replace(OSCILLATOR, ports=(port,)), [rig.record_of(nothing)])
     assert finding.verdict.status == "parameter"
     (candidate,) = finding.accepted.candidates
     assert candidate.port == "stiffness of spring"
@@ -188,13 +188,13 @@ def test_an_effect_that_is_known_is_not_found_again():
         return 2.0 * np.tanh(v / 1e-3), 0.0
 
     records = [rig.record_of(dry, seed=4)]
-    assert [one["name"] for one in effects(investigate(OSCILLATOR, records))] == [
+    assert [one["name"] for one in effects(examine_mechanism(OSCILLATOR, records))] == [
         "coulomb_friction"
     ]
     friction = LawAt("coulomb_friction", "spring", CoulombFriction(2.0))
-    finding = investigate(OSCILLATOR, records, known=[friction])
+    finding = examine_mechanism(OSCILLATOR, records, known=[friction])
     assert "coulomb_friction" not in [one["name"] for one in effects(finding)]
-    assert finding.base_misfit < 0.2 * investigate(OSCILLATOR, records).base_misfit
+    assert finding.base_misfit < 0.2 * examine_mechanism(OSCILLATOR, records).base_misfit
 
 
 def test_the_verdict_does_not_hang_on_units():
@@ -204,11 +204,11 @@ def test_the_verdict_does_not_hang_on_units():
         "mm", "train", record.time, dict(record.channels) | {"x": 1e3 * record.channels["x"]}
     )
     scaled = Mechanism(
-        inertias={"x": Believed(1e-3, 0.1)},
-        ports=[Port("spring", {"x": 1.0}, Believed(4.1, 0.1), Believed(5e-3, 0.5))],
+        inertias={"x": BelievedValue(1e-3, 0.1)},
+        ports=[Port("spring", {"x": 1.0}, BelievedValue(4.1, 0.1), BelievedValue(5e-3, 0.5))],
         inputs=[Input("force", {"x": 1.0})],
     )
-    one, other = investigate(OSCILLATOR, [record]), investigate(scaled, [milli])
+    one, other = examine_mechanism(OSCILLATOR, [record]), examine_mechanism(scaled, [milli])
     assert one.verdict.status == other.verdict.status == "named"
     coefficient = [effects(each)[0]["parameters"]["coefficient"]["value"] for each in (one, other)]
     assert coefficient[1] == pytest.approx(1e-9 * coefficient[0], rel=1e-3)
@@ -218,12 +218,12 @@ def test_the_next_test_sets_what_was_found_against_its_rival():
     def dry(x, v, z, t):
         return 2.0 * np.tanh(v / 1e-3), 0.0
 
-    test = next_test(investigate(OSCILLATOR, [rig.record_of(dry, seed=4)]))
+    test = next_test(examine_mechanism(OSCILLATOR, [rig.record_of(dry, seed=4)]))
     assert test.separates == ("coulomb_friction:spring", "stribeck_friction:spring")
     assert "train 4" in test.description or "another motion" in test.description
-    alone = next_test(investigate(OSCILLATOR, [rig.record_of(cubic)]))
+    alone = next_test(examine_mechanism(OSCILLATOR, [rig.record_of(cubic)]))
     assert "no rival is left" in alone.description
-    unknown = next_test(investigate(OSCILLATOR, [rig.record_of(swinging_stiffness)]))
+    unknown = next_test(examine_mechanism(OSCILLATOR, [rig.record_of(swinging_stiffness)]))
     assert "proved" not in unknown.description
 
 
@@ -236,7 +236,7 @@ def test_the_next_test_sets_what_was_found_against_its_rival():
 )
 def test_without_training_records_nothing_is_fitted(records, message):
     with pytest.raises(InvalidInput, match=message):
-        investigate(OSCILLATOR, records)
+        examine_mechanism(OSCILLATOR, records)
 
 
 def test_a_missing_a_dead_and_a_short_channel_are_named():
@@ -246,7 +246,7 @@ def test_a_missing_a_dead_and_a_short_channel_are_named():
         (dict(record.channels) | {"x": np.full(len(record.time), 2.0)}, "dead"),
     ):
         with pytest.raises(InvalidInput, match=message):
-            investigate(OSCILLATOR, [Record("bad", "train", record.time, channels)])
+            examine_mechanism(OSCILLATOR, [Record("bad", "train", record.time, channels)])
     short = {name: channel[:20] for name, channel in record.channels.items()}
     with pytest.raises(InvalidInput, match=r"duration of record short .* at least"):
         measured_data(OSCILLATOR, [Record("short", "train", record.time[:20], short)], 12.0)
@@ -256,7 +256,7 @@ def test_a_position_of_noise_only_is_refused():
     record = rig.record_of(nothing)
     noise = np.random.default_rng(1).standard_normal(len(record.time))
     with pytest.raises(InvalidInput, match="power of a position over that of its noise"):
-        investigate(
+        examine_mechanism(
             OSCILLATOR,
             [Record("noise", "train", record.time, dict(record.channels) | {"x": noise})],
         )
@@ -266,21 +266,24 @@ def test_a_position_of_noise_only_is_refused():
     ("change", "message"),
     [
         ({"ports": ()}, "at least one: effects are looked for there"),
-        ({"inputs": [Input("force", {"x": 1.0}, Believed(1.0, 0.5))]}, "only ratios are known"),
+        (
+            {"inputs": [Input("force", {"x": 1.0}, BelievedValue(1.0, 0.5))]},
+            "only ratios are known",
+        ),
     ],
 )
 def test_a_mechanism_that_says_too_little_is_refused(change, message):
     with pytest.raises(InvalidInput, match=message):
-        investigate(replace(OSCILLATOR, **change), [rig.record_of(nothing)])
+        examine_mechanism(replace(OSCILLATOR, **change), [rig.record_of(nothing)])
 
 
 def test_two_records_of_one_name_and_a_held_out_one_without_a_channel_are_refused_at_once():
     record = rig.record_of(nothing)
     with pytest.raises(InvalidInput, match="a name of its own for each record"):
-        investigate(OSCILLATOR, [record, record])
+        examine_mechanism(OSCILLATOR, [record, record])
     held_out = Record("other", "held_out", record.time, {"x": record.channels["x"]})
     with pytest.raises(InvalidInput, match="channels of record other"):
-        investigate(OSCILLATOR, [record, held_out])
+        examine_mechanism(OSCILLATOR, [record, held_out])
 
 
 def test_a_spring_and_a_damper_that_were_forgotten_are_named():
@@ -289,8 +292,8 @@ def test_a_spring_and_a_damper_that_were_forgotten_are_named():
         ("stiffness", "linear_stiffness", rig.STIFFNESS),
         ("damping", "viscous_friction", rig.DAMPING),
     ):
-        forgetful = replace(OSCILLATOR, ports=(replace(port, **{lost: Believed(0.0)}),))
-        (effect,) = effects(investigate(forgetful, [rig.record_of(nothing)]))
+        forgetful = replace(OSCILLATOR, ports=(replace(port, **{lost: BelievedValue(0.0)}),))
+        (effect,) = effects(examine_mechanism(forgetful, [rig.record_of(nothing)]))
         assert effect["name"] == name
         assert effect["parameters"]["coefficient"]["value"] == pytest.approx(size, rel=0.01)
 
@@ -300,7 +303,7 @@ def test_play_takes_the_stiffness_that_is_fitted_and_not_the_believed_one():
         return rig.STIFFNESS * (np.clip(x, -0.002, 0.002) * -1.0), 0.0
 
     records = [rig.record_of(play), rig.record_of(play, "held_out", seed=3)]
-    finding = investigate(OSCILLATOR, records)
+    finding = examine_mechanism(OSCILLATOR, records)
     (effect,) = effects(finding)
     assert effect["name"] == "backlash"
     assert effect["parameters"]["half_width"]["value"] == pytest.approx(0.002, rel=0.02)
@@ -313,5 +316,5 @@ def test_play_takes_the_stiffness_that_is_fitted_and_not_the_believed_one():
 def test_a_sign_that_is_swapped_is_no_parameter_out_of_tolerance():
     record = rig.record_of(nothing)
     swapped = dict(record.channels) | {"force": -record.channels["force"]}
-    finding = investigate(OSCILLATOR, [Record("swapped", "train", record.time, swapped)])
+    finding = examine_mechanism(OSCILLATOR, [Record("swapped", "train", record.time, swapped)])
     assert finding.verdict.status == "unlisted"

@@ -10,13 +10,13 @@ from scipy.stats import t
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
-from pymoo_hdte.discrepancy.mechanism import investigate
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.report.mechanism_document import effects, limits
-from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port, Record
+from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.motion import motion_of
 
 STEP, DURATION, CUTOFF = 2e-3, 12.0, 25.0
@@ -24,8 +24,8 @@ TIME = np.arange(0.0, DURATION, STEP)
 INERTIA, VISCOUS = 0.05, 0.4
 
 JOINT = Mechanism(
-    {"q": Believed(0.06, 0.5)},
-    [Port("bearing", {"q": 1.0}, damping=Believed(0.5, 0.5))],
+    {"q": BelievedValue(0.06, 0.5)},
+    [Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, 0.5))],
     [Input("torque", {"q": 1.0})],
 )
 
@@ -62,7 +62,7 @@ def test_a_ripple_is_one_effect_with_its_orders():
     def rippled(q, v):
         return 0.05 * np.cos(17.0 * q + 0.5) + 0.03 * np.cos(34.0 * q + 1.0)
 
-    finding = investigate(JOINT, [turning(f"{v}", v, rippled) for v in (-0.8, 1.5, 2.5)])
+    finding = examine_mechanism(JOINT, [turning(f"{v}", v, rippled) for v in (-0.8, 1.5, 2.5)])
     assert finding.verdict.status == "named"
     (effect,) = effects(finding)
     assert effect["name"] == "torque_ripple"
@@ -75,13 +75,13 @@ def test_a_ripple_is_one_effect_with_its_orders():
 
 
 def test_one_direction_is_said_and_the_reverse_run_proposed():
-    one_way = investigate(JOINT, [turning(f"{v}", v, dry) for v in (0.5, 1.5, 2.5)])
+    one_way = examine_mechanism(JOINT, [turning(f"{v}", v, dry) for v in (0.5, 1.5, 2.5)])
     assert [one["name"] for one in effects(one_way)] == ["coulomb_friction"]
     assert any("cannot separate Coulomb friction" in sentence for sentence in limits(one_way))
     assert next_test(one_way).rate < 0.0
     assert "reverse" in next_test(one_way).description
 
-    both = investigate(JOINT, [turning(f"{v}", v, dry) for v in (0.5, -1.5, 2.5)])
+    both = examine_mechanism(JOINT, [turning(f"{v}", v, dry) for v in (0.5, -1.5, 2.5)])
     assert [one["name"] for one in effects(both)] == ["coulomb_friction"]
     assert not any("cannot separate" in sentence for sentence in limits(both))
     assert next_test(both).rate > 0.0
@@ -91,7 +91,7 @@ def test_friction_and_an_offset_are_told_apart_by_two_directions():
     def offset(q, v):
         return 0.8 + 0.0 * q
 
-    finding = investigate(JOINT, [turning(f"{v}", v, offset) for v in (0.5, -1.5, 2.5)])
+    finding = examine_mechanism(JOINT, [turning(f"{v}", v, offset) for v in (0.5, -1.5, 2.5)])
     (effect,) = effects(finding)
     assert effect["name"] == "force_offset"
     assert effect["parameters"]["force"]["value"] == pytest.approx(0.8, rel=0.01)
@@ -103,7 +103,7 @@ def test_a_rest_that_nobody_explains_does_not_hide_the_main_effect():
     wander = np.convolve(generator.standard_normal(len(TIME) + 400), np.hanning(401), "valid")
     wander *= 0.13 / wander.std()
 
-    finding = investigate(
+    finding = examine_mechanism(
         JOINT, [turning(f"{v}", v, lambda q, v: dry(q, v) + wander) for v in (0.5, -1.5, 2.5)]
     )
     assert effects(finding)[0]["name"] == "coulomb_friction"
@@ -212,7 +212,7 @@ def test_a_stop_with_noise_is_no_second_direction():
     assert np.any(motion.speed < 0.0)
     torque = INERTIA * motion.acceleration + VISCOUS * motion.speed + 0.8
     torque += 1e-3 * np.random.default_rng(3).standard_normal(len(TIME))
-    finding = investigate(JOINT, [Record("stops", "train", TIME, {"q": q, "torque": torque})])
+    finding = examine_mechanism(JOINT, [Record("stops", "train", TIME, {"q": q, "torque": torque})])
     assert any("cannot separate" in sentence for sentence in limits(finding))
     assert "force_offset" not in [
         c.name for r in finding.verdict.alternatives for c in r.candidates
@@ -222,12 +222,12 @@ def test_a_stop_with_noise_is_no_second_direction():
 def test_a_port_with_a_small_share_of_the_motion_is_searched_in_its_own_forces():
     geared = Mechanism(
         JOINT.inertias,
-        [Port("bearing", {"q": 1.0}, damping=Believed(0.5, 0.5)), Port("slide", {"q": 0.05})],
+        [Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, 0.5)), Port("slide", {"q": 0.05})],
         JOINT.inputs,
     )
     sized = turning("both", 1.5, lambda q, v: dry(q, v))
     back = turning("back", -1.0, lambda q, v: dry(q, v))
-    finding = investigate(geared, [sized, back])
+    finding = examine_mechanism(geared, [sized, back])
     first = effects(finding)[0]
     assert first["name"] == "coulomb_friction"
     assert first["at_bound"] == []
@@ -237,10 +237,10 @@ def test_a_port_with_a_small_share_of_the_motion_is_searched_in_its_own_forces()
 
 def test_a_ripple_between_two_bodies_is_found():
     pair = Mechanism(
-        {"a": Believed(0.05), "b": Believed(0.03)},
+        {"a": BelievedValue(0.05), "b": BelievedValue(0.03)},
         [
-            Port("between", {"a": 1.0, "b": -1.0}, damping=Believed(0.2, 0.5)),
-            Port("bearing", {"b": 1.0}, damping=Believed(0.3, 0.5)),
+            Port("between", {"a": 1.0, "b": -1.0}, damping=BelievedValue(0.2, 0.5)),
+            Port("bearing", {"b": 1.0}, damping=BelievedValue(0.3, 0.5)),
         ],
         [Input("drive", {"a": 1.0})],
     )
@@ -259,7 +259,7 @@ def test_a_ripple_between_two_bodies_is_found():
     torque = 0.05 * motion_of(a, STEP, CUTOFF).acceleration + passes
     torque += 1e-4 * generator.standard_normal(len(TIME))
     record = Record("pair", "train", TIME, {"a": a, "b": b, "drive": torque})
-    finding = investigate(pair, [record])
+    finding = examine_mechanism(pair, [record])
     assert effects(finding)[0]["name"] == "torque_ripple"
     assert effects(finding)[0]["port"] == "between"
     amplitude = effects(finding)[0]["parameters"]["order_9_amplitude"]["value"]

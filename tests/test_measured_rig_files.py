@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE, read_model, read_rig, rig_toml
-from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Loop, Mechanism, Port
+from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE, read_rig
+from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_model
+from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import law_from_values
 
 MODEL = """\
@@ -72,14 +73,18 @@ time = { column = "t", unit = "s" }
 channels.w = { column = "q", unit = "m" }
 """
 MECHANISM = Mechanism(
-    {"q": Believed(100.0, 0.5), "w": Believed(2.0)},
+    {"q": BelievedValue(100.0, 0.5), "w": BelievedValue(2.0)},
     [
-        Port("joint", {"q": 1.0, "w": -0.5}, damping=Believed(300.0, 1.0)),
+        Port("joint", {"q": 1.0, "w": -0.5}, damping=BelievedValue(300.0, 1.0)),
         Port(
-            "cell", {"w": 1.0}, Believed(7e4), read=True, error=(ErrorLine("q", 2.0, 1e-4, 0.25),)
+            "cell",
+            {"w": 1.0},
+            BelievedValue(7e4),
+            read=True,
+            error=(ErrorLine("q", 2.0, 1e-4, 0.25),),
         ),
     ],
-    [Input("vir", {"q": 1.0}, Believed(35.15))],
+    [Input("vir", {"q": 1.0}, BelievedValue(35.15))],
     [Loop("vir", "qg", "q", 38995.8, 243.45, 10.0)],
 )
 FRICTION = LawAt("coulomb_friction", "joint", law_from_values("coulomb_friction", {"level": 20.4}))
@@ -135,7 +140,11 @@ def test_path_of_the_file_and_another_folder_of_data(folder, tmp_path):
 
 
 def test_written_model_with_records_is_read(folder):
-    text = rig_toml("A rig", MECHANISM, [FRICTION], 12.5) + TABLE + RECORDS.replace("SHA", 14 * "0")
+    text = (
+        model_text(MechanismModel("A rig", MECHANISM, (FRICTION,), 12.5))
+        + TABLE
+        + RECORDS.replace("SHA", 14 * "0")
+    )
     (folder / RIG_FILE).write_text(text.replace('sha256 = "00000000000000"\n', ""))
     rig = read_rig(folder)
     assert (rig.mechanism, rig.effects, rig.cutoff) == (MECHANISM, (FRICTION,), 12.5)
@@ -249,9 +258,8 @@ def test_mutated_files_give_a_rig_or_a_clear_error(folder):
         except (InvalidInput, OSError):
             continue
         read += 1
-        model = rig.title, rig.mechanism, rig.effects
-        (folder / "model.toml").write_text(rig_toml(*model), encoding="utf-8")
-        assert read_model(folder / "model.toml") == model
+        (folder / "model.toml").write_text(model_text(rig.model), encoding="utf-8")
+        assert read_model(folder / "model.toml") == rig.model
     assert 30 < read < 570
 
 

@@ -5,15 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.mechanism.files import read_model, rig_toml
+from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_model
 from pymoo_hdte.drive.port_effects import LAWS
 from pymoo_hdte.laws.linear import ConstantForce
 from pymoo_hdte.laws.stiffness import PeriodicClearance
-from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Loop, Mechanism, Port
+from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import EFFECTS, law_from_values, values_of
 
 RIG = Mechanism(
-    {"q": Believed(2.0)}, [Port("joint", {"q": 1.0}), Port("cell", {"q": 0.5}, read=True)]
+    {"q": BelievedValue(2.0)}, [Port("joint", {"q": 1.0}), Port("cell", {"q": 0.5}, read=True)]
 )
 READING = {"order": 3.0, "phase": 0.5, "amplitude": 0.1}
 ERROR = law_from_values("kinematic_error", READING)
@@ -21,7 +21,7 @@ FRICTION = law_from_values("coulomb_friction", {"level": 20.4})
 
 
 def through_file(folder, *parts):
-    (folder / "model.toml").write_text(rig_toml(*parts), encoding="utf-8")
+    (folder / "model.toml").write_text(model_text(MechanismModel(*parts)), encoding="utf-8")
     return read_model(folder / "model.toml")
 
 
@@ -32,7 +32,7 @@ def test_every_effect_survives_the_file(name, tmp_path):
         values["sharpness"] += 1.0
     effect = LawAt(name, "cell", law_from_values(name, values))
     assert values_of(effect) == values
-    assert through_file(tmp_path, "x", RIG, [effect]) == ("x", RIG, (effect,))
+    assert through_file(tmp_path, "x", RIG, [effect]) == MechanismModel("x", RIG, (effect,))
 
 
 def test_registry_is_that_of_the_drive_and_five_more():
@@ -45,7 +45,7 @@ def test_registry_is_that_of_the_drive_and_five_more():
 
 
 NAMES = st.text(min_size=1, max_size=6)
-BELIEVED = st.builds(Believed, st.floats(1e-300, 1e300), st.floats(0.0, 1.0))
+BELIEVED = st.builds(BelievedValue, st.floats(1e-300, 1e300), st.floats(0.0, 1.0))
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 
@@ -78,9 +78,9 @@ def test_any_model_survives_the_file(
     )
     effect = LawAt("force_offset", port, ConstantForce(numbers[4]))
     found = through_file(tmp_path_factory.getbasetemp(), title, mechanism, (effect, effect))
-    assert found == (title, mechanism, (effect, effect))
-    assert list(found[1].inertias) == [first, second]
-    assert list(found[1].ports[0].motion) == [second, first]
+    assert found == MechanismModel(title, mechanism, (effect, effect))
+    assert list(found.mechanism.inertias) == [first, second]
+    assert list(found.mechanism.ports[0].motion) == [second, first]
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_any_model_survives_the_file(
 )
 def test_unreadable_model_is_not_written(parts, message):
     with pytest.raises(InvalidInput) as caught:
-        rig_toml(*parts)
+        model_text(MechanismModel(*parts))
     assert message in str(caught.value)
 
 

@@ -11,8 +11,8 @@ from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.law import PortState, periodic_phase
 from pymoo_hdte.laws.linear import ConstantForce, DirectionalFriction, LinearDamper, LinearSpring
 from pymoo_hdte.laws.stiffness import HardeningStiffness
-from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
+from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.balances import ForceBalance, balance_names, quantity_names
 from pymoo_hdte.mechanism.motion import highest_frequency, motion_of, noise_of, smooth, timing_noise
 from pymoo_hdte.mechanism.port_motion import law_force
 
@@ -34,9 +34,9 @@ def course(frequencies, seed=0):
 def two_masses(**ports):
     """Return masses a and b with a spring between them; both are driven."""
     return Mechanism(
-        {name: Believed(mass) for name, mass in MASSES.items()},
-        [Port("between", {"a": 1.0, "b": -1.0}, Believed(300.0), Believed(4.0), **ports)],
-        [Input("push", {"a": 1.0}), Input("pull", {"b": 2.0}, Believed(3.0))],
+        {name: BelievedValue(mass) for name, mass in MASSES.items()},
+        [Port("between", {"a": 1.0, "b": -1.0}, BelievedValue(300.0), BelievedValue(4.0), **ports)],
+        [Input("push", {"a": 1.0}), Input("pull", {"b": 2.0}, BelievedValue(3.0))],
     )
 
 
@@ -155,7 +155,7 @@ LAWS = [
 
 @pytest.mark.parametrize(("name", "law", "force"), LAWS, ids=[name for name, *_ in LAWS])
 def test_the_balances_of_an_analytic_motion_close(name, law, force):
-    balance = Balance(two_masses(), closed([force]), CUTOFF)
+    balance = ForceBalance(two_masses(), closed([force]), CUTOFF)
     effect = LawAt(name, "between", law)
     scale = np.sqrt(np.sum(balance.terms[:, 0] ** 2))
     assert np.sqrt(np.sum(left(balance, [effect]) ** 2)) < 2e-3 * scale
@@ -165,7 +165,7 @@ def test_the_balances_of_an_analytic_motion_close(name, law, force):
 
 @pytest.mark.parametrize(("cutoff", "finer"), [(20.0, 1), (30.0, 2), (80.0, 4)])
 def test_a_law_that_is_linear_takes_what_the_port_of_its_coefficient_does(cutoff, finer):
-    balance = Balance(two_masses(), closed(), cutoff)
+    balance = ForceBalance(two_masses(), closed(), cutoff)
     assert len(balance._fine["between"].speed) == finer * len(balance.time)
     laws = [
         LawAt("linear_stiffness", "between", LinearSpring(7.0)),
@@ -195,7 +195,7 @@ def test_damping_of_a_law_is_its_derivative_by_the_speed(law):
 def test_slipping_springs_follow_the_order_of_the_samples():
     law = MaxwellSlip(3.0, 0.05)
     record = closed()
-    balance = Balance(two_masses(), record, CUTOFF)
+    balance = ForceBalance(two_masses(), record, CUTOFF)
     motion = balance.ports["between"]
     torque = law_force(law, motion, 300.0)
     work = np.sum(0.5 * (torque[1:] + torque[:-1]) * np.diff(motion.position))
@@ -205,7 +205,7 @@ def test_slipping_springs_follow_the_order_of_the_samples():
 
 
 def test_forces_are_the_same_when_asked_again():
-    balance = Balance(two_masses(), closed(), CUTOFF)
+    balance = ForceBalance(two_masses(), closed(), CUTOFF)
     effects = [LawAt("coulomb_friction", "between", CoulombFriction(float(k))) for k in range(100)]
     first = [balance.forces([effect]) for effect in effects]
     again = [balance.forces([effect]) for effect in effects]
@@ -214,14 +214,14 @@ def test_forces_are_the_same_when_asked_again():
 
 
 def test_a_force_sensor_reads_its_port_and_touches_nothing():
-    sensor = Port("sensor", {"a": 1.0}, Believed(50.0), Believed(2.0), read=True)
+    sensor = Port("sensor", {"a": 1.0}, BelievedValue(50.0), BelievedValue(2.0), read=True)
     mechanism = two_masses()
     mechanism = Mechanism(mechanism.inertias, [*mechanism.ports, sensor], mechanism.inputs)
     record = closed()
     position, speed, _ = course((0.6, 2.3, 6.1), 1)
     reading = 50.0 * position + 2.0 * speed
     record = Record("read", "train", TIME, dict(record.channels) | {"sensor": reading})
-    balance = Balance(mechanism, record, CUTOFF)
+    balance = ForceBalance(mechanism, record, CUTOFF)
     assert balance_names(mechanism) == ("a", "b", "sensor")
     assert np.sqrt(np.sum(left(balance)[2] ** 2)) < 1e-4 * np.sqrt(np.sum(balance.constant[2] ** 2))
     before = left(balance)
@@ -234,8 +234,8 @@ def test_a_force_sensor_reads_its_port_and_touches_nothing():
 
 def test_a_kinematic_error_moves_the_port():
     line = ErrorLine("a", 5.0, 0.01, 0.4)
-    balance = Balance(two_masses(error=(line,)), closed(), CUTOFF)
-    plain = Balance(two_masses(), closed(), CUTOFF)
+    balance = ForceBalance(two_masses(error=(line,)), closed(), CUTOFF)
+    plain = ForceBalance(two_masses(), closed(), CUTOFF)
     (a, va, _) = course((0.6, 2.3, 6.1), 1)
     rows = slice(len(TIME) // 2 - 5, len(TIME) // 2)
     moved = balance.ports["between"].position - plain.ports["between"].position
@@ -247,15 +247,15 @@ def test_a_kinematic_error_moves_the_port():
 
 
 def test_sensor_noise_is_carried_into_the_balances():
-    exact, ratios = left(Balance(two_masses(), closed(), CUTOFF)), []
+    exact, ratios = left(ForceBalance(two_masses(), closed(), CUTOFF)), []
     for seed in range(12):
-        balance = Balance(two_masses(), closed(noise=1e-5, seed=seed), CUTOFF)
+        balance = ForceBalance(two_masses(), closed(noise=1e-5, seed=seed), CUTOFF)
         difference = (left(balance) - exact) / balance.noise
         ratios.append(np.mean(difference[balance.kept] ** 2))
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.08)
 
 
 def test_in_time_undoes_the_transform():
-    balance = Balance(two_masses(), closed(), CUTOFF)
+    balance = ForceBalance(two_masses(), closed(), CUTOFF)
     signal = balance.in_time(balance.terms[0, 0])
     assert np.sum(signal**2) == pytest.approx(np.sum(balance.terms[0, 0] ** 2))

@@ -19,7 +19,7 @@ from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.law import PortState, Response, periodic_phase
 from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, SoftWindup
 from pymoo_hdte.mechanism import (
-    Believed,
+    BelievedValue,
     ErrorLine,
     Input,
     LawAt,
@@ -30,13 +30,13 @@ from pymoo_hdte.mechanism import (
     exponential_steps,
 )
 from pymoo_hdte.mechanism.drive import drive_mechanism
-from pymoo_hdte.mechanism.simulation import simulate
+from pymoo_hdte.mechanism.simulation import simulate_mechanism
 from pymoo_hdte.units import ARCSEC
 
 
 def block(mass=2.0, stiffness=0.0, damping=0.0, loops=(), **of_port):
-    port = Port("joint", {"q": 1.0}, Believed(stiffness), Believed(damping), **of_port)
-    return Mechanism({"q": Believed(mass)}, [port], [Input("u", {"q": 1.0})], loops)
+    port = Port("joint", {"q": 1.0}, BelievedValue(stiffness), BelievedValue(damping), **of_port)
+    return Mechanism({"q": BelievedValue(mass)}, [port], [Input("u", {"q": 1.0})], loops)
 
 
 def record(time, **channels):
@@ -50,7 +50,9 @@ def at(law, port="joint"):
 
 def test_free_decay_is_the_closed_form():
     time = np.linspace(0.0, 3.0, 61)
-    found = simulate(block(2.0, 800.0, 3.0), record(time, u=0.0), start={"q": (0.4, -1.0)})
+    found = simulate_mechanism(
+        block(2.0, 800.0, 3.0), record(time, u=0.0), start={"q": (0.4, -1.0)}
+    )
     ring = np.sqrt(400.0 - 0.75**2)
     wave = 0.4 * np.cos(ring * time) + (0.75 * 0.4 - 1.0) / ring * np.sin(ring * time)
     assert found.position["q"] == pytest.approx(np.exp(-0.75 * time) * wave, abs=1e-11)
@@ -59,7 +61,7 @@ def test_free_decay_is_the_closed_form():
 def test_at_resonance_the_response_lags_by_a_quarter_and_inputs_are_straight_between_samples():
     frequency, damping_ratio, rate, time = 50.0, 0.05, 500.0, np.arange(5000) / 500.0
     mechanism = block(2.0, 2.0 * frequency**2, 4.0 * damping_ratio * frequency)
-    found = simulate(mechanism, record(time, u=3.0 * np.cos(frequency * time)))
+    found = simulate_mechanism(mechanism, record(time, u=3.0 * np.cos(frequency * time)))
     passed = np.sinc(frequency / (2.0 * np.pi * rate)) ** 2
     amplitude = 3.0 * passed / (2.0 * 2.0 * damping_ratio * frequency**2)
     expected = amplitude * np.sin(frequency * time[4700:])
@@ -105,7 +107,9 @@ def test_laws_converge_to_what_another_integrator_finds(laws, rng):
     missed = []
     for rtol in (1e-3, 1e-5, 1e-7):
         effects, start = [at(law) for law in laws], {"q": (0.1, 0.5)}
-        found = simulate(mechanism, record(time, u=force), effects, start=start, rtol=rtol)
+        found = simulate_mechanism(
+            mechanism, record(time, u=force), effects, start=start, rtol=rtol
+        )
         difference = np.abs([found.position["q"], found.speed["q"]] - expected)
         missed.append(np.max(difference.T / np.max(np.abs(expected), axis=1)))
     assert np.all(np.array(missed) < [3e-2, 3e-4, 3e-6])
@@ -114,7 +118,9 @@ def test_laws_converge_to_what_another_integrator_finds(laws, rng):
 
 def test_without_damping_energy_is_kept():
     still, cubic = record(np.linspace(0.0, 4.0, 401), u=0.0), at(HardeningStiffness(5e3))
-    found = simulate(block(2.0, 500.0), still, [cubic], start={"q": (0.2, 0.0)}, rtol=1e-8)
+    found = simulate_mechanism(
+        block(2.0, 500.0), still, [cubic], start={"q": (0.2, 0.0)}, rtol=1e-8
+    )
     q, v = found.position["q"], found.speed["q"]
     assert v**2 + 250.0 * q**2 + 1250.0 * q**4 == pytest.approx(12.0, rel=1e-6)
 
@@ -123,12 +129,12 @@ def test_hysteresis_takes_the_area_of_masings_loop_in_every_cycle():
     law, step = MaxwellSlip(30.0, 0.08, 1.5), 5e-4
     coarse = np.arange(801) * 0.005
     wave = 40.0 * np.sin(4.0 * np.pi * coarse)
-    joint = Port("joint", {"q": 1.0}, Believed(500.0), Believed(2.0))
+    joint = Port("joint", {"q": 1.0}, BelievedValue(500.0), BelievedValue(2.0))
     sensor = Port("sensor", {"q": 1.0}, read=True)
-    mechanism = Mechanism({"q": Believed(2.0)}, [joint, sensor], [Input("u", {"q": 1.0})])
+    mechanism = Mechanism({"q": BelievedValue(2.0)}, [joint, sensor], [Input("u", {"q": 1.0})])
     effects, start = [at(law), at(law, "sensor")], {"q": (0.03, 0.0)}
     force = np.interp(time := np.arange(8001) * step, coarse, wave)
-    found = simulate(mechanism, record(time, u=force), effects, start=start)
+    found = simulate_mechanism(mechanism, record(time, u=force), effects, start=start)
     q, v = found.position["q"], found.speed["q"]
     cycle = slice(-1001, -1)
     taken = np.sum(((force - 2.0 * v) * v)[cycle]) * step
@@ -138,16 +144,16 @@ def test_hysteresis_takes_the_area_of_masings_loop_in_every_cycle():
     assert np.sum((found.forces["sensor"] * v)[cycle]) * step == pytest.approx(taken, rel=1e-4)
     assert found.forces["sensor"][0] == 0.0
     # Where it turns back between samples is not lost: springs would keep what they slipped.
-    seldom = simulate(mechanism, record(coarse, u=wave), effects, start=start)
+    seldom = simulate_mechanism(mechanism, record(coarse, u=wave), effects, start=start)
     assert seldom.position["q"] == pytest.approx(q[::10], abs=2e-6)
 
 
 def test_dry_friction_stops_a_block_after_its_way_and_holds_it_up_to_breakaway():
     time, dry = np.linspace(0.0, 2.0, 201), at(CoulombFriction(3.0))
-    thrown = simulate(block(), record(time, u=0.0), [dry], start={"q": (1.0, 1.2)})
+    thrown = simulate_mechanism(block(), record(time, u=0.0), [dry], start={"q": (1.0, 1.2)})
     assert thrown.position["q"][-1] - 1.0 == pytest.approx(2.0 * 1.2**2 / (2.0 * 3.0), rel=1e-6)
     # Smoothed friction lets it creep at the speed whose tanh is the share of the breakaway.
-    pushed = simulate(block(), record(time, u=2.4), [dry])
+    pushed = simulate_mechanism(block(), record(time, u=2.4), [dry])
     assert pushed.speed["q"][1:] == pytest.approx(1e-4 * np.arctanh(0.8), rel=1e-5)
 
 
@@ -155,14 +161,16 @@ def test_what_happens_between_samples_is_not_missed():
     effects, start, found = [at(CoulombFriction(1.0))], {"q": (0.0, 4.0)}, []
     for parts in (1, 20):
         time = np.arange(16 * parts + 1) * np.pi / 10.0 / parts
-        run = simulate(block(2.0, 800.0), record(time, u=0.0), effects, start=start)
+        run = simulate_mechanism(block(2.0, 800.0), record(time, u=0.0), effects, start=start)
         found.append(run.speed["q"][::parts])
     assert found[0] == pytest.approx(found[1], abs=1e-4)
     # It nearly sticks for less than a sample, and moves as before at the end of it.
     force = np.append(1.64665, np.full(15, 1.7468))
     light = block(0.02), record(np.arange(16) * 1e-3, u=force), [at(CoulombFriction(1.7))]
     start = {"q": (0.0, 8e-4)}
-    coarse, fine = (simulate(*light, start=start, rtol=rtol).speed["q"] for rtol in (1e-3, 1e-8))
+    coarse, fine = (
+        simulate_mechanism(*light, start=start, rtol=rtol).speed["q"] for rtol in (1e-3, 1e-8)
+    )
     assert coarse[1] == pytest.approx(fine[1], rel=0.02)
 
 
@@ -174,38 +182,40 @@ def test_a_closed_loop_is_the_open_one_under_its_own_command():
     wanted, begin = 0.3 * np.sin(3.0 * time) ** 2, {"start": {"q": (0.1, 0.0)}}
     effects = [at(CoulombFriction(1.0)), at(PeriodicTorque(20.0, 0.0, 0.5))]
     mechanism = block(damping=2.0, loops=[LOOP])
-    closed = simulate(mechanism, record(time, wanted=wanted), effects, **begin)
+    closed = simulate_mechanism(mechanism, record(time, wanted=wanted), effects, **begin)
     command = 200.0 * (wanted - closed.position["q"]) - 30.0 * closed.speed["q"]
     assert closed.inputs["u"] == pytest.approx(command, abs=1e-12)
     driven = record(time, u=command, wanted=wanted)
     for chosen, missed in ((False, 2e-5), (True, 0.0)):
-        opened = simulate(mechanism, driven, effects, closed_loop=chosen, **begin)
+        opened = simulate_mechanism(mechanism, driven, effects, closed_loop=chosen, **begin)
         assert opened.position["q"] == pytest.approx(closed.position["q"], rel=0.0, abs=missed)
 
 
 def test_a_loop_commands_no_more_than_its_limit():
     time = np.linspace(0.0, 4.0, 401)
-    found = simulate(block(2.0, loops=[replace(LOOP, limit=5.0)]), record(time, wanted=1.0))
+    found = simulate_mechanism(
+        block(2.0, loops=[replace(LOOP, limit=5.0)]), record(time, wanted=1.0)
+    )
     assert found.inputs["u"].max() == 5.0
     assert found.position["q"][:50] == pytest.approx(1.25 * time[:50] ** 2, abs=1e-9)
     assert found.position["q"][-1] == pytest.approx(1.0, abs=1e-3)
 
 
 def two_masses(read=False, **of_mesh):
-    mesh = Port("mesh", {"a": 0.5, "b": -1.0}, Believed(900.0), Believed(0.7), **of_mesh)
-    sensor = Port("sensor", {"a": 1.0}, Believed(80.0), Believed(3.0), read=True)
-    ground = Port("ground", {"b": 1.0}, Believed(60.0), Believed(0.2))
+    mesh = Port("mesh", {"a": 0.5, "b": -1.0}, BelievedValue(900.0), BelievedValue(0.7), **of_mesh)
+    sensor = Port("sensor", {"a": 1.0}, BelievedValue(80.0), BelievedValue(3.0), read=True)
+    ground = Port("ground", {"b": 1.0}, BelievedValue(60.0), BelievedValue(0.2))
     return Mechanism(
-        {"a": Believed(1.5), "b": Believed(4.0)},
+        {"a": BelievedValue(1.5), "b": BelievedValue(4.0)},
         [mesh, ground, sensor] if read else [mesh],
-        [Input("u", {"a": 1.0, "b": -0.2}, Believed(2.0))],
+        [Input("u", {"a": 1.0, "b": -0.2}, BelievedValue(2.0))],
     )
 
 
 def test_coupled_coordinates_are_the_matrix_exponential_and_read_ports_act_on_nothing():
     time, start = np.linspace(0.0, 2.0, 41), {"a": (0.1, 0.0), "b": (-0.2, 1.0)}
     effects = [at(friction.StribeckFriction(1.0, 0.5, 0.1), "sensor")]
-    found = simulate(two_masses(read=True), record(time, u=0.6), effects, start=start)
+    found = simulate_mechanism(two_masses(read=True), record(time, u=0.6), effects, start=start)
     mesh, ground = np.array([0.5, -1.0]), np.array([0.0, 1.0])
     inverse, still = np.diag([1.0 / 1.5, 1.0 / 4.0]), np.zeros((2, 2))
     stiffness = 900.0 * np.outer(mesh, mesh) + 60.0 * np.outer(ground, ground)
@@ -226,7 +236,7 @@ def test_momentum_is_kept_where_nothing_acts_from_outside():
     laws.append(MaxwellSlip(2.0, 0.02))
     effects, start = [at(law, "mesh") for law in laws], {"a": (0.0, 2.0), "b": (0.0, 0.5)}
     mechanism = two_masses(error=(ErrorLine("a", 30.0, 0.01, 0.2),))
-    found = simulate(mechanism, record(time, u=0.0), effects, start=start)
+    found = simulate_mechanism(mechanism, record(time, u=0.0), effects, start=start)
     momentum = 1.5 * found.speed["a"] / 0.5 + 4.0 * found.speed["b"]
     assert momentum == pytest.approx(8.0, abs=1e-9)
 
@@ -255,7 +265,7 @@ def test_the_drive_is_an_instance(effects):
         "output_angle": (angle / 11.0 - error(run.time[0]), speed / 11.0 - error(run.time[0], 1)),
     }
     steady = record(run.time, motor_torque=torque, load_torque=sheet.load_torque)
-    found = simulate(mechanism, steady, laws, start=start, rtol=1e-3)
+    found = simulate_mechanism(mechanism, steady, laws, start=start, rtol=1e-3)
     mine = found.position["input_angle"] / 11.0 - found.position["output_angle"]
     assert mine == pytest.approx(run.transmission_error, abs=1e-3 * ARCSEC)
 
@@ -263,7 +273,7 @@ def test_the_drive_is_an_instance(effects):
 def test_starts_are_read_from_the_record():
     time = 1.0 + np.arange(40) * 0.01
     measured = 0.4 - 0.3 * (time - 1.0) + 2.0 * (time - 1.0) ** 2
-    found = simulate(two_masses(), record(time, u=0.0, a=measured))
+    found = simulate_mechanism(two_masses(), record(time, u=0.0, a=measured))
     assert (found.position["a"][0], found.position["b"][0]) == (0.4, 0.0)
     assert found.speed["a"][0] == pytest.approx(-0.3, abs=1e-10)
 
@@ -285,7 +295,7 @@ TIME = np.linspace(0.0, 1.0, 21)
 )
 def test_wrong_arguments_are_named(mechanism, channels, arguments, named):
     with pytest.raises(InvalidInput, match=named):
-        simulate(mechanism, record(TIME, **channels), **arguments)
+        simulate_mechanism(mechanism, record(TIME, **channels), **arguments)
 
 
 @pytest.mark.parametrize(
@@ -301,7 +311,7 @@ def test_what_cannot_be_followed_ends_in_an_error(of_speed, gain, message, monke
     mechanism = block(loops=[replace(LOOP, position_gain=gain, speed_gain=0.0)])
     law = SimpleNamespace(orders=(), respond=lambda state: Response(of_speed(state.speed)))
     with pytest.raises(ArithmeticError, match=message):
-        simulate(mechanism, record(TIME, wanted=1.0), [at(law)], start={"q": (0.1, 0.5)})
+        simulate_mechanism(mechanism, record(TIME, wanted=1.0), [at(law)], start={"q": (0.1, 0.5)})
 
 
 def test_drives_are_refused_that_no_mechanism_can_be():

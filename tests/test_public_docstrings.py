@@ -28,8 +28,8 @@ SOURCES = {
     "drive.measured_dte": "Section 4",
     "drive.quasi_static_torsion": "Section 3",
     "drive.sample_static_error": "Section 2.1",
-    "drive.simulate": "Eq. (9)",
-    "drive.steady_state": "Hill's method (Nayfeh and Mook",
+    "drive.simulate_drive": "Eq. (9)",
+    "drive.hill_steady_state": "Hill's method (Nayfeh and Mook",
     "surrogate.Accuracy": "Table 5",
     "surrogate.ChebyshevSurrogate": "Eqs. 14-25",
     "surrogate.ExactMoments": "Eqs. (29) and (30)",
@@ -69,7 +69,7 @@ SOURCES = {
     "discrepancy.residual_spectrum": "Scargle",
     "mechanism.Loop": "Astrom and Murray",
     "mechanism.Mechanism": "Eqs. (3) to (9)",
-    "discrepancy.mechanism.investigate": "Schwarz",
+    "discrepancy.analyse": "Schwarz",
     "validation.validation_metrics": "Section 4",
 }
 """Methods that others published, or the paper's own, and a part of the source they must name."""
@@ -97,7 +97,7 @@ def test_source_of(name):
 def test_what_is_walked():
     """Functions, classes, methods, properties, inherited members and calls are all there."""
     assert {
-        "drive.simulate",
+        "drive.simulate_drive",
         "drive.DriveModel",
         "drive.DriveModel.dte_arcsec",
         "drive.DataSheet.ratio",

@@ -14,10 +14,8 @@ from virtual_rig_cases import effect
 from experiments.runner.report import write_report
 from experiments.runner.store import save
 from pymoo_hdte.cli import __main__ as cli
-from pymoo_hdte.discrepancy import write_campaign
-from pymoo_hdte.discrepancy.mechanism import investigate
-from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
-from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port
+from pymoo_hdte.discrepancy import MeasuredMechanism, analyse, write_campaign
+from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 WIDTHS = (1280, 500)
@@ -57,12 +55,12 @@ def pages(tmp_path_factory, records):  # noqa: F811
     for name, arguments in commands.items():
         assert cli.main([name, *arguments, "--out", str(top / name), "--quiet"]) == 0
     oscillator = Mechanism(
-        inertias={"x": Believed(1.0, 0.1)},
-        ports=[Port("spring", {"x": 1.0}, Believed(4100.0, 0.1), Believed(5.0, 0.5))],
+        inertias={"x": BelievedValue(1.0, 0.1)},
+        ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
         inputs=[Input("force", {"x": 1.0})],
     )
     runs = [rig.record_of(rig.cubic), rig.record_of(rig.cubic, "held_out", seed=3)]
-    write_measured_report("oscillator", investigate(oscillator, runs), top / "measured")
+    analyse(MeasuredMechanism(oscillator, runs, title="oscillator")).report(top / "measured")
     found = {name: top / name / "report.html" for name in (*commands, "measured")}
     save(top / "results", "table7", example())
     return found | {"experiments": write_report(top / "results")}

@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from pymoo_hdte.discrepancy import write_campaign
-from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.units import ARCSEC
 from pymoo_hdte.virtual.hidden_forms import draw_effect
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
-BELIEVED = Believed(
+BELIEVED = BelievedDrive(
     ratio=101.0,
     stiffness=2.6e4,  # N.m/rad
     damping=4.5,  # N.m.s/rad

@@ -29,7 +29,7 @@ from pymoo_hdte.drive import (
     load_datasheet,
     load_model,
     sample_static_error,
-    simulate,
+    simulate_drive,
 )
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import accuracy, latin_hypercube
@@ -130,13 +130,13 @@ print("effects:", ", ".join(effect.name for effect in model.effects))
 # Simulate
 # --------
 #
-# The steady state needs no time stepping. ``simulate`` integrates the same equations from rest,
-# which takes longer and checks it.
+# The steady state needs no time stepping. ``simulate_drive`` integrates the same equations from
+# rest, which takes longer and checks it.
 
 design = model.nominal
 steady = model.steady_state(design[np.newaxis])
 (dte,) = model.dte_arcsec(design[np.newaxis])
-run = simulate(model, design)
+run = simulate_drive(model, design)
 print(f"DTE: steady state {dte:.2f} arcsec, integrated from rest {run.dte_arcsec():.2f} arcsec")
 print(f"they differ by less than 1 %: {abs(run.dte_arcsec() / dte - 1) < 0.01}")
 

@@ -20,10 +20,10 @@ from pymoo.optimize import minimize
 from pymoo_hdte.algorithms import ElitistSwarm, EntropyWeight, Flat, LinearDecrease, ParticleSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange
-from pymoo_hdte.drive import harmonic_balance, preset, simulate
+from pymoo_hdte.drive import harmonic_balance, preset, simulate_drive
 from pymoo_hdte.laws.law import Aperiodic, Response
-from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.simulation import simulate as simulate_mechanism
+from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.simulation import simulate_mechanism
 from pymoo_hdte.problems import RobustDTE
 
 # %%
@@ -64,7 +64,7 @@ class EyringDrag(Aperiodic):
 # by the drag alone. With the small-speed limit of the law its speed would fall exponentially.
 
 drag = EyringDrag(level=0.02, knee=5.0)
-flywheel = Mechanism({"angle": Believed(0.01)}, [Port("bearing", {"angle": 1.0})])
+flywheel = Mechanism({"angle": BelievedValue(0.01)}, [Port("bearing", {"angle": 1.0})])
 time = np.arange(0.0, 8.0, 0.01)
 idle = Record("coasting down", "train", time, {})
 course = simulate_mechanism(
@@ -130,7 +130,7 @@ print(f"difference {motor[1] - motor[0]:.4f} N.m, in closed form {expected:.4f} 
 # The integrator knows it too, and so does the robust problem: the drag is now part of the drive.
 
 steady = draggy.dte_arcsec(design[np.newaxis])[0]
-integrated = simulate(draggy, design, ramp=0.2, settle=0.3).dte_arcsec()
+integrated = simulate_drive(draggy, design, ramp=0.2, settle=0.3).dte_arcsec()
 print(f"DTE: steady state {steady:.3f}, integrated {integrated:.3f} arcsec")
 scenario = replace(preset("calibrated"), name="calibrated_draggy")
 scenario = replace(scenario, effects=(*scenario.effects, *draggy.effects))
@@ -152,11 +152,11 @@ print(f"robust problem on it: mean {mean:.1f}, std {std:.1f} arcsec")
 # of ratio 4. The belt is one port, and each bearing is another.
 
 belt_drive = Mechanism(
-    inertias={"motor": Believed(2e-4), "load": Believed(5e-3)},
+    inertias={"motor": BelievedValue(2e-4), "load": BelievedValue(5e-3)},
     ports=[
-        Port("belt", {"motor": 0.25, "load": -1.0}, Believed(40.0), Believed(0.01)),
-        Port("motor_bearing", {"motor": 1.0}, damping=Believed(1e-4)),
-        Port("load_bearing", {"load": 1.0}, damping=Believed(2e-3)),
+        Port("belt", {"motor": 0.25, "load": -1.0}, BelievedValue(40.0), BelievedValue(0.01)),
+        Port("motor_bearing", {"motor": 1.0}, damping=BelievedValue(1e-4)),
+        Port("load_bearing", {"load": 1.0}, damping=BelievedValue(2e-3)),
     ],
     inputs=[Input("torque", {"motor": 1.0})],
 )

@@ -21,7 +21,7 @@ from pymoo_hdte.drive import (
     floquet_multipliers,
     harmonic_balance,
     preset,
-    simulate,
+    simulate_drive,
 )
 from pymoo_hdte.units import ARCSEC
 
@@ -253,7 +253,7 @@ plt.show()
 balance = harmonic_balance(coefficients)
 hill_dte = steady.peak_to_peak(ratio)[0] / ARCSEC
 full_dte = balance.spectrum().peak_to_peak(ratio)[0] / ARCSEC
-integrated = simulate(model, model.nominal).dte_arcsec()
+integrated = simulate_drive(model, model.nominal).dte_arcsec()
 print(f"Hill's method         {hill_dte:.3f} arcsec")
 print(f"harmonic balance      {full_dte:.3f} arcsec")
 print(f"integrated from rest  {integrated:.3f} arcsec")

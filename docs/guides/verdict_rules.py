@@ -17,8 +17,8 @@ from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.mechanism import investigate
-from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port, Record
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
+from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
 # %%
 # Residuals in units of their noise
@@ -208,12 +208,12 @@ def record_of(friction, seed=1):
 
 
 joint = Mechanism(
-    inertias={"q": Believed(0.06, tolerance=0.5)},
-    ports=[Port("bearing", {"q": 1.0}, damping=Believed(0.5, tolerance=0.5))],
+    inertias={"q": BelievedValue(0.06, tolerance=0.5)},
+    ports=[Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, tolerance=0.5))],
     inputs=[Input("torque", {"q": 1.0})],
 )
 for friction in (0.0, 0.3):
-    verdict = investigate(joint, [record_of(friction)]).verdict
+    verdict = examine_mechanism(joint, [record_of(friction)]).verdict
     freedom = verdict.degrees_of_freedom
     ratio = verdict.base.chi_square / freedom
     print(f"friction {friction:g} N.m: chi-square / nu of the base {ratio:.3g}, {verdict.status}")

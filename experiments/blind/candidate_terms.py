@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.laws.hysteresis import slip_along
 from pymoo_hdte.units import ARCSEC
 
@@ -30,7 +30,7 @@ BREAKAWAYS = (0.5, 1.0, 2.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RecordMotion:
     """A record along its path, arrays of shape (n,), SI; nan where unknown.
 
     ``closed`` says that the path ends where it begins, as in a steady state.
@@ -47,7 +47,7 @@ class Motion:
     error_slope: Values
 
 
-Law = Callable[[Motion], Values]
+Law = Callable[[RecordMotion], Values]
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Term:
     positive: bool = False
 
 
-def terms(believed: Believed, orders: Sequence[float]) -> list[Term]:
+def terms(believed: BelievedDrive, orders: Sequence[float]) -> list[Term]:
     """Return the library, with lines at these orders (cycles per input turn).
 
     Ports are "input", "output" and "mesh" of the drive, "load", "motor", and of the reading of the
@@ -124,33 +124,33 @@ def _friction_terms(slow: Sequence[float]) -> list[Term]:
     ]
 
 
-def _one(motion: Motion) -> Values:
+def _one(motion: RecordMotion) -> Values:
     return np.ones_like(motion.angle)
 
 
-def _direction(motion: Motion) -> Values:
+def _direction(motion: RecordMotion) -> Values:
     return np.sign(motion.speed)
 
 
-def _falling(motion: Motion, speed: float) -> Values:
+def _falling(motion: RecordMotion, speed: float) -> Values:
     return np.sign(motion.speed) * np.exp(-((motion.speed / speed) ** 2))
 
 
-def _missing_below_windup(motion: Motion, size: float) -> Values:
+def _missing_below_windup(motion: RecordMotion, size: float) -> Values:
     return -np.tanh(motion.torsion / size)
 
 
-def _missing_in_clearance(motion: Motion, size: float) -> Values:
+def _missing_in_clearance(motion: RecordMotion, size: float) -> Values:
     return -np.clip(motion.torsion, -size, size)
 
 
-def _slipping_spring(motion: Motion, size: float) -> Values:
+def _slipping_spring(motion: RecordMotion, size: float) -> Values:
     """Return the stretch of a spring that slips there, once what came before is forgotten."""
     path = np.tile(motion.torsion, 2 if motion.closed else 1)
     return _stretch(path, size)[-len(motion.torsion) :]
 
 
-def _dry(motion: Motion, breakaway: float) -> Values:
+def _dry(motion: RecordMotion, breakaway: float) -> Values:
     """Return the sign of the output's speed; at rest, the share of the load that friction holds."""
     if motion.closed:
         return np.sign(motion.output_speed)
@@ -161,7 +161,9 @@ def _stretch(path: Values, slip: float) -> Values:
     return np.asarray(slip_along(path[None], np.array([slip]))[0][0, 0])
 
 
-def _wave(motion: Motion, order: float, wave: Callable[[Values], Values], factor: Law) -> Values:
+def _wave(
+    motion: RecordMotion, order: float, wave: Callable[[Values], Values], factor: Law
+) -> Values:
     return factor(motion) * wave(order * motion.angle)
 
 

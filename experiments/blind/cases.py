@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy import Believed, Campaign, Rig
+from pymoo_hdte.discrepancy import BelievedDrive, Campaign, Rig
 from pymoo_hdte.units import ARCSEC
 from pymoo_hdte.virtual.hidden_forms import LISTED_FORMS, UNLISTED_FORMS, HiddenEffect, draw_effect
 from pymoo_hdte.virtual.rig import TrueRig, draw_rig, run_campaign
@@ -56,7 +56,7 @@ LEAST_CLOSED = 0.70
 MOST_SECONDS = 10.0
 """Median, one core."""
 
-BELIEVED = Believed(
+BELIEVED = BelievedDrive(
     ratio=101.0,
     stiffness=2.583e4,
     damping=4.5,

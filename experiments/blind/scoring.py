@@ -18,7 +18,7 @@ from experiments.blind.cases import Case
 from experiments.blind.codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
 from experiments.runner.campaign import Run
 from pymoo_hdte.discrepancy import Campaign
-from pymoo_hdte.discrepancy.drive.analysis import Analysis, analyse
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, examine_drive
 from pymoo_hdte.discrepancy.drive.evidence import training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
@@ -27,7 +27,6 @@ from pymoo_hdte.discrepancy.drive.next_test import next_experiment
 from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.drive.proof import Proof, prove
-from pymoo_hdte.discrepancy.drive.revision import accepted_fit
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
@@ -70,7 +69,7 @@ NUMBERS = (
 COLUMNS = (*VERDICT_COLUMNS, *NUMBERS, *RIVALS)
 
 Scores = dict[str, float]
-Tool = Callable[[Analysis], str]
+Tool = Callable[[DriveFinding], str]
 _Result = TypeVar("_Result")
 
 
@@ -115,7 +114,7 @@ def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, .
     For a detection limit the verdict is all that counts.
     """
     campaign = case.run(case.effects())
-    analysis, analysed = _timed(analyse, campaign)
+    analysis, analysed = _timed(examine_drive, campaign)
     scores = verdict_scores(case, analysis.verdict)
     if case.kind == "detection":
         return scores, (analysed,)
@@ -149,7 +148,7 @@ def verdict_scores(case: Case, verdict: Verdict) -> Scores:
     return scores
 
 
-def truly_moved(analysis: Analysis, twin: Campaign) -> Flags:
+def truly_moved(analysis: DriveFinding, twin: Campaign) -> Flags:
     """Return the cells that the hidden effects move by more than the root mean square of the noise.
 
     The twin is the same run without them: it differs by nothing else, not even by its noise, but
@@ -188,12 +187,11 @@ def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
     rows = np.array([layout.index(name) for name in (*MECHANICAL, *lines)])
     scale = layout.array("scale")[rows]
     error, revised = (
-        np.sqrt(np.diagonal(fitted.covariance)[rows]) / scale
-        for fitted in (twin, accepted_fit(verdict))
+        np.sqrt(np.diagonal(fitted.covariance)[rows]) / scale for fitted in (twin, verdict.accepted)
     )
     known = np.maximum(error, revised) < DETERMINED
     scores = {"bias_error": _root_mean_square(error[known])}
-    for state, fitted in (("before", verdict.base), ("after", accepted_fit(verdict))):
+    for state, fitted in (("before", verdict.base), ("after", verdict.accepted)):
         moved = (fitted.values[rows] - twin.values[rows]) / scale
         scores[f"bias_{state}"] = _root_mean_square(moved[known])
         scores[f"bias_of_all_{state}"] = _root_mean_square(moved)
@@ -222,7 +220,7 @@ def _root_mean_square(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _answer(tool: Tool, analysis: Analysis) -> str:
+def _answer(tool: Tool, analysis: DriveFinding) -> str:
     """Return what a simpler tool says; its defects must not look like the workflow's."""
     try:
         return tool(analysis)

@@ -19,8 +19,8 @@ from scipy.stats import chi2
 from experiments.blind.candidate_terms import terms
 from experiments.blind.torque_balances import Regression, regression
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.objective import LOST
 from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
@@ -38,7 +38,7 @@ _THRESHOLDS = 30
 Values = NDArray[np.float64]
 
 
-def largest_residual_rule(analysis: Analysis) -> str:
+def largest_residual_rule(analysis: DriveFinding) -> str:
     """Name the effect by the cell in which the base model is most wrong.
 
     A cell is a mean or an order line of a channel in all records together, the torsion sweeps, or
@@ -48,7 +48,7 @@ def largest_residual_rule(analysis: Analysis) -> str:
 
     Parameters
     ----------
-    analysis : Analysis
+    analysis : DriveFinding
         Of which the data and the base fit are used.
     """
     data, values = analysis.data, _base_values(analysis)
@@ -135,7 +135,7 @@ def _correlation(one: Values, other: Values) -> float:
     return float(np.corrcoef(one, other)[0, 1])
 
 
-def sparse_regression(analysis: Analysis) -> str:
+def sparse_regression(analysis: DriveFinding) -> str:
     """Name the effect by sparse regression of the residual torques on candidate laws.
 
     Sequentially thresholded least squares (Brunton, Proctor, Kutz, PNAS 113, 2016; that of
@@ -151,7 +151,7 @@ def sparse_regression(analysis: Analysis) -> str:
 
     Parameters
     ----------
-    analysis : Analysis
+    analysis : DriveFinding
         Of which the data, the held-out records and the base fit are used.
 
     Raises
@@ -275,5 +275,5 @@ def explained(columns: Values, target: Values, positive: NDArray[np.bool_] | Non
     return float(short @ short - 2.0 * found.cost)
 
 
-def _base_values(analysis: Analysis) -> Values:
+def _base_values(analysis: DriveFinding) -> Values:
     return analysis.verdict.base.values[: len(analysis.data.base)]

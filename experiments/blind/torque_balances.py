@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.blind.candidate_terms import Motion, Term
+from experiments.blind.candidate_terms import RecordMotion, Term
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import stack
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
@@ -181,7 +181,7 @@ def _weights(port: str, ratio: float) -> Values:
     return np.array([float(port == balance) for balance in BALANCES])
 
 
-def _motions(data: Data, values: Values, angle: Values, basis: Values) -> list[Motion]:
+def _motions(data: Data, values: Values, angle: Values, basis: Values) -> list[RecordMotion]:
     """Return the motion of every record, put together from its lines."""
     believed = data.campaign.believed
     p = dict(zip((parameter.name for parameter in data.base), values, strict=True))
@@ -207,7 +207,7 @@ def _motions(data: Data, values: Values, angle: Values, basis: Values) -> list[M
         along(load, output_torque),
         slope,
     ]
-    return [Motion(True, angle, *rows) for rows in zip(*channels, strict=True)]
+    return [RecordMotion(True, angle, *rows) for rows in zip(*channels, strict=True)]
 
 
 def _sweep(
@@ -234,7 +234,7 @@ def _sweep(
     return white @ left(values)[:, None], white @ np.array(base).T, white @ np.array(laws).T
 
 
-def _at_rest(points: TorsionPoints) -> Motion:
+def _at_rest(points: TorsionPoints) -> RecordMotion:
     """Return the motion of a sweep: slow, at an input angle that nobody knows."""
     unknown, rest = np.full_like(points.angle, np.nan), np.zeros_like(points.angle)
     direction = np.sign(points.path[points.intervals + 1] - points.path[points.intervals])
@@ -242,4 +242,6 @@ def _at_rest(points: TorsionPoints) -> Motion:
     creeping = 1e-12 * direction
     torsion = points.angle - intercept
     # A positive torque turns the output backwards.
-    return Motion(False, unknown, rest, -creeping, rest, torsion, creeping, points.torque, unknown)
+    return RecordMotion(
+        False, unknown, rest, -creeping, rest, torsion, creeping, points.torque, unknown
+    )

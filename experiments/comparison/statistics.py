@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import wilcoxon
 
-from pymoo_hdte.identification.error_statistics import holm
+from pymoo_hdte.identification.error_samples import holm
 
 __all__ = ["Summary", "effect_size", "holm", "summary", "wilcoxon_p"]
 

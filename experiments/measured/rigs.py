@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from experiments.runner.committed import DATA
 from experiments.runner.result import Column, Picture, Result, Table
-from pymoo_hdte.discrepancy.mechanism import Finding, investigate
-from pymoo_hdte.discrepancy.mechanism.files import Rig, read_rig
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
 from pymoo_hdte.discrepancy.report.mechanism import proof_sentence
@@ -36,8 +36,8 @@ _BANDS = 12
 class Study:
     """A rig, what the workflow finds in its records, and the proof."""
 
-    rig: Rig
-    finding: Finding
+    rig: MeasuredMechanism
+    finding: MechanismFinding
     gaps: tuple[MeasuredGap, ...]
 
     @property
@@ -51,7 +51,7 @@ def study(name: str, folder: str) -> Study | None:
     if not (MEASURED / folder).is_dir():
         return None
     rig = read_rig(RIGS / f"{name}.toml", MEASURED / folder)
-    finding = investigate(rig.mechanism, rig.records, rig.cutoff, rig.effects)
+    finding = examine_mechanism(rig.mechanism, rig.records, rig.cutoff, rig.effects)
     return Study(rig, finding, prove_measured(finding))
 
 

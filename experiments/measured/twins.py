@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from experiments.measured.rigs import Study, coloured_rest
 from experiments.runner.result import Column, Table
 from experiments.runner.result import Finding as Agreement
-from pymoo_hdte.discrepancy.mechanism import Finding, investigate
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.proof import fitted_mechanism
 from pymoo_hdte.laws.friction import NonlinearDrag
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-from pymoo_hdte.mechanism.balances import Balance
+from pymoo_hdte.mechanism.balances import ForceBalance
 from pymoo_hdte.mechanism.motion import noise_of
 from pymoo_hdte.mechanism.port_motion import law_force
 
@@ -32,7 +32,7 @@ class Twin:
 
     hidden: str
     rest: bool
-    finding: Finding
+    finding: MechanismFinding
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -94,7 +94,7 @@ def twins_table(found: Sequence[Twin]) -> Table:
     )
 
 
-def _found(one: Study, effects: Sequence[LawAt], rest: bool) -> Finding:
+def _found(one: Study, effects: Sequence[LawAt], rest: bool) -> MechanismFinding:
     generator = np.random.default_rng(SEED)
     mechanism = fitted_mechanism(one.rig.mechanism, one.finding.accepted)
     disturbances = coloured_rest(one, generator)
@@ -102,12 +102,12 @@ def _found(one: Study, effects: Sequence[LawAt], rest: bool) -> Finding:
         _twin(mechanism, balance, effects, disturbance if rest else 0.0 * disturbance, generator)
         for balance, disturbance in zip(one.finding.data.spectra, disturbances, strict=True)
     ]
-    return investigate(one.rig.mechanism, records, one.finding.cutoff)
+    return examine_mechanism(one.rig.mechanism, records, one.finding.cutoff)
 
 
 def _twin(
     mechanism: Mechanism,
-    balance: Balance,
+    balance: ForceBalance,
     effects: Sequence[LawAt],
     disturbance: NDArray[np.float64],
     generator: np.random.Generator,
@@ -119,7 +119,7 @@ def _twin(
     """
     record = balance.record
     (coordinate,), (drive,) = mechanism.coordinates, mechanism.inputs
-    exact = Balance(mechanism, record, balance.cutoff)
+    exact = ForceBalance(mechanism, record, balance.cutoff)
     motion = exact.motions[coordinate]
     force = mechanism.inertias[coordinate].value * motion.acceleration - disturbance[0]
     for port in mechanism.ports:

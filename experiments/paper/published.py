@@ -20,7 +20,7 @@ from pymoo_hdte.drive import (
     DriveModel,
     Run,
     preset,
-    simulate,
+    simulate_drive,
     transfer_function,
 )
 from pymoo_hdte.units import ARCSEC
@@ -43,7 +43,7 @@ def run(context: Context) -> Result:
     """Compare transfer function, integration from rest, and the paper's mean DTE."""
     model = preset("published")
     nominal = model.nominal
-    orders = _orders(model, simulate(model, nominal, angle="prescribed"))
+    orders = _orders(model, simulate_drive(model, nominal, angle="prescribed"))
     box = np.random.default_rng(SEED).uniform(0.65, 1.35, (N_DESIGNS, len(PARAMETERS)))
     progress = tqdm([nominal, *(nominal * box)], desc="published", unit="design", delay=2.0)
     designs = [_design(model, values) for values in progress]
@@ -116,7 +116,7 @@ def _design(model: DriveModel, parameters: NDArray[np.float64]) -> Design:
     return Design(
         static=parameters[0] / ARCSEC,
         steady=model.dte_arcsec(parameters[None])[0],
-        integrated=simulate(model, parameters).dte_arcsec(),
+        integrated=simulate_drive(model, parameters).dte_arcsec(),
     )
 
 

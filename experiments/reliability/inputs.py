@@ -14,7 +14,8 @@ from experiments.reliability import commands, originals
 from experiments.reliability.commands import Wrong
 from experiments.reliability.mutations import Files
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
-from pymoo_hdte.discrepancy.mechanism.files import read_rig, rig_toml
+from pymoo_hdte.discrepancy.mechanism.files import read_rig
+from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.drive import UnstableDrive, hs_20_100, load_datasheet, load_model
 from pymoo_hdte.identification import (
     error_statistics,
@@ -24,7 +25,7 @@ from pymoo_hdte.identification import (
 )
 from pymoo_hdte.identification.damping import bearing_damping
 from pymoo_hdte.identification.torsion import stiffness
-from pymoo_hdte.problems.duty_cycle import load_conditions, shares
+from pymoo_hdte.problems.operating_conditions import load_conditions, shares
 from pymoo_hdte.surrogate import ChebyshevSurrogate
 
 
@@ -68,7 +69,7 @@ def _read_rig(folder: Path) -> None:
     for record in rig.records:
         for name, values in record.channels.items():
             _finite(f"{name} of {record.name}", values)
-    rig_toml(rig.title, rig.mechanism, rig.effects, rig.cutoff)
+    model_text(rig.model)
 
 
 def _read_datasheet(folder: Path) -> None:

@@ -30,7 +30,7 @@ from tqdm import tqdm
 from experiments.runner.provenance import environment, fingerprint
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.workers import WorkerLost, WrongWorker, arithmetic, interrupts_held_off
-from pymoo_hdte.reports.csv_text import csv_text
+from pymoo_hdte.reports.csv_table import csv_text
 
 SOURCE = "source or versions"
 ONE_JOB = Lock()

@@ -14,7 +14,7 @@ from typing import Any
 
 from experiments.runner.provenance import environment
 from experiments.runner.registry import Context
-from pymoo_hdte.reports.csv_text import csv_text
+from pymoo_hdte.reports.csv_table import csv_text
 
 DATA = Path(__file__).parents[1] / "data"
 _ORIGIN = "# {"

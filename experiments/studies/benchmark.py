@@ -21,7 +21,14 @@ from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
 from experiments.studies.timing import Ratio, best_time, ratio_table
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
-from pymoo_hdte.drive import PARAMETERS, PRESETS, DriveModel, harmonic_balance, preset, simulate
+from pymoo_hdte.drive import (
+    PARAMETERS,
+    PRESETS,
+    DriveModel,
+    harmonic_balance,
+    preset,
+    simulate_drive,
+)
 from pymoo_hdte.drive.simulation import ANGLES, METHODS
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.units import ARCSEC
@@ -109,7 +116,7 @@ def _steady_state() -> Iterator[Ratio]:
 def _integration_time(model: DriveModel, designs: NDArray[np.float64], method: str) -> float:
     begin = time.perf_counter()
     for design in designs:
-        simulate(model, design, method=method)
+        simulate_drive(model, design, method=method)
     return time.perf_counter() - begin
 
 
@@ -173,7 +180,7 @@ def _agreement() -> Iterator[tuple[str, str, float, float]]:
         model = preset(name)
         designs = np.vstack([model.nominal, _random_designs(model, N_TIMED)])
         expected = model.dte_arcsec(designs)
-        found = [simulate(model, design, angle=angle).dte_arcsec() for design in designs]
+        found = [simulate_drive(model, design, angle=angle).dte_arcsec() for design in designs]
         loose = name in RESONANT and angle == "free"
         allowed = AGREEMENT_RESONANT_FREE if loose else AGREEMENT
         yield name, f"steady state, angle {angle}", _largest(found, expected), allowed

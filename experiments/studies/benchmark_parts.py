@@ -16,8 +16,8 @@ from experiments.comparison.runs import robust_problem
 from experiments.studies.timing import Ratio, best_time
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.discrepancy.drive.analysis import analyse
-from pymoo_hdte.drive import harmonic_balance, preset, simulate
+from pymoo_hdte.discrepancy.drive.analysis import examine_drive
+from pymoo_hdte.drive import harmonic_balance, preset, simulate_drive
 from pymoo_hdte.virtual.hidden_forms import draw_effect
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
@@ -61,7 +61,7 @@ def _surrogate() -> Ratio:
     problem = robust_problem("calibrated")
     model, box = problem.model, problem.surrogate.box
     points = np.random.default_rng(3).uniform(box.lower, box.upper, (N_POINTS, len(box)))
-    integrated = best_time(lambda: simulate(model, points[0]), 2)
+    integrated = best_time(lambda: simulate_drive(model, points[0]), 2)
     return Ratio(
         f"one DTE of {model.name} (paper: 49,000)",
         "integration from rest",
@@ -79,7 +79,7 @@ def _harmonic_balance() -> Ratio:
     return Ratio(
         "steady state with a free input angle",
         "integration from rest",
-        best_time(lambda: simulate(model, model.nominal), 2),
+        best_time(lambda: simulate_drive(model, model.nominal), 2),
         "harmonic balance",
         best_time(lambda: harmonic_balance(coefficients), REPEATS),
         "",
@@ -116,7 +116,7 @@ def _discrepancy() -> Ratio:
     campaign = run_campaign(rig, BELIEVED, RIG, rng)
     recorded = time.perf_counter() - begin
     begin = time.perf_counter()
-    analyse(campaign)
+    examine_drive(campaign)
     return Ratio(
         f"a campaign of {len(campaign.running)} records with a hidden ripple",
         "integrating the rig once",

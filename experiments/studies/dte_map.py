@@ -17,7 +17,7 @@ from experiments.paper.models import model_sentences
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Picture, Result, Table, significant
 from pymoo_hdte.drive import PRESETS
-from pymoo_hdte.drive.speed_load_map import (
+from pymoo_hdte.drive.dte_map import (
     SpeedLoadMap,
     critical_speeds,
     neighbouring_resonances,

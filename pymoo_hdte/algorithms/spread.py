@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compiled import compiled
+from pymoo_hdte.compilation import compiled
 
 
 def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:

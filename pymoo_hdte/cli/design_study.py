@@ -16,7 +16,7 @@ from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.problems import OperatingCondition, RobustDTE
-from pymoo_hdte.problems.duty_cycle import duty_cycle_dte_arcsec
+from pymoo_hdte.problems.operating_conditions import duty_cycle_dte_arcsec
 from pymoo_hdte.surrogate import SobolIndices, sobol_indices
 
 POPULATION = 100
@@ -201,7 +201,7 @@ class DesignStudy:
         return dict(zip(("mean", "standard deviation"), gains, strict=True))
 
 
-def design_study(
+def run_design_study(
     model: DriveModel, preference: str, settings: Settings, callback: Callback | None = None
 ) -> DesignStudy:
     """Optimise a drive and choose a design.

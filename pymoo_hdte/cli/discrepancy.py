@@ -33,60 +33,35 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
 
 def _analysed(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
     """Analyse a campaign or a rig and write its report; return the verdict's document."""
+    from pymoo_hdte.discrepancy import analyse, check_report_folder
+
+    check_report_folder(out)
+    say("reading the records")
+    measured = _measured(folder, data)
+    say("looking for what is missing")
+    analysis = analyse(measured)
+    say("locating the misfit")
+    analysis.locate()
+    say("proving it on the records that were held out")
+    analysis.prove()
+    say("choosing the next test and writing the report")
+    return analysis.report(out)
+
+
+def _measured(folder: Path, data: Path | None) -> Any:
+    """Read a campaign of a drive, or a rig of any other mechanism."""
+    from pymoo_hdte.discrepancy import read_campaign, read_rig
     from pymoo_hdte.discrepancy.campaign.format import CAMPAIGN_FILE
     from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE
-    from pymoo_hdte.discrepancy.report.write import FOLDER
 
-    FOLDER.check(out)
     if (folder / RIG_FILE).is_file() or folder.suffix == ".toml":
-        return _of_mechanism(folder, out, data, say)
+        return read_rig(folder, data)
     if data is not None:
         raise InvalidInput("--data", str(data), f"none without a {RIG_FILE}")
     if folder.is_dir() and not (folder / CAMPAIGN_FILE).is_file():
         allowed = f"a folder with {CAMPAIGN_FILE}, of a harmonic drive, or {RIG_FILE}, of another"
         raise InvalidInput("CAMPAIGN", str(folder), allowed)
-    return _of_drive(folder, out, say)
-
-
-def _of_mechanism(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
-    from threadpoolctl import threadpool_limits
-
-    from pymoo_hdte.discrepancy.mechanism import investigate
-    from pymoo_hdte.discrepancy.mechanism.files import read_rig
-    from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
-
-    say("reading the records")
-    rig = read_rig(folder, data)
-    with threadpool_limits(limits=1):
-        say("looking for what is missing")
-        finding = investigate(rig.mechanism, rig.records, rig.cutoff, rig.effects)
-        say("proving it on the records that were held out")
-        return write_measured_report(rig.title, finding, out)
-
-
-def _of_drive(folder: Path, out: Path, say: Say) -> dict[str, Any]:
-    from threadpoolctl import threadpool_limits
-
-    from pymoo_hdte.cli.optimum_shift import optimum_shift
-    from pymoo_hdte.discrepancy import read_campaign
-    from pymoo_hdte.discrepancy.drive.analysis import analyse
-    from pymoo_hdte.discrepancy.drive.misfit.location import locate
-    from pymoo_hdte.discrepancy.drive.next_test import next_experiment
-    from pymoo_hdte.discrepancy.drive.proof import prove
-    from pymoo_hdte.discrepancy.report.write import write_report
-
-    say("reading the records")
-    campaign = read_campaign(folder)
-    say("looking for what is missing")
-    analysis = analyse(campaign)
-    with threadpool_limits(limits=1):
-        say("locating the misfit")
-        location = locate(analysis)
-        say("proving it on the records that were held out")
-        proof = prove(analysis)
-        say("choosing the next test and writing the report")
-        proposal = next_experiment(analysis)
-        return write_report(analysis, location, proof, proposal, optimum_shift, out)
+    return read_campaign(folder)
 
 
 def _summary(document: dict[str, Any], out: Path) -> str:

@@ -102,7 +102,7 @@ class Identification:
     errors: ErrorStatistics | None
 
 
-def identification(folder: Path) -> Identification:
+def identify_drive(folder: Path) -> Identification:
     """Read the `FILES` that are there and identify what they hold.
 
     Raises

@@ -17,7 +17,7 @@ from pymoo_hdte.drive.toml_text import sheet_toml
 from pymoo_hdte.identification import ErrorStatistics, hysteresis_width, lost_energy
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
 from pymoo_hdte.reports.folder import ReportFolder
-from pymoo_hdte.reports.page import number, page
+from pymoo_hdte.reports.html import number, page
 from pymoo_hdte.units import ARCSEC
 
 SHEET_FILE = "identified_sheet.toml"

@@ -50,7 +50,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from tqdm import tqdm
 
     from pymoo_hdte.checks import one_of, whole_number
-    from pymoo_hdte.cli.design_study import POPULATION, Progress, Settings, design_study
+    from pymoo_hdte.cli.design_study import POPULATION, Progress, Settings, run_design_study
     from pymoo_hdte.cli.optimum_report import FOLDER, write_optimum_report
     from pymoo_hdte.decision import PREFERENCES
     from pymoo_hdte.problems import load_conditions
@@ -71,7 +71,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     # Without a terminal, or if quiet, there is no bar.
     silent = True if options.quiet else None
     with tqdm(total=settings.evaluations, unit="design", leave=False, disable=silent) as bar:
-        study = design_study(model, preference, settings, Progress(bar))
+        study = run_design_study(model, preference, settings, Progress(bar))
     say("writing the report")
     document = write_optimum_report(study, notes, options.out)
     return outcome_of(document, options.out)

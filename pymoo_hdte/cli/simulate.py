@@ -34,7 +34,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.checks import real_number
-    from pymoo_hdte.cli.simulation import simulation
+    from pymoo_hdte.cli.simulation import simulate_condition
     from pymoo_hdte.cli.simulation_report import FOLDER, write_simulation_report
     from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
@@ -47,7 +47,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     if options.load is not None:
         load = real_number("--load", options.load, at_least=0.0, at_most=LARGEST_LOAD)
     say("integrating the equations of motion, and the steady state over all speeds")
-    found = simulation(model.at(speed, load))
+    found = simulate_condition(model.at(speed, load))
     return outcome_of(write_simulation_report(found, notes, options.out), options.out)
 
 

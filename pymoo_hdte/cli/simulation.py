@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.drive import DriveModel, Run, simulate
-from pymoo_hdte.drive.speed_load_map import (
+from pymoo_hdte.drive import DriveModel, Run, simulate_drive
+from pymoo_hdte.drive.dte_map import (
     SpeedLoadMap,
     TorsionalMode,
     critical_speeds,
@@ -67,7 +67,7 @@ class Simulation:
         return self.run.dte_arcsec() / self.steady - 1.0
 
 
-def simulation(model: DriveModel) -> Simulation:
+def simulate_condition(model: DriveModel) -> Simulation:
     """Simulate the nominal design of a model at the condition of its data sheet.
 
     Raises
@@ -83,7 +83,7 @@ def simulation(model: DriveModel) -> Simulation:
     speeds = np.linspace(0.0, fastest, SPEEDS + 1)[1:]
     return Simulation(
         model=model,
-        run=simulate(model, model.nominal, settle=max(SETTLE, TURNS_TO_SETTLE * turn)),
+        run=simulate_drive(model, model.nominal, settle=max(SETTLE, TURNS_TO_SETTLE * turn)),
         steady=float(spectrum.peak_to_peak(model.sheet.ratio)[0] / ARCSEC),
         lines={
             order: float(amplitude[0] / ARCSEC)

@@ -1,24 +1,14 @@
-"""Where simulation and measurement disagree: campaigns, their records and order lines."""
+"""Where model and measurement disagree: what is missing, proved on records that were not fitted.
 
-from pymoo_hdte.discrepancy.campaign.campaign import (
-    Believed,
-    Campaign,
-    Rig,
-    RunningRecord,
-    TorsionRecord,
-)
-from pymoo_hdte.discrepancy.campaign.files import read_campaign, write_campaign
-from pymoo_hdte.discrepancy.campaign.order_lines import OrderLines, order_lines, residual_spectrum
+>>> from pymoo_hdte.discrepancy import analyse, read_campaign
+>>> analysis = analyse(read_campaign("campaign"))
+>>> print(analysis.verdict.status, analysis.next_experiment().description)
+>>> analysis.report("report")
 
-__all__ = [
-    "Believed",
-    "Campaign",
-    "OrderLines",
-    "Rig",
-    "RunningRecord",
-    "TorsionRecord",
-    "order_lines",
-    "read_campaign",
-    "residual_spectrum",
-    "write_campaign",
-]
+A campaign is of a harmonic drive (`read_campaign`); any other machine is a mechanism with its
+records (`read_rig`, `MeasuredMechanism`).
+"""
+
+from pymoo_hdte.lazy import lazy_names
+
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

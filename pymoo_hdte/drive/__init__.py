@@ -14,21 +14,20 @@ from pymoo_hdte.drive.model import (
 )
 from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
 from pymoo_hdte.drive.sensor_effects import Eccentricity, ThermalDrift
-from pymoo_hdte.drive.simulation import Run, simulate
+from pymoo_hdte.drive.simulation import Run, simulate_drive
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.harmonic_balance import harmonic_balance
-from pymoo_hdte.drive.solve.hill import steady_state, transfer_function
+from pymoo_hdte.drive.solve.free_angle import harmonic_balance
+from pymoo_hdte.drive.solve.hill import hill_steady_state, transfer_function
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.solve.quasi_static import mean_torsion, quasi_static_torsion
 from pymoo_hdte.drive.solve.stability import UnstableDrive, floquet_multipliers
-from pymoo_hdte.drive.solve.steady_motion import Balance, SpeedLoop
+from pymoo_hdte.drive.solve.steady_motion import SpeedLoop, SteadyMotion
 from pymoo_hdte.drive.static_error import StaticErrorSample, class_amplitudes, sample_static_error
 
 __all__ = [
     "PARAMETERS",
     "PARAMETER_UNITS",
     "PRESETS",
-    "Balance",
     "Coefficients",
     "DampingReference",
     "DataSheet",
@@ -45,11 +44,13 @@ __all__ = [
     "Run",
     "SpeedLoop",
     "StaticErrorSample",
+    "SteadyMotion",
     "ThermalDrift",
     "UnstableDrive",
     "class_amplitudes",
     "floquet_multipliers",
     "harmonic_balance",
+    "hill_steady_state",
     "hs_20_100",
     "load_datasheet",
     "load_model",
@@ -59,7 +60,6 @@ __all__ = [
     "preset",
     "quasi_static_torsion",
     "sample_static_error",
-    "simulate",
-    "steady_state",
+    "simulate_drive",
     "transfer_function",
 ]

@@ -18,7 +18,7 @@ from pymoo_hdte.drive.effects import Effect, effect_from_fields, place_of
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.port_effects import with_unit
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.hill import steady_state
+from pymoo_hdte.drive.solve.hill import hill_steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.io.archive import FileFormat
 from pymoo_hdte.io.fields import Fields, read_toml
@@ -151,7 +151,7 @@ class DriveModel:
         ArithmeticError
             If the harmonics of a deeply varying stiffness do not die out.
         """
-        return steady_state(self.coefficients(parameters))
+        return hill_steady_state(self.coefficients(parameters))
 
     def dte_arcsec(self, parameters: ArrayLike) -> NDArray[np.float64]:
         """Return the DTE of n designs, shape (n,), in arcsec (Section 4).

@@ -63,7 +63,7 @@ class Run:
         return self.peak_to_peak() / ARCSEC
 
 
-def simulate(
+def simulate_drive(
     model: DriveModel,
     parameters: ArrayLike,
     *,

@@ -5,7 +5,7 @@ files a user can bring; `pymoo_hdte.virtual.bench` makes records with known trut
 """
 
 from pymoo_hdte.identification.damping import NoLoadRun, bearing_damping, mesh_damping
-from pymoo_hdte.identification.error_statistics import (
+from pymoo_hdte.identification.error_samples import (
     ErrorStatistics,
     detectable_correlation,
     error_statistics,

@@ -9,7 +9,7 @@ from scipy.stats import truncnorm
 
 from pymoo_hdte.checks import whole_number
 from pymoo_hdte.drive.static_error import TRUNCATION
-from pymoo_hdte.identification.error_statistics import EMPIRICAL, LOGNORMAL, ErrorStatistics
+from pymoo_hdte.identification.error_samples import EMPIRICAL, LOGNORMAL, ErrorStatistics
 from pymoo_hdte.identification.prototypes import NormalSample
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.compiled import compiled
+from pymoo_hdte.compilation import compiled
 from pymoo_hdte.laws.law import Aperiodic, PortState, Response, Values
 
 SPRINGS = 4

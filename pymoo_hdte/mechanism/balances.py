@@ -17,7 +17,7 @@ from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
 from pymoo_hdte.mechanism.motion import finer_than, motion_of, smooth, smoothed_noise
-from pymoo_hdte.mechanism.port_motion import PortMotion, law_force, port_motion
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force, motion_at_port
 from pymoo_hdte.mechanism.records import Record
 from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, working_rows
 
@@ -38,7 +38,7 @@ def quantity_names(mechanism: Mechanism) -> tuple[str, ...]:
     return (*mechanism.quantities, *zeros)
 
 
-class Balance:
+class ForceBalance:
     """Force balances of one record.
 
     Parameters
@@ -160,7 +160,7 @@ class Balance:
     def _port_motions(
         self, position: dict[str, Values], speed: dict[str, Values]
     ) -> dict[str, PortMotion]:
-        return {port.name: port_motion(port, position, speed) for port in self.mechanism.ports}
+        return {port.name: motion_at_port(port, position, speed) for port in self.mechanism.ports}
 
     def _between(self, stride: int) -> tuple[dict[str, Values], dict[str, Values]]:
         """Return positions and speeds at ``_finer`` moments around each of the working rate."""

@@ -11,7 +11,7 @@ from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.drive.model import PARAMETERS, DriveModel
 from pymoo_hdte.drive.port_effects import LawAtPort
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.mechanism.mechanism import Believed, ErrorLine, Input, LawAt, Mechanism, Port
+from pymoo_hdte.mechanism.mechanism import BelievedValue, ErrorLine, Input, LawAt, Mechanism, Port
 
 
 def drive_mechanism(
@@ -53,13 +53,13 @@ def drive_mechanism(
     bearings = float(coefficients.input_damping[0]), float(coefficients.output_damping)
     mechanism = Mechanism(
         {
-            "input_angle": Believed(float(coefficients.input_inertia[0])),
-            "output_angle": Believed(float(coefficients.output_inertia)),
+            "input_angle": BelievedValue(float(coefficients.input_inertia[0])),
+            "output_angle": BelievedValue(float(coefficients.output_inertia)),
         },
         (
-            Port("input", {"input_angle": 1.0}, damping=Believed(bearings[0])),
-            Port("output", {"output_angle": 1.0}, damping=Believed(bearings[1])),
-            Port("mesh", mesh, Believed(stiffness), Believed(damping), error=error),
+            Port("input", {"input_angle": 1.0}, damping=BelievedValue(bearings[0])),
+            Port("output", {"output_angle": 1.0}, damping=BelievedValue(bearings[1])),
+            Port("mesh", mesh, BelievedValue(stiffness), BelievedValue(damping), error=error),
         ),
         (
             Input("motor_torque", {"input_angle": 1.0}),

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compiled import compiled
+from pymoo_hdte.compilation import compiled
 from pymoo_hdte.mechanism.acting_forces import Command, PortForce
 
 Values = NDArray[np.float64]

@@ -16,7 +16,7 @@ from pymoo_hdte.laws.law import Law
 
 
 @dataclass(frozen=True)
-class Believed:
+class BelievedValue:
     """A value that is believed within a relative tolerance, which a fit must not leave.
 
     Attributes
@@ -40,7 +40,7 @@ class Believed:
         real_number("believed.tolerance", self.tolerance, at_least=0.0, at_most=1.0)
 
 
-NOTHING = Believed(0.0)
+NOTHING = BelievedValue(0.0)
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Port:
     name : str
     motion : mapping of str to float
         Share of each coordinate in the motion d of the port, by name.
-    stiffness, damping : Believed
+    stiffness, damping : BelievedValue
         Of the linear spring and damper that stand there, N/m and N.s/m or N.m/rad and N.m.s/rad.
     read : bool
         True for a force sensor: what acts at the port is measured, as the channel of this name,
@@ -97,8 +97,8 @@ class Port:
 
     name: str
     motion: Mapping[str, float]
-    stiffness: Believed = NOTHING
-    damping: Believed = NOTHING
+    stiffness: BelievedValue = NOTHING
+    damping: BelievedValue = NOTHING
     read: bool = False
     error: tuple[ErrorLine, ...] = ()
 
@@ -113,13 +113,13 @@ class Input:
         Its channel.
     acts : mapping of str to float
         Share with which it acts on each coordinate, by name.
-    gain : Believed
+    gain : BelievedValue
         Force, N, or torque, N.m, per unit of the signal.
     """
 
     name: str
     acts: Mapping[str, float]
-    gain: Believed = field(default=Believed(1.0))
+    gain: BelievedValue = field(default=BelievedValue(1.0))
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class Mechanism:
 
     Attributes
     ----------
-    inertias : mapping of str to Believed
+    inertias : mapping of str to BelievedValue
         Mass, kg, or inertia, kg.m2, by coordinate, which is measured where a record has a channel
         of its name.
     ports : sequence of Port
@@ -173,7 +173,7 @@ class Mechanism:
         port or input that touches no coordinate.
     """
 
-    inertias: Mapping[str, Believed]
+    inertias: Mapping[str, BelievedValue]
     ports: Sequence[Port] = ()
     inputs: Sequence[Input] = ()
     loops: Sequence[Loop] = ()
@@ -224,7 +224,7 @@ class Mechanism:
         return self.ports[self.port_names.index(one_of("port", name, self.port_names))]
 
     @property
-    def quantities(self) -> dict[str, Believed]:
+    def quantities(self) -> dict[str, BelievedValue]:
         """What is believed, SI, by the name under which a fit knows it; what is 0 is left out."""
         found = {f"inertia of {name}": one for name, one in self.inertias.items()}
         for port in self.ports:
@@ -252,8 +252,8 @@ class Mechanism:
             For a value that is not finite or negative, or an inertia that is not above 0.
         """
 
-        def known(name: str, before: Believed) -> Believed:
-            return Believed(float(values[name])) if name in values else before
+        def known(name: str, before: BelievedValue) -> BelievedValue:
+            return BelievedValue(float(values[name])) if name in values else before
 
         inertias = {name: known(f"inertia of {name}", one) for name, one in self.inertias.items()}
         ports = [

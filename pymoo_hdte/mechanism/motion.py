@@ -40,7 +40,7 @@ _STENCIL = 7
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class SmoothedMotion:
     """Smoothed position with its derivatives, shape (n,) each; SI."""
 
     position: Values
@@ -147,10 +147,10 @@ def smoothed_noise(noise: float, step: float, cutoff: float) -> tuple[float, flo
     return noise * share**0.5, noise * (share / 3.0) ** 0.5 * 2.0 * np.pi * corner
 
 
-def motion_of(position: Values, step: float, cutoff: float) -> Motion:
+def motion_of(position: Values, step: float, cutoff: float) -> SmoothedMotion:
     """Return the motion of a measured position, shape (n,), up to the cutoff in Hz."""
     smoothed = smooth(position, step, cutoff)
     speed, acceleration = (
         savgol_filter(smoothed, _STENCIL, _STENCIL - 1, deriv=order, delta=step) for order in (1, 2)
     )
-    return Motion(smoothed, speed, acceleration)
+    return SmoothedMotion(smoothed, speed, acceleration)

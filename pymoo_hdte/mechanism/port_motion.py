@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.law import Law, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Port
-from pymoo_hdte.mechanism.motion import Motion
+from pymoo_hdte.mechanism.motion import SmoothedMotion
 
 Values = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ class PortMotion:
     speed: Values
 
 
-def port_motion(port: Port, position: dict[str, Values], speed: dict[str, Values]) -> PortMotion:
+def motion_at_port(port: Port, position: dict[str, Values], speed: dict[str, Values]) -> PortMotion:
     """Return the motion at a port, with its kinematic error, of coordinates of shape (n,)."""
     here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
     rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
@@ -34,7 +34,7 @@ def port_motion(port: Port, position: dict[str, Values], speed: dict[str, Values
     return PortMotion(here, rate)
 
 
-def law_force(law: Law, motion: PortMotion | Motion, stiffness: float) -> Values:
+def law_force(law: Law, motion: PortMotion | SmoothedMotion, stiffness: float) -> Values:
     """Return the force of a law against a motion in time, shape (n,).
 
     ``stiffness`` is that of its port, N/m or N.m/rad.

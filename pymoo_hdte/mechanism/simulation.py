@@ -26,7 +26,7 @@ _FARTHEST = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class Simulation:
+class SimulatedCourse:
     """Course of a mechanism at the samples of a record; SI, arrays of shape (n,).
 
     Attributes
@@ -47,7 +47,7 @@ class Simulation:
     forces: dict[str, Values]
 
 
-def simulate(
+def simulate_mechanism(
     mechanism: Mechanism,
     record: Record,
     effects: Sequence[LawAt] = (),
@@ -55,7 +55,7 @@ def simulate(
     start: Mapping[str, ArrayLike] | None = None,
     closed_loop: bool | None = None,
     rtol: float = 1e-6,
-) -> Simulation:
+) -> SimulatedCourse:
     """Integrate a mechanism over the time of a record.
 
     Parameters
@@ -113,7 +113,7 @@ def simulate(
     position, speed = (
         dict(zip(mechanism.coordinates, rows, strict=True)) for rows in path.transpose(1, 2, 0)
     )
-    return Simulation(record.time, position, speed, inputs, forces)
+    return SimulatedCourse(record.time, position, speed, inputs, forces)
 
 
 def _closed_loops(mechanism: Mechanism, record: Record, closed: bool | None) -> list[Loop]:

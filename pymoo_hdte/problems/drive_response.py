@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
 from pymoo_hdte.drive import PARAMETER_UNITS, PARAMETERS, PRESETS, DriveModel, preset
-from pymoo_hdte.problems.duty_cycle import (
+from pymoo_hdte.problems.operating_conditions import (
     OperatingCondition,
     duty_cycle,
     duty_cycle_dte_arcsec,

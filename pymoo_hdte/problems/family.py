@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from pymoo_hdte.problems.duty_cycle import hs_20_100_duty_cycle
+from pymoo_hdte.problems.operating_conditions import hs_20_100_duty_cycle
 from pymoo_hdte.problems.robust_dte import RobustDTE
 from pymoo_hdte.problems.robust_dte_tolerance import RobustDTETolerance
 

@@ -17,7 +17,7 @@ from pymoo_hdte.problems.drive_response import (
     UNITS,
     DriveResponse,
 )
-from pymoo_hdte.problems.duty_cycle import OperatingCondition
+from pymoo_hdte.problems.operating_conditions import OperatingCondition
 from pymoo_hdte.problems.reference import StoredFront
 from pymoo_hdte.problems.robust import RobustProblem
 from pymoo_hdte.surrogate import (

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pymoo_hdte.checks import one_of, real_number
-from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.virtual import listed_forms, unlisted_forms
 
-_Draw = Callable[[Believed, np.random.Generator, float], listed_forms.Drawn]
+_Draw = Callable[[BelievedDrive, np.random.Generator, float], listed_forms.Drawn]
 
 
 def _by_name(*draws: _Draw) -> dict[str, _Draw]:
@@ -73,7 +73,7 @@ class HiddenEffect:
 
 
 def draw_effect(
-    name: str, believed: Believed, rng: np.random.Generator, size: float = 1.0
+    name: str, believed: BelievedDrive, rng: np.random.Generator, size: float = 1.0
 ) -> HiddenEffect:
     """Draw one effect of `HIDDEN_FORMS`; ``size`` scales its strength, 1 being typical.
 

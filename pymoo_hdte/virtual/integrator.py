@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compiled import compiled
+from pymoo_hdte.compilation import compiled
 from pymoo_hdte.virtual.laws import (
     Mesh,
     Side,

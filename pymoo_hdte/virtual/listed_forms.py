@@ -12,7 +12,7 @@ import math
 import numpy as np
 from scipy.optimize import brentq
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 Drawn = tuple[str, dict[str, float | tuple[float, ...]]]
@@ -30,11 +30,11 @@ def uniform_phase(rng: np.random.Generator) -> float:
     return rng.uniform(0.0, 2.0 * math.pi)
 
 
-def _windup(believed: Believed) -> float:
+def _windup(believed: BelievedDrive) -> float:
     return RATED_TORQUE / believed.stiffness
 
 
-def hardening_stiffness(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def hardening_stiffness(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a sinh, or a corner beyond which the mesh is stiffer; 4 to 12 % more torque at rated."""
     windup, share = _windup(believed), size * rng.uniform(0.04, 0.12)
     if rng.random() < 0.5:
@@ -48,7 +48,7 @@ def hardening_stiffness(believed: Believed, rng: np.random.Generator, size: floa
     }
 
 
-def soft_windup(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def soft_windup(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw three pieces K1 < K2 < K3 as in catalogues; the third hardly stiffer."""
     windup, corner = _windup(believed), rng.uniform(0.1, 0.35)
     return "mesh", {
@@ -60,7 +60,7 @@ def soft_windup(believed: Believed, rng: np.random.Generator, size: float) -> Dr
     }
 
 
-def hysteresis(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def hysteresis(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw Maxwell slip: 4 to 8 elements of equal torque, 0.5 to 2.5 N.m together."""
     count = int(rng.integers(4, 9))
     limit = size * rng.uniform(0.5, 2.5) / count
@@ -69,13 +69,13 @@ def hysteresis(believed: Believed, rng: np.random.Generator, size: float) -> Dra
     return "mesh", {"slip_stiffness": stiffness, "slip_limit": (limit,) * count}
 
 
-def backlash(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def backlash(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a rounded dead zone of 2 to 8 arcsec half width."""
     half_width = size * rng.uniform(2.0, 8.0) * ARCSEC
     return "mesh", {"clearance": half_width, "clearance_rounding": 0.15 * half_width}
 
 
-def clearance_variation(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def clearance_variation(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a rounded dead zone whose width varies once or twice in an input turn.
 
     Both flanks move, or one does. A zone that moves as a whole is not drawn: wherever the load
@@ -90,14 +90,14 @@ def clearance_variation(believed: Believed, rng: np.random.Generator, size: floa
     return port, parameters | flanks | {"clearance_order": order, "clearance_phase": phase}
 
 
-def coulomb_friction(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def coulomb_friction(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw dry friction of one shaft; 0.008 to 0.03 N.m at the input, 0.5 to 2.5 at the output."""
     port, low, high = [("input", 0.008, 0.03), ("output", 0.5, 2.5)][rng.integers(2)]
     level = size * rng.uniform(low, high)
     return port, {"coulomb": level, "rounding_speed": ROUNDING_SPEED[port]}
 
 
-def stribeck_friction(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def stribeck_friction(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw dry friction of the input that falls exponentially with speed."""
     return "input", {
         "coulomb": size * rng.uniform(0.005, 0.02),
@@ -107,7 +107,9 @@ def stribeck_friction(believed: Believed, rng: np.random.Generator, size: float)
     }
 
 
-def position_dependent_friction(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def position_dependent_friction(
+    believed: BelievedDrive, rng: np.random.Generator, size: float
+) -> Drawn:
     """Draw friction that varies once or twice in an input turn, or once in an output turn.
 
     Its mean keeps it from turning negative: friction that drives would shake the rig by itself.
@@ -128,14 +130,16 @@ def position_dependent_friction(believed: Believed, rng: np.random.Generator, si
     }
 
 
-def nonlinear_drag(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def nonlinear_drag(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw drag of the input with power 1.7 or 3; 0.01 to 0.04 N.m at rated speed."""
     exponent = float(rng.choice([1.7, 3.0]))
     torque = size * rng.uniform(0.01, 0.04)
     return "input", {"drag": torque / RATED_SPEED**exponent, "drag_exponent": exponent}
 
 
-def mesh_stiffness_variation(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def mesh_stiffness_variation(
+    believed: BelievedDrive, rng: np.random.Generator, size: float
+) -> Drawn:
     """Draw stiffness variation twice in an input turn, 1 to 5 %, its cosine clipped or not."""
     return "mesh", {
         "depth": min(size * rng.uniform(0.01, 0.05), 0.5),
@@ -145,7 +149,7 @@ def mesh_stiffness_variation(believed: Believed, rng: np.random.Generator, size:
     }
 
 
-def kinematic_error(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def kinematic_error(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a further line of 1 to 4 arcsec: order 3, 4, 5 or a whole order of the output."""
     fast = rng.random() < 0.5
     order = float(rng.integers(3, 6)) if fast else float(rng.integers(5, 61)) / believed.ratio
@@ -157,12 +161,12 @@ def kinematic_error(believed: Believed, rng: np.random.Generator, size: float) -
     }
 
 
-def kinematic_reaction(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def kinematic_reaction(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Return mesh torque times d theta_s / d theta_in on the input; ``size`` 1 is the physics."""
     return "input", {"reaction": size}
 
 
-def eccentricity(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def eccentricity(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw an output encoder off centre by 2 to 8 arcsec."""
     return "sensor", {
         "eccentricity": size * rng.uniform(2.0, 8.0) * ARCSEC,
@@ -171,7 +175,7 @@ def eccentricity(believed: Believed, rng: np.random.Generator, size: float) -> D
     }
 
 
-def torque_ripple(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def torque_ripple(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a motor torque of 0.005 to 0.025 N.m at a whole order from 2 to 8."""
     return "input", {
         "ripple": size * rng.uniform(0.005, 0.025),
@@ -181,12 +185,12 @@ def torque_ripple(believed: Believed, rng: np.random.Generator, size: float) -> 
     }
 
 
-def load_inertia(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def load_inertia(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw an inertia of 0.02 to 0.08 kg.m2 beyond the believed one."""
     return "output", {"extra_inertia": size * rng.uniform(0.02, 0.08)}
 
 
-def damping_reference(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def damping_reference(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw mesh damping 3 to 10 times the believed one, 5 % more at rated speed."""
     return "mesh", {
         "damping_factor": 1.0 + size * rng.uniform(2.0, 9.0),
@@ -194,7 +198,7 @@ def damping_reference(believed: Believed, rng: np.random.Generator, size: float)
     }
 
 
-def thermal_drift(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def thermal_drift(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a reading of the output angle that drifts to 2 to 10 arcsec, with two time constants."""
     return "sensor", {
         "drift": size * rng.uniform(2.0, 10.0) * ARCSEC * float(rng.choice([-1.0, 1.0])),

@@ -14,7 +14,7 @@ import numpy as np
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.discrepancy.campaign.campaign import (
-    Believed,
+    BelievedDrive,
     Campaign,
     Rig,
     RunningRecord,
@@ -68,7 +68,7 @@ class TrueRig:
 
     Attributes
     ----------
-    drive : Believed
+    drive : BelievedDrive
         True values in the place of the believed ones.
     error_phases : tuple of float
         phi of a sin(o theta_in + phi), one for each error order, rad.
@@ -80,7 +80,7 @@ class TrueRig:
         If the phases do not match the orders, or two effects set the same field differently.
     """
 
-    drive: Believed
+    drive: BelievedDrive
     error_phases: tuple[float, ...]
     effects: tuple[HiddenEffect, ...] = ()
 
@@ -138,7 +138,7 @@ class TrueRig:
 
 
 def draw_rig(
-    believed: Believed, effects: tuple[HiddenEffect, ...], rng: np.random.Generator
+    believed: BelievedDrive, effects: tuple[HiddenEffect, ...], rng: np.random.Generator
 ) -> TrueRig:
     """Draw a rig whose parameters differ from the believed ones uniformly within the tolerances.
 
@@ -164,7 +164,7 @@ def draw_rig(
 
 def run_campaign(
     true_rig: TrueRig,
-    believed: Believed,
+    believed: BelievedDrive,
     rig: Rig,
     rng: np.random.Generator,
     conditions: tuple[Condition, ...] = DEFAULT_CONDITIONS,
@@ -175,7 +175,7 @@ def run_campaign(
     Parameters
     ----------
     true_rig : TrueRig
-    believed : Believed
+    believed : BelievedDrive
         What the campaign says about the drive.
     rig : Rig
         Its speed loop needs an integral part, or the mean speed would be free.

@@ -9,12 +9,12 @@ import math
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.units import ARCSEC
 from pymoo_hdte.virtual.listed_forms import RATED_SPEED, ROUNDING_SPEED, Drawn, uniform_phase
 
 
-def output_vibration(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def output_vibration(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a torque of 0.1 to 0.6 N.m on the output at 47 to 120 Hz, whatever the speed."""
     return "output", {
         "vibration": size * rng.uniform(0.1, 0.6),
@@ -22,7 +22,7 @@ def output_vibration(believed: Believed, rng: np.random.Generator, size: float) 
     }
 
 
-def compliant_sensor(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def compliant_sensor(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a torque sensor of 3e4 to 1e5 N.m/rad between drive and load: a third inertia."""
     return "output", {
         "sensor_stiffness": rng.uniform(3e4, 1e5) / size,
@@ -30,7 +30,7 @@ def compliant_sensor(believed: Believed, rng: np.random.Generator, size: float) 
     }
 
 
-def load_ripple(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def load_ripple(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw a load that varies by 1 to 5 % at a whole order of the output."""
     return "output", {
         "ripple": size * rng.uniform(0.01, 0.05),
@@ -40,12 +40,12 @@ def load_ripple(believed: Believed, rng: np.random.Generator, size: float) -> Dr
     }
 
 
-def speed_stiffening(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def speed_stiffening(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw stiffness that grows with speed, 5 to 15 % at rated."""
     return "mesh", {"stiffening": size * rng.uniform(0.05, 0.15) / RATED_SPEED}
 
 
-def encoder_interpolation(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def encoder_interpolation(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw an interpolation error of 1 to 4 arcsec with 20 to 60 periods in an output turn."""
     return "sensor", {
         "interpolation": size * rng.uniform(1.0, 4.0) * ARCSEC,
@@ -54,7 +54,7 @@ def encoder_interpolation(believed: Believed, rng: np.random.Generator, size: fl
     }
 
 
-def friction_bursts(believed: Believed, rng: np.random.Generator, size: float) -> Drawn:
+def friction_bursts(believed: BelievedDrive, rng: np.random.Generator, size: float) -> Drawn:
     """Draw friction of the input that comes and goes within a tenth of a second."""
     return "input", {
         "burst": size * rng.uniform(0.01, 0.04),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from pymoo_hdte.drive import DriveModel, low_pass, measured_dte, simulate
+from pymoo_hdte.drive import DriveModel, low_pass, measured_dte, simulate_drive
 from pymoo_hdte.drive.measurement import SAMPLING_RATE
 from pymoo_hdte.units import ARCSEC
 
@@ -41,7 +41,7 @@ class Record:
 
 def record(model: DriveModel, parameters: NDArray[np.float64]) -> Record:
     """Run a prototype, parameters (5,) in SI units, from rest and record one output turn."""
-    run = simulate(model, parameters)
+    run = simulate_drive(model, parameters)
     times = np.arange(run.time[0], run.time[-1], 1.0 / SAMPLING_RATE)
     error = CubicSpline(run.time, run.transmission_error)(times)
     angle = CubicSpline(run.time, run.input_angle)(times)

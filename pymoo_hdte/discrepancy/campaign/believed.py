@@ -9,7 +9,7 @@ from pymoo_hdte.units import ARCSEC
 
 
 @dataclass(frozen=True)
-class Believed:
+class BelievedDrive:
     """Believed parameters of the drive and its load in Eq. (9), with their tolerances.
 
     Attributes

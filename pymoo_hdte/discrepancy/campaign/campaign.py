@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.plausibility import (
     check_believed,
     check_noise,
@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.campaign.plausibility import (
 )
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
 
-__all__ = ["Believed", "Campaign", "Rig", "RunningRecord", "TorsionRecord"]
+__all__ = ["BelievedDrive", "Campaign", "Rig", "RunningRecord", "TorsionRecord"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Campaign:
     ----------
     title, drive : str
         One line of printable text each.
-    believed : Believed
+    believed : BelievedDrive
         Drive and load, as they are thought to be.
     rig : Rig
         Speed loop and sensors.
@@ -47,7 +47,7 @@ class Campaign:
 
     title: str
     drive: str
-    believed: Believed
+    believed: BelievedDrive
     rig: Rig
     running: tuple[RunningRecord, ...]
     torsion: tuple[TorsionRecord, ...]
@@ -119,7 +119,7 @@ RATED_STIFFNESS = 2.583e4
 """N.m/rad of its mesh."""
 
 
-def torque_scale(loads: Sequence[float], believed: Believed) -> float:
+def torque_scale(loads: Sequence[float], believed: BelievedDrive) -> float:
     """Return the size of a drive in torque: 1 for rigs near `RATED_TORQUE`, a power of two.
 
     The larger of what was loaded and what the stiffness lets expect, since the friction of a drive
@@ -130,7 +130,7 @@ def torque_scale(loads: Sequence[float], believed: Believed) -> float:
     ----------
     loads : sequence of float
         Of the running records, N.m.
-    believed : Believed
+    believed : BelievedDrive
         For the stiffness.
     """
     largest = max(abs(load) for load in loads)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.columns import line_of_row, read_columns, write_columns
 from pymoo_hdte.discrepancy.campaign.format import (
@@ -29,7 +29,7 @@ from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, Torsio
 from pymoo_hdte.drive.toml_text import toml_string
 from pymoo_hdte.io.fields import Fields, toml_with_lines
 
-Checked = TypeVar("Checked", Believed, Rig, RunningRecord | TorsionRecord)
+Checked = TypeVar("Checked", BelievedDrive, Rig, RunningRecord | TorsionRecord)
 
 
 def read_campaign(folder: str | Path) -> Campaign:
@@ -57,7 +57,9 @@ def read_campaign(folder: str | Path) -> Campaign:
     folder = Path(folder)
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
         title, drive = top.text("title"), top.text("drive")
-        believed = _build(Believed, BELIEVED, top.table("believed"), f"{CAMPAIGN_FILE}.believed")
+        believed = _build(
+            BelievedDrive, BELIEVED, top.table("believed"), f"{CAMPAIGN_FILE}.believed"
+        )
         rig = _rig(top.table("rig"))
         entries = top.tables("record")
         top.finish()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
 from pymoo_hdte.units import ARCSEC
 
@@ -29,7 +29,7 @@ NOISE_FACTOR = 30.0
 """Largest ratio of the noise that is stated to what the rows of the records show."""
 
 
-def check_believed(believed: Believed) -> None:
+def check_believed(believed: BelievedDrive) -> None:
     """Refuse beliefs that no drive can have.
 
     Raises
@@ -67,7 +67,7 @@ def check_believed(believed: Believed) -> None:
 def check_noise(
     running: Sequence[RunningRecord],
     torsion: Sequence[TorsionRecord],
-    believed: Believed,
+    believed: BelievedDrive,
     rig: Rig,
 ) -> None:
     """Refuse a stated noise so large that no record shows it: it would hide every misfit.
@@ -106,13 +106,15 @@ def _scatters(channels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
         return np.array([np.sqrt(np.mean(np.diff(rows, 3) ** 2) / 20.0) for rows in channels])
 
 
-def check_running(record: RunningRecord, believed: Believed, rig: Rig, largest_load: float) -> None:
+def check_running(
+    record: RunningRecord, believed: BelievedDrive, rig: Rig, largest_load: float
+) -> None:
     """Refuse a running record whose channels contradict its condition or the drive.
 
     Parameters
     ----------
     record : RunningRecord
-    believed : Believed
+    believed : BelievedDrive
     rig : Rig
     largest_load : float
         Of the campaign, N.m: the scale of torques where a record has no load.
@@ -135,7 +137,7 @@ def check_running(record: RunningRecord, believed: Believed, rig: Rig, largest_l
         _check_torques(record, believed.ratio, rig, largest_load)
 
 
-def check_torsion(record: TorsionRecord, believed: Believed) -> None:
+def check_torsion(record: TorsionRecord, believed: BelievedDrive) -> None:
     """Refuse a torsion record whose slope is not that of the drive within a factor of five.
 
     Raises

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,9 +13,9 @@ from threadpoolctl import threadpool_limits
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.order_lines import HIGHEST_ORDER
+from pymoo_hdte.discrepancy.campaign.line_fit import HIGHEST_ORDER
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
-from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.candidates import OfDrives, drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
@@ -41,7 +42,7 @@ LEAST_LOAD = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis:
+class DriveFinding:
     """A campaign and what the workflow finds in it.
 
     Attributes
@@ -94,10 +95,16 @@ def expected_orders(campaign: Campaign) -> list[float]:
 
 
 @threadpool_limits.wrap(limits=1)
-def analyse(campaign: Campaign) -> Analysis:
+def examine_drive(campaign: Campaign, effects: Sequence[OfDrives] = ()) -> DriveFinding:
     """Return the verdict on a campaign.
 
     In one thread: the matrices are small, and threads that wait for each other cost a multiple.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    effects : sequence of OfDrives
+        Effects that may be missing beside those of the library.
 
     Raises
     ------
@@ -117,14 +124,14 @@ def analyse(campaign: Campaign) -> Analysis:
         features = measure(campaign, campaign.train, orders)
     data = training_data(campaign, features)
     base = fit(data)
-    listed = _candidates(data, base)
+    listed = _candidates(data, base, effects)
     if leading_sweep_effect(data, base, listed) in CLEARANCES:
         data = _loaded(data)
         base = fit(data)
-        listed = _candidates(data, base)
+        listed = _candidates(data, base, effects)
     verdict = judge(data, base, listed)
     data, verdict = _with_noise_of(verdict, data, listed)
-    return Analysis(campaign, data, verdict, tuple(unexpected))
+    return DriveFinding(campaign, data, verdict, tuple(unexpected))
 
 
 def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
@@ -146,11 +153,13 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
     return (data, verdict) if again.chosen is None else (renewed, again)
 
 
-def _candidates(data: Data, base: Fit) -> list[Candidate]:
+def _candidates(data: Data, base: Fit, effects: Sequence[OfDrives]) -> list[Candidate]:
     features = data.features
     seen = _strong_lines(features, base)
     campaign = data.campaign
-    return candidates(campaign.believed, features.orders.tolist(), seen, campaign.torque_scale)
+    return drive_candidates(
+        campaign.believed, features.orders.tolist(), seen, campaign.torque_scale, effects
+    )
 
 
 def _loaded(data: Data) -> Data:

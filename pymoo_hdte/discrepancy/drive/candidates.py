@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
+from typing import Protocol
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.drive.friction_candidates import friction_candidates
 from pymoo_hdte.discrepancy.drive.line_candidates import line_candidates
 from pymoo_hdte.discrepancy.drive.mesh_candidates import mesh_candidates
@@ -17,26 +19,48 @@ _OF_THEIR_OWN = ("load_inertia", "damping")
 """Base parameters for which an effect of another name stands in the library."""
 
 
-def candidates(
-    believed: Believed, orders: Sequence[float], seen: Sequence[float], torque_scale: float
+class OfDrives(Protocol):
+    """An effect that may be missing in a drive."""
+
+    def drive_candidates(
+        self,
+        believed: BelievedDrive,
+        orders: Sequence[float],
+        seen: Sequence[float],
+        torque_scale: float,
+    ) -> Sequence[Candidate]:
+        """Return what a fit may add; parameters as those of the function of this name."""
+        ...
+
+
+def drive_candidates(
+    believed: BelievedDrive,
+    orders: Sequence[float],
+    seen: Sequence[float],
+    torque_scale: float,
+    effects: Sequence[OfDrives] = (),
 ) -> list[Candidate]:
     """Return all candidates for a drive.
 
     Parameters
     ----------
-    believed : Believed
+    believed : BelievedDrive
     orders : sequence of float
         All orders of the features.
     seen : sequence of float
         Orders at which something was seen, for effects whose order is not known beforehand.
     torque_scale : float
         Of the campaign: how much larger its torques are than those the library is sized for.
+    effects : sequence of OfDrives
+        Further effects that may be missing.
     """
+    own = [effect.drive_candidates(believed, orders, seen, torque_scale) for effect in effects]
     return [
         *mesh_candidates(believed, orders, torque_scale),
         *friction_candidates(believed.ratio, orders, torque_scale),
         *line_candidates(believed, orders, seen, torque_scale),
         *_others(believed),
+        *chain.from_iterable(own),
     ]
 
 
@@ -53,7 +77,7 @@ def out_of_tolerance(base: Sequence[Parameter], at_bounds: Sequence[str]) -> lis
     ]
 
 
-def _others(believed: Believed) -> list[Candidate]:
+def _others(believed: BelievedDrive) -> list[Candidate]:
     inertia = max(believed.load_inertia, 10.0 * believed.output_inertia)
     return [
         Candidate(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy.drive.features import MEANS, Features
 from pymoo_hdte.discrepancy.drive.objective import Objective

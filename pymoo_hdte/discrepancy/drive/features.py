@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import Rig
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS, OrderLines, order_lines
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, OrderLines, order_lines
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.prediction import Conditions, Prediction
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.drive.analysis import Analysis, highest_order
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, highest_order
 from pymoo_hdte.discrepancy.engine.candidate import harmonics_among
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
 
@@ -18,27 +18,27 @@ _SAME_ORDER = 1e-6
 """Largest distance at which a line is that of an order: one beside it is not predicted for it."""
 
 
-def limits(analysis: Analysis) -> list[str]:
+def campaign_limits(finding: DriveFinding) -> list[str]:
     """Return a sentence for everything that the records of a campaign cannot tell.
 
     Parameters
     ----------
-    analysis : Analysis
-        Of `analysis.analyse`.
+    finding : DriveFinding
+        Of `analysis.examine_drive`.
     """
-    return [*_unproven(analysis), *_unvaried(analysis), *_unseen(analysis), *_too_high(analysis)]
+    return [*_unproven(finding), *_unvaried(finding), *_unseen(finding), *_too_high(finding)]
 
 
-def _unproven(analysis: Analysis) -> list[str]:
+def _unproven(finding: DriveFinding) -> list[str]:
     found = []
-    if not analysis.campaign.held_out:
+    if not finding.campaign.held_out:
         found.append("No record was held out: nothing is proven about conditions not fitted.")
-    fitted = {record.name for record in analysis.data.features.records}
-    if analysis.campaign.held_out and (held_out := analysis.held_out) is None:
+    fitted = {record.name for record in finding.data.features.records}
+    if finding.campaign.held_out and (held_out := finding.held_out) is None:
         found.append("All held-out records rattle: nothing is proven about conditions not fitted.")
-    elif analysis.campaign.held_out and held_out is not None:
+    elif finding.campaign.held_out and held_out is not None:
         fitted |= {record.name for record in held_out.features.records}
-    left_out = [record.name for record in analysis.campaign.running if record.name not in fitted]
+    left_out = [record.name for record in finding.campaign.running if record.name not in fitted]
     if left_out:
         found.append(
             "Neither fitted nor predicted, because the load does not hold the tooth flanks "
@@ -47,8 +47,8 @@ def _unproven(analysis: Analysis) -> list[str]:
     return found
 
 
-def _unvaried(analysis: Analysis) -> list[str]:
-    records, found = analysis.data.features.records, []
+def _unvaried(finding: DriveFinding) -> list[str]:
+    records, found = finding.data.features.records, []
     speeds = np.array([record.input_speed for record in records])
     loads = np.array([record.load_torque for record in records])
     if np.abs(speeds).max() <= _SAME_SPEED * np.abs(speeds).min():
@@ -64,12 +64,12 @@ def _unvaried(analysis: Analysis) -> list[str]:
     if np.all(speeds > 0.0) or np.all(speeds < 0.0):
         found.append(
             "All fitted records turn one way: only the stated zero error of the input torque "
-            f"sensor, {analysis.campaign.rig.input_torque_zero:g} N.m, tells dry friction at the "
+            f"sensor, {finding.campaign.rig.input_torque_zero:g} N.m, tells dry friction at the "
             "input from it."
         )
     if np.ptp([record.elapsed for record in records]) == 0.0:
         found.append("All fitted records stand at one time of the session: no drift can be seen.")
-    if not analysis.data.torsion:
+    if not finding.data.torsion:
         found.append(
             "No torsion sweep was fitted: a clearance cannot be told from a soft wind-up, nor "
             "hysteresis from damping, where the running records do not pass through zero torque."
@@ -77,9 +77,9 @@ def _unvaried(analysis: Analysis) -> list[str]:
     return found
 
 
-def _unseen(analysis: Analysis) -> list[str]:
-    orders, highest = analysis.data.features.orders, highest_order(analysis.campaign)
-    believed = analysis.campaign.believed
+def _unseen(finding: DriveFinding) -> list[str]:
+    orders, highest = finding.data.features.orders, highest_order(finding.campaign)
+    believed = finding.campaign.believed
     unseen = [
         order
         for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True)
@@ -96,11 +96,11 @@ def _unseen(analysis: Analysis) -> list[str]:
     return found
 
 
-def _too_high(analysis: Analysis) -> list[str]:
-    verdict, highest = analysis.verdict, highest_order(analysis.campaign)
+def _too_high(finding: DriveFinding) -> list[str]:
+    verdict, highest = finding.verdict, highest_order(finding.campaign)
     if verdict.chosen is None or not verdict.leaves_more_than_noise:
         return []
-    seen = analysis.data.features.orders.tolist()
+    seen = finding.data.features.orders.tolist()
     orders = {one.order for one in verdict.chosen.candidates if one.order is not None}
     values = ", which may shift the values of the effect" if verdict.status in EXPLAINED else ""
     # A line that nobody expects is searched strictly below the highest order.

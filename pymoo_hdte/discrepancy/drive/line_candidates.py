@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.engine.candidate import (
     Candidate,
     Values,
@@ -32,13 +32,13 @@ ENCODER_LINE = "encoder_line"
 
 
 def line_candidates(
-    believed: Believed, orders: Sequence[float], seen: Sequence[float], torque_scale: float
+    believed: BelievedDrive, orders: Sequence[float], seen: Sequence[float], torque_scale: float
 ) -> list[Candidate]:
     """Return candidates for lines.
 
     Parameters
     ----------
-    believed : Believed
+    believed : BelievedDrive
     orders : sequence of float
         All orders of the features: harmonics beyond them would be guesses.
     seen : sequence of float

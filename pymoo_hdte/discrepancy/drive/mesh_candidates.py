@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.campaign.campaign import RATED_TORQUE
 from pymoo_hdte.discrepancy.engine.candidate import (
     Candidate,
@@ -30,7 +30,7 @@ VARYING_MOST = 15 * ARCSEC
 
 
 def mesh_candidates(
-    believed: Believed, orders: Sequence[float], torque_scale: float
+    believed: BelievedDrive, orders: Sequence[float], torque_scale: float
 ) -> list[Candidate]:
     """Return the candidates at the mesh of a drive of this size, for features of these orders."""
     windup = torque_scale * RATED_TORQUE / believed.stiffness

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.line_candidates import ENCODER_LINE
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
@@ -65,19 +65,19 @@ class Proposal:
         return asdict(self) | {"separates": list(self.separates) if self.separates else None}
 
 
-def next_experiment(analysis: Analysis) -> Proposal:
+def next_experiment(finding: DriveFinding) -> Proposal:
     """Return the test to make next.
 
     Parameters
     ----------
-    analysis : Analysis
-        Of `analysis.analyse`.
+    finding : DriveFinding
+        Of `analysis.examine_drive`.
     """
-    verdict, grid = analysis.verdict, Grid.of(analysis)
+    verdict, grid = finding.verdict, Grid.of(finding)
     if verdict.chosen is None:
         return _most_uncertain(grid, grid.model(verdict.base))
     chosen = verdict.chosen.fit
-    twin = _encoder_twin(grid, chosen) or _zero_twin(grid, analysis, chosen)
+    twin = _encoder_twin(grid, chosen) or _zero_twin(grid, finding, chosen)
     if twin is not None and verdict.status != "unlisted":
         return twin
     model = grid.model(chosen)
@@ -163,13 +163,13 @@ def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
     return None
 
 
-def _zero_twin(grid: Grid, analysis: Analysis, chosen: Fit) -> Proposal | None:
+def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit) -> Proposal | None:
     """Return the test for dry friction at the input: friction, or a zero error of the sensor.
 
     In reverse friction changes its sign and a zero error does not. All else is mirrored, so that
     the forward record says how well the rest of the mean input torque is known.
     """
-    one_way = len({record.input_speed > 0.0 for record in analysis.campaign.train}) == 1
+    one_way = len({record.input_speed > 0.0 for record in finding.campaign.train}) == 1
     for candidate, parts in zip(chosen.candidates, chosen.effects_by_candidate, strict=True):
         effect = parts[0] if parts else None
         if not (one_way and isinstance(effect, LawAtPort) and effect.port == "input"):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.drive.observations import Observations
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Unknowns, Vector, built
-from pymoo_hdte.drive import Balance, Effect
+from pymoo_hdte.drive import Effect, SteadyMotion
 
 LOST = 1e3
 """Residual of a point at which the model cannot carry the torque."""
@@ -38,7 +38,7 @@ class Objective(Unknowns):
         super().__init__(data.base, candidates)
         self.data = data
         self.slopes = slopes
-        self.nearby: Balance | None = None
+        self.nearby: SteadyMotion | None = None
 
     def residuals(self, values: Vector) -> Vector:
         """Return residuals at values (n,), those of sweeps and priors last."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.features import (
     MEANS,
     Features,
@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy.drive.features import (
 from pymoo_hdte.discrepancy.drive.prediction import Prediction, coefficients_of, predict
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout, Parameter
-from pymoo_hdte.drive import Balance, Effect, mean_torsion
+from pymoo_hdte.drive import Effect, SteadyMotion, mean_torsion
 
 Vector = NDArray[np.float64]
 Values = NDArray[np.float64]
@@ -87,13 +87,13 @@ class Observations:
         return covariance
 
     def predict(
-        self, vectors: Vector, effects: Sequence[Effect], start: Balance | None = None
+        self, vectors: Vector, effects: Sequence[Effect], start: SteadyMotion | None = None
     ) -> NDArray[np.float64]:
         """Return features, shape (v, r, f), of vectors (v, n_base) of base parameters."""
         return self.features.of_prediction(self.prediction(vectors, effects, start))
 
     def prediction(
-        self, vectors: Vector, effects: Sequence[Effect], start: Balance | None = None
+        self, vectors: Vector, effects: Sequence[Effect], start: SteadyMotion | None = None
     ) -> Prediction:
         """Return what `predict` is made of, steady states included."""
         values = self._named(vectors)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.engine.candidate import Parameter
 
 MECHANICAL = (
@@ -20,7 +20,7 @@ MECHANICAL = (
     "output_damping",
     "load_inertia",
 )
-"""Fields of `Believed` that are fitted; J_out, 1/100 of the load's inertia, is not."""
+"""Fields of `BelievedDrive` that are fitted; J_out, 1/100 of the load's inertia, is not."""
 
 READING = (
     "offset",
@@ -33,13 +33,13 @@ READING = (
 
 
 def base_parameters(
-    believed: Believed, rig: Rig, phases: Sequence[float], offset: float
+    believed: BelievedDrive, rig: Rig, phases: Sequence[float], offset: float
 ) -> tuple[Parameter, ...]:
     """Return the unknowns of a drive without any further effect.
 
     Parameters
     ----------
-    believed : Believed
+    believed : BelievedDrive
     rig : Rig
     phases : sequence of float, length n_lines
         First guess of the phases of the static error, rad.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.objective import Objective
@@ -58,9 +58,9 @@ class Grid:
     repeats: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, analysis: Analysis) -> Grid:
+    def of(cls, finding: DriveFinding) -> Grid:
         """Return tests within the speeds and loads of the training records."""
-        features = analysis.data.features
+        features = finding.data.features
         conditions = features.conditions
         measured = np.unique([abs(record.input_speed) for record in features.records])
         places = np.linspace(0, len(measured) - 1, min(_SPEEDS, len(measured))).round().astype(int)
@@ -83,11 +83,11 @@ class Grid:
             values=np.zeros((len(grid), features.values.shape[1])),
             covariance=features.covariance[nearest],
         )
-        sweep = _sweep(_SWEEP_SHARE * largest, analysis.campaign.rig.torsion_angle_noise)
-        data = replace(analysis.data, features=planned, torsion=(sweep,) if largest else ())
+        sweep = _sweep(_SWEEP_SHARE * largest, finding.campaign.rig.torsion_angle_noise)
+        data = replace(finding.data, features=planned, torsion=(sweep,) if largest else ())
         # Those without effects serve for all models: how uncertain a test is needs no more.
-        slopes = Objective(data, ()).slopes_at(analysis.verdict.base.values)
-        made = [(one.input_speed, one.load_torque) for one in analysis.campaign.running]
+        slopes = Objective(data, ()).slopes_at(finding.verdict.base.values)
+        made = [(one.input_speed, one.load_torque) for one in finding.campaign.running]
         repeats = np.isclose(grid[:, None], made).all(axis=2).any(axis=1)
         return cls(data, speed / REVOLUTION_PER_MINUTE, load, slopes, repeats)
 

@@ -12,20 +12,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.drive import (
-    Balance,
     Coefficients,
     Eccentricity,
     Effect,
     LawAtPort,
     SpeedLoop,
+    SteadyMotion,
     ThermalDrift,
     harmonic_balance,
 )
-from pymoo_hdte.drive.solve.harmonic_balance import torus_of
+from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
 from pymoo_hdte.drive.solve.steady_motion import BY_CASE
 from pymoo_hdte.drive.solve.torus import Torus
@@ -72,17 +72,17 @@ class Prediction:
 
     mean: NDArray[np.float64]
     phasors: NDArray[np.complex128]
-    balance: Balance
+    balance: SteadyMotion
 
 
 def predict(
-    believed: Believed,
+    believed: BelievedDrive,
     rig: Rig,
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
     effects: Sequence[Effect] = (),
-    start: Balance | None = None,
+    start: SteadyMotion | None = None,
 ) -> Prediction:
     """Return what the sensors would show.
 
@@ -96,7 +96,7 @@ def predict(
         Parameters by name, those of `parameters.base_parameters`.
     effects : sequence of Effect
         Shared by all vectors.
-    start : Balance, optional
+    start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
     """
     count, records = len(values["offset"]), len(conditions)
@@ -105,7 +105,7 @@ def predict(
     coefficients = coefficients_of(believed, values, effects, records)
     near = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
-    balance = steady_state(coefficients, speed, load.ravel(), rig, near)
+    balance = steady_motions(coefficients, speed, load.ravel(), rig, near)
     channels = [
         balance.transmission_error,
         balance.motor_torque + _driving(balance, effects),
@@ -120,13 +120,13 @@ def predict(
     return Prediction(mean, phasors, balance)
 
 
-def steady_state(
+def steady_motions(
     coefficients: Coefficients,
     speed: NDArray[np.float64],
     load: NDArray[np.float64],
     rig: Rig,
-    start: Balance | None = None,
-) -> Balance:
+    start: SteadyMotion | None = None,
+) -> SteadyMotion:
     """Return the steady state of all rows.
 
     Where a clearance would open because the load does not hold the flanks together, there is none:
@@ -135,7 +135,7 @@ def steady_state(
     """
     motor = SpeedLoop(rig.proportional, rig.integral)
 
-    def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> Balance:
+    def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> SteadyMotion:
         return harmonic_balance(
             coefficients.rows(rows),
             input_speed=speed[rows],
@@ -162,17 +162,17 @@ def steady_state(
     return _merged(balance.rows(balance.converged), plain.rows(~held), held)
 
 
-def _merged(held: Balance, plain: Balance, places: NDArray[np.bool_]) -> Balance:
+def _merged(held: SteadyMotion, plain: SteadyMotion, places: NDArray[np.bool_]) -> SteadyMotion:
     """Put rows together again: ``held`` where ``places``, ``plain`` elsewhere."""
     order = np.argsort(np.concatenate([np.flatnonzero(places), np.flatnonzero(~places)]))
     joined = [
         np.concatenate([getattr(held, name), getattr(plain, name)])[order] for name in BY_CASE
     ]
-    return Balance(held.torus, *joined)
+    return SteadyMotion(held.torus, *joined)
 
 
 def coefficients_of(
-    believed: Believed,
+    believed: BelievedDrive,
     values: dict[str, NDArray[np.float64]],
     effects: Sequence[Effect],
     records: int,
@@ -205,7 +205,7 @@ def coefficients_of(
 
 
 def _line(
-    balance: Balance, phasors: NDArray[np.complex128], order: float
+    balance: SteadyMotion, phasors: NDArray[np.complex128], order: float
 ) -> NDArray[np.complex128]:
     """Return the phasors of one order, (n,); zero where the balance has no such order."""
     place = balance.torus.find(order)
@@ -215,7 +215,7 @@ def _line(
     return phasors[:, column].conj() if conjugate else phasors[:, column]
 
 
-def _driving(balance: Balance, effects: Sequence[Effect]) -> NDArray[np.complex128]:
+def _driving(balance: SteadyMotion, effects: Sequence[Effect]) -> NDArray[np.complex128]:
     """Return the harmonics of a motor's ripple, which its torque sensor sees; (1, n_harmonics)."""
     total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
     for effect in effects:
@@ -227,7 +227,7 @@ def _driving(balance: Balance, effects: Sequence[Effect]) -> NDArray[np.complex1
 
 
 def _read(
-    believed: Believed,
+    believed: BelievedDrive,
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],

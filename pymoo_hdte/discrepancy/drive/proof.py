@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
-from pymoo_hdte.discrepancy.drive.revision import accepted_fit
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive import OrderSpectrum
 from pymoo_hdte.units import ARCSEC
@@ -123,16 +122,16 @@ class Proof:
         }
 
 
-def prove(analysis: Analysis) -> Proof | None:
+def prove(finding: DriveFinding) -> Proof | None:
     """Return the gaps on the held-out records, or None where there are none.
 
     The loads are those measured. Where the verdict names nothing, nothing was added, so that
     before and after are the same.
     """
-    data = analysis.held_out
+    data = finding.held_out
     if data is None:
         return None
-    fits = (analysis.verdict.base, accepted_fit(analysis.verdict))
+    fits = (finding.verdict.base, finding.verdict.accepted)
     predicted = np.array([_predict(data, fitted) for fitted in fits])
     difference = predicted - data.features.values
     white = data.whiten(difference).reshape(len(fits), len(data.features.records), -1)

@@ -12,11 +12,10 @@ from fractions import Fraction
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.campaign.believed import Believed
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED, Verdict
 from pymoo_hdte.drive import (
     DampingReference,
     DataSheet,
@@ -41,21 +40,14 @@ _LEAST_SCATTER = 1e-3
 _LARGEST_TOOTH_DIVISOR = 100
 
 
-def accepted_fit(verdict: Verdict) -> Fit:
-    """Return the fit that is believed after the verdict: without effects unless some are named."""
-    if verdict.status in EXPLAINED and verdict.chosen is not None:
-        return verdict.chosen.fit
-    return verdict.base
-
-
-def revised_model(analysis: Analysis) -> DriveModel:
+def revised_model(finding: DriveFinding) -> DriveModel:
     """Return the drive with its fitted values and the named effects.
 
     Effects enter where the verdict names them (`EXPLAINED`); otherwise only the base parameters
     change, and ``description`` says so. Errors as in `drive_model`.
     """
-    verdict = analysis.verdict
-    fitted = accepted_fit(verdict)
+    verdict = finding.verdict
+    fitted = verdict.accepted
     if fitted.candidates:
         labels = ", ".join(candidate.label for candidate in fitted.candidates)
         what = f"the believed drive with {labels}, all values fitted"
@@ -63,7 +55,7 @@ def revised_model(analysis: Analysis) -> DriveModel:
         what = "the believed drive with fitted values; nothing was found to be missing"
     else:
         what = "the believed drive with fitted values; what is missing is in no list, so none added"
-    return drive_model(analysis.campaign, fitted, "revised", what)
+    return drive_model(finding.campaign, fitted, "revised", what)
 
 
 def drive_model(campaign: Campaign, fitted: Fit, name: str, description: str) -> DriveModel:
@@ -105,7 +97,7 @@ def drive_model(campaign: Campaign, fitted: Fit, name: str, description: str) ->
     )
 
 
-def _peak_to_peak(believed: Believed, amplitudes: list[float], phases: list[float]) -> float:
+def _peak_to_peak(believed: BelievedDrive, amplitudes: list[float], phases: list[float]) -> float:
     phasors = sine_phasor([amplitudes], phases)
     spectrum = OrderSpectrum(np.array(believed.error_orders), phasors)
     return float(spectrum.peak_to_peak(believed.ratio)[0])

@@ -72,6 +72,12 @@ class Verdict:
     degrees_of_freedom: int
 
     @property
+    def accepted(self) -> Fit:
+        """The fit that is believed after the verdict: without effects unless some are named."""
+        chosen = self.chosen
+        return chosen.fit if chosen is not None and self.status in EXPLAINED else self.base
+
+    @property
     def leaves_more_than_noise(self) -> bool:
         """Whether the chosen effects do not explain the data down to the noise."""
         chosen = self.chosen

@@ -26,8 +26,12 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     varied,
 )
 from pymoo_hdte.discrepancy.engine.screening import screen
-from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED, FITTED, OF_ONE_NAME, Verdict, judge
-from pymoo_hdte.discrepancy.mechanism.candidates import CONTAINED, mechanism_candidates
+from pymoo_hdte.discrepancy.engine.verdict import FITTED, OF_ONE_NAME, Verdict, judge
+from pymoo_hdte.discrepancy.mechanism.candidates import (
+    CONTAINED,
+    OfMechanisms,
+    mechanism_candidates,
+)
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.mechanism.preconditions import (
@@ -50,7 +54,7 @@ _SECONDS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Finding:
+class MechanismFinding:
     """What the workflow finds in measured records.
 
     Attributes
@@ -77,8 +81,7 @@ class Finding:
     @property
     def accepted(self) -> Fit:
         """The fit with the effects that the verdict names, or that of the base."""
-        chosen = self.verdict.chosen
-        return chosen.fit if chosen and self.verdict.status in EXPLAINED else self.verdict.base
+        return self.verdict.accepted
 
     @property
     def sensors(self) -> MeasuredData:
@@ -115,12 +118,13 @@ class Finding:
         return root_mean_square(self.data, self.accepted.residuals)
 
 
-def investigate(
+def examine_mechanism(
     mechanism: Mechanism,
     records: Sequence[Record],
     cutoff: float | None = None,
     known: Sequence[LawAt] = (),
-) -> Finding:
+    effects: Sequence[OfMechanisms] = (),
+) -> MechanismFinding:
     """Return the verdict on records of a mechanism.
 
     By inverse dynamics, for which every coordinate has to be measured (of robots: Janot,
@@ -137,10 +141,12 @@ def investigate(
         Hz, up to which the motion is known; by default where it ceases to stand out of its noise.
     known : sequence of LawAt
         Effects that the mechanism is known to have.
+    effects : sequence of OfMechanisms
+        Effects that may be missing beside those of the library.
 
     Returns
     -------
-    Finding
+    MechanismFinding
 
     Raises
     ------
@@ -158,13 +164,13 @@ def investigate(
     sensors = measured_data(mechanism, train, cutoff, known)
     check_scale(sensors)
     base = fit(sensors)
-    candidates = _candidates(sensors, base)
+    candidates = _candidates(sensors, base, effects)
     data = _with_rest(sensors, base, candidates)
     verdict = _judged(sensors, data, candidates)
-    return Finding(mechanism, tuple(records), cutoff, data, verdict)
+    return MechanismFinding(mechanism, tuple(records), cutoff, data, verdict)
 
 
-def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
+def _candidates(data: MeasuredData, base: Fit, effects: Sequence[OfMechanisms]) -> list[Candidate]:
     left = dict(zip(data.names, root_mean_square(data, base.residuals), strict=True))
     forces = {
         port.name: left[port.name]
@@ -172,7 +178,7 @@ def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
         else max(left[name] / abs(share) for name, share in port.motion.items() if share)
         for port in data.mechanism.ports
     }
-    return mechanism_candidates(data, forces, position_orders(data, base))
+    return mechanism_candidates(data, forces, position_orders(data, base), effects)
 
 
 def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -26,8 +26,24 @@ _BACKWARDS = 0.01
 """Least share of the way in the rarer direction that makes two directions."""
 
 
+class OfMechanisms(Protocol):
+    """An effect that may be missing at the ports of a mechanism."""
+
+    def mechanism_candidates(
+        self,
+        data: MeasuredData,
+        forces: Mapping[str, float],
+        orders: Mapping[str, Sequence[float]],
+    ) -> Sequence[Candidate]:
+        """Return what a fit may add; parameters as those of the function of this name."""
+        ...
+
+
 def mechanism_candidates(
-    data: MeasuredData, forces: Mapping[str, float], orders: Mapping[str, Sequence[float]]
+    data: MeasuredData,
+    forces: Mapping[str, float],
+    orders: Mapping[str, Sequence[float]],
+    effects: Sequence[OfMechanisms] = (),
 ) -> list[Candidate]:
     """Return all candidates.
 
@@ -38,6 +54,8 @@ def mechanism_candidates(
         By port, size of a force that may be missing there, N or N.m.
     orders : mapping of str to sequence of float
         By port, orders at which something varies with its position, per unit of it.
+    effects : sequence of OfMechanisms
+        Further effects that may be missing.
     """
     found: list[Candidate] = []
     for port in data.mechanism.ports:
@@ -63,6 +81,8 @@ def mechanism_candidates(
             if read.read and dict(read.motion) == dict(port.motion):
                 found += periodic(port.name, orders.get(read.name, ()), force)[:1]
         found += _elastic(port.name, force, travel, port.stiffness.value, both)
+    for effect in effects:
+        found += effect.mechanism_candidates(data, forces, orders)
     known = {place_of(one) for one in data.known}  # type: ignore[arg-type]
     return [one for one in found if not one.places & known]
 

@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter, out_of
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Response, Unknowns, Vector, built
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-from pymoo_hdte.mechanism.balances import Balance, balance_names, quantity_names
+from pymoo_hdte.mechanism.balances import ForceBalance, balance_names, quantity_names
 
 Values = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class MeasuredData:
     Attributes
     ----------
     mechanism : Mechanism
-    spectra : tuple of Balance
+    spectra : tuple of ForceBalance
         Of the records.
     deviation : tuple of ndarray, shape (n_balances, n_bins)
         Standard deviation that counts as noise, by record.
@@ -42,7 +42,7 @@ class MeasuredData:
     """
 
     mechanism: Mechanism
-    spectra: tuple[Balance, ...]
+    spectra: tuple[ForceBalance, ...]
     deviation: tuple[Values, ...]
     known: tuple[LawAt, ...] = ()
 
@@ -278,7 +278,7 @@ def measured_data(
     Raises
     ------
     InvalidInput
-        See `Balance`.
+        See `ForceBalance`.
     """
-    spectra = tuple(Balance(mechanism, record, cutoff) for record in records)
+    spectra = tuple(ForceBalance(mechanism, record, cutoff) for record in records)
     return MeasuredData(mechanism, spectra, tuple(one.noise for one in spectra), tuple(known))

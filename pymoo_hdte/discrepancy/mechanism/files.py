@@ -47,48 +47,75 @@ Numbers of the mechanism are in SI; the columns of the records have units of the
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 
 from pymoo_hdte.checks import InvalidInput, one_of
-from pymoo_hdte.discrepancy.mechanism.models import model_from_fields, read_model, rig_toml
+from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_from_fields
 from pymoo_hdte.io.fields import Fields, toml_with_lines
 from pymoo_hdte.io.tables import TableLayout, check_sha256, layout_from_fields, read_table
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.records import ROLES
 
-__all__ = ["RIG_FILE", "Rig", "read_model", "read_rig", "rig_toml"]
-
 RIG_FILE = "rig.toml"
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
-    """A mechanism and its records.
+class MeasuredMechanism:
+    """A mechanism as it is believed, and its records.
 
     Attributes
     ----------
-    title : str
     mechanism : Mechanism
-    effects : tuple of LawAt
+        Without the effects that are to be found.
+    records : sequence of Record
+        At least one of them of role ``train``; others, ``held_out``, to prove what is found.
+    cutoff : float, optional
+        Hz, up to which the motion is known; by default where it ceases to stand out of its noise.
+    effects : sequence of LawAt
         Laws that are known to be there.
-    records : tuple of Record
-    cutoff : float or None
-        Hz, up to which the motion is known; None if the file leaves that open.
+    title : str
     source : str
-        Path of the file.
+        Path of the file that it was read from.
+
+    Examples
+    --------
+    >>> joint = Mechanism(
+    ...     {"q": BelievedValue(0.06, tolerance=0.5)},
+    ...     [Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, tolerance=0.5))],
+    ...     [Input("torque", {"q": 1.0})],
+    ... )
+    >>> record = Record("one", "train", time, {"q": angle, "torque": torque})
+    >>> analyse(MeasuredMechanism(joint, [record])).verdict.status
+    'named'
     """
 
-    title: str
     mechanism: Mechanism
-    effects: tuple[LawAt, ...]
-    records: tuple[Record, ...]
-    cutoff: float | None
-    source: str
+    records: Sequence[Record]
+    cutoff: float | None = None
+    effects: Sequence[LawAt] = ()
+    title: str = "A mechanism"
+    source: str = ""
+
+    @property
+    def model(self) -> MechanismModel:
+        """What is believed, which `model_text` writes to a file."""
+        return MechanismModel(self.title, self.mechanism, tuple(self.effects), self.cutoff)
+
+    def believing(self, model: MechanismModel) -> MeasuredMechanism:
+        """Return the same records with another model of what is believed.
+
+        Parameters
+        ----------
+        model : MechanismModel
+            From `read_model` or `MechanismAnalysis.revised_model`; its cutoff holds if it has one.
+        """
+        cutoff = self.cutoff if model.cutoff is None else model.cutoff
+        return replace(self, mechanism=model.mechanism, effects=model.effects, cutoff=cutoff)
 
 
-def read_rig(folder: str | Path, data: str | Path | None = None) -> Rig:
+def read_rig(folder: str | Path, data: str | Path | None = None) -> MeasuredMechanism:
     """Read and check a rig.
 
     Parameters
@@ -111,7 +138,7 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> Rig:
     path = path / RIG_FILE if path.is_dir() else path
     files = path.parent if data is None else Path(data)
     with toml_with_lines(path) as top:
-        (title, mechanism, effects), cutoff = model_from_fields(top, path.name)
+        model = model_from_fields(top, path.name)
         shared = layout_from_fields(top.table("table")) if top.has("table") else None
         noise = _noise(top)
         entries = top.tables("records")
@@ -121,7 +148,14 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> Rig:
             record = _record(entry, f"{path.name}.records[{index}]", files, shared, records, noise)
             records[record.name] = record
         _check_noise(noise, records, path.name)
-    return Rig(title, mechanism, effects, tuple(records.values()), cutoff, str(path))
+    return MeasuredMechanism(
+        model.mechanism,
+        tuple(records.values()),
+        model.cutoff,
+        model.effects,
+        model.title,
+        str(path),
+    )
 
 
 def _record(

@@ -1,36 +1,66 @@
-"""The model part of a rig's file, read and written: mechanism and effects, `rig_files` has it."""
+"""A model of a mechanism as a file: its values with tolerances, and the effects it has."""
 
 from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.drive.toml_text import toml_string
 from pymoo_hdte.io.fields import Fields, toml_with_lines
-from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Loop, Mechanism, Port
+from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import EFFECTS, OF_READINGS, law_from_values, values_of
 from pymoo_hdte.mechanism.mechanism import NOTHING
 
-Model = tuple[str, Mechanism, tuple[LawAt, ...]]
-"""Title, mechanism and effects."""
+
+@dataclass(frozen=True)
+class MechanismModel:
+    """What is believed of a mechanism: the model part of a rig's file.
+
+    Attributes
+    ----------
+    title : str
+    mechanism : Mechanism
+        Its values with their tolerances.
+    effects : tuple of LawAt
+        Laws at its ports that are known to be there.
+    cutoff : float or None
+        Hz, up to which the motion is known; None leaves that to the records.
+    """
+
+    title: str
+    mechanism: Mechanism
+    effects: tuple[LawAt, ...] = ()
+    cutoff: float | None = None
 
 
-def read_model(path: str | Path) -> Model:
-    """Return title, mechanism and effects of a file without records; errors as of `read_rig`."""
+def read_model(path: str | Path) -> MechanismModel:
+    """Read a model of a mechanism, such as ``revised_model.toml`` of a report.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a file like ``rig.toml``, without records.
+
+    Raises
+    ------
+    InvalidInput
+        With file and line, as `read_rig`.
+    OSError
+        If the file cannot be read.
+    """
     path = Path(path)
     with toml_with_lines(path) as top:
-        model, _ = model_from_fields(top, path.name)
+        model = model_from_fields(top, path.name)
         top.finish()
     return model
 
 
-def rig_toml(
-    title: str, mechanism: Mechanism, effects: Sequence[LawAt], cutoff: float | None = None
-) -> str:
+def model_text(model: MechanismModel) -> str:
     """Return the text that `read_model` reads back exactly, without tables and records.
 
     Raises
@@ -39,6 +69,7 @@ def rig_toml(
         For what `read_model` would refuse: an effect whose name is none of `EFFECTS` or whose port
         is not there, an empty title, a limit or cutoff that is not positive.
     """
+    mechanism = model.mechanism
     tables: list[tuple[str, Mapping[str, Any]]] = []
     for name, inertia in mechanism.inertias.items():
         tables.append((_heading("coordinates", name), {"inertia": _believed_table(inertia)}))
@@ -53,17 +84,19 @@ def rig_toml(
         # The reader takes finite numbers only: a loop without saturation has no limit there.
         kept = {name: one for name, one in vars(loop).items() if one != float("inf")}
         tables.append(("[[loops]]", kept))
-    for effect in effects:
+    for effect in model.effects:
         where = {"name": effect.name, "port": effect.port}
         tables.append(("[[effects]]", {**where, **values_of(effect)}))
-    top = {"title": title} if cutoff is None else {"title": title, "cutoff": cutoff}
+    top: dict[str, Any] = {"title": model.title}
+    if model.cutoff is not None:
+        top["cutoff"] = model.cutoff
     text = _lines(top) + "".join(f"\n{heading}\n{_lines(table)}" for heading, table in tables)
     # What cannot be read back is better refused now than when the text is needed.
     model_from_fields(Fields(tomllib.loads(text), "model"), "model")
     return text
 
 
-def _believed_table(one: Believed) -> dict[str, float]:
+def _believed_table(one: BelievedValue) -> dict[str, float]:
     return {"value": one.value} | ({"tolerance": one.tolerance} if one.tolerance else {})
 
 
@@ -95,8 +128,8 @@ def _value(value: Any) -> str:
     return "true" if value is True else repr(float(value))
 
 
-def model_from_fields(top: Fields, file: str) -> tuple[Model, float | None]:
-    """Take the model out of a file's top table, and the cutoff (Hz) if it has one.
+def model_from_fields(top: Fields, file: str) -> MechanismModel:
+    """Take the model out of a file's top table.
 
     Raises `InvalidInput` with the name of the ``file`` and the field.
     """
@@ -105,11 +138,11 @@ def model_from_fields(top: Fields, file: str) -> tuple[Model, float | None]:
     mechanism = _mechanism(top, file)
     rows = top.tables("effects") if top.has("effects") else []
     effects = [_effect(row, f"{file}.effects[{i}]", mechanism) for i, row in enumerate(rows)]
-    return (title, mechanism, tuple(effects)), cutoff
+    return MechanismModel(title, mechanism, tuple(effects), cutoff)
 
 
 def _mechanism(top: Fields, file: str) -> Mechanism:
-    inertias: dict[str, Believed] = {}
+    inertias: dict[str, BelievedValue] = {}
     for name, table in _named(top, "coordinates", file).items():
         inertias[name] = _believed(table, "inertia", above=0.0)
         table.finish()
@@ -140,13 +173,13 @@ def _named(top: Fields, field: str, file: str) -> dict[str, Fields]:
     return {name: Fields(table, f"{file}.{field}.{name}") for name, table in raw.items()}
 
 
-def _believed(table: Fields, field: str, **limits: float) -> Believed:
+def _believed(table: Fields, field: str, **limits: float) -> BelievedValue:
     inside = table.table(field)
     value = inside.number("value", **limits)
     given = inside.has("tolerance")
     tolerance = inside.number("tolerance", at_least=0.0, at_most=1.0) if given else 0.0
     inside.finish()
-    return Believed(value, tolerance)
+    return BelievedValue(value, tolerance)
 
 
 def _shares(

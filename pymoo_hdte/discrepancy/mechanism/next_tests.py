@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
-from pymoo_hdte.discrepancy.mechanism.analysis import Finding
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 
@@ -65,7 +65,7 @@ class NextTest:
         }
 
 
-def next_test(finding: Finding) -> NextTest:
+def next_test(finding: MechanismFinding) -> NextTest:
     """Return the test that says most about what the verdict leaves open."""
     one_way = [
         port.name
@@ -98,7 +98,7 @@ def next_test(finding: Finding) -> NextTest:
     return _best_repetition(finding, chosen, rival)
 
 
-def _nearest(finding: Finding) -> Rival | None:
+def _nearest(finding: MechanismFinding) -> Rival | None:
     """Return the explanation that comes closest to the chosen one and differs from it."""
     chosen = finding.verdict.chosen
     others = [
@@ -115,7 +115,7 @@ def _nearest(finding: Finding) -> Rival | None:
     return min(equivalent or near, key=lambda one: one.bic, default=None)
 
 
-def _best_repetition(finding: Finding, chosen: Rival, rival: Rival) -> NextTest:
+def _best_repetition(finding: MechanismFinding, chosen: Rival, rival: Rival) -> NextTest:
     best: tuple[float, int, float, float] = (-1.0, 0, 1.0, 1.0)
     for place, size, rate in product(range(len(finding.data.spectra)), SIZES, RATES):
         best = max(
@@ -146,7 +146,7 @@ def _best_repetition(finding: Finding, chosen: Rival, rival: Rival) -> NextTest:
 
 
 def _separation(
-    finding: Finding, chosen: Rival, rival: Rival, place: int, size: float, rate: float
+    finding: MechanismFinding, chosen: Rival, rival: Rival, place: int, size: float, rate: float
 ) -> float:
     """Return how far two explanations lie apart when a record is repeated, beyond the base."""
     balance = finding.data.spectra[place]

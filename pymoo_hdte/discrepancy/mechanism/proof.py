@@ -16,11 +16,11 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.mechanism.analysis import Finding, root_mean_square
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, root_mean_square
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.records import FINER
-from pymoo_hdte.mechanism.simulation import simulate
+from pymoo_hdte.mechanism.simulation import simulate_mechanism
 
 Values = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ class MeasuredGap:
         }
 
 
-def prove_measured(finding: Finding) -> tuple[MeasuredGap, ...]:
+def prove_measured(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
     """Return the gaps on the held-out records; none where none was held out.
 
     Where nothing is named before and after are the same.
@@ -106,7 +106,7 @@ def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:
     return mechanism.with_values(values)
 
 
-def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
+def _simulated(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
     base, accepted = finding.verdict.base, finding.accepted
     before_all = _positions(finding, record, base)
     after_all = before_all if accepted is base else _positions(finding, record, accepted)
@@ -131,13 +131,13 @@ def _simulated(finding: Finding, record: Record) -> list[MeasuredGap]:
     return found
 
 
-def _positions(finding: Finding, record: Record, fitted: Fit) -> dict[str, Values]:
+def _positions(finding: MechanismFinding, record: Record, fitted: Fit) -> dict[str, Values]:
     """Return the simulated positions at the samples of a record, nan where a model diverges."""
     mechanism = fitted_mechanism(finding.mechanism, fitted)
-    effects = (*finding.data.known, *_laws(fitted.effects))
+    effects = (*finding.data.known, *laws_of(fitted.effects))
     try:
         start = {name: _start(record, name, finding.cutoff) for name in mechanism.coordinates}
-        fine = simulate(mechanism, record.finer(FINER), effects, start=start).position
+        fine = simulate_mechanism(mechanism, record.finer(FINER), effects, start=start).position
         return {name: one[::FINER] for name, one in fine.items()}
     except ArithmeticError:
         lost = np.full(len(record.time), np.nan)
@@ -152,13 +152,13 @@ def _start(record: Record, name: str, cutoff: float) -> tuple[float, float]:
     return float(curve(0.0)), float(curve.deriv()(0.0))
 
 
-def _balanced(finding: Finding, record: Record) -> list[MeasuredGap]:
+def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
     data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
     n_base = len(data.base)
     (balance,) = data.spectra
     left = []
     for one in (finding.verdict.base, finding.accepted):
-        whitened = data.residuals(one.values[:n_base], _laws(one.effects))
+        whitened = data.residuals(one.values[:n_base], laws_of(one.effects))
         left.append((root_mean_square(data, whitened), data.coefficients(whitened)[0]))
     floor = root_mean_square(data, np.ones(len(data.frequency)))
     return [
@@ -178,7 +178,8 @@ def _balanced(finding: Finding, record: Record) -> list[MeasuredGap]:
     ]
 
 
-def _laws(effects: Sequence[Any]) -> tuple[LawAt, ...]:
+def laws_of(effects: Sequence[Any]) -> tuple[LawAt, ...]:
+    """Return the effects of a fit, which are laws at ports in a mechanism."""
     return tuple(effects)
 
 

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
-from pymoo_hdte.discrepancy.drive.revision import accepted_fit
 from pymoo_hdte.discrepancy.engine.candidate import (
     HARMONIC_NAMES,
     Candidate,
@@ -24,6 +23,9 @@ from pymoo_hdte.discrepancy.engine.candidate import (
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
+
+SCHEMA_VERSION = 1
+"""Of ``verdict.json``: it grows when a field goes, or changes its name, type or meaning."""
 
 _DEVIATIONS = 1.959964
 """Half-width of a central 95 % interval of a normal value, in standard deviations."""
@@ -75,7 +77,7 @@ UNITS = {
 
 
 def verdict_document(
-    analysis: Analysis,
+    finding: DriveFinding,
     location: Location,
     held_out: Mapping[str, Any] | None,
     proposal: Proposal,
@@ -84,17 +86,18 @@ def verdict_document(
 
     Parameters
     ----------
-    analysis : Analysis
+    finding : DriveFinding
     location : Location
     held_out : mapping or None
         ``before``, ``after``, ``noise_floor``, ``unit`` and more, of plain types; None where no
         record was held out.
     proposal : Proposal
     """
-    verdict = analysis.verdict
+    verdict = finding.verdict
     absent = {"reason": "no held-out record can be predicted, so that nothing can be proved"}
     return {
-        "campaign": analysis.campaign.title,
+        "schema_version": SCHEMA_VERSION,
+        "campaign": finding.campaign.title,
         "status": verdict.status,
         "sentence": sentence(verdict),
         "effects": _effects(verdict),
@@ -102,7 +105,7 @@ def verdict_document(
         "base": {
             "chi_square": verdict.base.chi_square,
             "degrees_of_freedom": verdict.degrees_of_freedom,
-            "parameters": base_parameters(accepted_fit(verdict)),
+            "parameters": base_parameters(verdict.accepted),
         },
         "held_out": absent if held_out is None else dict(held_out),
         "next_experiment": proposal.as_dict(),
@@ -135,7 +138,7 @@ def sentence(verdict: Verdict) -> str:
 
 def _effects(verdict: Verdict) -> list[dict[str, Any]]:
     """Return the accepted effects; none unless the verdict names or classes them."""
-    fitted, found = accepted_fit(verdict), []
+    fitted, found = verdict.accepted, []
     start = len(fitted.values) - sum(len(one.parameters) for one in fitted.candidates)
     for candidate in fitted.candidates:
         rows = np.arange(start, start + len(candidate.parameters))

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.drive.revision import MODEL_FILE
-from pymoo_hdte.discrepancy.mechanism.analysis import Finding
-from pymoo_hdte.discrepancy.mechanism.files import rig_toml
-from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
-from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, fitted_mechanism, prove_measured
-from pymoo_hdte.discrepancy.report.mechanism_document import measured_document
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.discrepancy.mechanism.models import model_text
+from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
+from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
+from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechanism
+from pymoo_hdte.discrepancy.report.mechanism_document import mechanism_document
 from pymoo_hdte.discrepancy.report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy.report.mechanism_figures import (
     misfit_over_frequency,
@@ -23,19 +23,28 @@ from pymoo_hdte.discrepancy.report.mechanism_figures import (
 from pymoo_hdte.discrepancy.report.tables import STATUSES
 from pymoo_hdte.discrepancy.report.write import FOLDER
 from pymoo_hdte.reports.figures import data_uri
-from pymoo_hdte.reports.page import page
+from pymoo_hdte.reports.html import page
 
 _SIZES = 5
 """Parameters on the first screen."""
 
 
-def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict[str, Any]:
+def write_mechanism_report(
+    title: str,
+    finding: MechanismFinding,
+    gaps: Sequence[MeasuredGap],
+    test: NextTest,
+    out: str | Path,
+) -> dict[str, Any]:
     """Write a report with verdict and revised model; return the verdict's document.
 
     Parameters
     ----------
     title : str
-    finding : Finding
+    finding : MechanismFinding
+    gaps : sequence of MeasuredGap
+        Of the held-out records.
+    test : NextTest
     out : str or Path
         New, empty, or an earlier report, which is replaced.
 
@@ -52,21 +61,14 @@ def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict
         If it cannot be written.
     """
     FOLDER.check(Path(out))
-    gaps = prove_measured(finding)
-    document = measured_document(title, finding, gaps, next_test(finding))
+    document = mechanism_document(title, finding, gaps, test)
     document["revised_model"] = {"file": MODEL_FILE}
-    accepted = finding.accepted
-    model = rig_toml(
-        f"{title}, revised",
-        fitted_mechanism(finding.mechanism, accepted),
-        (*finding.data.known, *accepted.effects),  # type: ignore[arg-type]
-        finding.cutoff,
-    )
+    model = model_text(revised_mechanism(title, finding))
     FOLDER.write(Path(out), _page(finding, document, gaps), document, {MODEL_FILE: model})
     return document
 
 
-def _page(finding: Finding, document: dict[str, Any], gaps: Sequence[MeasuredGap]) -> str:
+def _page(finding: MechanismFinding, document: dict[str, Any], gaps: Sequence[MeasuredGap]) -> str:
     pictures = {
         "motion": data_uri(misfit_over_motion(finding)),
         "frequency": data_uri(misfit_over_frequency(finding)),
@@ -98,7 +100,7 @@ def _shown(gaps: Sequence[MeasuredGap]) -> MeasuredGap | None:
     return max(drawn, key=lambda gap: (gap.kind == "simulation", gap.before), default=None)
 
 
-def proof_sentence(finding: Finding, gaps: Sequence[MeasuredGap]) -> str:
+def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> str:
     """Return in words what the correction does to records that were not fitted."""
     if not gaps:
         return "No record was held out, so that nothing can be proved."

@@ -13,12 +13,13 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words, line_wi
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.mechanism.analysis import Finding
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
+from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
-from pymoo_hdte.discrepancy.report.document import sentence
+from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence
 
 _OFFERED = 6.0
 """Gain of BIC with which a second effect that is not named is mentioned."""
@@ -26,21 +27,22 @@ _MEANINGFUL = 0.05
 """Least share of what is left that it removes."""
 
 
-def measured_document(
-    title: str, finding: Finding, gaps: Sequence[MeasuredGap], test: NextTest
+def mechanism_document(
+    title: str, finding: MechanismFinding, gaps: Sequence[MeasuredGap], test: NextTest
 ) -> dict[str, Any]:
     """Return the verdict as plain types.
 
     Parameters
     ----------
     title : str
-    finding : Finding
+    finding : MechanismFinding
     gaps : sequence of MeasuredGap
         Of held-out records; empty where there are none.
     test : NextTest
     """
     verdict = finding.verdict
     return {
+        "schema_version": SCHEMA_VERSION,
         "campaign": title,
         "status": verdict.status,
         "sentence": _sentence(verdict),
@@ -50,7 +52,7 @@ def measured_document(
             _evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
         ],
         "base": quantities(finding),
-        "location": location(finding),
+        "location": locate_in_mechanism(finding).summary(),
         "remainder": remainder(finding),
         "limits": limits(finding),
         "held_out": [gap.as_dict() for gap in gaps]
@@ -73,7 +75,7 @@ def _sentence(verdict: Verdict) -> str:
     return sentence(verdict)
 
 
-def effects(finding: Finding) -> list[dict[str, Any]]:
+def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
     """Return the accepted effects with values and 95 % intervals."""
     fitted = finding.accepted
     spread = Spread(finding.data, fitted)
@@ -103,7 +105,7 @@ def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
     return range(place, place + 1)
 
 
-def offered(finding: Finding) -> list[dict[str, Any]]:
+def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
     """Return second effects beside the named one that the data speak for, though not loudly.
 
     They make the fit better than chance does, but remove too little to be named.
@@ -122,31 +124,7 @@ def offered(finding: Finding) -> list[dict[str, Any]]:
     return found
 
 
-def location(finding: Finding) -> dict[str, Any]:
-    """Return in which balance the base is wrong, and by how much."""
-    before, noise = finding.base_misfit, finding.sensor_noise
-    wrong = [
-        name
-        for name, one, floor in zip(finding.data.names, before, noise, strict=True)
-        if one**2 > 2.0 * floor**2
-    ]
-    if finding.verdict.status == "adequate":
-        words = "Nowhere: what the model leaves is that of its sensors, or near it."
-    else:
-        parts = [
-            f"the {finding.data.what(name)} (off by {before[k]:.3g}, sensors {noise[k]:.2g})"
-            for k, name in enumerate(finding.data.names)
-            if name in wrong
-        ]
-        words = f"In {' and '.join(parts) or 'no balance by itself'}."
-    return {
-        "sentence": words,
-        "base_misfit": dict(zip(finding.data.names, before.tolist(), strict=True)),
-        "sensor_noise": dict(zip(finding.data.names, noise.tolist(), strict=True)),
-    }
-
-
-def remainder(finding: Finding) -> dict[str, Any]:
+def remainder(finding: MechanismFinding) -> dict[str, Any]:
     """Return what the accepted model leaves, and in words how much of the misfit that is."""
     after, noise = finding.remainder, finding.sensor_noise
     size = ", ".join(
@@ -170,7 +148,7 @@ def remainder(finding: Finding) -> dict[str, Any]:
     }
 
 
-def limits(finding: Finding) -> list[str]:
+def limits(finding: MechanismFinding) -> list[str]:
     """Return what these records cannot tell, in sentences."""
     found = [
         f"The {port.name} moves in one direction only: these records cannot separate Coulomb "
@@ -197,7 +175,7 @@ def _by_bic(one: Rival) -> float:
     return one.bic
 
 
-def _evidence(finding: Finding, one: Rival) -> dict[str, Any]:
+def _evidence(finding: MechanismFinding, one: Rival) -> dict[str, Any]:
     chosen = finding.verdict.chosen
     return {
         "effects": [{"name": c.name, "port": c.port} for c in one.candidates],
@@ -209,14 +187,14 @@ def _evidence(finding: Finding, one: Rival) -> dict[str, Any]:
     }
 
 
-def _role(finding: Finding, one: Rival) -> str:
+def _role(finding: MechanismFinding, one: Rival) -> str:
     chosen = finding.verdict.chosen
     if one in finding.verdict.equivalent:
         return "as good"
     return "richer, hardly better" if chosen and one.bic < chosen.bic else "rejected"
 
 
-def quantities(finding: Finding) -> dict[str, Any]:
+def quantities(finding: MechanismFinding) -> dict[str, Any]:
     """Return the fitted values of the mechanism with 95 % intervals."""
     spread = Spread(finding.data, finding.accepted)
     return _parameters(finding.accepted, spread, range(len(finding.data.base)))

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.mechanism.analysis import Finding
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY
 
@@ -20,7 +20,7 @@ _POINTS = 2000
 _BANDS = 30
 
 
-def misfit_over_motion(finding: Finding) -> Figure:
+def misfit_over_motion(finding: MechanismFinding) -> Figure:
     """Draw what the model leaves of each balance over the speed and the position of a port."""
     names = finding.data.names
     figure = Figure(figsize=(8.4, 2.6 * len(names)), layout="constrained")
@@ -51,7 +51,7 @@ def misfit_over_motion(finding: Finding) -> Figure:
     return figure
 
 
-def misfit_over_frequency(finding: Finding) -> Figure:
+def misfit_over_frequency(finding: MechanismFinding) -> Figure:
     """Draw the amplitude density of what the model leaves, beside that of the sensors' noise."""
     names = finding.data.names
     figure = Figure(figsize=(4.2 * max(len(names), 1), 2.8), layout="constrained")
@@ -128,7 +128,7 @@ def gaps(found: Sequence[MeasuredGap]) -> Figure:
     return figure
 
 
-def _port_of(finding: Finding, balance: str) -> str:
+def _port_of(finding: MechanismFinding, balance: str) -> str:
     """Return a port whose motion a balance is best drawn over."""
     if balance in finding.mechanism.port_names:
         return balance

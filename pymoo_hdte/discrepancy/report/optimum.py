@@ -1,6 +1,6 @@
 """What the correction does to the robust optimum, as the report tells it.
 
-Who optimises stands above the workflow: `pymoo_hdte.cli.optimum_shift`.
+Who optimises stands above the workflow: `pymoo_hdte.discrepancy.robust_optimum`.
 """
 
 from __future__ import annotations

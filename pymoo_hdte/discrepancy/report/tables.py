@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
-from pymoo_hdte.discrepancy.drive.revision import accepted_fit
 from pymoo_hdte.discrepancy.engine.candidate import Parameter, in_words
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     EXACT_SHARE,
@@ -84,9 +83,9 @@ class RivalRow:
     at_bounds: str
 
 
-def certainty(analysis: Analysis) -> str:
+def certainty(finding: DriveFinding) -> str:
     """Return how sure the verdict is, in words."""
-    verdict = analysis.verdict
+    verdict = finding.verdict
     limit = adequate(verdict.degrees_of_freedom)
     left = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate" or verdict.chosen is None:
@@ -104,14 +103,14 @@ def certainty(analysis: Analysis) -> str:
     if verdict.status == "unlisted":
         return (
             "That something is missing is certain; what it is, is not. The nearest known effect "
-            f"explains {share} of the misfit, {_too_little(analysis, verdict.chosen)}."
+            f"explains {share} of the misfit, {_too_little(finding, verdict.chosen)}."
         )
     return " ".join(_evidence(verdict, verdict.chosen, share))
 
 
-def _too_little(analysis: Analysis, nearest: Rival) -> str:
+def _too_little(finding: DriveFinding, nearest: Rival) -> str:
     """Return why an effect is not named though it is the nearest."""
-    left = unexplained(analysis.data, analysis.verdict.base, nearest.fit)
+    left = unexplained(finding.data, finding.verdict.base, nearest.fit)
     if left.any():
         parts = [part.replace("_", " ") for part, missed in zip(PARTS, left, strict=True) if missed]
         return f"but not what shows in {' and '.join(f'the {part}' for part in parts)}"
@@ -147,14 +146,14 @@ def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
     return words
 
 
-def gap_sentence(analysis: Analysis, proof: Proof | None) -> str:
+def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
     """Return how much the gap shrank on held-out records, in words."""
     if proof is None:
         return "No record was held out, so nothing can be said about conditions not fitted."
     gap, error = proof.channels[proof.leading], proof.channels["transmission_error"]
     where = f"{len(proof.records)} held-out records, {proof.leading.replace('_', ' ')}"
     noise = f"noise alone {gap.noise_floor:.3g} {gap.unit}"
-    if not accepted_fit(analysis.verdict).candidates:
+    if not finding.verdict.accepted.candidates:
         return f"Nothing was added. On {where}: off by {gap.before:.3g} {gap.unit}, {noise}."
     words = f"On {where}: off by {gap.before:.3g} before, {gap.after:.3g} after, {noise}"
     if gap.after > gap.before or proof.overall.after > proof.overall.before:
@@ -205,16 +204,16 @@ def rival_rows(verdict: Verdict) -> list[RivalRow]:
     ]
 
 
-def parameter_rows(analysis: Analysis) -> list[ParameterRow]:
+def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     """Return the base parameters of the accepted fit."""
-    fitted = accepted_fit(analysis.verdict)
+    fitted = finding.verdict.accepted
     # What no residual depends on has no interval, and variances near zero may round below it.
     known = np.any(fitted.jacobian != 0.0, axis=0)
     variances = np.where(known, np.maximum(np.diag(fitted.covariance), 0.0), np.nan)
     half_widths = _NORMAL_95 * np.sqrt(variances)
-    base = fitted.parameters[: len(analysis.data.base)]
+    base = fitted.parameters[: len(finding.data.base)]
     return [
-        _parameter_row(analysis.campaign, parameter, value, half_width, fitted.at_bounds)
+        _parameter_row(finding.campaign, parameter, value, half_width, fitted.at_bounds)
         for parameter, value, half_width in zip(
             base, fitted.values.tolist(), half_widths.tolist(), strict=False
         )

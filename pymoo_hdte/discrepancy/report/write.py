@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
-from pymoo_hdte.discrepancy.drive.limits import limits
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.limits import campaign_limits
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.drive.revision import (
     MODEL_FILE,
     SHEET_FILE,
-    accepted_fit,
     drive_model,
     revised_model,
 )
@@ -44,14 +43,14 @@ from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.reports.figures import data_uri
 from pymoo_hdte.reports.folder import ReportFolder
-from pymoo_hdte.reports.page import page
+from pymoo_hdte.reports.html import page
 
 OptimumOf = Callable[[DriveModel, DriveModel], OptimumShift]
 """Says how the robust optimum moves from one drive model to another."""
 
 
 def write_report(
-    analysis: Analysis,
+    finding: DriveFinding,
     location: Location,
     proof: Proof | None,
     proposal: Proposal,
@@ -62,14 +61,14 @@ def write_report(
 
     Parameters
     ----------
-    analysis : Analysis
+    finding : DriveFinding
     location : Location
     proof : Proof or None
         None where no record was held out.
     proposal : Proposal
     optimum_shift : callable
         Of the fitted base and the revised model; asked only where an effect was added. That of
-        `pymoo_hdte.cli.optimum_shift` optimises both.
+        `pymoo_hdte.discrepancy.robust_optimum` optimises both.
     out : str or Path
         New, empty, or an earlier report, which is replaced. Without a revised model, for a drive
         that a data sheet cannot hold, its two files are missing and the verdict says why.
@@ -88,27 +87,29 @@ def write_report(
     """
     FOLDER.check(Path(out))
     document = verdict_document(
-        analysis, location, None if proof is None else proof.as_dict(), proposal
+        finding, location, None if proof is None else proof.as_dict(), proposal
     )
-    document["limits"] = limits(analysis)
-    model_files, shift = _revision(analysis, optimum_shift)
+    document["limits"] = campaign_limits(finding)
+    model_files, shift = _revision(finding, optimum_shift)
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
-    html = _page(analysis, location, proof, document, shift)
+    html = _page(finding, location, proof, document, shift)
     FOLDER.write(Path(out), html, document, model_files)
     return document
 
 
-def _revision(analysis: Analysis, optimum_shift: OptimumOf) -> tuple[dict[str, str], OptimumShift]:
+def _revision(
+    finding: DriveFinding, optimum_shift: OptimumOf
+) -> tuple[dict[str, str], OptimumShift]:
     """Return the files of the revised model, and what it does to the robust optimum."""
     try:
-        model = revised_model(analysis)
-        before = drive_model(analysis.campaign, analysis.verdict.base, "before", "the fitted base")
+        model = revised_model(finding)
+        before = drive_model(finding.campaign, finding.verdict.base, "before", "the fitted base")
     except InvalidInput as error:
         return {}, OptimumShift((), f"The revised drive is no drive model: {error}.")
     how_to_read = f'# Read it with load_model("{MODEL_FILE}", load_datasheet("{SHEET_FILE}")).\n'
     files = {MODEL_FILE: how_to_read + model_toml(model), SHEET_FILE: sheet_toml(model.sheet)}
-    if not accepted_fit(analysis.verdict).candidates:
+    if not finding.verdict.accepted.candidates:
         return files, OptimumShift((), "No effect was added, so the optimum stays where it was.")
     return files, optimum_shift(before, model)
 
@@ -132,7 +133,7 @@ def _shift_document(shift: OptimumShift) -> dict[str, Any]:
 
 
 def _page(
-    analysis: Analysis,
+    finding: DriveFinding,
     location: Location,
     proof: Proof | None,
     document: dict[str, Any],
@@ -153,21 +154,21 @@ def _page(
     return page(
         "pymoo_hdte.discrepancy.report",
         "report.html.j2",
-        campaign=analysis.campaign,
-        verdict=analysis.verdict,
+        campaign=finding.campaign,
+        verdict=finding.verdict,
         document=document,
         location=location,
         proof=proof,
-        status=STATUSES[analysis.verdict.status],
+        status=STATUSES[finding.verdict.status],
         effects=effect_rows(document["effects"]),
-        certainty=certainty(analysis),
-        gap=gap_sentence(analysis, proof),
+        certainty=certainty(finding),
+        gap=gap_sentence(finding, proof),
         next_test=in_words(document["next_experiment"]["description"]),
         pictures=pictures,
-        rivals=rival_rows(analysis.verdict),
-        parameters=parameter_rows(analysis),
+        rivals=rival_rows(finding.verdict),
+        parameters=parameter_rows(finding),
         metrics=metric_rows(proof),
-        records=record_rows(analysis.campaign, proof),
+        records=record_rows(finding.campaign, proof),
         shift=shift,
     )
 

@@ -30,7 +30,7 @@ Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Motion:
+class TorsionMotion:
     """A torsion and a speed on the grid of the torus, with what follows; arrays (n, G).
 
     ``mesh_slope`` and ``mesh_damping`` are the derivatives of ``mesh_torque`` by torsion and by its
@@ -101,7 +101,7 @@ class AngleEquations:
         size = np.sqrt(2.0 * np.maximum(self.torus.signal(energy), 1e-12))
         return np.copysign(size, self.speed)
 
-    def motion(self, torsion: Phasors, energy: Phasors) -> Motion:
+    def motion(self, torsion: Phasors, energy: Phasors) -> TorsionMotion:
         """Put torsion and E on the grid, with the torques that follow."""
         torus, coefficients = self.torus, self.coefficients
         angular_speed = self._angular_speed(energy)
@@ -121,7 +121,7 @@ class AngleEquations:
         damping = coefficients.damping[:, None]
         mesh = self._laws("mesh", position, rate)
         output = self._laws("output", np.zeros_like(output_speed), output_speed)
-        return Motion(
+        return TorsionMotion(
             angular_speed=angular_speed,
             energy_slope=energy_slope,
             output_speed=output_speed,
@@ -185,7 +185,7 @@ class AngleEquations:
             total -= self.torus.recall_matrix(on_grid, elsewhere)
         return total
 
-    def output_residual(self, motion: Motion) -> Phasors:
+    def output_residual(self, motion: TorsionMotion) -> Phasors:
         """Return what is left of the second equation, N.m."""
         return self.torus.phasors(
             self.output_inertia * motion.output_acceleration
@@ -195,7 +195,7 @@ class AngleEquations:
             + self.load
         )
 
-    def input_residual(self, motion: Motion) -> Phasors:
+    def input_residual(self, motion: TorsionMotion) -> Phasors:
         """Return what is left of the first equation, N.m; its mean is the motor's constant."""
         coefficients = self.coefficients
         reaction = coefficients.reaction * self._static_slope
@@ -209,11 +209,11 @@ class AngleEquations:
         )
         return self.torus.phasors(resisting - self.loop_torque(motion))
 
-    def lead(self, motion: Motion) -> Phasors:
+    def lead(self, motion: TorsionMotion) -> Phasors:
         """Return alpha - Omega t."""
         return -self.torus.integral(self.torus.phasors(self.speed / motion.angular_speed))
 
-    def loop_torque(self, motion: Motion) -> Values:
+    def loop_torque(self, motion: TorsionMotion) -> Values:
         """Return the motor's torque but for its constant."""
         motor = self.motor
         if motor == CONSTANT_TORQUE:

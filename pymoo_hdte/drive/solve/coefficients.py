@@ -5,8 +5,8 @@
     d = th_in / N - th_out - th_s(th_in),   k = K (1 + kappa cos(2 th_in + psi))
 
 and laws at ports, which add their torques, and the reaction of theta_s on the input.
-`steady_state`, `harmonic_balance` and `time_domain` all solve these equations, so a term stands
-here once.
+`hill_steady_state`, `harmonic_balance` and `time_domain` all solve these equations, so a term
+stands here once.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.harmonic_balance import harmonic_balance
+from pymoo_hdte.drive.solve.free_angle import harmonic_balance
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.solve.stability import require_stable
 
@@ -50,7 +50,7 @@ def transfer_function(
     return mesh / (mesh + _free_impedance(coefficients, frequency))
 
 
-def steady_state(coefficients: Coefficients) -> OrderSpectrum:
+def hill_steady_state(coefficients: Coefficients) -> OrderSpectrum:
     """Return theta_d = theta_s + d of Eqs. (9) and (10), rad, as an order spectrum.
 
     By `transfer_function` at constant stiffness, by Hill's method (Nayfeh and Mook, Nonlinear

@@ -36,7 +36,7 @@ CONSTANT_TORQUE = SpeedLoop()
 
 
 @dataclass(frozen=True)
-class Balance:
+class SteadyMotion:
     """Steady state of n cases, as harmonics of the input angle.
 
     Phasors multiply exp(i order alpha) with the input angle alpha as it is, in either direction: in
@@ -67,7 +67,7 @@ class Balance:
     energy: Phasors
     converged: NDArray[np.bool_]
 
-    def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> Balance:
+    def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> SteadyMotion:
         """Return some of the cases, each as often as its place is given.
 
         Parameters
@@ -77,9 +77,9 @@ class Balance:
 
         Returns
         -------
-        Balance
+        SteadyMotion
         """
-        return Balance(self.torus, *(getattr(self, name)[rows] for name in BY_CASE))
+        return SteadyMotion(self.torus, *(getattr(self, name)[rows] for name in BY_CASE))
 
     def spectrum(self) -> OrderSpectrum:
         """Return theta_d of the n cases as an order spectrum, rad."""
@@ -90,4 +90,4 @@ BY_CASE = (
     "transmission_error", "torsion", "motor_torque", "coupling_torque", "lead", "energy",
     "converged",
 )  # fmt: skip
-"""Fields of `Balance` with a row a case, in their order."""
+"""Fields of `SteadyMotion` with a row a case, in their order."""

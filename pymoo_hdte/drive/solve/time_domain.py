@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.harmonic_balance import harmonic_balance
+from pymoo_hdte.drive.solve.free_angle import harmonic_balance
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.law import PORTS, Law, PortState, periodic_phase
 

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
-from pymoo_hdte.discrepancy.drive.analysis import Analysis
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.misfit.map import (
@@ -28,7 +28,6 @@ from pymoo_hdte.discrepancy.drive.misfit.map import (
 from pymoo_hdte.discrepancy.drive.misfit.words import sentences
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
 from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
-from pymoo_hdte.discrepancy.drive.revision import accepted_fit
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.drive import Effect
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
@@ -48,16 +47,16 @@ _LEFT_OUT = 1e8
 """Factor on the variance of a cell that is left out of a fit."""
 
 
-def locate(analysis: Analysis) -> Location:
+def locate(finding: DriveFinding) -> Location:
     """Return the map of the misfit with its sentences.
 
     Parameters
     ----------
-    analysis : Analysis
-        Of `analysis.analyse`.
+    finding : DriveFinding
+        Of `analysis.examine_drive`.
     """
-    data = analysis.data
-    clean = refit_clean(data, accepted_fit(analysis.verdict))
+    data = finding.data
+    clean = refit_clean(data, finding.verdict.accepted)
     base = clean.values[None, : len(data.base)]
     without, complete = data.predict(base, ())[0], data.predict(base, clean.effects)[0]
     freedom = degrees_of_freedom(data)
@@ -80,7 +79,7 @@ def locate(analysis: Analysis) -> Location:
         sweep_flagged=_wrong(sweep),
         named=bool(clean.candidates),
     )
-    sentence, trusted = sentences(found, data, analysis.unexpected)
+    sentence, trusted = sentences(found, data, finding.unexpected)
     return replace(found, sentence=sentence, trusted=trusted)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 
 FALSE_DISCOVERIES = 0.01
 """Share of flagged cells that may be clean, after Benjamini and Hochberg (J. R. Stat. Soc. B 1995);

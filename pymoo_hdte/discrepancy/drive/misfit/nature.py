@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.campaign.believed import Believed
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS, residual_spectrum
+from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, residual_spectrum
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 
@@ -60,7 +60,7 @@ def changes(ratio: float | None, name: str) -> str:
     return f"hardly changes with {name}"
 
 
-def nature(location: Location, believed: Believed) -> str:
+def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
     """Return in words what kind of misfit it is."""
     speed = np.abs(location.speed_rpm)
     slow = speed <= np.median(speed)

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.misfit.map import Flags, Location, Values
 from pymoo_hdte.discrepancy.drive.misfit.nature import (
     StrayLines,
     changes,
     growth,
-    nature,
+    nature_of_misfit,
     sizes,
     stray_lines,
 )
@@ -44,7 +44,7 @@ def sentences(location: Location, data: Data, unexpected: Sequence[float]) -> tu
         parts.append(_where(location, stray, believed.ratio))
         if stray.frequency is None:
             parts.append(f"{_growth(location, bool(stray.broad))}.")
-        kind = nature(location, believed)
+        kind = nature_of_misfit(location, believed)
         parts.append(f"{kind}.")
     elif location.named:
         parts.append("The named effect moves no mean and no order line by more than its noise.")

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Motion, Values, mean
+from pymoo_hdte.drive.solve.angle_equations import AngleEquations, TorsionMotion, Values, mean
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.steady_motion import (
     BY_CASE,
     CONSTANT_TORQUE,
-    Balance,
     Phasors,
     SpeedLoop,
+    SteadyMotion,
 )
 from pymoo_hdte.drive.solve.torus import (
     Matrices,
@@ -68,8 +68,8 @@ def harmonic_balance(
     motor: SpeedLoop = CONSTANT_TORQUE,
     torus: Torus | None = None,
     tolerance: float = 1e-11,
-    start: Balance | None = None,
-) -> Balance:
+    start: SteadyMotion | None = None,
+) -> SteadyMotion:
     """Return the steady state of the n designs of ``coefficients``, laws at ports included.
 
     Newton's method on the harmonics over the input angle; the torques are evaluated on a grid
@@ -88,12 +88,12 @@ def harmonic_balance(
         Harmonics that are kept; by default all excited orders and their combinations.
     tolerance : float
         Largest change of the torsion, relative to its size, at which the iteration ends.
-    start : Balance, optional
+    start : SteadyMotion, optional
         Nearby cases, a row each, to begin from; ignored if their torus is another.
 
     Returns
     -------
-    Balance
+    SteadyMotion
         A row a design; one without a steady state is marked as not converged.
 
     Raises
@@ -118,7 +118,7 @@ def harmonic_balance(
         with np.errstate(over="ignore", invalid="ignore"):
             solver.solve(tolerance)
         parts.append(solver.result())
-    return Balance(
+    return SteadyMotion(
         torus, *(np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE)
     )
 
@@ -134,7 +134,7 @@ class _Solver:
         self.energy[:, :1] = equations.speed**2 / 2.0
         self.converged = np.zeros(len(self.torsion), dtype=bool)
 
-    def begin(self, near: Balance) -> None:
+    def begin(self, near: SteadyMotion) -> None:
         """Begin from nearby cases that have converged."""
         kept = near.converged[:, None]
         self.torsion = np.where(kept, near.torsion, self.torsion)
@@ -165,14 +165,14 @@ class _Solver:
                 left = left[~settled]
                 equations = self.equations.rows(left)
 
-    def result(self) -> Balance:
+    def result(self) -> SteadyMotion:
         """Return the steady state as it is now."""
         equations = self.equations
         motion = equations.motion(self.torsion, self.energy)
         torus, coefficients = equations.torus, equations.coefficients
         inertia = np.reshape(coefficients.load_inertia, (-1, 1))
         constant = equations.input_residual(motion)[:, :1].real
-        return Balance(
+        return SteadyMotion(
             torus=torus,
             transmission_error=equations.static + self.torsion,
             torsion=self.torsion,
@@ -223,7 +223,7 @@ def _newton_step(
 
 def _torsion_change(
     equations: AngleEquations,
-    motion: Motion,
+    motion: TorsionMotion,
     impedance: Phasors,
     recall: Matrices | None,
     right: Phasors,

@@ -13,7 +13,6 @@ from pymoo.optimize import minimize
 
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.cli.design_study import POPULATION
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia, deviation_degree
 from pymoo_hdte.discrepancy.report.optimum import Choice, OptimumShift, Values
 from pymoo_hdte.drive import DriveModel
@@ -22,6 +21,7 @@ from pymoo_hdte.problems import RobustDTE
 SURROGATE_ORDER = 3
 """That of the paper; with laws at ports it costs a harmonic balance in each of 4^5 runs."""
 EVALUATIONS = 5_000
+POPULATION = 100
 
 
 def optimum_shift(before: DriveModel, after: DriveModel, seed: int = 1) -> OptimumShift:

@@ -1,0 +1,38 @@
+from pymoo_hdte.discrepancy.analysis import (
+    DriveAnalysis,
+    MechanismAnalysis,
+    analyse,
+    check_report_folder,
+)
+from pymoo_hdte.discrepancy.campaign.campaign import (
+    BelievedDrive,
+    Campaign,
+    Rig,
+    RunningRecord,
+    TorsionRecord,
+)
+from pymoo_hdte.discrepancy.campaign.files import read_campaign, write_campaign
+from pymoo_hdte.discrepancy.campaign.line_fit import OrderLines, order_lines, residual_spectrum
+from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
+from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, read_model
+
+__all__ = [
+    "BelievedDrive",
+    "Campaign",
+    "DriveAnalysis",
+    "MeasuredMechanism",
+    "MechanismAnalysis",
+    "MechanismModel",
+    "OrderLines",
+    "Rig",
+    "RunningRecord",
+    "TorsionRecord",
+    "analyse",
+    "check_report_folder",
+    "order_lines",
+    "read_campaign",
+    "read_model",
+    "read_rig",
+    "residual_spectrum",
+    "write_campaign",
+]

@@ -1,0 +1,267 @@
+"""One call from measurements to a verdict, and from it to place, proof, next test and report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, overload
+
+from threadpoolctl import threadpool_limits
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, examine_drive
+from pymoo_hdte.discrepancy.drive.misfit.location import Location, locate
+from pymoo_hdte.discrepancy.drive.next_test import Proposal, next_experiment
+from pymoo_hdte.discrepancy.drive.proof import Proof, prove
+from pymoo_hdte.discrepancy.drive.revision import revised_model
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism
+from pymoo_hdte.discrepancy.mechanism.location import MechanismLocation, locate_in_mechanism
+from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
+from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest, next_test
+from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
+from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
+from pymoo_hdte.drive import DriveModel
+
+ONE_THREAD = threadpool_limits.wrap(limits=1)
+"""The matrices are small: threads that wait for each other cost a multiple."""
+
+
+@overload
+def analyse(measured: Campaign, effects: Sequence[Any] = ()) -> DriveAnalysis: ...
+@overload
+def analyse(measured: MeasuredMechanism, effects: Sequence[Any] = ()) -> MechanismAnalysis: ...
+@ONE_THREAD
+def analyse(
+    measured: Campaign | MeasuredMechanism, effects: Sequence[Any] = ()
+) -> DriveAnalysis | MechanismAnalysis:
+    """Return what the believed model lacks beside measurements.
+
+    The believed model is fitted within its tolerances; if that is not enough, candidate effects are
+    compared by the Bayesian information criterion (Schwarz, Annals of Statistics 6, 1978). A
+    mechanism is judged by inverse dynamics, for which every coordinate has to be measured (of
+    robots: Janot, Vandanjon and Gautier, IEEE Trans. Control Systems Technology 22, 2014).
+
+    Parameters
+    ----------
+    measured : Campaign or MeasuredMechanism
+        From `read_campaign`, of a harmonic drive; from `read_rig` or made in Python, of any other
+        machine.
+    effects : sequence, optional
+        Effects of your own that may be missing, beside those of the library.
+
+    Returns
+    -------
+    DriveAnalysis or MechanismAnalysis
+
+    Raises
+    ------
+    InvalidInput
+        If too few records are to be fitted, or they cannot show what is believed: of a drive, a
+        line of its static error; of a mechanism, a channel, motion, or what sets the scale.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_campaign("campaign"))
+    >>> analysis.verdict.status
+    'named'
+    >>> [effect.label for effect in analysis.verdict.chosen.candidates]
+    ['torque_ripple:input@2']
+    >>> problem = RobustDTE(model=analysis.revised_model())
+    """
+    if isinstance(measured, Campaign):
+        return DriveAnalysis(examine_drive(measured, effects))
+    if isinstance(measured, MeasuredMechanism):
+        believed = measured.mechanism, measured.records, measured.cutoff, measured.effects
+        return MechanismAnalysis(measured, examine_mechanism(*believed, effects))
+    raise InvalidInput("measured", type(measured).__name__, "a Campaign or a MeasuredMechanism")
+
+
+class DriveAnalysis:
+    """What the workflow finds in a campaign of a harmonic drive; made by `analyse`.
+
+    Each answer is worked out when it is first asked for.
+
+    Attributes
+    ----------
+    finding : DriveFinding
+        Campaign, features of its records and verdict.
+    """
+
+    def __init__(self, finding: DriveFinding) -> None:
+        self.finding = finding
+
+    @property
+    def campaign(self) -> Campaign:
+        """The campaign with what is believed."""
+        return self.finding.campaign
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
+        return self.finding.verdict
+
+    def locate(self) -> Location:
+        """Return where the believed model is wrong: by record, channel and order, and in words."""
+        return self._location
+
+    def prove(self) -> Proof | None:
+        """Return the gap on the held-out records before and after; None without such records."""
+        return self._proof
+
+    def next_experiment(self) -> Proposal:
+        """Return the test that says most about what is still in doubt."""
+        return self._proposal
+
+    def revised_model(self) -> DriveModel:
+        """Return the drive with fitted values and named effects, e.g. for `RobustDTE`.
+
+        Raises
+        ------
+        InvalidInput
+            If no drive model can hold it: its ratio is not one of whole tooth numbers.
+        """
+        return revised_model(self.finding)
+
+    @ONE_THREAD
+    def report(self, out: str | Path) -> dict[str, Any]:
+        """Write ``report.html``, ``verdict.json`` and the revised model; return the verdict.
+
+        Parameters
+        ----------
+        out : str or Path
+            A folder that is new, empty, or an earlier report, which is replaced.
+
+        Returns
+        -------
+        dict
+            What ``verdict.json`` holds.
+
+        Raises
+        ------
+        InvalidInput
+            If the folder holds anything else.
+        OSError
+            If it cannot be written.
+        """
+        # Pictures and optimisation take long to import, and nothing else here needs them.
+        from pymoo_hdte.discrepancy.report.write import write_report
+        from pymoo_hdte.discrepancy.robust_optimum import optimum_shift
+
+        check_report_folder(out)
+        found = self.locate(), self.prove(), self.next_experiment()
+        return write_report(self.finding, *found, optimum_shift, out)
+
+    @cached_property
+    @ONE_THREAD
+    def _location(self) -> Location:
+        return locate(self.finding)
+
+    @cached_property
+    @ONE_THREAD
+    def _proof(self) -> Proof | None:
+        return prove(self.finding)
+
+    @cached_property
+    @ONE_THREAD
+    def _proposal(self) -> Proposal:
+        return next_experiment(self.finding)
+
+
+class MechanismAnalysis:
+    """What the workflow finds in the records of a mechanism; made by `analyse`.
+
+    Each answer is worked out when it is first asked for.
+
+    Attributes
+    ----------
+    measured : MeasuredMechanism
+        The mechanism as it is believed, and its records.
+    finding : MechanismFinding
+        Force balances of the records, verdict, and what it leaves.
+    """
+
+    def __init__(self, measured: MeasuredMechanism, finding: MechanismFinding) -> None:
+        self.measured, self.finding = measured, finding
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is missing: ``status``, the ``chosen`` effects, and ``alternatives``."""
+        return self.finding.verdict
+
+    def locate(self) -> MechanismLocation:
+        """Return in which force balance the believed model is wrong, and by how much."""
+        return locate_in_mechanism(self.finding)
+
+    def prove(self) -> tuple[MeasuredGap, ...]:
+        """Return the gaps on the held-out records before and after; none without such records."""
+        return self._gaps
+
+    def next_experiment(self) -> NextTest:
+        """Return the repetition of a record that says most about what is still in doubt."""
+        return self._test
+
+    def revised_model(self) -> MechanismModel:
+        """Return the mechanism with fitted values, and the effects that it has."""
+        return revised_mechanism(self.measured.title, self.finding)
+
+    @ONE_THREAD
+    def report(self, out: str | Path) -> dict[str, Any]:
+        """Write ``report.html``, ``verdict.json`` and the revised model; return the verdict.
+
+        Parameters
+        ----------
+        out : str or Path
+            A folder that is new, empty, or an earlier report, which is replaced.
+
+        Returns
+        -------
+        dict
+            What ``verdict.json`` holds.
+
+        Raises
+        ------
+        InvalidInput
+            If the folder holds anything else.
+        OSError
+            If it cannot be written.
+        """
+        # Pictures take long to import, and nothing else here needs them.
+        from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
+
+        check_report_folder(out)
+        found = self.prove(), self.next_experiment()
+        return write_mechanism_report(self.measured.title, self.finding, *found, out)
+
+    @cached_property
+    @ONE_THREAD
+    def _gaps(self) -> tuple[MeasuredGap, ...]:
+        return prove_measured(self.finding)
+
+    @cached_property
+    @ONE_THREAD
+    def _test(self) -> NextTest:
+        return next_test(self.finding)
+
+
+def check_report_folder(out: str | Path) -> None:
+    """Refuse a folder that could not take a report, before anybody waits for one.
+
+    Parameters
+    ----------
+    out : str or Path
+        New, empty, or an earlier report, which `report` replaces.
+
+    Raises
+    ------
+    InvalidInput
+        If the folder holds anything else.
+    OSError
+        If it cannot be written.
+    """
+    from pymoo_hdte.discrepancy.report.write import FOLDER
+
+    FOLDER.check(Path(out))

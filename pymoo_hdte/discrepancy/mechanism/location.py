@@ -1,0 +1,48 @@
+"""Where a mechanism's model is wrong: in which force balance, and by how much."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+
+_WRONG = 2.0
+"""Ratio of powers from which a balance is off by more than its sensors."""
+
+
+@dataclass(frozen=True)
+class MechanismLocation:
+    """Which force balances the believed mechanism misses.
+
+    Attributes
+    ----------
+    sentence : str
+    base_misfit, sensor_noise : dict of str to float
+        Root mean square by balance, N or N.m: what the base leaves, and what sensors would show.
+    """
+
+    sentence: str
+    base_misfit: dict[str, float]
+    sensor_noise: dict[str, float]
+
+    def summary(self) -> dict[str, Any]:
+        """Return what ``verdict.json`` says of it, as plain types."""
+        return asdict(self)
+
+
+def locate_in_mechanism(finding: MechanismFinding) -> MechanismLocation:
+    """Return in which balance the base is wrong, and by how much."""
+    names = finding.data.names
+    misfit = dict(zip(names, finding.base_misfit.tolist(), strict=True))
+    noise = dict(zip(names, finding.sensor_noise.tolist(), strict=True))
+    if finding.verdict.status == "adequate":
+        words = "Nowhere: what the model leaves is that of its sensors, or near it."
+    else:
+        parts = [
+            f"the {finding.data.what(name)} (off by {misfit[name]:.3g}, sensors {noise[name]:.2g})"
+            for name in names
+            if misfit[name] ** 2 > _WRONG * noise[name] ** 2
+        ]
+        words = f"In {' and '.join(parts) or 'no balance by itself'}."
+    return MechanismLocation(words, misfit, noise)
