@@ -179,7 +179,7 @@ def test_every_python_block_runs_and_prints_what_the_page_says(at_the_rig):
     for name, block in zip(("table", "joint"), blocks("toml"), strict=True):
         assert read_block(at_the_rig, block).mechanism == names[name], name
     # The second block is left with the joint.
-    (friction,) = names["finding"].accepted.effects
+    (friction,) = names["analysis"].verdict.accepted.effects
     assert friction.name == "coulomb_friction"
     assert friction.law.level == pytest.approx(JOINT["friction"], rel=0.03)
 

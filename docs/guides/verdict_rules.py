@@ -12,12 +12,12 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.stats import chi2, ncx2
 
+from pymoo_hdte.discrepancy import MeasuredMechanism, analyse
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
 from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
 # %%
@@ -213,7 +213,7 @@ joint = Mechanism(
     inputs=[Input("torque", {"q": 1.0})],
 )
 for friction in (0.0, 0.3):
-    verdict = examine_mechanism(joint, [record_of(friction)]).verdict
+    verdict = analyse(MeasuredMechanism(joint, [record_of(friction)])).verdict
     freedom = verdict.degrees_of_freedom
     ratio = verdict.base.chi_square / freedom
     print(f"friction {friction:g} N.m: chi-square / nu of the base {ratio:.3g}, {verdict.status}")
