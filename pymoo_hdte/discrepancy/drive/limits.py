@@ -10,10 +10,6 @@ from pymoo_hdte.discrepancy.drive.analysis import Analysis, highest_order
 from pymoo_hdte.discrepancy.engine.candidate import harmonics_among
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
 
-_SAME_SPEED = 1.1
-"""Ratio of the largest to the smallest speed up to which records run at one speed."""
-_SAME_LOAD = 0.1
-"""Range of loads, as a share of the largest, up to which records carry one load."""
 _SAME_ORDER = 1e-6
 """Largest distance at which a line is that of an order: one beside it is not predicted for it."""
 
@@ -49,14 +45,15 @@ def _unproven(analysis: Analysis) -> list[str]:
 
 def _unvaried(analysis: Analysis) -> list[str]:
     records, found = analysis.data.features.records, []
+    rules = analysis.data.rules
     speeds = np.array([record.input_speed for record in records])
     loads = np.array([record.load_torque for record in records])
-    if np.abs(speeds).max() <= _SAME_SPEED * np.abs(speeds).min():
+    if np.abs(speeds).max() <= rules.one_speed_ratio * np.abs(speeds).min():
         found.append(
             "All fitted records run at one speed: dry friction, friction that changes with speed "
             "and damping cannot be told apart."
         )
-    if np.ptp(loads) <= _SAME_LOAD * np.abs(loads).max():
+    if np.ptp(loads) <= rules.one_load_range * np.abs(loads).max():
         found.append(
             "All fitted records carry one load: an error that grows with load cannot be told from "
             "one that does not."
@@ -78,7 +75,8 @@ def _unvaried(analysis: Analysis) -> list[str]:
 
 
 def _unseen(analysis: Analysis) -> list[str]:
-    orders, highest = analysis.data.features.orders, highest_order(analysis.campaign)
+    orders = analysis.data.features.orders
+    highest = highest_order(analysis.campaign, analysis.data.rules)
     believed = analysis.campaign.believed
     unseen = [
         order
@@ -97,7 +95,8 @@ def _unseen(analysis: Analysis) -> list[str]:
 
 
 def _too_high(analysis: Analysis) -> list[str]:
-    verdict, highest = analysis.verdict, highest_order(analysis.campaign)
+    verdict, rules = analysis.verdict, analysis.data.rules
+    highest = highest_order(analysis.campaign, rules)
     if verdict.chosen is None or not verdict.leaves_more_than_noise:
         return []
     seen = analysis.data.features.orders.tolist()

@@ -20,11 +20,6 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.report.document import sentence
 
-_OFFERED = 6.0
-"""Gain of BIC with which a second effect that is not named is mentioned."""
-_MEANINGFUL = 0.05
-"""Least share of what is left that it removes."""
-
 
 def measured_document(
     title: str, finding: Finding, gaps: Sequence[MeasuredGap], test: NextTest
@@ -108,7 +103,7 @@ def offered(finding: Finding) -> list[dict[str, Any]]:
 
     They make the fit better than chance does, but remove too little to be named.
     """
-    chosen = finding.verdict.chosen
+    chosen, rules = finding.verdict.chosen, finding.data.rules
     if chosen is None or finding.accepted is not chosen.fit or len(chosen.candidates) > 1:
         return []
     found = []
@@ -117,7 +112,7 @@ def offered(finding: Finding) -> list[dict[str, Any]]:
         removes = 1.0 - one.fit.chi_square / chosen.fit.chi_square
         if len(seconds) == 1 < len(one.candidates):
             gain = chosen.bic - one.bic
-            if gain > _OFFERED and removes > _MEANINGFUL:
+            if gain > rules.bic_gain and removes > rules.offered_share:
                 found.append({"name": seconds[0].name, "port": seconds[0].port, "removes": removes})
     return found
 
@@ -128,7 +123,7 @@ def location(finding: Finding) -> dict[str, Any]:
     wrong = [
         name
         for name, one, floor in zip(finding.data.names, before, noise, strict=True)
-        if one**2 > 2.0 * floor**2
+        if one**2 > finding.data.rules.noise_power_ratio * floor**2
     ]
     if finding.verdict.status == "adequate":
         words = "Nowhere: what the model leaves is that of its sensors, or near it."
