@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.drive.misfit.location import Location, locate
 from pymoo_hdte.discrepancy.drive.next_test import Proposal, next_experiment
 from pymoo_hdte.discrepancy.drive.proof import Proof, prove
 from pymoo_hdte.discrepancy.drive.revision import revised_model
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism
@@ -31,12 +32,16 @@ ONE_THREAD = threadpool_limits.wrap(limits=1)
 
 
 @overload
-def analyse(measured: Campaign, effects: Sequence[Any] = ()) -> DriveAnalysis: ...
+def analyse(
+    measured: Campaign, effects: Sequence[Any] = (), rules: Rules = RULES
+) -> DriveAnalysis: ...
 @overload
-def analyse(measured: MeasuredMechanism, effects: Sequence[Any] = ()) -> MechanismAnalysis: ...
+def analyse(
+    measured: MeasuredMechanism, effects: Sequence[Any] = (), rules: Rules = RULES
+) -> MechanismAnalysis: ...
 @ONE_THREAD
 def analyse(
-    measured: Campaign | MeasuredMechanism, effects: Sequence[Any] = ()
+    measured: Campaign | MeasuredMechanism, effects: Sequence[Any] = (), rules: Rules = RULES
 ) -> DriveAnalysis | MechanismAnalysis:
     """Return what the believed model lacks beside measurements.
 
@@ -52,6 +57,8 @@ def analyse(
         machine.
     effects : sequence, optional
         Effects of your own that may be missing, beside those of the library.
+    rules : Rules, optional
+        Thresholds of the verdict.
 
     Returns
     -------
@@ -73,10 +80,10 @@ def analyse(
     >>> problem = RobustDTE(model=analysis.revised_model())
     """
     if isinstance(measured, Campaign):
-        return DriveAnalysis(examine_drive(measured, effects))
+        return DriveAnalysis(examine_drive(measured, effects, rules))
     if isinstance(measured, MeasuredMechanism):
         believed = measured.mechanism, measured.records, measured.cutoff, measured.effects
-        return MechanismAnalysis(measured, examine_mechanism(*believed, effects))
+        return MechanismAnalysis(measured, examine_mechanism(*believed, effects, rules))
     raise InvalidInput("measured", type(measured).__name__, "a Campaign or a MeasuredMechanism")
 
 

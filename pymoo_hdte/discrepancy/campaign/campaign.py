@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.campaign.plausibility import (
     check_torsion,
 )
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
 __all__ = ["BelievedDrive", "Campaign", "Rig", "RunningRecord", "TorsionRecord"]
 
@@ -36,6 +37,9 @@ class Campaign:
         At least one.
     torsion : tuple of TorsionRecord
         May be empty.
+    rules : Rules
+        Thresholds of what is refused. They are used to check and not kept: give them to
+        ``dataclasses.replace`` again.
 
     Raises
     ------
@@ -51,8 +55,9 @@ class Campaign:
     rig: Rig
     running: tuple[RunningRecord, ...]
     torsion: tuple[TorsionRecord, ...]
+    rules: InitVar[Rules] = RULES
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, rules: Rules) -> None:
         for field in ("title", "drive"):
             text = getattr(self, field)
             if not isinstance(text, str) or not text.strip() or not text.isprintable():
@@ -60,15 +65,15 @@ class Campaign:
         if not self.running:
             raise InvalidInput("running records", 0, "at least one")
         self._check_each_once()
-        check_believed(self.believed)
+        check_believed(self.believed, rules)
         largest_load = max(abs(record.load_torque) for record in self.running)
         for record in self.running:
             with _named(record.name):
-                check_running(record, self.believed, self.rig, largest_load)
+                check_running(record, self.believed, self.rig, largest_load, rules)
         for sweep in self.torsion:
             with _named(sweep.name):
-                check_torsion(sweep, self.believed)
-        check_noise(self.running, self.torsion, self.believed, self.rig)
+                check_torsion(sweep, self.believed, rules)
+        check_noise(self.running, self.torsion, self.believed, self.rig, rules)
 
     @property
     def train(self) -> tuple[RunningRecord, ...]:

@@ -26,13 +26,14 @@ from pymoo_hdte.discrepancy.campaign.format import (
     Names,
 )
 from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.drive.toml_text import toml_string
 from pymoo_hdte.io.fields import Fields, toml_with_lines
 
 Checked = TypeVar("Checked", BelievedDrive, Rig, RunningRecord | TorsionRecord)
 
 
-def read_campaign(folder: str | Path) -> Campaign:
+def read_campaign(folder: str | Path, rules: Rules = RULES) -> Campaign:
     """Read and check a campaign.
 
     Parameters
@@ -40,6 +41,8 @@ def read_campaign(folder: str | Path) -> Campaign:
     folder : str or Path
         With ``campaign.toml`` and a ``.csv.gz`` or plain ``.csv`` file for each record, whose
         fields and columns have their units in their names.
+    rules : Rules
+        Thresholds of what `Campaign` refuses.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def read_campaign(folder: str | Path) -> Campaign:
         running = tuple(record for record in records if isinstance(record, RunningRecord))
         torsion = tuple(record for record in records if isinstance(record, TorsionRecord))
         try:
-            return Campaign(title, drive, believed, rig, running, torsion)
+            return Campaign(title, drive, believed, rig, running, torsion, rules)
         except InvalidInput as error:
             raise _placed_in_files(error, records, files) from None
 

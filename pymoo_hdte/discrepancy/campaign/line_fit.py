@@ -22,12 +22,11 @@ from scipy.special import factorial
 from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 from pymoo_hdte.discrepancy.campaign.believed import Rig
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.engine.rules import RULES
 
 CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
 
-HIGHEST_ORDER = 14.0
-"""Of the residual spectrum, cycles per input turn."""
-
+# Conditions of a linear fit, which keep its digits; what is named does not depend on them.
 LARGEST_CONDITION = 1e3
 """Of the matrix of the fit; beyond it the noise of the lines has grown a thousandfold."""
 
@@ -159,7 +158,11 @@ def row_covariance(rig: Rig, ratio: float, samples_averaged: int) -> NDArray[np.
 
 
 def residual_spectrum(
-    record: RunningRecord, rig: Rig, ratio: float, orders: ArrayLike | Sequence[float]
+    record: RunningRecord,
+    rig: Rig,
+    ratio: float,
+    orders: ArrayLike | Sequence[float],
+    highest_order: float = RULES.highest_order,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return what the order lines leave, at multiples of 1/N and of 1, in units of the noise.
 
@@ -174,11 +177,13 @@ def residual_spectrum(
     ----------
     record, rig, ratio, orders
         As in `order_lines`.
+    highest_order : float
+        Cycles per input turn.
 
     Returns
     -------
     orders : ndarray, shape (k,)
-        Cycles per input turn, up to 14 or the Nyquist order.
+        Cycles per input turn, up to ``highest_order`` or the Nyquist order.
     amplitudes : ndarray, shape (4, k)
         Dimensionless, by channel as in `OrderLines`: over their root mean square under noise alone.
         The square is then exponential with mean 1: a line exceeds x by chance with probability
@@ -190,7 +195,7 @@ def residual_spectrum(
         As `order_lines`.
     """
     fit = _Fit.of(record, ratio, orders)
-    highest = min(HIGHEST_ORDER, _nyquist_order(record))
+    highest = min(highest_order, _nyquist_order(record))
     multiples = np.arange(1, int(np.ceil(highest * ratio - 1e-9)))
     whole = ratio * np.arange(1, int(np.ceil(highest - 1e-9)))
     whole = whole[np.abs(whole - whole.round()) > 1e-9]

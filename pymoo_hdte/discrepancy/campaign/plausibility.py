@@ -15,34 +15,26 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.units import ARCSEC
 
-LARGEST_TRANSMISSION_ERROR = 0.02
-"""rad; ten times the wind-up of the drive of the paper at its rated torque."""
-LEAST_AMPLITUDE = 1e-3 * ARCSEC
-"""rad; no encoder would show a line of the static error that is smaller, but not zero."""
-LEAST_FREQUENCY = 0.5
-"""Hz, of an inertia on the mesh; those of the drive of the paper swing at 18, 90 and 900 Hz."""
-LEAST_TOLERANCE = 1e-3
-"""No parameter of a drive is known better; a base held fixed turns its own errors into effects."""
-NOISE_FACTOR = 30.0
-"""Largest ratio of the noise that is stated to what the rows of the records show."""
 
-
-def check_believed(believed: BelievedDrive) -> None:
+def check_believed(believed: BelievedDrive, rules: Rules) -> None:
     """Refuse beliefs that no drive can have.
 
     Raises
     ------
     InvalidInput
-        If an inertia would swing on the mesh below `LEAST_FREQUENCY`, the static error has no line
-        or one beyond what drives have, or a tolerance is below `LEAST_TOLERANCE`.
+        If an inertia would swing on the mesh below `Rules.least_natural_frequency`, the static
+        error has no line or one beyond what drives have, or a tolerance is below
+        `Rules.least_tolerance`.
     """
     for name in ("tolerance", "error_tolerance"):
         value = getattr(believed, name)
-        if value < LEAST_TOLERANCE:
-            raise InvalidInput(f"believed.{name}", value, f"at least {LEAST_TOLERANCE:g}")
-    heaviest = believed.stiffness / (2.0 * math.pi * LEAST_FREQUENCY) ** 2
+        if value < rules.least_tolerance:
+            raise InvalidInput(f"believed.{name}", value, f"at least {rules.least_tolerance:g}")
+    slowest = rules.least_natural_frequency
+    heaviest = believed.stiffness / (2.0 * math.pi * slowest) ** 2
     for name, referred in (
         ("input_inertia", believed.ratio**2),
         ("output_inertia", 1.0),
@@ -52,15 +44,15 @@ def check_believed(believed: BelievedDrive) -> None:
         if not value * referred <= heaviest:
             allowed = (
                 f"at most {heaviest / referred:.3g} kg.m2, or its natural frequency on the mesh "
-                f"of {believed.stiffness:g} N.m/rad would be below {LEAST_FREQUENCY:g} Hz"
+                f"of {believed.stiffness:g} N.m/rad would be below {slowest:g} Hz"
             )
             raise InvalidInput(f"believed.{name}", value, allowed)
     if not believed.error_orders:
         raise InvalidInput("believed.error_orders", (), "at least one; its amplitude may be zero")
+    least, most = rules.least_error_amplitude, rules.largest_transmission_error
     for amplitude in believed.error_amplitudes:
-        if not (amplitude == 0.0 or LEAST_AMPLITUDE <= amplitude <= LARGEST_TRANSMISSION_ERROR):
-            least, most = LEAST_AMPLITUDE / ARCSEC, LARGEST_TRANSMISSION_ERROR / ARCSEC
-            allowed = f"zero, or {least:.2g} to {most:.2g} arcsec"
+        if not (amplitude == 0.0 or least <= amplitude <= most):
+            allowed = f"zero, or {least / ARCSEC:.2g} to {most / ARCSEC:.2g} arcsec"
             raise InvalidInput("believed.error_amplitudes", amplitude, allowed)
 
 
@@ -69,6 +61,7 @@ def check_noise(
     torsion: Sequence[TorsionRecord],
     believed: BelievedDrive,
     rig: Rig,
+    rules: Rules,
 ) -> None:
     """Refuse a stated noise so large that no record shows it: it would hide every misfit.
 
@@ -77,7 +70,7 @@ def check_noise(
     Raises
     ------
     InvalidInput
-        If all records scatter less than stated by more than `NOISE_FACTOR`.
+        If all records scatter less than stated by more than `Rules.overstated_noise_ratio`.
     """
     averaged = np.sqrt([record.samples_averaged for record in running])
     errors = [record.transmission_error(believed.ratio) for record in running]
@@ -91,10 +84,10 @@ def check_noise(
         shown["torsion_angle_noise"] = _scatters([record.output_angle for record in torsion])
     for name, scatters in shown.items():
         stated, largest = getattr(rig, name), float(scatters.max())
-        if not stated <= NOISE_FACTOR * largest:
+        if not stated <= rules.overstated_noise_ratio * largest:
             allowed = (
-                f"at most {NOISE_FACTOR:g} times what the records show from row to row, "
-                f"which is {largest / stated:.2g} times that"
+                f"at most {rules.overstated_noise_ratio:g} times what the records show from row "
+                f"to row, which is {largest / stated:.2g} times that"
             )
             raise InvalidInput(f"rig.{name}", stated, allowed)
 
@@ -107,7 +100,7 @@ def _scatters(channels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def check_running(
-    record: RunningRecord, believed: BelievedDrive, rig: Rig, largest_load: float
+    record: RunningRecord, believed: BelievedDrive, rig: Rig, largest_load: float, rules: Rules
 ) -> None:
     """Refuse a running record whose channels contradict its condition or the drive.
 
@@ -118,27 +111,30 @@ def check_running(
     rig : Rig
     largest_load : float
         Of the campaign, N.m: the scale of torques where a record has no load.
+    rules : Rules
 
     Raises
     ------
     InvalidInput
-        If the speed is off by more than 10 %, the record is shorter than one output turn, the
-        transmission error is not small, or a torque is far from what the load asks for.
+        If the speed is off by more than `Rules.speed_mismatch`, the record is shorter than one
+        output turn, the transmission error is not small, or a torque is far from what the load asks
+        for.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        _check_travel(record, believed.ratio)
+        _check_travel(record, believed.ratio, rules)
         largest = float(np.max(np.abs(record.transmission_error(believed.ratio))))
-        if not largest <= LARGEST_TRANSMISSION_ERROR:
+        most = rules.largest_transmission_error
+        if not largest <= most:
             allowed = (
-                f"at most {LARGEST_TRANSMISSION_ERROR:g} rad at a ratio of {believed.ratio:g}, "
+                f"at most {most:g} rad at a ratio of {believed.ratio:g}, "
                 "both angles in rad with one common zero"
             )
             raise InvalidInput("largest transmission error", largest, allowed)
-        _check_torques(record, believed.ratio, rig, largest_load)
+        _check_torques(record, believed.ratio, rig, largest_load, rules)
 
 
-def check_torsion(record: TorsionRecord, believed: BelievedDrive) -> None:
-    """Refuse a torsion record whose slope is not that of the drive within a factor of five.
+def check_torsion(record: TorsionRecord, believed: BelievedDrive, rules: Rules) -> None:
+    """Refuse a torsion record whose slope is not that of the drive within a factor.
 
     Raises
     ------
@@ -149,22 +145,24 @@ def check_torsion(record: TorsionRecord, believed: BelievedDrive) -> None:
         torque = record.output_torque - np.mean(record.output_torque)
         slope = -float(torque @ record.output_angle / (torque @ torque))
         relative = slope * believed.stiffness
-    if not 0.2 < relative < 5.0:
+    factor = rules.slope_mismatch
+    if not 1.0 / factor < relative < factor:
         cause = "the unit of either" if relative > 0.0 else "a positive torque turns it backwards"
         allowed = (
             f"{1.0 / believed.stiffness:.3g} rad/(N.m), as of the believed stiffness of "
-            f"{believed.stiffness:.4g} N.m/rad, within a factor of five ({cause})"
+            f"{believed.stiffness:.4g} N.m/rad, within a factor of {factor:g} ({cause})"
         )
         raise InvalidInput(
             "slope of -output_angle over output_torque", float(f"{slope:.3g}"), allowed
         )
 
 
-def _check_travel(record: RunningRecord, ratio: float) -> None:
+def _check_travel(record: RunningRecord, ratio: float, rules: Rules) -> None:
     travel = float(record.input_angle[-1] - record.input_angle[0])
     speed = travel / float(record.time[-1] - record.time[0])
-    if not abs(speed - record.input_speed) <= 0.1 * abs(record.input_speed):
-        allowed = f"{record.input_speed:g} rad/s within 10 %, the input speed of the record"
+    if not abs(speed - record.input_speed) <= rules.speed_mismatch * abs(record.input_speed):
+        within = f"{100.0 * rules.speed_mismatch:g} %"
+        allowed = f"{record.input_speed:g} rad/s within {within}, the input speed of the record"
         raise InvalidInput("mean speed of input_angle", speed, allowed)
     turn = 2.0 * math.pi * ratio
     # The last sample lies one step before the end of the turn, and the speed is not exact.
@@ -173,18 +171,20 @@ def _check_travel(record: RunningRecord, ratio: float) -> None:
         raise InvalidInput("travel of input_angle", abs(travel), allowed)
 
 
-def _check_torques(record: RunningRecord, ratio: float, rig: Rig, largest_load: float) -> None:
-    load = record.load_torque
+def _check_torques(
+    record: RunningRecord, ratio: float, rig: Rig, largest_load: float, rules: Rules
+) -> None:
+    load, multiple = record.load_torque, rules.torque_mismatch
     measured = float(np.mean(record.output_torque))
     # A single wild sample moves the mean, but not the middle 95 %.
     spread = float(np.ptp(np.quantile(record.output_torque, (0.025, 0.975))))
-    slack = 10.0 * rig.output_torque_zero + spread
-    if not abs(measured - load) <= 0.3 * abs(load) + slack:
+    slack = multiple * rig.output_torque_zero + spread
+    if not abs(measured - load) <= rules.load_mismatch * abs(load) + slack:
         raise InvalidInput("mean of output_torque", measured, f"near the load of {load:g} N.m")
     motor = float(np.mean(record.input_torque))
-    slack = 10.0 * rig.input_torque_zero
+    slack = multiple * rig.input_torque_zero
     if load == 0.0:
-        most = 10.0 * largest_load / ratio + slack if largest_load else math.inf
+        most = multiple * largest_load / ratio + slack if largest_load else math.inf
         # Only the motor drives, against friction.
         if not -slack <= math.copysign(1.0, record.input_speed) * motor <= most:
             allowed = "a torque that overcomes friction, small beside that under load"
@@ -192,7 +192,7 @@ def _check_torques(record: RunningRecord, ratio: float, rig: Rig, largest_load: 
         return
     share = abs(load) / ratio
     # Friction adds to the load when the motor drives it and may reverse the torque when not.
-    least = 0.3 * share - slack if load * record.input_speed > 0.0 else -math.inf
-    if not (least <= math.copysign(1.0, load) * motor and abs(motor) <= 10.0 * share + slack):
+    least = rules.load_mismatch * share - slack if load * record.input_speed > 0.0 else -math.inf
+    if not (least <= math.copysign(1.0, load) * motor and abs(motor) <= multiple * share + slack):
         allowed = f"near load / ratio = {load / ratio:.3g} N.m"
         raise InvalidInput("mean of input_torque", motor, allowed)

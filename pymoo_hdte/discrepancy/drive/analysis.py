@@ -13,7 +13,6 @@ from threadpoolctl import threadpool_limits
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.line_fit import HIGHEST_ORDER
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.candidates import OfDrives, drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
@@ -21,24 +20,10 @@ from pymoo_hdte.discrepancy.drive.features import Features, measure
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
-from pymoo_hdte.discrepancy.engine.hypothesis import SHARE
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
 
-FEWEST_RECORDS = 3
-"""Below this no effect could be told from the base parameters."""
-_SEPARATION = 0.9
-"""Least distance of two order lines, in cycles per output turn."""
-_BELOW_NYQUIST = 0.9
-"""Share of the lowest Nyquist order: closer to it, rows hardly tell sine from cosine."""
-_MOST_LINES = 4
-_LINE_CHANCE = 1e-6
-_SECOND_CHANCE = 0.01
-"""That noise alone makes a line of one speed seem to be one of two."""
 CLEARANCES = ("backlash", "clearance_variation")
-_SAME_NOISE = 1.5
-"""Largest ratio of variances up to which the noise is that of the believed drive."""
-LEAST_LOAD = 0.5
-"""N.m at a `torque_scale` of 1, a few times what a torque sensor's zero is known to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +56,14 @@ class DriveFinding:
             return None
         features = measure(self.campaign, records, self.data.features.orders.tolist())
         if len(self.data.features.records) < len(self.campaign.train):
-            held = _flanks_held(features, self.campaign.torque_scale)
+            held = _flanks_held(features, self.campaign.torque_scale, self.data.rules)
             features = features.rows(np.flatnonzero(held))
         if not features.records:
             return None
         return replace(self.data, features=features, torsion=())
 
 
-def expected_orders(campaign: Campaign) -> list[float]:
+def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
     """Return the orders that are always looked at: of the error, their sums, of the output turn.
 
     Raises
@@ -91,11 +76,13 @@ def expected_orders(campaign: Campaign) -> list[float]:
     wanted = [1.0 / believed.ratio, 2.0 / believed.ratio, *lines]
     wanted += [one + other for place, one in enumerate(lines) for other in lines[place:]]
     wanted += [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]
-    return _apart(wanted, campaign, _error_lines(campaign))
+    return _apart(wanted, campaign, _error_lines(campaign, rules), rules)
 
 
 @threadpool_limits.wrap(limits=1)
-def examine_drive(campaign: Campaign, effects: Sequence[OfDrives] = ()) -> DriveFinding:
+def examine_drive(
+    campaign: Campaign, effects: Sequence[OfDrives] = (), rules: Rules = RULES
+) -> DriveFinding:
     """Return the verdict on a campaign.
 
     In one thread: the matrices are small, and threads that wait for each other cost a multiple.
@@ -105,24 +92,26 @@ def examine_drive(campaign: Campaign, effects: Sequence[OfDrives] = ()) -> Drive
     campaign : Campaign
     effects : sequence of OfDrives
         Effects that may be missing beside those of the library.
+    rules : Rules
+        Thresholds of the verdict.
 
     Raises
     ------
     InvalidInput
-        If fewer than `FEWEST_RECORDS` records are there to be fitted, or a record cannot show or
-        tell apart the lines of the believed static error.
+        If fewer than `Rules.fewest_records` records are there to be fitted, or a record cannot show
+        or tell apart the lines of the believed static error.
     """
-    if len(campaign.train) < FEWEST_RECORDS:
-        allowed = f"at least {FEWEST_RECORDS}, or base and effects cannot be told apart"
+    if len(campaign.train) < rules.fewest_records:
+        allowed = f"at least {rules.fewest_records}, or base and effects cannot be told apart"
         raise InvalidInput("number of train records", len(campaign.train), allowed)
     ratio = campaign.believed.ratio
-    expected = expected_orders(campaign)
+    expected = expected_orders(campaign, rules)
     features = measure(campaign, campaign.train, expected)
-    unexpected = unexpected_orders(features, ratio, campaign.rig)
+    unexpected = unexpected_orders(features, ratio, campaign.rig, rules)
     if unexpected:
-        orders = _apart(unexpected, campaign, expected)
+        orders = _apart(unexpected, campaign, expected, rules)
         features = measure(campaign, campaign.train, orders)
-    data = training_data(campaign, features)
+    data = training_data(campaign, features, rules)
     base = fit(data)
     listed = _candidates(data, base, effects)
     if leading_sweep_effect(data, base, listed) in CLEARANCES:
@@ -139,7 +128,8 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
 
     The repeatability is a motion, which all channels show by way of the model's own response.
     """
-    if verdict.chosen is None or verdict.chosen.share < SHARE:
+    rules = data.rules
+    if verdict.chosen is None or verdict.chosen.share < rules.explained_share:
         return data, verdict
     fitted = verdict.chosen.fit
     values = fitted.values[: len(data.base)]
@@ -147,7 +137,7 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
     ratio = np.diagonal(renewed.covariance, axis1=1, axis2=2) / np.diagonal(
         data.covariance, axis1=1, axis2=2
     )
-    if ratio.max() <= _SAME_NOISE:
+    if ratio.max() <= rules.changed_noise_ratio:
         return data, verdict
     again = judge(renewed, fit(renewed), listed)
     return (data, verdict) if again.chosen is None else (renewed, again)
@@ -155,7 +145,7 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
 
 def _candidates(data: Data, base: Fit, effects: Sequence[OfDrives]) -> list[Candidate]:
     features = data.features
-    seen = _strong_lines(features, base)
+    seen = _strong_lines(features, base, data.rules)
     campaign = data.campaign
     return drive_candidates(
         campaign.believed, features.orders.tolist(), seen, campaign.torque_scale, effects
@@ -167,59 +157,61 @@ def _loaded(data: Data) -> Data:
 
     With a clearance such a drive rattles and has no steady state to be fitted.
     """
-    held = _flanks_held(data.features, data.campaign.torque_scale)
-    if np.all(held) or held.sum() < FEWEST_RECORDS:
+    held = _flanks_held(data.features, data.campaign.torque_scale, data.rules)
+    if np.all(held) or held.sum() < data.rules.fewest_records:
         return data
     return replace(data, features=data.features.rows(np.flatnonzero(held)))
 
 
-def _flanks_held(features: Features, torque_scale: float) -> NDArray[np.bool_]:
+def _flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:
     """Return which records carry a load beyond the swing of their torque, shape (r,)."""
     m = len(features.orders)
     lines = features.values[:, features.places(2)].reshape(len(features.records), m, 2)
     swing = np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)
     load = np.abs(features.conditions.output_torque)
-    return np.asarray(load > np.maximum(swing, torque_scale * LEAST_LOAD))
+    return np.asarray(load > np.maximum(swing, torque_scale * rules.least_held_load))
 
 
-def highest_order(campaign: Campaign) -> float:
+def highest_order(campaign: Campaign, rules: Rules) -> float:
     """Return the order up to which lines of a campaign are looked at, cycles per input turn."""
-    return float(min(HIGHEST_ORDER, *(_shown_order(record) for record in campaign.running)))
+    shown = [_shown_order(record, rules) for record in campaign.running]
+    return float(min(rules.highest_order, *shown))
 
 
-def _shown_order(record: RunningRecord) -> float:
+def _shown_order(record: RunningRecord, rules: Rules) -> float:
     """Return the order up to which the rows of a record show lines."""
-    return _BELOW_NYQUIST * (np.pi * record.sample_rate / abs(record.input_speed))
+    return rules.nyquist_share * (np.pi * record.sample_rate / abs(record.input_speed))
 
 
-def _error_lines(campaign: Campaign) -> list[float]:
+def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
     """Return the orders of the believed static error that the records show, if they can.
 
     A line that a record folds to another order, or mixes with its neighbour, would be there and
     not predicted: a drive that hides nothing would miss something. What is believed to be nothing
-    need not be seen, and what lies above `HIGHEST_ORDER` is looked at nowhere.
+    need not be seen, and what lies above `Rules.highest_order` is looked at nowhere.
     """
     believed = campaign.believed
-    coarsest = min(campaign.running, key=_shown_order)
+    coarsest = min(campaign.running, key=lambda record: _shown_order(record, rules))
     shortest = min(campaign.running, key=_travel)
-    least = 2.0 * np.pi * _SEPARATION / max(_travel(shortest), 2.0 * np.pi * believed.ratio)
+    apart = rules.line_separation
+    least = 2.0 * np.pi * apart / max(_travel(shortest), 2.0 * np.pi * believed.ratio)
     kept: list[float] = []
     for order, amplitude in zip(believed.error_orders, believed.error_amplitudes, strict=True):
         if amplitude == 0.0:
             continue
-        if order > (shown := _shown_order(coarsest)):
+        if order > (shown := _shown_order(coarsest, rules)):
             rate = coarsest.sample_rate * order / shown
             allowed = (
-                f"at most {shown:.4g}, {_BELOW_NYQUIST:g} of the Nyquist order of "
+                f"at most {shown:.4g}, {rules.nyquist_share:g} of the Nyquist order of "
                 f"{coarsest.name}: rows at {rate:.4g} Hz or more instead of "
                 f"{coarsest.sample_rate:g} Hz, or a campaign without this record"
             )
             raise InvalidInput("believed.error_orders", order, allowed)
-        if order > HIGHEST_ORDER:
+        if order > rules.highest_order:
             continue
         near = min(kept, key=lambda one: abs(one - order), default=np.inf)
         if abs(order - near) < least:
-            turns = _SEPARATION / (believed.ratio * abs(order - near))
+            turns = apart / (believed.ratio * abs(order - near))
             allowed = (
                 f"{least:.4g} or more from order {near:g}, or {shortest.name} cannot tell them "
                 f"apart: records of at least {turns:.3g} output turns, or both as one line"
@@ -233,10 +225,10 @@ def _travel(record: RunningRecord) -> float:
     return abs(float(record.input_angle[-1] - record.input_angle[0]))
 
 
-def _apart(wanted: list[float], campaign: Campaign, kept: list[float]) -> list[float]:
+def _apart(wanted: list[float], campaign: Campaign, kept: list[float], rules: Rules) -> list[float]:
     """Return orders that every record can tell apart: those kept, then the first ones first."""
-    least = _SEPARATION / campaign.believed.ratio
-    highest = highest_order(campaign)
+    least = rules.line_separation / campaign.believed.ratio
+    highest = highest_order(campaign, rules)
     kept = list(kept)
     for order in wanted:
         if order <= highest and all(abs(order - other) >= least for other in kept):
@@ -244,7 +236,7 @@ def _apart(wanted: list[float], campaign: Campaign, kept: list[float]) -> list[f
     return sorted(kept)
 
 
-def _strong_lines(features: Features, base: Fit) -> list[float]:
+def _strong_lines(features: Features, base: Fit, rules: Rules) -> list[float]:
     """Return the orders at which the base leaves more than noise in any channel.
 
     What is seen at one speed only is no order but a frequency, if there are several speeds.
@@ -257,12 +249,13 @@ def _strong_lines(features: Features, base: Fit) -> list[float]:
     speed = np.abs([record.input_speed for record in features.records])
     groups = [power[speed == one].sum(axis=0) for one in np.unique(speed)]
     total, strongest = power.sum(axis=0), np.max(groups, axis=0)
-    strong = total > _threshold(8 * len(speed), _LINE_CHANCE)
+    strong = total > _threshold(8 * len(speed), rules.order_line_chance)
     if len(groups) > 1:
         fewest = min(np.sum(speed == one) for one in np.unique(speed))
-        strong &= total - strongest > _threshold(8 * (len(speed) - fewest), _SECOND_CHANCE)
+        freedom = 8 * (len(speed) - fewest)
+        strong &= total - strongest > _threshold(freedom, rules.second_speed_chance)
     ranked = [k for k in np.argsort(-total) if strong[k]]
-    return [float(features.orders[k]) for k in ranked[:_MOST_LINES]]
+    return [float(features.orders[k]) for k in ranked[: rules.most_order_lines]]
 
 
 def _threshold(freedom: int, chance: float) -> float:

@@ -23,24 +23,31 @@ from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Response
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.drive import Effect
 
 Vector = NDArray[np.float64]
 
 PARTS = (*CHANNELS, "torsion_sweep")
 """Of the data, as an `Excess` has them: channels of the running records, and the sweeps."""
-NUMERICAL = 1e-4
-"""Share of an excess that may be of the integrator's steps: see `hypothesis.EXACT_SHARE`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Data(Observations):
-    """The observations of a campaign as the engine's `Evidence`."""
+    """The observations of a campaign as the engine's `Evidence`.
+
+    Attributes
+    ----------
+    rules : Rules
+        By which they are judged.
+    """
+
+    rules: Rules = RULES
 
     @property
     def remainder(self) -> float:
-        """Share of the base's excess up to which what is left is numerical."""
-        return NUMERICAL
+        """Share of the base's excess up to which what is left is the model's own error."""
+        return self.rules.model_accuracy**2
 
     def objective(
         self, candidates: Sequence[Candidate], slopes: NDArray[np.float64] | None = None
@@ -103,10 +110,10 @@ class Data(Observations):
         return out_of_tolerance(self.base, at_bounds)
 
 
-def training_data(campaign: Campaign, features: Features) -> Data:
+def training_data(campaign: Campaign, features: Features, rules: Rules = RULES) -> Data:
     """Return features of training records with first guesses, and the sweeps."""
     points = tuple(torsion_points(record, campaign.rig) for record in campaign.torsion)
-    return Data(campaign, features, start_parameters(campaign, features), points)
+    return Data(campaign, features, start_parameters(campaign, features), points, rules=rules)
 
 
 def start_parameters(campaign: Campaign, features: Features) -> tuple[Parameter, ...]:

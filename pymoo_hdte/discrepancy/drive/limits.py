@@ -10,10 +10,6 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, highest_order
 from pymoo_hdte.discrepancy.engine.candidate import harmonics_among
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
 
-_SAME_SPEED = 1.1
-"""Ratio of the largest to the smallest speed up to which records run at one speed."""
-_SAME_LOAD = 0.1
-"""Range of loads, as a share of the largest, up to which records carry one load."""
 _SAME_ORDER = 1e-6
 """Largest distance at which a line is that of an order: one beside it is not predicted for it."""
 
@@ -49,14 +45,15 @@ def _unproven(finding: DriveFinding) -> list[str]:
 
 def _unvaried(finding: DriveFinding) -> list[str]:
     records, found = finding.data.features.records, []
+    rules = finding.data.rules
     speeds = np.array([record.input_speed for record in records])
     loads = np.array([record.load_torque for record in records])
-    if np.abs(speeds).max() <= _SAME_SPEED * np.abs(speeds).min():
+    if np.abs(speeds).max() <= rules.one_speed_ratio * np.abs(speeds).min():
         found.append(
             "All fitted records run at one speed: dry friction, friction that changes with speed "
             "and damping cannot be told apart."
         )
-    if np.ptp(loads) <= _SAME_LOAD * np.abs(loads).max():
+    if np.ptp(loads) <= rules.one_load_range * np.abs(loads).max():
         found.append(
             "All fitted records carry one load: an error that grows with load cannot be told from "
             "one that does not."
@@ -78,7 +75,8 @@ def _unvaried(finding: DriveFinding) -> list[str]:
 
 
 def _unseen(finding: DriveFinding) -> list[str]:
-    orders, highest = finding.data.features.orders, highest_order(finding.campaign)
+    orders = finding.data.features.orders
+    highest = highest_order(finding.campaign, finding.data.rules)
     believed = finding.campaign.believed
     unseen = [
         order
@@ -97,7 +95,8 @@ def _unseen(finding: DriveFinding) -> list[str]:
 
 
 def _too_high(finding: DriveFinding) -> list[str]:
-    verdict, highest = finding.verdict, highest_order(finding.campaign)
+    verdict, rules = finding.verdict, finding.data.rules
+    highest = highest_order(finding.campaign, rules)
     if verdict.chosen is None or not verdict.leaves_more_than_noise:
         return []
     seen = finding.data.features.orders.tolist()

@@ -27,8 +27,6 @@ from pymoo_hdte.laws.friction import CoulombFriction
 
 TESTS = ("running", "torsion_sweep", "reclocked_encoder")
 
-SEPARATED = 9.0
-"""Least expected chi-square, three standard deviations, at which a test tells two models apart."""
 _RIVALS = 2
 OF_ENCODER = ("eccentricity", ENCODER_LINE)
 LARGEST_TURNS = 100
@@ -113,7 +111,7 @@ def _proposal(
     what, speed, load, kind = grid.condition(test)
     if verdict.status == "unlisted":
         said = f"Neither {one} nor {other} explains the data; they differ most in"
-    elif expected < SEPARATED:
+    elif expected < verdict.rules.separated_chi_square:
         said = f"{one} and {other} predict nearly the same in every test; they differ most in"
     elif verdict.equivalent:
         said = f"The data cannot tell {one} from {other}; what can is"

@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.drive import OrderSpectrum
 from pymoo_hdte.units import ARCSEC
 from pymoo_hdte.validation import ValidationMetrics, validation_metrics
@@ -141,7 +142,7 @@ def prove(finding: DriveFinding) -> Proof | None:
     noise = np.diagonal(data.covariance, axis1=1, axis2=2)
     floor = np.stack([_squares(data, noise, channel) for channel in range(3)], axis=1)
     gaps = {
-        name: _gap(squares[:, :, place].sum(axis=2), floor[:, place].sum(axis=1), name)
+        name: _gap(data, squares[:, :, place].sum(axis=2), floor[:, place].sum(axis=1), name)
         for place, name in enumerate(UNITS)
     }
     error, error_floor = squares[:, :, 0], floor[:, 0]
@@ -153,14 +154,17 @@ def prove(finding: DriveFinding) -> Proof | None:
     return Proof(
         records=tuple(record.name for record in data.features.records),
         channels=gaps,
-        overall=Gap(float(overall[0]), float(overall[1]), 1.0, DEVIATIONS),
+        overall=Gap(
+            float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, data.rules.least_gap_share
+        ),
         by_record=tuple(
-            _gap(error[:, [k]].sum(axis=2), error_floor[[k]].sum(axis=1), CHANNELS[0])
+            _gap(data, error[:, [k]].sum(axis=2), error_floor[[k]].sum(axis=1), CHANNELS[0])
             for k in range(error.shape[1])
         ),
         orders=np.array([0.0, *data.features.orders]),
         by_order=tuple(
-            _gap(error[:, :, k], error_floor[:, k], CHANNELS[0]) for k in range(error.shape[2])
+            _gap(data, error[:, :, k], error_floor[:, k], CHANNELS[0])
+            for k in range(error.shape[2])
         ),
         dte=dte,
         metrics=_metrics(dte),
@@ -187,11 +191,12 @@ def _squares(data: Data, squares: Values, channel: int) -> Values:
     return np.concatenate([mean, lines], axis=-1)
 
 
-def _gap(squares: Values, noise: Values, channel: str) -> Gap:
+def _gap(data: Data, squares: Values, noise: Values, channel: str) -> Gap:
     """Return the gap from mean squares (2, r) and those of the noise (r,)."""
     unit, size = UNITS[channel]
     before, after = np.sqrt(squares.mean(axis=1)) / size
-    return Gap(float(before), float(after), float(np.sqrt(noise.mean()) / size), unit)
+    floor = float(np.sqrt(noise.mean()) / size)
+    return Gap(float(before), float(after), floor, unit, data.rules.least_gap_share)
 
 
 def _height(gap: Gap) -> float:
@@ -265,10 +270,6 @@ UNITS = {
 DEVIATIONS = "standard deviations of the noise"
 
 
-_NO_GAP = 0.1
-"""A gap that exceeds the noise floor by less than this share of it cannot be said to shrink."""
-
-
 @dataclass(frozen=True)
 class Gap:
     """Root mean squares of measured minus predicted, in ``unit``.
@@ -279,12 +280,15 @@ class Gap:
         Of the fitted base, and of the model with what was named.
     noise_floor : float
     unit : str
+    least_share : float
+        Of the noise floor, by which a gap exceeds it that can be said to shrink.
     """
 
     before: float
     after: float
     noise_floor: float
     unit: str
+    least_share: float = RULES.least_gap_share
 
     @property
     def reduction(self) -> float:
@@ -295,10 +299,11 @@ class Gap:
     def shrinkage(self) -> float | None:
         """1 - (after - floor) / (before - floor), or None where there was no gap to shrink."""
         excess = self.before - self.noise_floor
-        if excess <= _NO_GAP * self.noise_floor:
+        if excess <= self.least_share * self.noise_floor:
             return None
         return 1.0 - (self.after - self.noise_floor) / excess
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it as plain values."""
-        return asdict(self) | {"shrinkage": self.shrinkage, "reduction": self.reduction}
+        sizes = {name: getattr(self, name) for name in ("before", "after", "noise_floor", "unit")}
+        return sizes | {"shrinkage": self.shrinkage, "reduction": self.reduction}

@@ -12,16 +12,7 @@ from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-
-_FALSE_LINES = 1e-3
-"""Chance that noise alone shows any line in a whole campaign."""
-
-
-_MOST_LINES = 6
-
-
-_SEEN_AT_REST = 50.0
-"""Reduction of chi-square beyond which a torsion sweep speaks for an effect."""
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
 
 def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> str | None:
@@ -38,7 +29,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
     imitated = (data.torsion_residuals(moved, fitted.effects) - before).T
     orthonormal, _ = np.linalg.qr(imitated)
     left = before - orthonormal @ (orthonormal.T @ before)
-    found: list[tuple[float, str]] = []
+    least, found = data.rules.sweep_gain, list[tuple[float, str]]()
     for candidate in candidates:
         for start in candidate.starts:
             effects = (*fitted.effects, *candidate.build(start))
@@ -46,13 +37,15 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
             change -= orthonormal @ (orthonormal.T @ change)
             size = float(change @ change)
             along = float(-change @ left)
-            if size > _SEEN_AT_REST and along > 0.0:
+            if size > least and along > 0.0:
                 found.append((along**2 / size, candidate.name))
     reduction, name = max(found, default=(0.0, ""))
-    return name if reduction > _SEEN_AT_REST else None
+    return name if reduction > least else None
 
 
-def unexpected_orders(features: Features, ratio: float, rig: Rig) -> list[float]:
+def unexpected_orders(
+    features: Features, ratio: float, rig: Rig, rules: Rules = RULES
+) -> list[float]:
     """Return orders beyond those of the features at which records show more than noise.
 
     The strongest first, summed over channels and records; fixed frequencies, whose order differs
@@ -60,9 +53,11 @@ def unexpected_orders(features: Features, ratio: float, rig: Rig) -> list[float]
     """
     total: dict[float, float] = {}
     for record in features.records:
-        orders, amplitudes = residual_spectrum(record, rig, ratio, features.orders)
+        orders, amplitudes = residual_spectrum(
+            record, rig, ratio, features.orders, rules.highest_order
+        )
         power = amplitudes**2
-        threshold = np.log(power.size * len(features.records) / _FALSE_LINES)
+        threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
         for place in np.flatnonzero(power.max(axis=0) > threshold):
             key = round(float(orders[place]), 9)
             total[key] = total.get(key, 0.0) + float(power[:, place].sum())
@@ -70,4 +65,4 @@ def unexpected_orders(features: Features, ratio: float, rig: Rig) -> list[float]
     for order in sorted(total, key=lambda one: -total[one]):
         if all(abs(order - other) > 2.5 / ratio for other in strongest):
             strongest.append(order)
-    return strongest[:_MOST_LINES]
+    return strongest[: rules.most_unexpected_lines]

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-DEVIATIONS = 4.0
-"""Standard deviations of chi-square up to which a model is adequate."""
+from pymoo_hdte.discrepancy.engine.rules import Rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,10 +35,10 @@ class Excess:
         """Of each part, shape (parts,)."""
         return np.asarray(self.chi_square.sum(axis=0))
 
-    @property
-    def significant(self) -> NDArray[np.bool_]:
-        """Whether it is more than noise, of each part, shape (parts,)."""
-        return np.asarray(self.of_parts > DEVIATIONS * np.sqrt(2.0 * self.freedom.sum(axis=0)))
+    def significant(self, rules: Rules) -> NDArray[np.bool_]:
+        """Return whether it is more than noise, of each part, shape (parts,)."""
+        noise = np.sqrt(2.0 * self.freedom.sum(axis=0))
+        return np.asarray(self.of_parts > rules.false_alarm_deviations * noise)
 
     @property
     def worst(self) -> NDArray[np.int_]:

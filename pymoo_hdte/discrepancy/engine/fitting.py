@@ -13,6 +13,7 @@ from scipy.optimize import least_squares
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout, Parameter
 from pymoo_hdte.discrepancy.engine.excess import Excess
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.drive import Effect
 
 Vector = NDArray[np.float64]
@@ -22,7 +23,6 @@ _STEP = 1e-3
 """Step of difference quotients, in units of a parameter's scale."""
 _FREED = 10.0
 """Factor by which a base parameter whose tolerance is lifted may be off."""
-_EVALUATIONS = 25
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,13 +119,13 @@ def fit(
     data: Evidence,
     candidates: Sequence[Candidate] = (),
     start: Vector | None = None,
-    evaluations: int = _EVALUATIONS,
+    evaluations: int | None = None,
     slopes: NDArray[np.float64] | None = None,
 ) -> Fit:
     """Fit base parameters and those of candidates from ``start`` (by default their own starts).
 
     With ``slopes`` (see `Objective`) a fit takes a fifth of the time; without, they are renewed in
-    every step.
+    every step. It takes ``evaluations`` steps at most, by default as many as the rules allow.
     """
     objective = data.objective(candidates, slopes)
     scale = objective.scale
@@ -137,7 +137,7 @@ def fit(
         begin / scale,
         jac=lambda scaled: objective.jacobian(scaled * scale),
         bounds=(objective.lower / scale, objective.upper / scale),
-        max_nfev=evaluations,
+        max_nfev=data.rules.fit_evaluations if evaluations is None else evaluations,
         xtol=1e-5,
         ftol=1e-6,
         gtol=1e-9,
@@ -177,6 +177,8 @@ class Evidence(Protocol):
     ----------
     base : tuple of Parameter
         Unknowns of the model without effects.
+    rules : Rules
+        By which it is judged.
     remainder : float
         Share of the base's excess that is no effect's, because no model of such data is exact.
     """
@@ -184,6 +186,11 @@ class Evidence(Protocol):
     @property
     def base(self) -> tuple[Parameter, ...]:
         """Unknowns of the model without effects."""
+        ...
+
+    @property
+    def rules(self) -> Rules:
+        """Rules by which it is judged."""
         ...
 
     @property

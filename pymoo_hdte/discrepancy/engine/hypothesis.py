@@ -14,37 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.excess import DEVIATIONS
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, count, fit
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened
-
-SHARE = 0.9
-"""Least share of the excess chi-square that named effects remove."""
-PART_SHARE = 0.5
-"""Least share of the excess of each part of the data that they remove."""
-PLAIN = 9.0
-"""Chi-square per degree of freedom from which a part of the data plainly contradicts a model: three
-times the noise."""
-EXACT = 1.3
-"""Chi-square per degree of freedom that does for effects of an exact form: noise that a resonance
-magnifies is no longer that of the linear covariance."""
-EXACT_SHARE = 0.9999
-"""Least share that effects of an exact form remove, if they do not explain down to the noise: of a
-line ten thousand times the noise, the integrator's steps show."""
-ALIKE = 2.0
-"""Where no form fits to the noise, a rival that leaves less than this multiple of what the chosen
-one leaves cannot be excluded: what is left is the form, not the noise."""
-BIC_GAIN = 6.0
-"""Least gain of BIC of a named effect."""
-VERY_STRONG = 10.0
-"""Distance of twice the logarithm of the evidence within which rivals cannot be told apart (Kass,
-Raftery, J. Am. Stat. Assoc. 1995)."""
-
-
-EVALUATIONS = {1: 25, 2: 10}
-"""Steps of a fit of one effect, and of a second one beside it."""
-REFINEMENT = 12
-"""Steps of a fit that begins where one of these ended, with slopes of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,14 +72,14 @@ def rival(fitted: Fit, of_base: float) -> Rival:
     return Rival(fitted, float(bic), float(share))
 
 
-def adequate(freedom: int) -> float:
+def adequate(freedom: int, rules: Rules) -> float:
     """Return chi-square per degree of freedom up to which a model is adequate; 1.15 for 1400."""
-    return float(1.0 + DEVIATIONS * np.sqrt(2.0 / freedom))
+    return float(1.0 + rules.false_alarm_deviations * np.sqrt(2.0 / freedom))
 
 
-def down_to_noise(fitted: Fit, freedom: int) -> bool:
+def down_to_noise(fitted: Fit, freedom: int, rules: Rules) -> bool:
     """Tell whether a fit is `adequate`."""
-    return fitted.chi_square <= adequate(freedom) * freedom
+    return fitted.chi_square <= adequate(freedom, rules) * freedom
 
 
 def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
@@ -116,28 +88,30 @@ def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     Shape (parts,), as `Excess` has them. Of several records the worst is left out: one condition
     may lie at a resonance, where no form is exact.
     """
-    before, after = data.excess(base), data.excess(fitted)
+    before, after, rules = data.excess(base), data.excess(fitted), data.rules
     worst = after.worst
     before, after = before.without(worst), after.without(worst)
-    plain = after.of_parts > (PLAIN - 1.0) * after.freedom.sum(axis=0)
-    left = after.of_parts > (1.0 - PART_SHARE) * before.of_parts
-    return np.asarray(before.significant & plain & left)
+    contradicting = rules.contradicting_chi_square - 1.0
+    plain = after.of_parts > contradicting * after.freedom.sum(axis=0)
+    left = after.of_parts > (1.0 - rules.explained_part_share) * before.of_parts
+    return np.asarray(before.significant(rules) & plain & left)
 
 
 def explains(data: Evidence, one: Rival, base: Fit, freedom: int) -> bool:
     """Tell whether a set of effects removes what is wrong with the base, and wherever it is."""
+    rules, limit = data.rules, adequate(freedom, data.rules)
     gain = base.chi_square - one.fit.chi_square
     unknowns = sum(candidate.unknowns for candidate in one.candidates)
-    share = EXACT_SHARE if one.exact else SHARE
-    limit = max(adequate(freedom), EXACT) if one.exact else adequate(freedom)
-    if gain - unknowns * np.log(len(base.residuals)) < BIC_GAIN:
+    share = rules.exact_share if one.exact else rules.explained_share
+    limit = max(limit, rules.exact_chi_square) if one.exact else limit
+    if gain - unknowns * np.log(len(base.residuals)) < rules.bic_gain:
         return False
     if one.fit.chi_square <= limit * freedom:
         return True
     return one.share >= share and not unexplained(data, base, one.fit).any()
 
 
-def alike(one: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
+def alike(one: Rival, chosen: Rival, freedom: int, rules: Rules, margin: float = 1.0) -> bool:
     """Tell whether the data cannot separate a rival with other effects from the chosen one.
 
     Where even the chosen form leaves more than noise, that remainder is the scale on which chi-
@@ -146,24 +120,27 @@ def alike(one: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
     if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
         return False
     misfit = max(chosen.fit.chi_square / freedom, 1.0)
-    near = one.fit.evidence - chosen.fit.evidence < margin * VERY_STRONG * misfit
-    if near or misfit <= adequate(freedom) or (one.exact and chosen.exact):
+    near = one.fit.evidence - chosen.fit.evidence < margin * rules.evidence_distance * misfit
+    if near or misfit <= adequate(freedom, rules) or (one.exact and chosen.exact):
         return near
-    return one.fit.chi_square - freedom < margin * ALIKE * (chosen.fit.chi_square - freedom)
+    left = chosen.fit.chi_square - freedom
+    return one.fit.chi_square - freedom < margin * rules.form_ratio * left
 
 
 def refined(data: Evidence, one: Rival, excess: float) -> Rival:
     """Fit a rival further from where it ended, with slopes of its own."""
-    return rival(fit(data, one.candidates, one.fit.values, REFINEMENT), excess)
+    evaluations = data.rules.refinement_evaluations
+    return rival(fit(data, one.candidates, one.fit.values, evaluations), excess)
 
 
 def fit_all(data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float) -> list[Rival]:
     """Fit candidates, each jointly with what stands; by rising BIC."""
-    found = []
+    rules, found = data.rules, []
     for one in chosen:
         start = np.concatenate([base.values, one.start])
         effects = (*base.candidates, one.candidate)
-        fitted = fit(data, effects, start, EVALUATIONS[len(effects)], base.slopes)
+        evaluations = rules.pair_evaluations if base.candidates else rules.fit_evaluations
+        fitted = fit(data, effects, start, evaluations, base.slopes)
         found.append(rival(fitted, excess))
     return sorted(found, key=lambda one: one.bic)
 

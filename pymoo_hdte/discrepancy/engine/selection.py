@@ -14,9 +14,6 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
-    EVALUATIONS,
-    PART_SHARE,
-    SHARE,
     Rival,
     alike,
     down_to_noise,
@@ -26,18 +23,8 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     rival,
     varied,
 )
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened, screen
-
-SECOND_SHARE = 0.8
-"""Least share of the excess left by a first effect of no exact form that a second one removes;
-beside an exact one it is `SHARE`."""
-SECOND_LEAST = 0.05
-"""Least share of the base's excess in some part of the data that a second one removes at the port
-of a first law of no exact form: less may be that form."""
-SECONDS = 2
-"""Names of second effects fitted beside the first, and as many for one part of the data."""
-HOPE = 0.5
-"""Least share of what is left that a second effect must remove to first order to be fitted."""
 
 
 def with_second(
@@ -56,7 +43,7 @@ def with_second(
     for place, pair in enumerate(pairs):
         if pair.bic >= best.bic:
             break
-        if _promising(pair, best, freedom):
+        if _promising(data, pair, best, freedom):
             pairs[place] = pair = refined(data, pair, excess)
         if not _second_earned(data, pair, singles, base, freedom):
             continue
@@ -74,15 +61,16 @@ def with_second(
 
 def _second_could_count(data: Evidence, single: Rival, freedom: int) -> bool:
     """Tell whether a second effect beside this one could be earned at all."""
-    if down_to_noise(single.fit, freedom):
+    if down_to_noise(single.fit, freedom, data.rules):
         return False
-    return single.exact or bool(data.excess(single.fit).significant.any())
+    return single.exact or bool(data.excess(single.fit).significant(data.rules).any())
 
 
-def _promising(pair: Rival, single: Rival, freedom: int) -> bool:
+def _promising(data: Evidence, pair: Rival, single: Rival, freedom: int) -> bool:
     """Tell whether a second effect removes so much that its fit is worth being finished."""
     left = single.fit.chi_square - freedom
-    return single.fit.chi_square - pair.fit.chi_square >= PART_SHARE * left
+    removed = single.fit.chi_square - pair.fit.chi_square
+    return removed >= data.rules.explained_part_share * left
 
 
 def _with_second_alone(
@@ -96,7 +84,8 @@ def _with_second_alone(
     if any(one.candidates == (second,) for one in singles):
         return singles
     start = np.concatenate([base.values, pair.fit.values[-len(second.parameters) :]])
-    alone = rival(fit(data, (second,), start, EVALUATIONS[1], base.slopes), excess)
+    fitted = fit(data, (second,), start, data.rules.fit_evaluations, base.slopes)
+    alone = rival(fitted, excess)
     return sorted([*singles, alone], key=lambda one: one.bic)
 
 
@@ -106,13 +95,14 @@ def _exchanged(
     """Return the pair with its first effect exchanged for those that do as well alone."""
     first, second = pair.candidates
     (best,) = (one for one in singles if one.candidates == (first,))
-    found = []
+    rules, found = data.rules, []
     for other in singles:
         (candidate,) = other.candidates
-        if alike(other, best, freedom) and candidate.frees is None and candidate.goes_with(second):
+        fits = candidate.frees is None and candidate.goes_with(second)
+        if fits and alike(other, best, freedom, rules):
             start = np.append(other.fit.values, pair.fit.values[-len(second.parameters) :])
             effects = (candidate, second)
-            fitted = fit(data, effects, start, EVALUATIONS[2], other.fit.slopes)
+            fitted = fit(data, effects, start, rules.pair_evaluations, other.fit.slopes)
             found.append(rival(fitted, excess))
     return found
 
@@ -128,43 +118,44 @@ def _pairs(
     (first,) = single.candidates
     others = [one for one in candidates if one.frees is None and first.goes_with(one)]
     before, after = (data.excess(one) for one in (base, single.fit))
-    ill = [] if single.exact else _ill_explained(before, after)
+    ill = [] if single.exact else _ill_explained(before, after, data.rules)
     whole, rest = before.of_parts, after.of_parts
     if not single.exact:
         shares = [rest.sum() / whole.sum(), *rest[ill] / whole[ill]]
         others = [one for one in others if max(shares) >= _least(data, first, one)]
     screened = screen(data, single.fit, others)
     left = single.fit.chi_square - (base.chi_square - excess)
-    chosen = _hopeful(screened, [one.reduction for one in screened], left)
+    chosen = _hopeful(screened, [one.reduction for one in screened], left, data.rules)
     for part in ill:
-        of_part = _hopeful(screened, [one.by_part[part] for one in screened], float(rest[part]))
+        reductions = [one.by_part[part] for one in screened]
+        of_part = _hopeful(screened, reductions, float(rest[part]), data.rules)
         chosen += [one for one in of_part if one not in chosen]
     return fit_all(data, single.fit, chosen, excess)
 
 
 def _least(data: Evidence, first: Candidate, second: Candidate) -> float:
     """Return the least share of the base's excess that a second effect removes."""
-    return SECOND_LEAST if first.port == second.port else data.remainder
+    return data.rules.second_form_share if first.port == second.port else data.remainder
 
 
 def _hopeful(
-    screened: Sequence[Screened], reductions: Sequence[float], left: float
+    screened: Sequence[Screened], reductions: Sequence[float], left: float, rules: Rules
 ) -> list[Screened]:
     """Return the best candidates, to first order, if they remove enough of what is left."""
     order = np.argsort([-reduction for reduction in reductions], kind="stable")
-    enough = [screened[k] for k in order if reductions[k] >= HOPE * left]
-    return varied(enough, 1)[:SECONDS]
+    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
+    return varied(enough, 1)[: rules.most_seconds]
 
 
-def _ill_explained(before: Excess, after: Excess) -> list[int]:
+def _ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
     """Return the parts of the data that contradict both a base and a fit, the worst first.
 
     The worst, and what else the fit explains no better than by half.
     """
-    wrong = np.flatnonzero(before.significant & after.significant)
+    wrong = np.flatnonzero(before.significant(rules) & after.significant(rules))
     left = after.of_parts[wrong] / before.of_parts[wrong]
     ranked = wrong[np.argsort(-left)].tolist()
-    return ranked[: max(1, int(np.sum(left > 1.0 - PART_SHARE)))]
+    return ranked[: max(1, int(np.sum(left > 1.0 - rules.explained_part_share)))]
 
 
 def _second_earned(
@@ -175,21 +166,22 @@ def _second_earned(
     What a law of no exact form leaves may be its form: a second one at its port must also count
     beside the base's excess, and one at another port beside what is numerical.
     """
-    labels = {candidate.label for candidate in pair.candidates}
+    rules, labels = data.rules, {candidate.label for candidate in pair.candidates}
     first = min(
         (single for single in singles if single.candidates[0].label in labels),
         key=lambda single: single.fit.chi_square,
     )
     if first.exact:
         left = first.fit.chi_square - freedom
-        return left > 0.0 and first.fit.chi_square - pair.fit.chi_square >= SHARE * left
+        removed = first.fit.chi_square - pair.fit.chi_square
+        return left > 0.0 and removed >= rules.explained_share * left
     before, alone, both = (data.excess(one) for one in (base, first.fit, pair.fit))
-    parts = _ill_explained(before, alone)
+    parts = _ill_explained(before, alone, rules)
     if not parts:
         return False
     least = _least(data, *pair.candidates)
     for part in (slice(None), parts[0]):
         whole, left, rest = (np.sum(one.of_parts[part]) for one in (before, alone, both))
-        if left - rest >= max(SECOND_SHARE * left, least * whole):
+        if left - rest >= max(rules.second_share * left, least * whole):
             return True
     return False

@@ -26,24 +26,13 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     rival,
     varied,
 )
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened, screen
 from pymoo_hdte.discrepancy.engine.selection import with_second
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted")
 EXPLAINED = ("named", "class", "parameter")
 """Statuses that say what is missing."""
-
-GAIN = 25.0
-"""Reduction of chi-square, to first order, by which some candidate makes a base inadequate though
-its total looks well: one line of one channel is lost among a thousand features."""
-GENEROUS = 5.0
-"""Multiple of these distances within which a rival is fitted to the end before it is judged."""
-FITTED = 5
-"""Most candidates fitted in earnest after the screening."""
-OF_ONE_NAME = 2
-"""Most of them of one name: a law that holds another as a special case must not crowd it out."""
-PROMISING = 0.2
-"""Least reduction, as a share of the most promising candidate's, with which one is fitted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +51,8 @@ class Verdict:
     equivalent : tuple of Rival
         Those of them that explain the data too and that these cannot tell from the chosen one.
     degrees_of_freedom : int
+    rules : Rules
+        By which it was judged.
     """
 
     status: str
@@ -70,6 +61,7 @@ class Verdict:
     alternatives: tuple[Rival, ...]
     equivalent: tuple[Rival, ...]
     degrees_of_freedom: int
+    rules: Rules = RULES
 
     @property
     def accepted(self) -> Fit:
@@ -81,17 +73,20 @@ class Verdict:
     def leaves_more_than_noise(self) -> bool:
         """Whether the chosen effects do not explain the data down to the noise."""
         chosen = self.chosen
-        return chosen is not None and not down_to_noise(chosen.fit, self.degrees_of_freedom)
+        freedom, rules = self.degrees_of_freedom, self.rules
+        return chosen is not None and not down_to_noise(chosen.fit, freedom, rules)
 
 
 def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
-    """Return the verdict on a fitted base."""
+    """Return the verdict on a fitted base, by the rules of its data."""
+    rules = data.rules
     freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     screened = screen(data, base, candidates)
     excess = base.chi_square - freedom
-    if down_to_noise(base, freedom) and screened[0].reduction < GAIN:
-        return Verdict("adequate", base, None, (), (), freedom)
+    gain = screened[0].reduction
+    if down_to_noise(base, freedom, rules) and gain < rules.single_effect_gain:
+        return Verdict("adequate", base, None, (), (), freedom, rules)
     singles = _fit_best(data, base, screened, excess)
     if not explains(data, singles[0], base, freedom):
         singles[0] = _searched(data, base, singles[0], excess)
@@ -99,8 +94,8 @@ def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict
     others = [rival for rival in rivals if rival is not chosen]
     chosen = refined(data, chosen, excess)
     if not explains(data, chosen, base, freedom):
-        return Verdict("unlisted", base, chosen, tuple(others), (), freedom)
-    near = [alike(rival, chosen, freedom, GENEROUS) for rival in others]
+        return Verdict("unlisted", base, chosen, tuple(others), (), freedom, rules)
+    near = [alike(rival, chosen, freedom, rules, rules.refit_margin) for rival in others]
     others = [
         refined(data, rival, excess) if flag else rival
         for rival, flag in zip(others, near, strict=True)
@@ -108,14 +103,15 @@ def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict
     equivalent = tuple(
         rival
         for rival in others
-        if alike(rival, chosen, freedom) and explains(data, rival, base, freedom)
+        if alike(rival, chosen, freedom, rules) and explains(data, rival, base, freedom)
     )
     listed = [rival for rival in equivalent if rival.listed]
     if not chosen.listed and listed:
         others = [chosen if rival is listed[0] else rival for rival in others]
         equivalent = tuple(chosen if rival is listed[0] else rival for rival in equivalent)
         chosen = listed[0]
-    return Verdict(_status(chosen, equivalent), base, chosen, tuple(others), equivalent, freedom)
+    status = _status(chosen, equivalent)
+    return Verdict(status, base, chosen, tuple(others), equivalent, freedom, rules)
 
 
 def _status(chosen: Rival, equivalent: Sequence[Rival]) -> str:
@@ -147,7 +143,8 @@ def _fit_best(
     data: Evidence, base: Fit, screened: Sequence[Screened], excess: float
 ) -> list[Rival]:
     """Fit the most promising candidates jointly with what stands; by rising BIC."""
-    least = PROMISING * screened[0].reduction
+    rules = data.rules
+    least = rules.promising_share * screened[0].reduction
     promising = [one for one in screened if one.reduction >= least]
-    chosen = varied(promising, OF_ONE_NAME)[:FITTED]
+    chosen = varied(promising, rules.most_of_one_name)[: rules.most_fitted]
     return fit_all(data, base, chosen, excess)

@@ -18,15 +18,15 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
-    SHARE,
     Rival,
     down_to_noise,
     fit_all,
     rival,
     varied,
 )
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.screening import screen
-from pymoo_hdte.discrepancy.engine.verdict import FITTED, OF_ONE_NAME, Verdict, judge
+from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
 from pymoo_hdte.discrepancy.mechanism.candidates import (
     CONTAINED,
     OfMechanisms,
@@ -41,16 +41,6 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     usual_cutoff,
 )
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-
-MAIN_SHARE = 0.5
-"""Least share of the power of a misfit beyond the sensors' noise that a named effect removes."""
-REST = 2.0
-"""Ratio of powers up to which a misfit may be of the sensors, whose noise is an estimate."""
-PARSIMONY = 1.1
-"""Ratio of powers of what two models leave up to which the one with fewer unknowns is named."""
-_ROUNDS = 2
-_SECONDS = 3
-"""Second effects tried beside each of as many first ones to find what nobody explains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +114,7 @@ def examine_mechanism(
     cutoff: float | None = None,
     known: Sequence[LawAt] = (),
     effects: Sequence[OfMechanisms] = (),
+    rules: Rules = RULES,
 ) -> MechanismFinding:
     """Return the verdict on records of a mechanism.
 
@@ -143,6 +134,8 @@ def examine_mechanism(
         Effects that the mechanism is known to have.
     effects : sequence of OfMechanisms
         Effects that may be missing beside those of the library.
+    rules : Rules
+        Thresholds of the verdict.
 
     Returns
     -------
@@ -161,7 +154,7 @@ def examine_mechanism(
     check_signals(mechanism, records)
     cutoff = usual_cutoff(mechanism, train) if cutoff is None else cutoff
     check_sampling(mechanism, records, cutoff)
-    sensors = measured_data(mechanism, train, cutoff, known)
+    sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
     base = fit(sensors)
     candidates = _candidates(sensors, base, effects)
@@ -186,11 +179,11 @@ def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]
 
     Which these are depends on the noise; after a few rounds it no longer does.
     """
-    freedom = len(base.residuals) - len(base.values)
-    if down_to_noise(base, freedom):
+    rules, freedom = sensors.rules, len(base.residuals) - len(base.values)
+    if down_to_noise(base, freedom, rules):
         return sensors
     data = sensors.with_rest(base.residuals)
-    for _ in range(_ROUNDS):
+    for _ in range(rules.rest_rounds):
         best = _best_two(data, candidates)
         data = sensors.with_rest(_in_units_of(sensors, data, best.fit.residuals))
     return data
@@ -198,30 +191,32 @@ def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]
 
 def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Rival:
     """Return the best model with up to two effects, by BIC."""
-    base = fit(data)
+    base, rules = fit(data), data.rules
     excess = base.chi_square - (len(base.residuals) - len(base.values))
-    promising = varied(screen(data, base, candidates), OF_ONE_NAME)[:FITTED]
-    singles = fit_all(data, base, promising, excess)
+    promising = varied(screen(data, base, candidates), rules.most_of_one_name)
+    singles = fit_all(data, base, promising[: rules.most_fitted], excess)
     found = [rival(base, excess), *singles]
-    for single in singles[:_SECONDS]:
+    for single in singles[: rules.rest_seconds]:
         (first,) = single.candidates
         others = [one for one in candidates if first.goes_with(one)]
-        seconds = varied(screen(data, single.fit, others), 1)[:_SECONDS]
-        found += fit_all(data, single.fit, seconds, excess)
+        seconds = varied(screen(data, single.fit, others), 1)
+        found += fit_all(data, single.fit, seconds[: rules.rest_seconds], excess)
     return min(found, key=lambda one: one.bic)
 
 
 def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict in units of the rest, if it stands before what the sensors would show."""
-    base = fit(data)
+    base, rules = fit(data), data.rules
     verdict = _with_true_rivals(data, _simplest(data, judge(data, base, candidates)))
     before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
     if verdict.chosen is None:
-        return verdict if np.all(before <= REST * noise) else _as_unlisted(verdict, None)
+        quiet = np.all(before <= rules.noise_power_ratio * noise)
+        return verdict if quiet else _as_unlisted(verdict, None)
     removed = share_removed(sensors, data, base, verdict.chosen.fit)
     freed = [one.frees for one in verdict.chosen.candidates]
     out = any(one in verdict.chosen.fit.at_bounds for one in freed if one)
-    if removed < (SHARE if verdict.status == "parameter" else MAIN_SHARE) or out:
+    least = rules.explained_share if verdict.status == "parameter" else rules.main_share
+    if removed < least or out:
         return _as_unlisted(verdict, verdict.chosen)
     return verdict
 
@@ -246,7 +241,7 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
     chosen = verdict.chosen
     if chosen is None or verdict.status not in ("named", "class"):
         return verdict
-    most = PARSIMONY * data.power(chosen.fit.residuals)
+    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
     near = [
         one
         for one in verdict.alternatives
@@ -264,7 +259,13 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
         if one is not simplest and len(one.candidates) == len(simplest.candidates)
     )
     status = "class" if equivalent else "named"
-    return Verdict(status, verdict.base, simplest, others, equivalent, verdict.degrees_of_freedom)
+    return replace(
+        verdict,
+        status=status,
+        chosen=simplest,
+        alternatives=others,
+        equivalent=equivalent,
+    )
 
 
 def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
@@ -275,7 +276,7 @@ def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
     chosen = verdict.chosen
     if chosen is None or verdict.status != "class":
         return verdict
-    most = PARSIMONY * data.power(chosen.fit.residuals)
+    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
     equivalent = tuple(
         one
         for one in verdict.equivalent
@@ -301,9 +302,7 @@ def _unknowns(one: Rival) -> int:
 
 
 def _as_unlisted(verdict: Verdict, nearest: Rival | None) -> Verdict:
-    return Verdict(
-        "unlisted", verdict.base, nearest, verdict.alternatives, (), verdict.degrees_of_freedom
-    )
+    return replace(verdict, status="unlisted", chosen=nearest, equivalent=())
 
 
 def _in_units_of(

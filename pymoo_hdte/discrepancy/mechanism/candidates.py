@@ -22,8 +22,6 @@ CONTAINED = {
     "coulomb_friction": ("stribeck_friction", "hysteresis", "position_dependent_friction"),
 }
 """Laws that are this one where some of their parameters are nothing: as good, they say no more."""
-_BACKWARDS = 0.01
-"""Least share of the way in the rarer direction that makes two directions."""
 
 
 class OfMechanisms(Protocol):
@@ -118,7 +116,7 @@ def turns_back(data: MeasuredData, port: str) -> bool:
     speeds = np.concatenate([one.ports[port].speed for one in data.spectra])
     forward, backward = np.sum(np.maximum(speeds, 0.0)), np.sum(np.maximum(-speeds, 0.0))
     # Noise of a record at rest changes its sign now and then.
-    return bool(min(forward, backward) > _BACKWARDS * (forward + backward))
+    return bool(min(forward, backward) > data.rules.reverse_share * (forward + backward))
 
 
 def _dry(port: str, force: float, speed: float) -> list[Candidate]:

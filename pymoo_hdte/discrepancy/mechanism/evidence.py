@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter, out_of_tolerance
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Response, Unknowns, Vector, built
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import ForceBalance, balance_names, quantity_names
 
 Values = NDArray[np.float64]
-
-REMAINDER = 0.05
-"""Share of the base's excess up to which what is left is nobody's effect."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +37,15 @@ class MeasuredData:
         Standard deviation that counts as noise, by record.
     known : tuple of LawAt
         Effects that the base has.
+    rules : Rules
+        By which they are judged.
     """
 
     mechanism: Mechanism
     spectra: tuple[ForceBalance, ...]
     deviation: tuple[Values, ...]
     known: tuple[LawAt, ...] = ()
+    rules: Rules = RULES
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -59,8 +60,8 @@ class MeasuredData:
 
     @property
     def remainder(self) -> float:
-        """Share of the base's excess up to which what is left is nobody's effect."""
-        return REMAINDER
+        """Share of the base's excess up to which what is left is no effect."""
+        return self.rules.mechanism_remainder
 
     @cached_property
     def base(self) -> tuple[Parameter, ...]:
@@ -263,6 +264,7 @@ def measured_data(
     records: Sequence[Record],
     cutoff: float,
     known: Sequence[LawAt] = (),
+    rules: Rules = RULES,
 ) -> MeasuredData:
     """Return records of a mechanism with the noise of their sensors.
 
@@ -274,6 +276,8 @@ def measured_data(
         Hz, up to which the motion is known.
     known : sequence of LawAt
         Effects that the mechanism has.
+    rules : Rules
+        By which the records are judged.
 
     Raises
     ------
@@ -281,4 +285,5 @@ def measured_data(
         See `ForceBalance`.
     """
     spectra = tuple(ForceBalance(mechanism, record, cutoff) for record in records)
-    return MeasuredData(mechanism, spectra, tuple(one.noise for one in spectra), tuple(known))
+    noise = tuple(one.noise for one in spectra)
+    return MeasuredData(mechanism, spectra, noise, tuple(known), rules)

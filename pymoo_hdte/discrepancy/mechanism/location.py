@@ -7,9 +7,6 @@ from typing import Any
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 
-_WRONG = 2.0
-"""Ratio of powers from which a balance is off by more than its sensors."""
-
 
 @dataclass(frozen=True)
 class MechanismLocation:
@@ -42,7 +39,7 @@ def locate_in_mechanism(finding: MechanismFinding) -> MechanismLocation:
         parts = [
             f"the {finding.data.what(name)} (off by {misfit[name]:.3g}, sensors {noise[name]:.2g})"
             for name in names
-            if misfit[name] ** 2 > _WRONG * noise[name] ** 2
+            if misfit[name] ** 2 > finding.data.rules.noise_power_ratio * noise[name] ** 2
         ]
         words = f"In {' and '.join(parts) or 'no balance by itself'}."
     return MechanismLocation(words, misfit, noise)

@@ -24,8 +24,6 @@ Values = NDArray[np.float64]
 
 SIZES = (0.3, 1.0, 3.0)
 RATES = (0.3, 1.0, 3.0)
-_NEAR = 4.0
-"""Times what the chosen explanation leaves, up to which another one is a rival."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +98,7 @@ def next_test(finding: MechanismFinding) -> NextTest:
 
 def _nearest(finding: MechanismFinding) -> Rival | None:
     """Return the explanation that comes closest to the chosen one and differs from it."""
-    chosen = finding.verdict.chosen
+    chosen, near_by = finding.verdict.chosen, finding.data.rules.nearest_rival_ratio
     others = [
         one
         for one in (*finding.verdict.equivalent, *finding.verdict.alternatives)
@@ -110,7 +108,7 @@ def _nearest(finding: MechanismFinding) -> Rival | None:
     near = [
         one
         for one in others
-        if chosen is not None and one.fit.chi_square <= _NEAR * chosen.fit.chi_square
+        if chosen is not None and one.fit.chi_square <= near_by * chosen.fit.chi_square
     ]
     return min(equivalent or near, key=lambda one: one.bic, default=None)
 

@@ -10,16 +10,12 @@ from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
 from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 
 Values = NDArray[np.float64]
 
-_FEWEST_PERIODS = 5.0
-"""Periods within a record that make an order of what varies with its position: fewer may be a
-wander."""
-_FALSE_ORDER = 1e-4
-"""Chance that noise alone shows an order in its middle; near the ends it is larger."""
-_MOST_ORDERS = 6
+# Grid and smoothing of the search. When an order counts as seen stands in `Rules`.
 _MOST_TRIED = 2000
 _WHOLE = 2.0
 """Resolution up to which orders are taken for whole numbers."""
@@ -51,7 +47,7 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
             rows = [data.names.index(name) for name in shares]
             left = np.array(list(shares.values())) @ left_by_row[rows]
             signals.append((balance.ports[port.name].position, _detrended(balance.in_time(left))))
-        found[port.name] = _strongest(signals)
+        found[port.name] = _strongest(signals, data.rules)
     return found
 
 
@@ -61,15 +57,15 @@ def _detrended(signal: Values) -> Values:
     return signal - np.polynomial.Polynomial.fit(time, signal, 3)(time)
 
 
-def _strongest(signals: list[tuple[Values, Values]]) -> tuple[float, ...]:
+def _strongest(signals: list[tuple[Values, Values]], rules: Rules) -> tuple[float, ...]:
     """Return orders of which (position, signal) pairs show more than their own surroundings.
 
     One after the other, what is found being taken out, so that none is found again beside itself.
     """
-    orders, step = _tried([position for position, _ in signals])
+    orders, step = _tried([position for position, _ in signals], rules)
     kept: list[float] = []
-    while len(kept) < _MOST_ORDERS and orders.size:
-        ratio = _significance(signals, orders)
+    while len(kept) < rules.most_position_orders and orders.size:
+        ratio = _significance(signals, orders, rules)
         place = int(np.argmax(ratio))
         if ratio[place] <= 1.0:
             break
@@ -80,7 +76,7 @@ def _strongest(signals: list[tuple[Values, Values]]) -> tuple[float, ...]:
     return tuple(kept)
 
 
-def _tried(positions: Sequence[Values]) -> tuple[Values, float]:
+def _tried(positions: Sequence[Values], rules: Rules) -> tuple[Values, float]:
     """Return the orders that are looked at, and their step.
 
     Whole numbers where the travel, as of a shaft, resolves them; otherwise half of what it does.
@@ -89,7 +85,7 @@ def _tried(positions: Sequence[Values]) -> tuple[Values, float]:
     if widest == 0.0:
         return np.empty(0), 1.0
     step = 1.0 if np.pi / widest < _WHOLE else np.pi / widest
-    lowest = step * np.ceil(max(1.0, 2.0 * np.pi * _FEWEST_PERIODS / widest) / step)
+    lowest = step * np.ceil(max(1.0, 2.0 * np.pi * rules.fewest_periods / widest) / step)
     highest = min(max(map(_finest, positions)), lowest + _MOST_TRIED * step)
     return np.arange(lowest, highest, step), step
 
@@ -110,11 +106,11 @@ def _refined(signals: Sequence[tuple[Values, Values]], order: float, step: float
     return float(near[np.argmax(power)])
 
 
-def _significance(signals: Sequence[tuple[Values, Values]], orders: Values) -> Values:
+def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rules: Rules) -> Values:
     """Return the power at each order over what noise shows there by chance, shape (n_orders,)."""
     total, counted = np.zeros((2, len(orders)))
     for position, signal in signals:
-        seen = orders * np.ptp(position) >= 2.0 * np.pi * _FEWEST_PERIODS
+        seen = orders * np.ptp(position) >= 2.0 * np.pi * rules.fewest_periods
         seen &= orders <= _finest(position)
         if not seen.any():
             continue
@@ -122,7 +118,7 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values) -> V
         around = median_filter(power, min(_SURROUNDINGS, len(power)), mode="reflect")
         total[seen] += power / np.maximum(around, 1e-300) * np.log(2.0)
         counted += seen
-    limit = gamma.isf(_FALSE_ORDER / max(len(orders), 1), np.maximum(counted, 1))
+    limit = gamma.isf(rules.position_order_chance / max(len(orders), 1), np.maximum(counted, 1))
     return np.asarray(total / limit)
 
 

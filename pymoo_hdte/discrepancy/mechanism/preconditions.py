@@ -13,9 +13,6 @@ from pymoo_hdte.mechanism.balances import balance_names
 from pymoo_hdte.mechanism.motion import highest_frequency
 from pymoo_hdte.mechanism.working_rate import working_rows
 
-_STANDS_OUT = 2.0
-"""Ratio of powers up to which a force may be its noise, which is an estimate."""
-
 
 def check_signals(mechanism: Mechanism, records: Sequence[Record]) -> None:
     """Raise `InvalidInput` unless all that a mechanism needs is known and in each record."""
@@ -75,13 +72,13 @@ def check_scale(data: MeasuredData) -> None:
 
     A gain that is known sets the scale only where its input drives the mechanism.
     """
-    ratio = data.known_over_noise()
-    if not ratio > _STANDS_OUT:
+    ratio, least = data.known_over_noise(), data.rules.noise_power_ratio
+    if not ratio > least:
         known = ", ".join(_scales(data.mechanism))
         raise InvalidInput(
             f"power of the forces that are known exactly ({known}) over that of their noise",
             ratio,
-            f"more than {_STANDS_OUT:g} in a record to be fitted, or only ratios are known: drive "
+            f"more than {least:g} in a record to be fitted, or only ratios are known: drive "
             "the mechanism, or give an inertia or a stiffness without a tolerance; look at units",
         )
 

@@ -16,6 +16,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, root_mean_square
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
@@ -48,6 +49,8 @@ class MeasuredGap:
         s and SI; of a balance, zero.
     predicted_before, predicted_after : ndarray, shape (n,)
         What the models predict; of a balance, minus what they leave.
+    least_share : float
+        Of the noise floor, by which a gap exceeds it that can be said to shrink.
     """
 
     record: str
@@ -60,12 +63,13 @@ class MeasuredGap:
     measured: Values
     predicted_before: Values
     predicted_after: Values
+    least_share: float = RULES.least_gap_share
 
     @property
     def shrinkage(self) -> float | None:
         """1 - (after - floor) / (before - floor), or None where there was no gap to shrink."""
         excess = self.before - self.noise_floor
-        if not excess > 0.1 * self.noise_floor:
+        if not excess > self.least_share * self.noise_floor:
             return None
         return min(1.0 - (self.after - self.noise_floor) / excess, 1.0)
 
@@ -126,6 +130,7 @@ def _simulated(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
                 measured,
                 before,
                 after,
+                finding.data.rules.least_gap_share,
             )
         )
     return found
@@ -173,6 +178,7 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
             np.zeros(len(balance.time)),
             -balance.in_time(left[0][1][place]),
             -balance.in_time(left[1][1][place]),
+            finding.data.rules.least_gap_share,
         )
         for place, name in enumerate(data.names)
     ]

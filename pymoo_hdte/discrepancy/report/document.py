@@ -22,6 +22,7 @@ from pymoo_hdte.discrepancy.engine.candidate import (
 )
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 
 SCHEMA_VERSION = 1
@@ -30,8 +31,6 @@ SCHEMA_VERSION = 1
 _DEVIATIONS = 1.959964
 """Half-width of a central 95 % interval of a normal value, in standard deviations."""
 
-_SAYS_LITTLE = 0.8
-"""Width of an interval, as a share of the bounds', from which these and not the records give it."""
 UNITS = {
     "stiffness": "N.m/rad",
     "damping": "N.m.s/rad",
@@ -105,7 +104,7 @@ def verdict_document(
         "base": {
             "chi_square": verdict.base.chi_square,
             "degrees_of_freedom": verdict.degrees_of_freedom,
-            "parameters": base_parameters(verdict.accepted),
+            "parameters": base_parameters(verdict.accepted, verdict.rules),
         },
         "held_out": absent if held_out is None else dict(held_out),
         "next_experiment": proposal.as_dict(),
@@ -202,22 +201,22 @@ def quantity(value: float, variance: float, effect: str, name: str) -> dict[str,
     }
 
 
-def base_parameters(fitted: Fit) -> dict[str, Any]:
+def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
     """Return the base values of a fit with units, intervals and whether they ended at a bound."""
     added = sum(len(candidate.parameters) for candidate in fitted.candidates)
     found = {}
     for row, parameter in enumerate(fitted.parameters[: len(fitted.parameters) - added]):
         kind = parameter.name.rstrip("0123456789").rstrip("_")
         entry = quantity(fitted.values[row], fitted.covariance[row, row], "base", kind)
-        entry["interval95"] = _within_bounds(parameter, entry["interval95"])
+        entry["interval95"] = _within_bounds(parameter, entry["interval95"], rules)
         found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
     return found
 
 
-def _within_bounds(parameter: Parameter, interval: list[float]) -> list[float]:
+def _within_bounds(parameter: Parameter, interval: list[float], rules: Rules) -> list[float]:
     """Return an interval cut at the bounds; all between them where the records say little."""
     lower, upper = parameter.lower, parameter.upper
-    if interval[1] - interval[0] > _SAYS_LITTLE * (upper - lower):
+    if interval[1] - interval[0] > rules.undetermined_share * (upper - lower):
         return [lower, upper]
     return [max(interval[0], lower), min(interval[1], upper)]
 

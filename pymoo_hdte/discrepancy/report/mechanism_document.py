@@ -21,11 +21,6 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence
 
-_OFFERED = 6.0
-"""Gain of BIC with which a second effect that is not named is mentioned."""
-_MEANINGFUL = 0.05
-"""Least share of what is left that it removes."""
-
 
 def mechanism_document(
     title: str, finding: MechanismFinding, gaps: Sequence[MeasuredGap], test: NextTest
@@ -110,7 +105,7 @@ def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
 
     They make the fit better than chance does, but remove too little to be named.
     """
-    chosen = finding.verdict.chosen
+    chosen, rules = finding.verdict.chosen, finding.data.rules
     if chosen is None or finding.accepted is not chosen.fit or len(chosen.candidates) > 1:
         return []
     found = []
@@ -119,7 +114,7 @@ def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
         removes = 1.0 - one.fit.chi_square / chosen.fit.chi_square
         if len(seconds) == 1 < len(one.candidates):
             gain = chosen.bic - one.bic
-            if gain > _OFFERED and removes > _MEANINGFUL:
+            if gain > rules.bic_gain and removes > rules.offered_share:
                 found.append({"name": seconds[0].name, "port": seconds[0].port, "removes": removes})
     return found
 

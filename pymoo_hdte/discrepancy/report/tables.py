@@ -14,8 +14,6 @@ from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
 from pymoo_hdte.discrepancy.engine.candidate import Parameter, in_words
 from pymoo_hdte.discrepancy.engine.hypothesis import (
-    EXACT_SHARE,
-    SHARE,
     Rival,
     adequate,
     unexplained,
@@ -86,7 +84,7 @@ class RivalRow:
 def certainty(finding: DriveFinding) -> str:
     """Return how sure the verdict is, in words."""
     verdict = finding.verdict
-    limit = adequate(verdict.degrees_of_freedom)
+    limit = adequate(verdict.degrees_of_freedom, verdict.rules)
     left = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate" or verdict.chosen is None:
         return (
@@ -114,7 +112,8 @@ def _too_little(finding: DriveFinding, nearest: Rival) -> str:
     if left.any():
         parts = [part.replace("_", " ") for part, missed in zip(PARTS, left, strict=True) if missed]
         return f"but not what shows in {' and '.join(f'the {part}' for part in parts)}"
-    share = EXACT_SHARE if nearest.exact else SHARE
+    rules = finding.verdict.rules
+    share = rules.exact_share if nearest.exact else rules.explained_share
     return f"where a name takes {100.0 * share:g} %, or what is left to be noise"
 
 

@@ -19,7 +19,6 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.misfit.map import (
-    FALSE_DISCOVERIES,
     Flags,
     Location,
     Values,
@@ -29,6 +28,7 @@ from pymoo_hdte.discrepancy.drive.misfit.words import sentences
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
 from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.drive import Effect
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
@@ -74,10 +74,11 @@ def locate(finding: DriveFinding) -> Location:
         chi_square=chi_square,
         p_value=chi2.sf(chi_square, freedom),
         moved=moved,
-        flagged=(moved > freedom) | _significant(left, freedom),
+        flagged=(moved > freedom) | _significant(left, freedom, data.rules),
         sweep_p_value=sweep,
-        sweep_flagged=_wrong(sweep),
+        sweep_flagged=_wrong(sweep, data.rules),
         named=bool(clean.candidates),
+        rules=data.rules,
     )
     sentence, trusted = sentences(found, data, finding.unexpected)
     return replace(found, sentence=sentence, trusted=trusted)
@@ -96,17 +97,17 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
     fitted : Fit
         Its effects are kept; returned as it is where it contradicts nothing.
     """
-    freedom = degrees_of_freedom(data)
+    freedom, rules = degrees_of_freedom(data), data.rules
     chi_square, sweep = _misfit(data, fitted)
-    if not (_significant(chi_square, freedom).any() or _wrong(sweep)):
+    if not (_significant(chi_square, freedom, rules).any() or _wrong(sweep, rules)):
         return fitted
     values = fitted.values
     for _ in range(_LINEARISATIONS):
         values = _robust_step(data, replace(fitted, values=values))
     fitted = replace(fitted, values=values)
     chi_square, sweep = _misfit(data, fitted)
-    factor = np.where(_significant(chi_square, freedom), _LEFT_OUT, 1.0)
-    weakened = _weakened(data, factor, _wrong(sweep))
+    factor = np.where(_significant(chi_square, freedom, rules), _LEFT_OUT, 1.0)
+    weakened = _weakened(data, factor, _wrong(sweep, rules))
     return fit(weakened, fitted.candidates, values, _EVALUATIONS, fitted.slopes)
 
 
@@ -117,7 +118,7 @@ def _robust_step(data: Data, fitted: Fit) -> Values:
     """
     freedom = degrees_of_freedom(data)
     _, sweep = _misfit(data, fitted)
-    kept = replace(data, torsion=()) if _wrong(sweep) else data
+    kept = replace(data, torsion=()) if _wrong(sweep, data.rules) else data
     objective = Objective(kept, fitted.candidates, fitted.slopes)
     difference, others = objective.differences(fitted.values)
     slopes, others_slopes = objective.derivatives(fitted.values)
@@ -144,12 +145,12 @@ def _misfit(data: Data, fitted: Fit) -> tuple[Values, float | None]:
     return chi_square, _sweep_p_value(data, fitted.values, fitted.effects)
 
 
-def _significant(chi_square: Values, freedom: Values) -> Flags:
-    return benjamini_hochberg(chi2.sf(chi_square, freedom), FALSE_DISCOVERIES)
+def _significant(chi_square: Values, freedom: Values, rules: Rules) -> Flags:
+    return benjamini_hochberg(chi2.sf(chi_square, freedom), rules.false_discovery_rate)
 
 
-def _wrong(sweep: float | None) -> bool:
-    return sweep is not None and sweep < FALSE_DISCOVERIES
+def _wrong(sweep: float | None, rules: Rules) -> bool:
+    return sweep is not None and sweep < rules.false_discovery_rate
 
 
 def _weakened(data: Data, factor: Values, without_sweep: bool) -> Data:

@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
-
-FALSE_DISCOVERIES = 0.01
-"""Share of flagged cells that may be clean, after Benjamini and Hochberg (J. R. Stat. Soc. B 1995);
-their rule holds for the positive dependence that shared parameters give neighbouring cells."""
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
 Values = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -40,12 +37,14 @@ class Location:
         Chi-square of what the named effects change; zero where none is named.
     flagged : ndarray of bool, shape (r, 4, 1 + m)
         Cells that the named effects move by more than the root mean square of the noise, and
-        those whose misfit the model with them leaves significant at `FALSE_DISCOVERIES`.
+        those whose misfit the model with them leaves significant at `Rules.false_discovery_rate`.
     sweep_p_value : float or None
         Of the torsion sweep, None without one.
     sweep_flagged : bool
     named : bool
         Whether there are named effects.
+    rules : Rules
+        By which cells were flagged.
     sentence, trusted : str
         Where the misfit lives, and where the model may be trusted as it is.
     """
@@ -62,6 +61,7 @@ class Location:
     sweep_p_value: float | None
     sweep_flagged: bool
     named: bool
+    rules: Rules = RULES
     sentence: str = ""
     trusted: str = ""
 
@@ -88,7 +88,8 @@ class Location:
             "sentence": self.sentence,
             "trusted": self.trusted,
             "cells": self.cells,
-            "rule": "moved by the named effects, or wrong at a false discovery rate of 1 %",
+            "rule": "moved by the named effects, or wrong at a false discovery rate of "
+            f"{100.0 * self.rules.false_discovery_rate:g} %",
             "flagged": flagged,
             "torsion_sweep": {"p_value": self.sweep_p_value, "flagged": self.sweep_flagged},
         }

@@ -17,13 +17,7 @@ from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, residual_spectrum
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
-
-_SLOW_SHARE = 0.1
-"""Share of the misfit in the slower half of the records below which it counts as one of speed."""
-_EXPLAINED = 0.25
-"""Share of the power that may remain of a misfit that another one causes."""
-_GROWTH = 2.0
-"""Ratio of amplitudes between the upper and lower half of the conditions that counts as growth."""
+from pymoo_hdte.discrepancy.engine.rules import Rules
 
 Values = NDArray[np.float64]
 
@@ -49,71 +43,58 @@ def growth(power: Values, condition: Values) -> float | None:
     return float(np.sqrt(power[upper].mean() / max(power[~upper].mean(), 1e-300)))
 
 
-def changes(ratio: float | None, name: str) -> str:
+def changes(ratio: float | None, name: str, rules: Rules) -> str:
     """Return in words how a misfit changes with a condition."""
     if ratio is None:
         return f"was seen at one {name} only"
-    if ratio > _GROWTH:
+    if ratio > rules.growth_ratio:
         return f"grows with {name}" + (f" ({ratio:.2g}-fold)" if ratio < 100.0 else "")
-    if ratio < 1.0 / _GROWTH:
+    if ratio < 1.0 / rules.growth_ratio:
         return f"falls with {name}" + (f" ({1.0 / ratio:.2g}-fold)" if ratio > 0.01 else "")
     return f"hardly changes with {name}"
 
 
 def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
     """Return in words what kind of misfit it is."""
-    speed = np.abs(location.speed_rpm)
+    rules, speed = location.rules, np.abs(location.speed_rpm)
     slow = speed <= np.median(speed)
     size = sizes(location)[:, :3].sum(axis=(1, 2))
-    if size[slow].sum() <= _SLOW_SHARE * size.sum():
+    if size[slow].sum() <= rules.slow_share * size.sum():
         return "It shows at speed only, as a torque of inertia or damping does"
     misfit = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)[slow]
     # As twists: what the torques do to the torsion through the stiffness.
     error = misfit[:, 0]
     from_input = misfit[:, 1] * believed.ratio / believed.stiffness
     from_output = misfit[:, 2] / believed.stiffness
-    if _power(error) <= _EXPLAINED * max(_power(from_input), _power(from_output)):
-        return _torque(from_input, from_output)
+    if _power(error) <= rules.caused_share * max(_power(from_input), _power(from_output)):
+        return _torque(from_input, from_output, rules)
     seen = location.flagged[slow, 0]
-    if _power((error - from_output)[seen]) <= _EXPLAINED * _power(error):
-        return _torque(from_input, from_output)
-    if _power((error - from_input)[seen]) <= _EXPLAINED * _power(error):
+    if _power((error - from_output)[seen]) <= rules.caused_share * _power(error):
+        return _torque(from_input, from_output, rules)
+    if _power((error - from_input)[seen]) <= rules.caused_share * _power(error):
         return "It is torque-like and acts on the output of the drive: the input has to supply it"
     if location.sweep_flagged:
         return "It is in the torsion: the sweep with the input locked shows it, too"
     ratio = growth(np.sum(np.abs(error) ** 2, axis=1), location.load_torque[slow])
-    if ratio is not None and ratio > _GROWTH:
+    if ratio is not None and ratio > rules.growth_ratio:
         return "It is a compliance: the torsion under load is not what the stiffness says"
     return "It is kinematic: no torque goes with it, as for an error of teeth or encoders"
 
 
-def _torque(from_input: NDArray[np.complex128], from_output: NDArray[np.complex128]) -> str:
+def _torque(
+    from_input: NDArray[np.complex128], from_output: NDArray[np.complex128], rules: Rules
+) -> str:
     """Return the words for a torque, with the side on which it acts.
 
     One on the output has to pass through the drive and shows on both sides.
     """
-    if _power(from_output) < _EXPLAINED * _power(from_input):
+    if _power(from_output) < rules.caused_share * _power(from_input):
         return "It is torque-like and acts on the input: the output torque hardly shows it"
     return "It is torque-like and comes from the load: the torsion merely follows it"
 
 
 def _power(lines: NDArray[np.complex128]) -> float:
     return float(np.sum(np.abs(lines) ** 2))
-
-
-_FALSE_LINES = 1e-3
-"""Chance that noise alone shows a line beyond the expected ones in a whole campaign."""
-
-
-_SAME_FREQUENCY = 0.02
-
-
-_FEWEST = 3
-"""Records that must share a frequency before it is called fixed."""
-
-
-_BROAD = 8.0
-"""Lines that share the power from which on a band is broad; one line that leaks fills two."""
 
 
 @dataclass(frozen=True)
@@ -144,20 +125,21 @@ def stray_lines(data: Data, unexpected: Sequence[float]) -> StrayLines:
     if not unexpected:
         return StrayLines()
     ratio, rig, features = data.campaign.believed.ratio, data.campaign.rig, data.features
+    rules = data.rules
     known = [order for order in features.orders if np.abs(order - unexpected).min() > 1e-6]
     speeds = np.abs(features.conditions.input_speed)
     peaks, widths = [], []
     for record, speed in zip(features.records, speeds, strict=True):
-        orders, amplitudes = residual_spectrum(record, rig, ratio, known)
+        orders, amplitudes = residual_spectrum(record, rig, ratio, known, rules.highest_order)
         power = amplitudes**2
-        power[power < np.log(power.size * len(speeds) / _FALSE_LINES)] = 0.0
+        power[power < np.log(power.size * len(speeds) / rules.unexpected_line_chance)] = 0.0
         widths.append(_lines_in_effect(power))
         if power.any():
             strongest = int(np.argmax(power.max(axis=0)))
             peaks.append((orders[strongest] * speed / (2.0 * np.pi), speed))
-    broad = np.median(widths, axis=0) > _BROAD
+    broad = np.median(widths, axis=0) > rules.broad_band_lines
     names = tuple(name for name, wide in zip(CHANNELS, broad, strict=True) if wide)
-    return StrayLines(None if names else _shared(np.array(peaks).reshape(-1, 2)), names)
+    return StrayLines(None if names else _shared(np.array(peaks).reshape(-1, 2), rules), names)
 
 
 def _lines_in_effect(power: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -166,11 +148,12 @@ def _lines_in_effect(power: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sum(power, axis=1) ** 2 / square)
 
 
-def _shared(peaks: NDArray[np.float64]) -> float | None:
+def _shared(peaks: NDArray[np.float64], rules: Rules) -> float | None:
     """Return the frequency that peaks (k, 2), in Hz at a speed, have in common at many speeds."""
     frequencies, speeds = peaks.T
     for frequency in frequencies:
-        same = np.abs(frequencies / frequency - 1.0) < _SAME_FREQUENCY
-        if same.sum() >= _FEWEST and np.ptp(speeds[same]) > 0.1 * speeds[same].max():
+        same = np.abs(frequencies / frequency - 1.0) < rules.fixed_frequency_width
+        enough = same.sum() >= rules.fixed_frequency_records
+        if enough and np.ptp(speeds[same]) > 0.1 * speeds[same].max():
             return float(np.median(frequencies[same]))
     return None

@@ -134,7 +134,7 @@ def _growth(location: Location, broad: bool) -> str:
     power = np.abs(location.misfit[:, channel]) ** 2 * real
     chosen = np.nansum(power[:, 1:], axis=1) if broad else power[:, order]
     found = [
-        changes(growth(chosen, condition), name)
+        changes(growth(chosen, condition), name, location.rules)
         for condition, name in ((location.speed_rpm, "speed"), (location.load_torque, "load"))
     ]
     steady = found == ["hardly changes with speed", "hardly changes with load"]

@@ -1,0 +1,272 @@
+"""All thresholds of the verdict in one place: `Rules`, each with its meaning, unit and derivation.
+
+Here stand the rules for adequacy, false alarms and names. What records must have, and when a line
+counts as seen, stands in `rules_of_records`; what a report flags and shows as certain in
+`rules_of_report`. `Rules` has them all.
+
+Steps of difference quotients, orders of filters and tolerances of solvers are no rules. They stand
+beside the code that needs them, since a finer one changes the digits of an answer and not what
+counts as an answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pymoo_hdte.discrepancy.engine.rule import BY_HAND, rule
+from pymoo_hdte.discrepancy.engine.rules_of_records import RecordRules
+from pymoo_hdte.discrepancy.engine.rules_of_report import ReportRules
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rules(ReportRules, RecordRules):
+    """Every threshold that decides what is named, refused, flagged or shown as certain.
+
+    ``analyse(campaign, rules=...)`` and ``investigate(..., rules=...)`` take one; `RULES` is what
+    they take by default. `explained` returns all of them in words.
+
+    Raises
+    ------
+    InvalidInput
+        For a value that is no number or that its field does not allow.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> stricter = replace(RULES, bic_gain=10.0)
+    >>> stricter.bic_gain
+    10.0
+    """
+
+    # Is anything missing?
+    false_alarm_deviations: float = rule(
+        4.0,
+        "standard deviations",
+        "A model is adequate while its chi-square exceeds the degrees of freedom by no more than "
+        "this many standard deviations, sqrt(2 x degrees of freedom).",
+        "Test level: noise alone exceeds it with a chance of 3e-4 (100 degrees of freedom) to 6e-5 "
+        "(1400), by the chi-square distribution.",
+    )
+    single_effect_gain: float = rule(
+        25.0,
+        "chi-square",
+        "A base that is adequate as a whole is not, if one candidate would reduce chi-square by "
+        "this much: one line of one channel is lost among a thousand features.",
+        "SIMULATED",
+    )
+
+    # Which effect, and does it explain the misfit?
+    bic_gain: float = rule(
+        6.0,
+        "twice the logarithm of a probability ratio",
+        "Least gain of the Bayesian information criterion of a set of effects that is named.",
+        "Literature: from 6 on the evidence is strong (Kass and Raftery, J. Am. Stat. Assoc. 90, "
+        "1995, Section 3.2).",
+    )
+    explained_share: float = rule(
+        0.9,
+        "share of the excess chi-square",
+        "Least share of the excess that effects remove if they do not fit down to the noise, and "
+        "of what a first effect of exact form leaves that a second one removes.",
+        f"{BY_HAND}, after 70 simulated campaigns of 14 effects (97 % named rightly, none "
+        "wrongly); up to a third of the amplitude, sqrt(0.1), may be the form of a curve.",
+        at_most=1.0,
+    )
+    explained_part_share: float = rule(
+        0.5,
+        "share of the excess chi-square",
+        "Least share of the excess of each single part of the data that effects remove, and of "
+        "what is left that a second effect removes before its fit is finished.",
+        f"{BY_HAND}: half is the least that may be called most of it. A curve that removes 96 % of "
+        "the whole and nothing of the input torque is not the cause of both.",
+        at_least=0.0,
+        at_most=1.0,
+    )
+    contradicting_chi_square: float = rule(
+        9.0,
+        "chi-square per degree of freedom",
+        "From here on a part of the data plainly contradicts a model.",
+        f"{BY_HAND}: three times the noise. In a part of ten degrees of freedom noise reaches it "
+        "with a chance of 5e-15, so that the size of a misfit decides here, not its significance.",
+        at_least=1.0,
+    )
+    exact_chi_square: float = rule(
+        1.3,
+        "chi-square per degree of freedom",
+        "Up to here effects of exact form fit down to the noise.",
+        f"{BY_HAND}: noise that a resonance magnifies is not quite that of the linear covariance. "
+        "It allows for a standard deviation that is stated 14 % too small.",
+        at_least=1.0,
+    )
+    exact_model_accuracy: float = rule(
+        1e-3,
+        "relative amplitude",
+        "Effects of exact form that do not fit down to the noise leave no more of the amplitude of "
+        "a misfit than this, their model's own error.",
+        "Simulation: with three times as many harmonics no effect of exact form changes what the "
+        "drive model predicts for it by more than 6e-4 (the reaction of the kinematic error; "
+        "others 2e-4 or less).",
+        at_least=0.0,
+        at_most=1.0,
+    )
+    model_accuracy: float = rule(
+        0.02,
+        "relative amplitude",
+        "Up to here what a first effect of no exact form leaves of a drive is its model's own "
+        "error and no second effect at another port.",
+        "Simulation: with three times as many harmonics what the drive model predicts for an "
+        "effect changes by up to 1.8e-2 (springs that slip early; others 2e-5 or less).",
+        at_least=0.0,
+        at_most=1.0,
+    )
+
+    # Which candidates are fitted at all?
+    promising_share: float = rule(
+        0.2,
+        "share of the best candidate's reduction",
+        "Least reduction of chi-square, to first order, with which a candidate is fitted.",
+        f"{BY_HAND}: the screening is linear and may underrate a candidate; this allows for a "
+        "factor of five.",
+        at_least=0.0,
+        at_most=1.0,
+    )
+    most_fitted: int = rule(
+        5,
+        "1",
+        "Most candidates fitted without linearisation after the screening.",
+        "Simulation: the screening had the right one among the first three in all of 70 campaigns; "
+        "two more are a margin.",
+    )
+    most_of_one_name: int = rule(
+        2,
+        "1",
+        "Most of the fitted candidates that have one name.",
+        f"{BY_HAND}: two forms or orders of one effect leave three places to others, so that a law "
+        "does not crowd out the special case of itself.",
+    )
+    fit_evaluations: int = rule(
+        25,
+        "1",
+        "Most steps of a fit of the base, or of one effect beside it.",
+        f"{BY_HAND} as a budget of time. Fits that decide are continued by "
+        "`refinement_evaluations`.",
+    )
+    pair_evaluations: int = rule(
+        10,
+        "1",
+        "Most steps of a fit of a second effect, which starts where the first one ended.",
+        f"{BY_HAND} as a budget of time. Pairs that promise most of what is left are continued.",
+    )
+    refinement_evaluations: int = rule(
+        12,
+        "1",
+        "Most steps by which a fit that decides is continued, with derivatives of its own.",
+        f"{BY_HAND} as a budget of time.",
+    )
+    refit_margin: float = rule(
+        5.0,
+        "1",
+        "Multiple of the distances `evidence_distance` and `form_ratio` within which another "
+        "explanation is fitted to the end before it is judged.",
+        f"{BY_HAND}: a fit that is continued may come nearer by this factor.",
+        at_least=1.0,
+    )
+
+    # Can the data tell two explanations apart?
+    evidence_distance: float = rule(
+        10.0,
+        "twice the logarithm of a probability ratio",
+        "Two explanations are a class, and none is named alone, if their evidence lies closer.",
+        "Literature: beyond 10 the evidence is very strong (Kass and Raftery, J. Am. Stat. Assoc. "
+        "90, 1995, Section 3.2).",
+    )
+    form_ratio: float = rule(
+        2.0,
+        "ratio of excess chi-squares",
+        "Where no form fits down to the noise, another explanation belongs to the class if it "
+        "leaves less than this multiple of what the chosen one leaves.",
+        f"{BY_HAND}: what is left is then the form of a law and not noise, so that no test level "
+        "says it.",
+        at_least=1.0,
+    )
+
+    # Is there a second effect?
+    second_share: float = rule(
+        0.8,
+        "share of what the first effect leaves",
+        "Least share that a second effect removes beside a first one of no exact form.",
+        f"{BY_HAND}, after 70 simulated campaigns of one effect, in 23 of which the gain of BIC "
+        "alone would have invented a second one.",
+        at_least=0.0,
+        at_most=1.0,
+    )
+    second_form_share: float = rule(
+        0.05,
+        "share of the excess chi-square of the base",
+        "Least share that a second effect removes at the port of a first one of no exact form.",
+        f"{BY_HAND}: what the listed form of a law leaves of another form may be this much.",
+        at_least=0.0,
+        at_most=1.0,
+    )
+    second_hope_share: float = rule(
+        0.5,
+        "share of what the first effect leaves",
+        "Least share that a second effect removes to first order to be fitted.",
+        f"{BY_HAND}: well below `second_share`, since the screening is linear.",
+        at_least=0.0,
+    )
+    most_seconds: int = rule(
+        2,
+        "1",
+        "Most second effects fitted beside the first, and as many for each part that it explains "
+        "ill.",
+        f"{BY_HAND} as a budget of time.",
+    )
+
+    # Other machines than a drive, no model of which meets the noise of its sensors.
+    mechanism_remainder: float = rule(
+        0.05,
+        "share of the excess chi-square of the base",
+        "Up to here what is left of the force balances of a mechanism is no second effect.",
+        f"{BY_HAND}, equal to `second_form_share`: no model of a real machine is exact, whichever "
+        "the port.",
+        at_least=0.0,
+        at_most=1.0,
+    )
+    main_share: float = rule(
+        0.5,
+        "share of the power beyond the sensors' noise",
+        "Least share that named effects of a mechanism remove.",
+        f"{BY_HAND}: half is the least that may be called most of it.",
+        at_least=0.0,
+        at_most=1.0,
+    )
+    parsimony_ratio: float = rule(
+        1.1,
+        "ratio of powers left",
+        "The model of fewer unknowns is named if it leaves at most this multiple of the power that "
+        "the best one leaves in every balance.",
+        f"{BY_HAND}: 5 % of amplitude; what is left is no noise, so that no test level says it.",
+        at_least=1.0,
+    )
+    rest_rounds: int = rule(
+        2,
+        "1",
+        "Rounds in which the noise of a mechanism is set to what its best model leaves.",
+        f"{BY_HAND}: which effects are best depends on the noise in the first round only.",
+    )
+    rest_seconds: int = rule(
+        3,
+        "1",
+        "Second effects tried beside each of as many first ones to find what no effect explains.",
+        "Simulation: as `most_fitted`, without its margin.",
+    )
+
+    @property
+    def exact_share(self) -> float:
+        """Least share of the excess that effects of exact form remove: all but their own error."""
+        return 1.0 - self.exact_model_accuracy**2
+
+
+RULES = Rules()
+"""The rules that hold where none are given."""

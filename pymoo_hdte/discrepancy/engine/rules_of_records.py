@@ -1,0 +1,207 @@
+"""Rules for what beliefs and records must be, and when a line of theirs counts as seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pymoo_hdte.discrepancy.engine.rule import BY_HAND, RuleSet, rule
+from pymoo_hdte.units import ARCSEC
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordRules(RuleSet):
+    """Thresholds by which beliefs and records are refused, left out, or show a line.
+
+    See `rules.Rules`, which has them all.
+    """
+
+    # Can these numbers come from this drive? Wide enough for every effect a campaign may hide.
+    largest_transmission_error: float = rule(
+        0.02,
+        "rad",
+        "Larger transmission errors and amplitudes of the static error are refused.",
+        f"{BY_HAND}: ten times the wind-up of the drive of the paper at its rated torque; angles "
+        "in degrees are 57 times too large.",
+    )
+    least_error_amplitude: float = rule(
+        1e-3 * ARCSEC,
+        "rad",
+        "Smaller amplitudes of the believed static error that are not zero are refused.",
+        f"{BY_HAND}: 0.001 arcsec; no encoder would show a smaller line.",
+    )
+    least_natural_frequency: float = rule(
+        0.5,
+        "Hz",
+        "An inertia that would swing on the mesh more slowly is refused.",
+        f"{BY_HAND}: those of the drive of the paper swing at 18, 90 and 900 Hz; g.cm2 for kg.m2 "
+        "lower a frequency 3000-fold.",
+    )
+    least_tolerance: float = rule(
+        1e-3,
+        "1",
+        "Smaller tolerances of beliefs are refused.",
+        f"{BY_HAND}: no parameter of a drive is known better, and a base held fixed turns its own "
+        "errors into effects.",
+    )
+    overstated_noise_ratio: float = rule(
+        30.0,
+        "ratio of standard deviations",
+        "A stated noise that exceeds what the rows of all records show by more is refused.",
+        f"{BY_HAND}: a wrong unit is off by 57 or 1000.",
+        at_least=1.0,
+    )
+    speed_mismatch: float = rule(
+        0.1,
+        "relative",
+        "Largest difference of the mean speed of a record from the one that it states.",
+        f"{BY_HAND}: the next wrong unit, rad/s for r/min, is a factor of ten.",
+        at_most=1.0,
+    )
+    slope_mismatch: float = rule(
+        5.0,
+        "ratio",
+        "Largest factor between the slope of a torsion sweep and the believed compliance.",
+        f"{BY_HAND}: wide enough for a soft wind-up or a clearance; a wrong unit is off by 57 or "
+        "1000.",
+        at_least=1.0,
+    )
+    load_mismatch: float = rule(
+        0.3,
+        "share of the load",
+        "Largest difference of a mean torque from what the load asks for, and the least share of "
+        "it that the motor supplies.",
+        f"{BY_HAND}: gains and ripples of sensors are smaller, a channel swapped is larger.",
+        at_most=1.0,
+    )
+    torque_mismatch: float = rule(
+        10.0,
+        "ratio",
+        "Multiple of the load at the input, and of the zero error of a sensor, that a torque may "
+        "have besides.",
+        f"{BY_HAND}: drives of this kind lose less to friction; N.mm for N.m is a factor of 1000.",
+        at_least=1.0,
+    )
+    fewest_records: int = rule(
+        3,
+        "1",
+        "Fewer records to be fitted are refused.",
+        f"{BY_HAND}: with fewer, what changes with speed or load cannot be told from the base "
+        "parameters.",
+    )
+
+    # Which lines of a drive are looked at, and which count as seen?
+    highest_order: float = rule(
+        14.0,
+        "cycles per input turn",
+        "Lines are looked at up to this order.",
+        f"{BY_HAND} as a budget of time; the report says where a harmonic may lie above.",
+    )
+    line_separation: float = rule(
+        0.9,
+        "cycles in the record or output turn",
+        "Least distance of two order lines that are fitted side by side.",
+        "Resolution: two lines a whole cycle apart are orthogonal; a record may fall short of a "
+        "whole turn by a little.",
+    )
+    nyquist_share: float = rule(
+        0.9,
+        "share of the Nyquist order",
+        "Order up to which the rows of a record show lines.",
+        f"{BY_HAND}: closer to it, rows hardly tell sine from cosine.",
+        at_most=1.0,
+    )
+    unexpected_line_chance: float = rule(
+        1e-3,
+        "probability",
+        "Chance that noise alone shows any line beyond the expected ones in a whole campaign.",
+        "Test level: the power of a line is exponential under noise (Scargle, Astrophysical "
+        "Journal 263, 1982), and all lines of all records share the chance (Bonferroni).",
+        at_most=1.0,
+    )
+    most_unexpected_lines: int = rule(
+        6,
+        "1",
+        "Most unexpected orders that are added to those looked at.",
+        f"{BY_HAND} as a budget of time.",
+    )
+    order_line_chance: float = rule(
+        1e-6,
+        "probability",
+        "Chance that noise alone makes a line strong enough to bring candidates of its order.",
+        "Test level by the chi-square distribution: 2e-5 for all of some 20 orders of a campaign.",
+        at_most=1.0,
+    )
+    second_speed_chance: float = rule(
+        0.01,
+        "probability",
+        "Chance that noise alone makes a line of one speed seem to be one of two.",
+        "Test level by the chi-square distribution; what is seen at one speed is a frequency.",
+        at_most=1.0,
+    )
+    most_order_lines: int = rule(
+        4,
+        "1",
+        "Most orders of strong lines that bring candidates.",
+        f"{BY_HAND} as a budget of time.",
+    )
+
+    # What else the records of a drive must show.
+    least_held_load: float = rule(
+        0.5,
+        "N.m at a torque scale of 1",
+        "A record of a drive with clearance is left out if its load is smaller, or does not exceed "
+        "the swing of its torque: the tooth flanks are not held together.",
+        f"{BY_HAND}: a few times what the zero of a torque sensor is known to.",
+    )
+    sweep_gain: float = rule(
+        50.0,
+        "chi-square",
+        "Reduction of the chi-square of the torsion sweeps with which they speak for an effect.",
+        f"{BY_HAND}: seven standard deviations of one unknown, since what stands on it is whether "
+        "records are left out.",
+    )
+    changed_noise_ratio: float = rule(
+        1.5,
+        "ratio of variances",
+        "The verdict is repeated with the noise that the named effect carries to the channels, if "
+        "a variance grows by more than this.",
+        f"{BY_HAND}: chi-square of the feature that it moves most is then off by half.",
+        at_least=1.0,
+    )
+
+    # Other machines than a drive.
+    noise_power_ratio: float = rule(
+        2.0,
+        "ratio of powers",
+        "Up to here a force, or what a model leaves of one, may be that of the sensors.",
+        f"{BY_HAND}: the noise of the sensors is an estimate from the same records.",
+        at_least=1.0,
+    )
+    fewest_periods: float = rule(
+        5.0,
+        "periods in a record",
+        "Fewer do not make an order of what varies with the position of a port.",
+        f"{BY_HAND}: fewer may be a wander.",
+    )
+    position_order_chance: float = rule(
+        1e-4,
+        "probability",
+        "Chance that noise alone shows an order in the middle of those that are looked at.",
+        "Test level: the power over that of its surroundings follows a gamma distribution; all "
+        "orders share the chance (Bonferroni). Near the ends it is larger.",
+        at_most=1.0,
+    )
+    most_position_orders: int = rule(
+        6,
+        "1",
+        "Most orders of one port.",
+        f"{BY_HAND} as a budget of time.",
+    )
+    reverse_share: float = rule(
+        0.01,
+        "share of the way",
+        "A port moves in two directions if it goes more than this share in the rarer one.",
+        f"{BY_HAND}: the noise of a record at rest changes the sign of its speed now and then.",
+        at_least=0.0,
+        at_most=0.5,
+    )
