@@ -1,5 +1,11 @@
 """What several test files share."""
 
+import os
+
+# Before NumPy is loaded: workers of pytest-xdist and the processes that tests start fill the cores
+# already, and small matrices are slower on two threads than on one.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 from hypothesis import settings
