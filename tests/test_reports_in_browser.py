@@ -5,16 +5,14 @@ import json
 import measured_oscillator as rig
 import numpy as np
 import pytest
+from bench_records import write_series
 from browser import CHROMIUM, probe
-from quick_campaigns import quick_campaign
-from test_cli_identify import records  # noqa: F401
-from test_experiments_report import example
-from virtual_rig_cases import effect
+from example_result import example
+from quick_campaigns import put_ripple_report
 
 from experiments.runner.report import write_report
 from experiments.runner.store import save
 from pymoo_hdte.cli import __main__ as cli
-from pymoo_hdte.discrepancy import write_campaign
 from pymoo_hdte.discrepancy.mechanism import investigate
 from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
 from pymoo_hdte.mechanism import Believed, Input, Mechanism, Port
@@ -40,19 +38,16 @@ def looked_at(page, tmp_path, width, script="null"):
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory, records):  # noqa: F811
+def pages(tmp_path_factory):
     """One report of every kind."""
     top = tmp_path_factory.mktemp("reports")
-    write_campaign(
-        quick_campaign(4, effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7)),
-        top / "rig",
-    )
+    write_series(top / "series-1")
+    put_ripple_report(top / "discrepancy")
     quick = ("--order", "2", "--evaluations", "1000")
     commands = {
         "optimise": ("hs_20_100", *quick),
         "simulate": ("hs_20_100",),
-        "identify": (str(records), "--datasheet", "hs_20_100"),
-        "discrepancy": (str(top / "rig"),),
+        "identify": (str(top / "series-1"), "--datasheet", "hs_20_100"),
     }
     for name, arguments in commands.items():
         assert cli.main([name, *arguments, "--out", str(top / name), "--quiet"]) == 0
@@ -63,7 +58,7 @@ def pages(tmp_path_factory, records):  # noqa: F811
     )
     runs = [rig.record_of(rig.cubic), rig.record_of(rig.cubic, "held_out", seed=3)]
     write_measured_report("oscillator", investigate(oscillator, runs), top / "measured")
-    found = {name: top / name / "report.html" for name in (*commands, "measured")}
+    found = {name: top / name / "report.html" for name in (*commands, "discrepancy", "measured")}
     save(top / "results", "table7", example())
     return found | {"experiments": write_report(top / "results")}
 
