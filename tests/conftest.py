@@ -1,14 +1,30 @@
 """What several test files share."""
 
+import os
+import shutil
+import tempfile
+
+# Before NumPy is loaded: workers of pytest-xdist and the processes that tests start fill the cores
+# already, and small matrices are slower on two threads than on one.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
 import pytest
 from hypothesis import settings
+from kept_results import FOLDER
 
 from pymoo_hdte.drive import PRESETS, DriveModel, preset
 
 # The first call of a compiled function compiles it: no test is judged by its time.
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Make the folder that all workers share; it goes with the process that made it."""
+    if FOLDER not in os.environ:
+        os.environ[FOLDER] = tempfile.mkdtemp(prefix="kept_results_")
+        config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(FOLDER)))
 
 
 @pytest.fixture(params=PRESETS)

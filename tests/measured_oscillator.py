@@ -1,5 +1,7 @@
 """An oscillator in multisine tests: hidden effects of forms that differ from the library's."""
 
+from functools import cache
+
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -19,6 +21,7 @@ def multisine(seed, size=20.0):
     return time, lines, phases, size / force.std()
 
 
+@cache
 def record_of(hidden, role="train", seed=1, size=20.0):
     """Return a record of m x'' + c x' + k x + hidden = F.
 

@@ -1,9 +1,14 @@
 """Virtual campaigns that are simulated and analysed in a second or two."""
 
-import numpy as np
-from virtual_rig_cases import BELIEVED, RIG
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from pymoo_hdte.discrepancy import Campaign
+import numpy as np
+from kept_results import kept
+from virtual_rig_cases import BELIEVED, RIG, effect
+
+from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.discrepancy import Campaign, write_campaign
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
 
@@ -24,8 +29,34 @@ CONDITIONS = tuple(
 )
 
 
+@kept
 def quick_campaign(seed: int, *effects) -> Campaign:
     """Return a campaign on a drawn rig, with planted effects or clean."""
     rng = np.random.default_rng(seed)
     rig = draw_rig(BELIEVED, effects, rng)
     return run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS)
+
+
+def write_ripple_campaign(folder: Path) -> None:
+    """Write a campaign on a rig whose motor torque has a ripple."""
+    ripple = effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7)
+    write_campaign(quick_campaign(4, ripple), folder)
+
+
+@kept
+def ripple_report() -> dict[str, bytes]:
+    """Return the files of the command's report on the campaign with a ripple, by name."""
+    with TemporaryDirectory() as name:
+        top = Path(name)
+        write_ripple_campaign(top / "rig")
+        assert (
+            cli.main(["discrepancy", str(top / "rig"), "--out", str(top / "out"), "--quiet"]) == 0
+        )
+        return {path.name: path.read_bytes() for path in (top / "out").iterdir()}
+
+
+def put_ripple_report(folder: Path) -> None:
+    """Write the report on the campaign with a ripple into a new folder."""
+    folder.mkdir()
+    for name, content in ripple_report().items():
+        (folder / name).write_bytes(content)

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from quick_campaigns import quick_campaign
-from virtual_rig_cases import effect
+from quick_campaigns import put_ripple_report, quick_campaign, write_ripple_campaign
 
 from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.discrepancy import write_campaign
@@ -271,10 +270,9 @@ def test_too_few_conditions_and_nothing_held_out_are_said(clean, tmp_path, capsy
 def reported(tmp_path_factory):
     """The folders of a campaign with a ripple of the motor torque and of two reports on it."""
     top = tmp_path_factory.mktemp("ripple")
-    ripple = effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7)
-    write_campaign(quick_campaign(4, ripple), top / "rig")
-    for name in ("one", "other"):
-        assert run(top / "rig", top / name, "--quiet") == 0
+    put_ripple_report(top / "one")
+    write_ripple_campaign(top / "rig")
+    assert run(top / "rig", top / "other", "--quiet") == 0
     return top
 
 

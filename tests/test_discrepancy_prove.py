@@ -4,67 +4,28 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
+from analysed_campaigns import LISTED, ORDERS, clean_analysis, ripple_analysis
+from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
-from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
-from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
-from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
 from pymoo_hdte.discrepancy.drive.proof import Gap, prove
 from pymoo_hdte.discrepancy.drive.revision import drive_model, revised_model
-from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Rival
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive import load_datasheet, load_model
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual.rig import run_campaign
-from pymoo_hdte.virtual.runs import Condition
-
-ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 6.0]
-CONDITIONS = tuple(
-    Condition(speed, load, 1000.0, 1, role)
-    for speed, load, role in (
-        (1000.0, 10.0, "train"),
-        (1000.0, 40.0, "train"),
-        (1400.0, 20.0, "train"),
-        (2000.0, 40.0, "train"),
-        (1000.0, 0.0, "held_out"),
-        (1400.0, 40.0, "held_out"),
-        (2000.0, 10.0, "held_out"),
-    )
-)
-LISTED = drive_candidates(BELIEVED, [6.0], [6.0], 1.0)
-
-
-def analysed(campaign, label=None, status="named"):
-    """Return what the workflow finds when it fits the effect ``label`` only."""
-    features = measure(campaign, campaign.train, ORDERS)
-    data = Data(campaign, features, start_parameters(campaign, features))
-    base = fit(data)
-    chosen = None
-    if label is not None:
-        (candidate,) = (one for one in LISTED if one.label == label)
-        start = np.concatenate([base.values, candidate.starts[0]])
-        chosen = Rival(fit(data, (candidate,), start), 0.0, 1.0)
-    freedom = len(base.residuals) - len(base.values)
-    return DriveFinding(campaign, data, Verdict(status, base, chosen, (), (), freedom), ())
 
 
 @pytest.fixture(scope="module")
 def ripple():
-    rig = true_rig(effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7))
-    campaign = run_campaign(rig, BELIEVED, RIG, np.random.default_rng(5), CONDITIONS)
-    return analysed(campaign, "torque_ripple:input@6")
+    return ripple_analysis()
 
 
 @pytest.fixture(scope="module")
 def clean():
-    campaign = run_campaign(true_rig(), BELIEVED, RIG, np.random.default_rng(6), CONDITIONS)
-    return analysed(campaign, status="adequate")
+    return clean_analysis()
 
 
 def at_start(*chosen):

@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from analysed_campaigns import ripple_analysis
 from hypothesis import given
 from hypothesis import strategies as st
-from test_discrepancy_prove import CONDITIONS, analysed
-from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
@@ -33,16 +32,13 @@ from pymoo_hdte.drive import (
 from pymoo_hdte.laws.stiffness import SoftWindup
 from pymoo_hdte.reports.html import digits, number
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual.rig import run_campaign
 
 PROPOSAL = Proposal("Turn it backwards.", "running", -600.0, 40.0, ("a", "b"), 12.0)
 
 
 @pytest.fixture(scope="module")
 def ripple():
-    rig = true_rig(effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7))
-    campaign = run_campaign(rig, BELIEVED, RIG, np.random.default_rng(5), CONDITIONS)
-    return analysed(campaign, "torque_ripple:input@6")
+    return ripple_analysis()
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from shutil import copytree, ignore_patterns
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
+from example_result import example
 
 import experiments
 from experiments.__main__ import main
@@ -21,50 +21,10 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.committed import read_origin, read_rows, stored_outcome, table_with_origin
 from experiments.runner.registry import EXPERIMENTS, Context, Experiment
 from experiments.runner.report import check_page, write_report
-from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
+from experiments.runner.result import Column, Finding, Result, Table, significant
 from experiments.runner.store import load, png_bytes, save
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.reports.csv_table import csv_text
-
-HOSTILE = "<script>alert('x')</script>"
-
-
-def line_plot() -> Figure:
-    figure = Figure(figsize=(2, 2))
-    figure.subplots().plot([0, 1], [0, np.pi])
-    return figure
-
-
-def example() -> Result:
-    columns = (
-        Column("algorithm"),
-        Column("mean", "arcsec", 3, "IGD"),
-        Column("paper", "arcsec", 4, "IGD", paper=True),
-        Column("runs"),
-    )
-    rows = (
-        (HOSTILE, np.float64(1 / 3), 0.018, np.int64(20)),
-        ("none", float("nan"), None, 0),
-        ("all", float("inf"), None, 0),
-    )
-    findings = (
-        Finding(np.bool_(True), "They agree."),
-        Finding(False, "They differ."),
-        Finding(True, "A fit gives it back.", fitted=True),
-        Finding(False, "A fit misses it.", fitted=True),
-        Finding(True, "It holds.", check=True),
-        Finding(False, "It fails.", check=True),
-    )
-    times = Table("times", "Wall times", (Column("time", "s"),), ((1.5,),), wall_times=True)
-    return Result(
-        title="An example",
-        command="python -m experiments table7",
-        paragraphs=(HOSTILE,),
-        tables=(Table("quality", "Quality", columns, rows, "How.", findings), times),
-        pictures=(Picture("line", "A line.", line_plot()),),
-        notes=("A note.",),
-        headline="quality",
-    )
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """The verdict on any mechanism: a user's oscillator with effects hidden, or none."""
 
 from dataclasses import replace
+from functools import cache
 
 import measured_oscillator as rig
 import numpy as np
@@ -30,6 +31,17 @@ OSCILLATOR = Mechanism(
     ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
     inputs=[Input("force", {"x": 1.0})],
 )
+
+
+def dry(x, v, z, t):
+    """Dry friction."""
+    return 2.0 * np.tanh(v / 1e-3), 0.0
+
+
+@cache
+def finding_on(hidden, seed=1):
+    """Return what is found in a record alone."""
+    return examine_mechanism(OSCILLATOR, [rig.record_of(hidden, seed=seed)])
 
 
 def with_held_out(hidden):
@@ -164,7 +176,7 @@ def test_an_interval_does_not_leave_the_tolerance():
 
 
 def test_what_no_law_explains_is_unlisted_and_described():
-    finding = examine_mechanism(OSCILLATOR, [rig.record_of(swinging_stiffness)])
+    finding = finding_on(swinging_stiffness)
     assert finding.verdict.status == "unlisted"
     assert effects(finding) == []
     assert "force balance of x" in remainder(finding)["sentence"]
@@ -184,17 +196,12 @@ def test_a_quantity_out_of_tolerance_is_a_parameter():
 
 
 def test_an_effect_that_is_known_is_not_found_again():
-    def dry(x, v, z, t):
-        return 2.0 * np.tanh(v / 1e-3), 0.0
-
     records = [rig.record_of(dry, seed=4)]
-    assert [one["name"] for one in effects(examine_mechanism(OSCILLATOR, records))] == [
-        "coulomb_friction"
-    ]
+    assert [one["name"] for one in effects(finding_on(dry, 4))] == ["coulomb_friction"]
     friction = LawAt("coulomb_friction", "spring", CoulombFriction(2.0))
     finding = examine_mechanism(OSCILLATOR, records, known=[friction])
     assert "coulomb_friction" not in [one["name"] for one in effects(finding)]
-    assert finding.base_misfit < 0.2 * examine_mechanism(OSCILLATOR, records).base_misfit
+    assert finding.base_misfit < 0.2 * finding_on(dry, 4).base_misfit
 
 
 def test_the_verdict_does_not_hang_on_units():
@@ -208,35 +215,26 @@ def test_the_verdict_does_not_hang_on_units():
         ports=[Port("spring", {"x": 1.0}, BelievedValue(4.1, 0.1), BelievedValue(5e-3, 0.5))],
         inputs=[Input("force", {"x": 1.0})],
     )
-    one, other = examine_mechanism(OSCILLATOR, [record]), examine_mechanism(scaled, [milli])
+    one, other = finding_on(cubic), examine_mechanism(scaled, [milli])
     assert one.verdict.status == other.verdict.status == "named"
     coefficient = [effects(each)[0]["parameters"]["coefficient"]["value"] for each in (one, other)]
     assert coefficient[1] == pytest.approx(1e-9 * coefficient[0], rel=1e-3)
 
 
 def test_the_next_test_sets_what_was_found_against_its_rival():
-    def dry(x, v, z, t):
-        return 2.0 * np.tanh(v / 1e-3), 0.0
-
-    test = next_test(examine_mechanism(OSCILLATOR, [rig.record_of(dry, seed=4)]))
+    test = next_test(finding_on(dry, 4))
     assert test.separates == ("coulomb_friction:spring", "stribeck_friction:spring")
     assert "train 4" in test.description or "another motion" in test.description
-    alone = next_test(examine_mechanism(OSCILLATOR, [rig.record_of(cubic)]))
+    alone = next_test(finding_on(cubic))
     assert "no rival is left" in alone.description
-    unknown = next_test(examine_mechanism(OSCILLATOR, [rig.record_of(swinging_stiffness)]))
+    unknown = next_test(finding_on(swinging_stiffness))
     assert "proved" not in unknown.description
 
 
-@pytest.mark.parametrize(
-    ("records", "message"),
-    [
-        ([], "number of train records is 0"),
-        ([rig.record_of(nothing, "held_out")], "number of train records is 0"),
-    ],
-)
-def test_without_training_records_nothing_is_fitted(records, message):
-    with pytest.raises(InvalidInput, match=message):
-        examine_mechanism(OSCILLATOR, records)
+@pytest.mark.parametrize("roles", [(), ("held_out",)])
+def test_without_training_records_nothing_is_fitted(roles):
+    with pytest.raises(InvalidInput, match="number of train records is 0"):
+        examine_mechanism(OSCILLATOR, [rig.record_of(nothing, role) for role in roles])
 
 
 def test_a_missing_a_dead_and_a_short_channel_are_named():

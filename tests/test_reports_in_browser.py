@@ -5,16 +5,15 @@ import json
 import measured_oscillator as rig
 import numpy as np
 import pytest
+from bench_records import write_series
 from browser import CHROMIUM, probe
-from quick_campaigns import quick_campaign
-from test_cli_identify import records  # noqa: F401
-from test_experiments_report import example
-from virtual_rig_cases import effect
+from example_result import example
+from quick_campaigns import put_ripple_report
 
 from experiments.runner.report import write_report
 from experiments.runner.store import save
 from pymoo_hdte.cli import __main__ as cli
-from pymoo_hdte.discrepancy import MeasuredMechanism, analyse, write_campaign
+from pymoo_hdte.discrepancy import MeasuredMechanism, analyse
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
@@ -38,19 +37,16 @@ def looked_at(page, tmp_path, width, script="null"):
 
 
 @pytest.fixture(scope="module")
-def pages(tmp_path_factory, records):  # noqa: F811
+def pages(tmp_path_factory):
     """One report of every kind."""
     top = tmp_path_factory.mktemp("reports")
-    write_campaign(
-        quick_campaign(4, effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7)),
-        top / "rig",
-    )
+    write_series(top / "series-1")
+    put_ripple_report(top / "discrepancy")
     quick = ("--order", "2", "--evaluations", "1000")
     commands = {
         "optimise": ("hs_20_100", *quick),
         "simulate": ("hs_20_100",),
-        "identify": (str(records), "--datasheet", "hs_20_100"),
-        "discrepancy": (str(top / "rig"),),
+        "identify": (str(top / "series-1"), "--datasheet", "hs_20_100"),
     }
     for name, arguments in commands.items():
         assert cli.main([name, *arguments, "--out", str(top / name), "--quiet"]) == 0
@@ -61,7 +57,7 @@ def pages(tmp_path_factory, records):  # noqa: F811
     )
     runs = [rig.record_of(rig.cubic), rig.record_of(rig.cubic, "held_out", seed=3)]
     analyse(MeasuredMechanism(oscillator, runs, title="oscillator")).report(top / "measured")
-    found = {name: top / name / "report.html" for name in (*commands, "measured")}
+    found = {name: top / name / "report.html" for name in (*commands, "discrepancy", "measured")}
     save(top / "results", "table7", example())
     return found | {"experiments": write_report(top / "results")}
 

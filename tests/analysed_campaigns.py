@@ -1,0 +1,60 @@
+"""Campaigns of few short records, fitted with one effect only or with none."""
+
+from functools import cache
+
+import numpy as np
+from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
+
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
+from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
+from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.virtual.rig import run_campaign
+from pymoo_hdte.virtual.runs import Condition
+
+ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 6.0]
+CONDITIONS = tuple(
+    Condition(speed, load, 1000.0, 1, role)
+    for speed, load, role in (
+        (1000.0, 10.0, "train"),
+        (1000.0, 40.0, "train"),
+        (1400.0, 20.0, "train"),
+        (2000.0, 40.0, "train"),
+        (1000.0, 0.0, "held_out"),
+        (1400.0, 40.0, "held_out"),
+        (2000.0, 10.0, "held_out"),
+    )
+)
+LISTED = drive_candidates(BELIEVED, [6.0], [6.0], 1.0)
+
+
+def analysed(campaign, label=None, status="named"):
+    """Return what the workflow finds when it fits the effect ``label`` only."""
+    features = measure(campaign, campaign.train, ORDERS)
+    data = Data(campaign, features, start_parameters(campaign, features))
+    base = fit(data)
+    chosen = None
+    if label is not None:
+        (candidate,) = (one for one in LISTED if one.label == label)
+        start = np.concatenate([base.values, candidate.starts[0]])
+        chosen = Rival(fit(data, (candidate,), start), 0.0, 1.0)
+    freedom = len(base.residuals) - len(base.values)
+    return DriveFinding(campaign, data, Verdict(status, base, chosen, (), (), freedom), ())
+
+
+@cache
+def ripple_analysis():
+    """Return what is found on a rig whose motor torque has a ripple."""
+    rig = true_rig(effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7))
+    campaign = run_campaign(rig, BELIEVED, RIG, np.random.default_rng(5), CONDITIONS)
+    return analysed(campaign, "torque_ripple:input@6")
+
+
+@cache
+def clean_analysis():
+    """Return what is found on a rig that is as believed."""
+    campaign = run_campaign(true_rig(), BELIEVED, RIG, np.random.default_rng(6), CONDITIONS)
+    return analysed(campaign, status="adequate")

@@ -1,0 +1,38 @@
+"""What is long in the making and needed in several files: one worker makes it for all."""
+
+import fcntl
+import hashlib
+import os
+import pickle
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+
+FOLDER = "PYMOO_HDTE_KEPT_RESULTS"
+"""Environment variable with the folder of this run of the suite; the workers inherit it."""
+
+
+def kept(make: Callable) -> Callable:
+    """Keep what a function returns, for the other workers as a file; whoever comes second waits.
+
+    The function must depend on nothing but its arguments, and nobody may change what it returns.
+    """
+    known = {}
+
+    @wraps(make)
+    def result(*args, **kwargs):
+        key = pickle.dumps((make.__module__, make.__qualname__, args, kwargs))
+        if key not in known:
+            known[key] = _made_once(hashlib.sha256(key).hexdigest(), lambda: make(*args, **kwargs))
+        return known[key]
+
+    return result
+
+
+def _made_once(name: str, make: Callable):
+    path = Path(os.environ[FOLDER]) / name
+    with path.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not path.exists():
+            path.write_bytes(pickle.dumps(make()))
+    return pickle.loads(path.read_bytes())
