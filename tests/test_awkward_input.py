@@ -123,6 +123,7 @@ def small_campaign():
 def test_lists_in_the_place_of_numbers_are_refused(tmp_path, key, value):
     write_campaign(small_campaign(), tmp_path / "rig")
     path = tmp_path / "rig" / "campaign.toml"
-    path.write_text(re.sub(rf"\n{key} = .*", f"\n{key} = {value}", path.read_text(), count=1))
+    written = rf"\n{key} = (\[[^]]*]|.*)"
+    path.write_text(re.sub(written, f"\n{key} = {value}", path.read_text(), count=1))
     with pytest.raises(InvalidInput, match=r"campaign\.toml, line \d+: "):
         read_campaign(tmp_path / "rig")

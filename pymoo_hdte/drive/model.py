@@ -21,7 +21,8 @@ from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.hill import steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.io.archive import FileFormat
-from pymoo_hdte.io.fields import Fields, read_toml
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.io.toml import read_toml
 from pymoo_hdte.units import ARCSEC
 
 PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")

@@ -53,8 +53,9 @@ from pathlib import Path, PureWindowsPath
 
 from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.discrepancy.mechanism.models import model_from_fields, read_model, rig_toml
-from pymoo_hdte.io.fields import Fields, toml_with_lines
+from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.tables import TableLayout, check_sha256, layout_from_fields, read_table
+from pymoo_hdte.io.toml import toml_with_lines
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.records import ROLES
 
