@@ -79,11 +79,11 @@ def test_all_numbers_of_matlab_in_rows_and_columns(tmp_path):
 def test_every_unit_is_converted(tmp_path):
     path = write(tmp_path, "csv", {"a": np.arange(20.0)})
     known = {"um": 1e-6, "rev": 2 * math.pi, "arcsec": math.pi / 648000, "r/min": math.pi / 30}
-    known |= dict.fromkeys(("ms", "mm", "mm/s", "N.mm", "mA", "mV"), 1e-3)
+    known |= dict.fromkeys(("ms", "mm", "mm/s", "N.mm", "mN.m", "mA", "mV"), 1e-3)
     known |= dict.fromkeys(("deg", "deg/s"), math.pi / 180)
     si = {"s", "m", "rad", "rad/s", "m/s", "N", "N.m", "A", "V", "m/s2", "rad/s2", "1"}
-    known |= dict.fromkeys(set(tables.UNITS) & si, 1.0)
-    assert len(known) == len(tables.UNITS)
+    known |= dict.fromkeys(set(tables.CHANNEL_UNITS) & si, 1.0)
+    assert len(known) == len(tables.CHANNEL_UNITS)
     for unit, factor in known.items():
         values = tables.read_table(path, layout(x=Channel("a", unit))).channels["x"]
         np.testing.assert_allclose(values, np.arange(20.0) * factor, rtol=1e-14)
@@ -96,7 +96,9 @@ def test_an_angle_that_wraps_is_unwrapped_also_across_a_gap(unit, turn, tmp_path
     column[np.flatnonzero(np.diff(column) < 0)[0]] = math.nan
     given = layout(x=Channel("a", unit, 0.5, unwrap=True))
     table = tables.read_table(write(tmp_path, "csv", {"a": column}), given)
-    np.testing.assert_allclose(table.channels["x"], angle * tables.UNITS[unit] * 0.5, atol=1e-9)
+    np.testing.assert_allclose(
+        table.channels["x"], angle * tables.CHANNEL_UNITS[unit] * 0.5, atol=1e-9
+    )
 
 
 @FORMS

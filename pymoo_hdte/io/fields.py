@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
-from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
-
-UNITS: dict[str, dict[str, float]] = {
-    "angle": {"rad": 1.0, "deg": math.pi / 180.0, "arcsec": ARCSEC},
-    "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
-    "angle rate": {"rad/s": 1.0},
-    "time": {"s": 1.0},
-    "speed": {"rad/s": 1.0, "r/min": REVOLUTION_PER_MINUTE},
-    "torque": {"N.m": 1.0},
-    "stiffness": {"N.m/rad": 1.0},
-    "inertia": {"kg.m2": 1.0},
-    "damping": {"N.m.s/rad": 1.0},
-    "cubic stiffness": {"N.m/rad3": 1.0},
-    "quadratic drag": {"N.m.s2/rad2": 1.0},
-}
-"""For each quantity the units it may be given in, with the factor to SI."""
+from pymoo_hdte.units import UNITS
 
 
 class Fields:

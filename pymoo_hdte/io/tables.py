@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 import struct
 import zlib
@@ -17,17 +16,15 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+from pymoo_hdte.units import UNITS
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3}
-ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180.0, "arcsec": ARCSEC, "rev": 2.0 * math.pi}
-UNITS: dict[str, float] = {
-    **(TIME_UNITS | ANGLE_UNITS),
-    **{"m": 1.0, "mm": 1e-3, "um": 1e-6, "m/s": 1.0, "mm/s": 1e-3, "m/s2": 1.0},
-    **{"rad/s": 1.0, "deg/s": math.pi / 180.0, "r/min": REVOLUTION_PER_MINUTE, "rad/s2": 1.0},
-    **{"N": 1.0, "N.m": 1.0, "N.mm": 1e-3, "A": 1.0, "mA": 1e-3, "V": 1.0, "mV": 1e-3, "1": 1.0},
-}
-"""Every unit a channel may have, with its factor to SI; ``"1"`` is dimensionless."""
+MEASURED = (
+    *("time", "angle", "length", "speed", "linear speed", "acceleration", "linear acceleration"),
+    *("force", "torque", "current", "voltage", "ratio"),
+)
+"""Quantities, among those of `pymoo_hdte.units`, that a channel may hold."""
+CHANNEL_UNITS = {unit: size for one in MEASURED for unit, size in UNITS[one].items()}
+"""Every unit a channel may have, with its factor to SI."""
 
 FEWEST_ROWS = 16
 STEP_SPREAD = 0.01  # Relative, of a time step from the median step.
@@ -41,9 +38,10 @@ RawColumns = dict[str | int, NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Channel:
-    """A column (in a plain table its number from 0) with a unit of `UNITS`, or `InvalidInput`.
+    """A column (in a plain table its number from 0) and its unit, one of `CHANNEL_UNITS`.
 
-    ``scale`` is a factor after the unit; ``unwrap`` is for angles that jump by a turn.
+    Another unit raises `InvalidInput`. ``scale`` is a factor after the unit; ``unwrap`` is for
+    angles that jump by a turn.
     """
 
     column: str | int
@@ -52,7 +50,7 @@ class Channel:
     unwrap: bool = False
 
     def __post_init__(self) -> None:
-        one_of("unit", self.unit, ANGLE_UNITS if self.unwrap else UNITS)
+        one_of("unit", self.unit, UNITS["angle"] if self.unwrap else CHANNEL_UNITS)
 
 
 @dataclass(frozen=True)
@@ -90,8 +88,8 @@ def layout_from_fields(table: Fields) -> TableLayout:
     names = list(channels.names())
     if not names:
         raise InvalidInput(table._name("channels"), {}, "at least one channel")
-    mapped = {name: _channel(channels.table(name), form, UNITS) for name in names}
-    time = _channel(table.table("time"), form, TIME_UNITS) if table.has("time") else None
+    mapped = {name: _channel(channels.table(name), form, CHANNEL_UNITS) for name in names}
+    time = _channel(table.table("time"), form, UNITS["time"]) if table.has("time") else None
     if time and table.has("sample_rate"):
         raise InvalidInput(table._name("time"), time.column, "absent if sample_rate is given")
     rate = None if time else table.number("sample_rate", at_least=1e-3, at_most=1e9)
@@ -105,7 +103,7 @@ def _channel(table: Fields, form: str, units: Collection[str]) -> Channel:
     unwrap = table.take("unwrap", "") if table.has("unwrap") else False
     if not isinstance(unwrap, bool):
         raise InvalidInput(table._name("unwrap"), unwrap, "true or false")
-    unit = table.choice("unit", ANGLE_UNITS if unwrap else units)
+    unit = table.choice("unit", UNITS["angle"] if unwrap else units)
     has_scale = table.has("scale")
     scale = table.number("scale", at_least=-LARGEST, at_most=LARGEST) if has_scale else 1.0
     table.finish()
@@ -175,7 +173,7 @@ def check_sha256(path: Path, expected: str) -> None:
 def _si(channel: Channel, kept: Mapping[str | int, NDArray[np.float64]]) -> NDArray[np.float64]:
     raw = kept[channel.column]
     at = np.flatnonzero(np.isfinite(raw))
-    values = raw[at] * UNITS[channel.unit]
+    values = raw[at] * CHANNEL_UNITS[channel.unit]
     # Unwrapped before anything is interpolated: halfway across a jump there is no angle.
     values = (np.unwrap(values) if channel.unwrap else values) * channel.scale
     return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
