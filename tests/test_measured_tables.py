@@ -135,7 +135,7 @@ def test_rows_that_are_not_finite_are_dropped_filled_and_counted(form, tmp_path)
     place = {"matlab": "row 151: ", "csv": "line 152: "}.get(form, "line 151: ")
     refused(write(tmp_path, form, wide), given, place, "gaps of at most 2 rows; here are 3")
     columns["q"][160] = math.nan
-    place = {"matlab": "row 151: column q", "csv": "line 152: column q"}.get(form, "line 151: col")
+    place = {"matlab": "row 151: q", "csv": "line 152: q"}.get(form, "line 151: col")
     refused(write(tmp_path, form, columns), given, place, "is nan", "1 % of rows; here 3 are not")
 
 
@@ -148,19 +148,19 @@ def test_a_missing_time_is_filled_but_time_must_rise_uniformly(tmp_path):
     falling[50], late[50:] = falling[49], TIME[50:] + 2e-5
     for time in (falling, late, lost):
         path = write(tmp_path, "csv", {"t": time, "q": WAVE[: len(time)]})
-        refused(path, wave(), "line 52: column t", f"is {float(time[50])}", "0.001 s, within 1 %")
+        refused(path, wave(), "line 52: t", f"is {float(time[50])}", "0.001 s, within 1 %")
     for time in (TIME[::-1], np.zeros(300)):
-        refused(write(tmp_path, "csv", {"t": time, "q": WAVE}), wave(), "line 3: column t")
+        refused(write(tmp_path, "csv", {"t": time, "q": WAVE}), wave(), "line 3: t")
 
 
 GOOD = "t,q\n" + "".join(f"{t},{q}\n" for t, q in zip(TIME.tolist(), WAVE.tolist(), strict=True))
 FAULTS = [
-    ("t,q", "t,r", "column is 'q', allowed: one of ['t', 'r']"),
-    ("t,q", "t,q,q", "column is 'q', allowed: one of ['t', 'q', 'q'], there once"),
+    ("t,q", "t,r", "line 1: columns is ['t', 'r'], allowed: t, q, each once"),
+    ("t,q", "t,q,q", "line 1: columns is ['t', 'q', 'q'], allowed: t, q, each once"),
     ("\n0.001,", "\n0.001,7,", "line 3: number of cells is 3, allowed: 2"),
-    ("\n0.001,", "\n0.001,x", "line 3: column q is 'x0.0009"),
-    ("\n0.002,", "\n0_002,", "line 4: column t is '0_002', allowed: a number"),
-    ("\n0.001,0", "\n0.001,9999999999999999", "line 3: column q is 1e+16, allowed: at most 1e+15"),
+    ("\n0.001,", "\n0.001,x", "line 3: q is 'x0.0009"),
+    ("\n0.002,", "\n0_002,", "line 4: t is '0_002', allowed: a number"),
+    ("\n0.001,0", "\n0.001,9999999999999999", "line 3: q is 1e+16, allowed: at most 1e+15"),
     ("\n0.002,", "\n0.002\0,", "line 4 is '0.002\\x00"),
     ("\n0.002,", "\n0.002\udcff,", "line 4 is '0.002\ufffd"),
 ]
@@ -183,7 +183,11 @@ def test_odd_but_good_texts_are_read(tmp_path):
     plain = GOOD.replace(",", " ").replace("t q\n", "# remark, with commas\n")
     path.write_text(plain)
     assert len(tables.read_table(path, wave("plain", skip=1)).time) == 300
-    refused(path, layout("plain", skip=1, q=Channel(2, "m")), "column is 2", "[0, 1]")
+    refused(
+        path,
+        layout("plain", skip=1, q=Channel(2, "m")),
+        "line 2: columns is [0, 1], allowed: 2, each once",
+    )
     path.write_text(plain.replace(".", ","))
     refused(path, layout("plain", skip=1, q=Channel(0, "m")), "line 2: column 1 is '0 0'")
 

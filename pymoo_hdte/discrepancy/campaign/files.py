@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.columns import line_of_row, read_columns, write_columns
 from pymoo_hdte.discrepancy.campaign.format import (
     BELIEVED,
     CAMPAIGN_FILE,
@@ -27,6 +26,7 @@ from pymoo_hdte.discrepancy.campaign.format import (
 )
 from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
 from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.io.text_table import line_of_row, read_text_table, write_columns
 from pymoo_hdte.io.toml import toml_text, toml_with_lines
 
 Checked = TypeVar("Checked", Believed, Rig, RunningRecord | TorsionRecord)
@@ -170,7 +170,7 @@ def _record(entry: Fields, file: str, place: str, folder: Path) -> RunningRecord
     kind: type[RunningRecord | TorsionRecord] = RunningRecord if running else TorsionRecord
     names = RUNNING if running else TORSION
     channels = [field.name for field in fields(kind) if field.name in COLUMNS]
-    columns = read_columns(path, [COLUMNS[channel][0] for channel in channels])
+    columns = read_text_table(path).numbers([COLUMNS[channel][0] for channel in channels])
     measured = {channel: columns[COLUMNS[channel][0]] for channel in channels}
     try:
         return _build(kind, names, entry, place, name=named[1], role=role, **measured)
