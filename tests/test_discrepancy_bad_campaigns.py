@@ -141,7 +141,10 @@ FAULTS = {
     ),
     "rad/s": (toml("rpm = 2000", "rpm = 209.44"), "run_2000rpm_00Nm.*mean speed"),
     "g.cm2": (toml("input_inertia_kgm2 = 0.000197", "input_inertia_kgm2 = 1970"), "line 8: beli"),
-    "noise in mN.m": (toml("torque_noise_Nm = 0.003", "torque_noise_Nm = 3"), "line 23: rig.input"),
+    "noise in mN.m": (
+        toml("torque_noise_Nm = 0.003", "torque_noise_Nm = 3"),
+        "line 31: rig.input",
+    ),
     "sign of motor": (column(ROW, "input_torque_Nm", np.negative), f"{ROW}, .*input_torque"),
     "sign of load": (column(ROW, "output_torque_Nm", np.negative), f"{ROW}, .*output_torque"),
     "one wild sample": (

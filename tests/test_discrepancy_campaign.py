@@ -165,24 +165,25 @@ def test_no_held_out_record_is_no_error(campaign):
     assert alone.held_out == ()
 
 
-LINES_OF_ERROR = """static_error_orders = [1, 2, 2.04]
-static_error_amplitudes_arcsec = [4, 9, 5]"""
+ORDERS = "[\n    1,\n    2,\n    2.04,\n]"
+AMPLITUDES = "[\n    4,\n    9,\n    5,\n]"
+LINES_OF_ERROR = f"static_error_orders = {ORDERS}\nstatic_error_amplitudes_arcsec = {AMPLITUDES}"
 NO_LINES = "static_error_orders = []\nstatic_error_amplitudes_arcsec = []"
 BAD_FIELDS = {
     "unknown key": ("ratio = 50", "ratio = 50\nrattle = 1", "line 6: believed.rattle"),
-    "missing key": ("angle_noise_arcsec = 0.7\n", "", "line 18: rig.angle_noise_arcsec"),
+    "missing key": ("angle_noise_arcsec = 0.7\n", "", "line 26: rig.angle_noise_arcsec"),
     "text for a number": ("ratio = 50", 'ratio = "50"', "line 5: believed.ratio"),
-    "negative": ("_arcsec = [4, 9", "_arcsec = [4, -9", "line 14: believed.static_error_ampl"),
-    "number for a list": ("= [1, 2, 2.04]", "= 1", "line 13: believed.static_error_orders"),
+    "negative": (AMPLITUDES, "[4, -9, 5]", "line 18: believed.static_error_ampl"),
+    "number for a list": (f"= {ORDERS}", "= 1", "line 13: believed.static_error_orders"),
     "not finite": ("stiffness_Nm_per_rad = 25830", "stiffness_Nm_per_rad = inf", "line 6"),
-    "unknown test": ('test = "running"', 'test = "walking"', r"line 34: record\[0\].test"),
-    "unknown role": ('role = "held_out"', 'role = "spare"', r"line 60: record\[2\].role"),
-    "missing file": ('"empty.csv.gz"', '"full.csv.gz"', r"line 43: record\[1\].file"),
-    "file elsewhere": ('"empty.csv.gz"', '"../empty.csv.gz"', r"line 43: record\[1\].file"),
-    "listed twice": ('"empty.csv.gz"', '"slow.csv.gz"', r"line 43: record\[1\].file"),
-    "part of a sample": ("samples_averaged = 20", "samples_averaged = 2.5", "line 38"),
-    "control": ("proportional_Nms_per_rad = 0.02", 'control = "by hand"', "line 19: rig.control"),
-    "no TOML": ("[rig]", "[rig", "at line 18"),
+    "unknown test": ('test = "running"', 'test = "walking"', r"line 42: record\[0\].test"),
+    "unknown role": ('role = "held_out"', 'role = "spare"', r"line 68: record\[2\].role"),
+    "missing file": ('"empty.csv.gz"', '"full.csv.gz"', r"line 51: record\[1\].file"),
+    "file elsewhere": ('"empty.csv.gz"', '"../empty.csv.gz"', r"line 51: record\[1\].file"),
+    "listed twice": ('"empty.csv.gz"', '"slow.csv.gz"', r"line 51: record\[1\].file"),
+    "part of a sample": ("samples_averaged = 20", "samples_averaged = 2.5", "line 46"),
+    "control": ("proportional_Nms_per_rad = 0.02", 'control = "by hand"', "line 27: rig.control"),
+    "no TOML": ("[rig]", "[rig", "at line 26"),
     "wrong speed": ("rpm = 500", "rpm = 52.36", r"slow.csv.gz, lines 2 to 302: mean speed"),
     "wrong load": ("load_torque_Nm = 20", "load_torque_Nm = 2", "slow.csv.gz.*output_torque"),
     "wrong rate": ("sample_rate_Hz = 50", "sample_rate_Hz = 20", "slow.csv.gz.*step of time"),
@@ -204,19 +205,19 @@ BAD_FIELDS = {
         "load_inertia_kgm2 = 8000",
         "line 12: .*load_in",
     ),
-    "amplitudes in rad": ("[4, 9, 5]", "[4, 9e-6, 5]", "line 14: .*arcsec is 9e-06"),
+    "amplitudes in rad": (AMPLITUDES, "[4, 9e-6, 5]", "line 18: .*arcsec is 9e-06"),
     "no line": (LINES_OF_ERROR, NO_LINES, "line 13: believed.static_error_orders"),
-    "frozen base": ("\ntolerance = 0.1", "\ntolerance = 0", "line 15: believed.tolerance"),
-    "frozen error": ("error_tolerance = 0.3", "error_tolerance = 0", "line 16: .*error_tolerance"),
+    "frozen base": ("\ntolerance = 0.1", "\ntolerance = 0", "line 23: believed.tolerance"),
+    "frozen error": ("error_tolerance = 0.3", "error_tolerance = 0", "line 24: .*error_tolerance"),
     "noise in mN.m": (
         "torque_noise_Nm = 0.003",
         "torque_noise_Nm = 3",
-        "line 23: rig.input_torque_n",
+        "line 31: rig.input_torque_n",
     ),
     "angle noise in rad": (
         "angle_noise_arcsec = 0.7",
         "angle_noise_arcsec = 1e5",
-        "line 21: .*angle_n",
+        "line 29: .*angle_n",
     ),
 }
 

@@ -24,7 +24,7 @@ from experiments.runner.report import check_page, write_report
 from experiments.runner.result import Column, Finding, Result, Table, significant
 from experiments.runner.store import load, png_bytes, save
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text
 
 
 @pytest.fixture
@@ -271,7 +271,7 @@ def test_the_versions_are_those_of_all_that_computes_a_result():
         imported |= set(re.findall(r"^ *(?:import|from) (\w+)", path.read_text(), re.MULTILINE))
     distributions = packages_distributions()
     found = {name for module in imported & distributions.keys() for name in distributions[module]}
-    bystanders = {"pymoo-hdte", "tqdm", "Jinja2", "threadpoolctl", "distributed"}
+    bystanders = {"pymoo-hdte", "tqdm", "Jinja2", "tomli_w", "threadpoolctl", "distributed"}
     named = {name.lower() for name in (*provenance.PACKAGES, *provenance.EXTRAS)}
     assert {name.lower() for name in found - bystanders} <= named
 

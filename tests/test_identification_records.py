@@ -90,7 +90,7 @@ BAD_LOOPS = {
     "short row": (replaced(loop_lines(), 6, "1,1,4,40"), "line 6: number of cells is 4", "5"),
     "time": (replaced(loop_lines(), 7, "1,1,4,30,240"), "line 7: time_s is 4.0", "above 4, rising"),
     "half a prototype": (replaced(loop_lines(), 7, "1.5,1,5,30,240"), "line 7: prototype", "whole"),
-    "no rows": (loop_lines()[:1], "line 1: number of lines is 1", "at least one row"),
+    "no rows": (loop_lines()[:1], "line 1: rows below the header is 0", "at least 1"),
     "scattered rows": (
         [
             *loop_lines(),
@@ -161,7 +161,7 @@ def test_a_bad_file_is_refused_with_its_line(tmp_path, read, lines, field, allow
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(b"", "line 1: number of lines is 0"), (b"prototype,repeat\n1,\xff\n", "UTF-8")],
+    [(b"", r"line 1: columns is \[\]"), (b"prototype,repeat\n1,\xff\n", "UTF-8")],
 )
 def test_files_that_are_no_csv_text_are_refused(tmp_path, content, message):
     path = tmp_path / "record.csv"

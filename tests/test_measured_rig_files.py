@@ -201,7 +201,11 @@ BAD = [
     ('"first.csv"', '"more"', "records[0].file is 'more'"),
     ('"SHA"', '"abc"', "records[0].sha256 is 'abc', allowed: 8 to 64 hexadecimal digits"),
     ('"SHA"', '"0123456789"', "first.csv: sha256 is"),
-    ('channels.w = { column = "q"', 'channels.w = { column = "z"', "second.csv: column is 'z'"),
+    (
+        'channels.w = { column = "q"',
+        'channels.w = { column = "z"',
+        "second.csv, line 1: columns is ['t', 'q'], allowed: t, z",
+    ),
 ]
 
 

@@ -79,11 +79,11 @@ def test_all_numbers_of_matlab_in_rows_and_columns(tmp_path):
 def test_every_unit_is_converted(tmp_path):
     path = write(tmp_path, "csv", {"a": np.arange(20.0)})
     known = {"um": 1e-6, "rev": 2 * math.pi, "arcsec": math.pi / 648000, "r/min": math.pi / 30}
-    known |= dict.fromkeys(("ms", "mm", "mm/s", "N.mm", "mA", "mV"), 1e-3)
+    known |= dict.fromkeys(("ms", "mm", "mm/s", "N.mm", "mN.m", "mA", "mV"), 1e-3)
     known |= dict.fromkeys(("deg", "deg/s"), math.pi / 180)
     si = {"s", "m", "rad", "rad/s", "m/s", "N", "N.m", "A", "V", "m/s2", "rad/s2", "1"}
-    known |= dict.fromkeys(set(tables.UNITS) & si, 1.0)
-    assert len(known) == len(tables.UNITS)
+    known |= dict.fromkeys(set(tables.CHANNEL_UNITS) & si, 1.0)
+    assert len(known) == len(tables.CHANNEL_UNITS)
     for unit, factor in known.items():
         values = tables.read_table(path, layout(x=Channel("a", unit))).channels["x"]
         np.testing.assert_allclose(values, np.arange(20.0) * factor, rtol=1e-14)
@@ -96,7 +96,9 @@ def test_an_angle_that_wraps_is_unwrapped_also_across_a_gap(unit, turn, tmp_path
     column[np.flatnonzero(np.diff(column) < 0)[0]] = math.nan
     given = layout(x=Channel("a", unit, 0.5, unwrap=True))
     table = tables.read_table(write(tmp_path, "csv", {"a": column}), given)
-    np.testing.assert_allclose(table.channels["x"], angle * tables.UNITS[unit] * 0.5, atol=1e-9)
+    np.testing.assert_allclose(
+        table.channels["x"], angle * tables.CHANNEL_UNITS[unit] * 0.5, atol=1e-9
+    )
 
 
 @FORMS
@@ -133,7 +135,7 @@ def test_rows_that_are_not_finite_are_dropped_filled_and_counted(form, tmp_path)
     place = {"matlab": "row 151: ", "csv": "line 152: "}.get(form, "line 151: ")
     refused(write(tmp_path, form, wide), given, place, "gaps of at most 2 rows; here are 3")
     columns["q"][160] = math.nan
-    place = {"matlab": "row 151: column q", "csv": "line 152: column q"}.get(form, "line 151: col")
+    place = {"matlab": "row 151: q", "csv": "line 152: q"}.get(form, "line 151: col")
     refused(write(tmp_path, form, columns), given, place, "is nan", "1 % of rows; here 3 are not")
 
 
@@ -146,19 +148,19 @@ def test_a_missing_time_is_filled_but_time_must_rise_uniformly(tmp_path):
     falling[50], late[50:] = falling[49], TIME[50:] + 2e-5
     for time in (falling, late, lost):
         path = write(tmp_path, "csv", {"t": time, "q": WAVE[: len(time)]})
-        refused(path, wave(), "line 52: column t", f"is {float(time[50])}", "0.001 s, within 1 %")
+        refused(path, wave(), "line 52: t", f"is {float(time[50])}", "0.001 s, within 1 %")
     for time in (TIME[::-1], np.zeros(300)):
-        refused(write(tmp_path, "csv", {"t": time, "q": WAVE}), wave(), "line 3: column t")
+        refused(write(tmp_path, "csv", {"t": time, "q": WAVE}), wave(), "line 3: t")
 
 
 GOOD = "t,q\n" + "".join(f"{t},{q}\n" for t, q in zip(TIME.tolist(), WAVE.tolist(), strict=True))
 FAULTS = [
-    ("t,q", "t,r", "column is 'q', allowed: one of ['t', 'r']"),
-    ("t,q", "t,q,q", "column is 'q', allowed: one of ['t', 'q', 'q'], there once"),
+    ("t,q", "t,r", "line 1: columns is ['t', 'r'], allowed: t, q, each once"),
+    ("t,q", "t,q,q", "line 1: columns is ['t', 'q', 'q'], allowed: t, q, each once"),
     ("\n0.001,", "\n0.001,7,", "line 3: number of cells is 3, allowed: 2"),
-    ("\n0.001,", "\n0.001,x", "line 3: column q is 'x0.0009"),
-    ("\n0.002,", "\n0_002,", "line 4: column t is '0_002', allowed: a number"),
-    ("\n0.001,0", "\n0.001,9999999999999999", "line 3: column q is 1e+16, allowed: at most 1e+15"),
+    ("\n0.001,", "\n0.001,x", "line 3: q is 'x0.0009"),
+    ("\n0.002,", "\n0_002,", "line 4: t is '0_002', allowed: a number"),
+    ("\n0.001,0", "\n0.001,9999999999999999", "line 3: q is 1e+16, allowed: at most 1e+15"),
     ("\n0.002,", "\n0.002\0,", "line 4 is '0.002\\x00"),
     ("\n0.002,", "\n0.002\udcff,", "line 4 is '0.002\ufffd"),
 ]
@@ -181,7 +183,11 @@ def test_odd_but_good_texts_are_read(tmp_path):
     plain = GOOD.replace(",", " ").replace("t q\n", "# remark, with commas\n")
     path.write_text(plain)
     assert len(tables.read_table(path, wave("plain", skip=1)).time) == 300
-    refused(path, layout("plain", skip=1, q=Channel(2, "m")), "column is 2", "[0, 1]")
+    refused(
+        path,
+        layout("plain", skip=1, q=Channel(2, "m")),
+        "line 2: columns is [0, 1], allowed: 2, each once",
+    )
     path.write_text(plain.replace(".", ","))
     refused(path, layout("plain", skip=1, q=Channel(0, "m")), "line 2: column 1 is '0 0'")
 

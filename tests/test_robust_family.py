@@ -247,7 +247,7 @@ def test_conditions_are_read_in_any_order_of_columns(tmp_path):
         ("speed_rpm,load_Nm,weight\n1,2,3\n1,2\n", "line 3: number of cells is 2, allowed: 3"),
         ("speed_rpm,load_Nm,weight\n1,2,3\n\n1,two,3\n", "line 4: load_Nm is 'two'"),
         ("speed_rpm,load_Nm,weight\n0,2,3\n", "line 2: speed_rpm is 0.0, allowed: a finite"),
-        ("speed_rpm,load_Nm,weight\n1,2,nan\n", "line 2: weight is nan"),
+        ("speed_rpm,load_Nm,weight\n1,2,nan\n", "line 2: weight is 'nan'"),
         ("speed_rpm,load_Nm,weight\n1,-2,1\n", "line 2: load_Nm is -2.0"),
     ],
 )

@@ -17,7 +17,7 @@ from experiments.runner.campaign import Run
 from experiments.runner.committed import read_origin, read_rows, table_with_origin
 from pymoo_hdte.discrepancy.drive.proof import Gap
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text
 
 CONFIDENT = ("named", "parameter")
 """Statuses that leave no choice."""

@@ -26,7 +26,7 @@ from experiments.runner.registry import Context
 from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text
 
 _KEY = ("problem", "algorithm", "evaluations", "seed")
 

@@ -15,7 +15,7 @@ from experiments.reliability.fuzz import ACCEPTED, REFUSED
 from experiments.reliability.limits import LimitJob, MemoryJob
 from experiments.runner.campaign import Run
 from experiments.runner.committed import read_rows, table_with_origin
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text
 
 FUZZ, KILL, LIMIT = "fuzz", "kill", "limit"
 LEVEL = 0.95

@@ -7,7 +7,6 @@ Only the process that asks writes files, and a worker that would give other byte
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import inspect
 import json
@@ -30,7 +29,7 @@ from tqdm import tqdm
 from experiments.runner.provenance import environment, fingerprint
 from experiments.runner.store import TIMES, write_atomically
 from experiments.runner.workers import WorkerLost, WrongWorker, arithmetic, interrupts_held_off
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text, read_text_table
 
 SOURCE = "source or versions"
 ONE_JOB = Lock()
@@ -147,11 +146,10 @@ class Campaign:
         write_atomically(self._path(job), table.encode())
 
     def _read(self, job: Job) -> Run:
-        with self._path(job).open(newline="") as file:
-            heading, *rows = csv.reader(file)
-        values = np.array(rows, dtype=float).reshape(len(rows), len(heading))
+        table = read_text_table(self._path(job))
+        values = np.column_stack([*table.numbers(table.titles, gaps=True).values()])
         seconds, *parts = map(float, self._time_path(job).read_text().split())
-        return Run(tuple(heading), values, seconds, tuple(parts))
+        return Run(tuple(table.titles), values, seconds, tuple(parts))
 
 
 def _run_in_executor(executor: Executor, jobs: Sequence[Job], keep: Keep) -> None:

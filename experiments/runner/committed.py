@@ -5,7 +5,6 @@ A first comment line holds, as JSON, the date and the versions that made the tab
 
 from __future__ import annotations
 
-import csv
 import datetime
 import json
 from collections.abc import Iterable, Sequence
@@ -14,7 +13,7 @@ from typing import Any
 
 from experiments.runner.provenance import environment
 from experiments.runner.registry import Context
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text, read_text_table
 
 DATA = Path(__file__).parents[1] / "data"
 _ORIGIN = "# {"
@@ -68,7 +67,4 @@ def stored_outcome(context: Context, experiment: str) -> tuple[str, ...]:
 
 def read_rows(path: Path) -> list[dict[str, str]]:
     """Return the rows of a table, with an origin or without, by column."""
-    with path.open(newline="", encoding="utf-8") as file:
-        if not file.readline().startswith(_ORIGIN):
-            file.seek(0)
-        return list(csv.DictReader(file))
+    return read_text_table(path, origin=_ORIGIN).texts()

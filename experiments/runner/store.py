@@ -12,7 +12,7 @@ from typing import Any
 
 from experiments.runner.provenance import report_fingerprint
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text
 
 RESULT = "result.json"
 TIMES = "times"

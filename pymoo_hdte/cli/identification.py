@@ -34,12 +34,6 @@ LOOPS, BEARING, COMPLETE, OUTPUT, ERRORS = FILES = (
     "no_load_output.csv",
     "errors.csv",
 )
-UNITS = {
-    "K": "N.m/rad",
-    "B_in": "N.m.s/rad",
-    "B_fc": "N.m.s/rad",
-    "B_out": "N.m.s/rad",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +43,7 @@ class Parameter:
     Attributes
     ----------
     name : str
-        A key of `UNITS`, which gives the unit of all values.
+        Of `NOMINAL_FIELDS`, whose `unit_of` all values are in.
     fits : mapping of (prototype, repeat) to LinearFit
     """
 

@@ -11,26 +11,19 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from pymoo_hdte.cli.command import heading
-from pymoo_hdte.cli.identification import UNITS, Identification, Parameter
+from pymoo_hdte.cli.identification import Identification, Parameter
 from pymoo_hdte.drive import DataSheet
+from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, unit_of
 from pymoo_hdte.drive.toml_text import sheet_toml
 from pymoo_hdte.identification import ErrorStatistics, hysteresis_width, lost_energy
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
 from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.html import number, page
-from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.units import ARCSEC, UNITS
 
 SHEET_FILE = "identified_sheet.toml"
 FOLDER = ReportFolder("parameters.json", optional=(SHEET_FILE,))
 
-_NOMINAL = {
-    "K": "stiffness",
-    "B_in": "input_damping",
-    "B_fc": "mesh_damping",
-    "B_out": "output_damping",
-}
-"""Where a data sheet holds each parameter."""
-_MICROMETRE = 1e-6
 _TOO_EQUAL = 1e-3
 """Scatter over prototypes, as a share of one record's error, that no separate drives show."""
 
@@ -62,15 +55,15 @@ def write_identification_report(
 
 def identified_sheet(found: Identification, sheet: DataSheet) -> DataSheet:
     """Return a data sheet with the identified values; what was not identified stays."""
-    values = {_NOMINAL[one.name]: one.value for one in found.parameters if one.value > 0.0}
+    values = {NOMINAL_FIELDS[one.name]: one.value for one in found.parameters if one.value > 0.0}
     sources = sheet.error_sources
     if found.errors is not None:
         samples = dict(zip(found.errors.symbols, found.errors.samples, strict=True))
         sources = tuple(
             replace(
                 source,
-                mean=samples[source.symbol].mean * _MICROMETRE,
-                std=samples[source.symbol].std * _MICROMETRE,
+                mean=samples[source.symbol].mean * UNITS["length"]["um"],
+                std=samples[source.symbol].std * UNITS["length"]["um"],
             )
             if source.symbol in samples and samples[source.symbol].mean >= 0.0
             else source
@@ -106,7 +99,7 @@ def _parameter(one: Parameter) -> dict[str, Any]:
     over = one.series
     return {
         "value": one.value,
-        "unit": UNITS[one.name],
+        "unit": unit_of(one.name),
         "interval95": list(one.interval),
         "prototypes": len({prototype for prototype, _ in one.fits}),
         "runs": len(one.fits),
@@ -146,7 +139,7 @@ def sentences(found: Identification) -> list[str]:
         over = one.series
         scatter = f", {over.between.cv_percent:.1f} % over prototypes" if over else ""
         said.append(
-            f"{one.name} {number(one.value, 4)} {UNITS[one.name]} "
+            f"{one.name} {number(one.value, 4)} {unit_of(one.name)} "
             f"(95 %: {number(low, 4)} to {number(high, 4)}{scatter})."
         )
     if found.errors is not None:
@@ -230,7 +223,7 @@ def _strips(found: Identification) -> dict[str, str]:
         axis.errorbar(numbers, slopes, errors, fmt="o", color=AFTER, markersize=4, elinewidth=0.8)
         axis.axhspan(*one.interval, color=BEFORE, alpha=0.2)
         axis.set_xlabel("prototype")
-        axis.set_ylabel(f"{one.name} [{UNITS[one.name]}]")
+        axis.set_ylabel(f"{one.name} [{unit_of(one.name)}]")
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
         pictures[one.name] = data_uri(figure)
     return pictures

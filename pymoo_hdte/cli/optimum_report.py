@@ -14,7 +14,7 @@ from pymoo_hdte.cli.design_study import CHECKED_DRIVES, LITTLE, POPULATION, Chec
 from pymoo_hdte.decision import tolerance_band
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text
 from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.front import Front, design_rows, front_svg
 from pymoo_hdte.reports.html import number, page

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.simulation import FASTEST, Simulation
 from pymoo_hdte.drive.dte_map import neighbouring_resonances
-from pymoo_hdte.reports.csv_table import csv_text
+from pymoo_hdte.io.text_table import csv_text
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
 from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.html import number, page

@@ -9,7 +9,9 @@ from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
 from pymoo_hdte.drive.port_effects import with_unit
-from pymoo_hdte.io.fields import Fields, read_toml
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.io.toml import read_toml
+from pymoo_hdte.units import si_unit
 
 ERROR_CLASSES = ("e_m", "e_g", "e_w", "e_p", "e_h")
 """Classes of Eq. (1): stationary, with the flexspline, with the wave generator, pitch, tooth."""
@@ -125,7 +127,23 @@ NOMINAL_QUANTITIES = {
     "output_inertia": "inertia",
     "output_damping": "damping",
 }
-"""The quantity, among `fields.UNITS`, of every field of `Nominal`."""
+"""The quantity, among `units.UNITS`, of every field of `Nominal`."""
+
+NOMINAL_FIELDS = {
+    "theta_s": "static_error",
+    "K": "stiffness",
+    "J_in": "input_inertia",
+    "B_in": "input_damping",
+    "B_fc": "mesh_damping",
+    "J_out": "output_inertia",
+    "B_out": "output_damping",
+}
+"""The field of `Nominal` for every symbol of Table 4."""
+
+
+def unit_of(symbol: str) -> str:
+    """Return the SI unit of a parameter, by its symbol in `NOMINAL_FIELDS`."""
+    return si_unit(NOMINAL_QUANTITIES[NOMINAL_FIELDS[symbol]])
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of
-from pymoo_hdte.drive.datasheet import DataSheet, datasheet_from_fields, hs_20_100, sheet_table
+from pymoo_hdte.drive.datasheet import (
+    NOMINAL_FIELDS,
+    DataSheet,
+    datasheet_from_fields,
+    hs_20_100,
+    sheet_table,
+    unit_of,
+)
 from pymoo_hdte.drive.effects import Effect, effect_from_fields, place_of
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.port_effects import with_unit
@@ -21,13 +28,14 @@ from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.hill import hill_steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.io.archive import FileFormat
-from pymoo_hdte.io.fields import Fields, read_toml
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.io.toml import read_toml
 from pymoo_hdte.units import ARCSEC
 
 PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")
 """The uncertain parameters xi of Section 2.3, in this order."""
 
-PARAMETER_UNITS = ("rad", "N.m/rad", "kg.m2", "N.m.s/rad", "N.m.s/rad")
+PARAMETER_UNITS = tuple(unit_of(name) for name in PARAMETERS)
 """Units of `PARAMETERS`, one for each."""
 
 FORMAT = FileFormat("pymoo_hdte drive model", version=1, fields=("data_sheet", "model"))
@@ -78,15 +86,7 @@ class DriveModel:
     def nominal(self) -> NDArray[np.float64]:
         """Nominal values of `PARAMETERS`, shape (5,), SI units."""
         values = self.sheet.nominal
-        return np.array(
-            [
-                values.static_error,
-                values.stiffness,
-                values.input_inertia,
-                values.input_damping,
-                values.mesh_damping,
-            ]
-        )
+        return np.array([getattr(values, NOMINAL_FIELDS[name]) for name in PARAMETERS])
 
     @cached_property
     def _unit_phasors(self) -> NDArray[np.complex128]:
@@ -319,7 +319,7 @@ def preset(name: str) -> DriveModel:
 def model_tables(model: DriveModel) -> dict[str, Any]:
     """Return the header's tables: ``data_sheet`` and ``model``, as in the files of ``drive/data``.
 
-    Quantities are in the SI unit of `fields.UNITS` whose factor is 1, so no bit is lost.
+    Quantities are in the SI unit of `units.UNITS` whose factor is 1, so no bit is lost.
     """
     error = model.kinematic_error
     table = {

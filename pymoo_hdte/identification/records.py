@@ -16,8 +16,7 @@ the header.
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -26,19 +25,17 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.identification.damping import NoLoadRun
 from pymoo_hdte.identification.prototypes import RunKey
 from pymoo_hdte.identification.torsion import TorsionLoop
+from pymoo_hdte.io.text_table import LARGEST, TextTable, read_text_table
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 MICROMETRES = "_um"
 """Ending of the columns of an error measurement."""
 
 KEY = ("prototype", "repeat")
-
-LARGEST = 1e15
-"""In any unit of the columns; beyond it nobody measures, and the squares of a fit overflow."""
 
 Record = TypeVar("Record")
 
@@ -127,52 +124,45 @@ def read_error_measurements(path: str | Path) -> tuple[NDArray[np.float64], tupl
     OSError
         If the file cannot be read.
     """
-    path = Path(path)
-    lines = _lines(path)
-    header = lines[0][1]
-    errors = [name for name in header if name.endswith(MICROMETRES)]
+    table = read_text_table(Path(path), by_hand=True)
+    errors = [name for name in table.titles if name.endswith(MICROMETRES)]
     if not errors:
         allowed = f"at least one column that ends in {MICROMETRES}"
-        raise InvalidInput(f"{path.name}, line 1: columns", header, allowed)
-    prototypes: dict[int, list[list[float]]] = {}
+        raise InvalidInput(f"{table.file}, line {table.title_line}: columns", table.titles, allowed)
+    rows = _rows(table, errors)
+    values = np.column_stack([rows.columns[name] for name in errors])
+    prototypes: dict[int, dict[int, NDArray[np.float64]]] = {}
     first_lines: dict[int, int] = {}
-    seen: set[RunKey] = set()
-    for row in _rows(path, lines, tuple(errors), ()):
-        if row.key in seen:
-            raise InvalidInput(f"{row.place}: repeat", row.key[1], "each repeat once")
-        seen.add(row.key)
-        first_lines.setdefault(row.key[0], row.line)
-        prototypes.setdefault(row.key[0], []).append([row.values[name] for name in errors])
-    counts = {number: len(repeats) for number, repeats in prototypes.items()}
-    usual = max(counts.values())
-    for number, count in counts.items():
-        if count != usual:
-            place = f"{path.name}, line {first_lines[number]}"
+    for (prototype, repeat), line, readings in zip(rows.keys, rows.lines, values, strict=True):
+        repeats = prototypes.setdefault(prototype, {})
+        if repeat in repeats:
+            raise InvalidInput(f"{table.file}, line {line}: repeat", repeat, "each repeat once")
+        repeats[repeat] = readings
+        first_lines.setdefault(prototype, line)
+    usual = max(map(len, prototypes.values()))
+    for number, repeats in prototypes.items():
+        if len(repeats) != usual:
+            place = f"{table.file}, line {first_lines[number]}"
             field = f"{place}: repeats of prototype {number}"
-            raise InvalidInput(field, count, f"{usual}, as for the others")
-    readings = np.array(list(prototypes.values())).transpose(0, 2, 1)
-    return readings, tuple(name.removesuffix(MICROMETRES) for name in errors)
-
-
-@dataclass(frozen=True)
-class _Row:
-    path: Path
-    line: int
-    key: RunKey
-    values: dict[str, float]
-
-    @property
-    def place(self) -> str:
-        return f"{self.path.name}, line {self.line}"
+            raise InvalidInput(field, len(repeats), f"{usual}, as for the others")
+    readings = np.array([list(repeats.values()) for repeats in prototypes.values()])
+    return readings.transpose(0, 2, 1), tuple(name.removesuffix(MICROMETRES) for name in errors)
 
 
 @dataclass(frozen=True)
 class _Run:
-    """All rows of one prototype and repeat, by column, with the lines they stand on."""
+    """Rows by column, with the lines they stand on and the prototype and repeat of each."""
 
-    path: Path
-    lines: list[int]
+    file: str
+    keys: list[RunKey]
+    lines: Sequence[int]
     columns: dict[str, NDArray[np.float64]]
+
+    def part(self, start: int, stop: int) -> _Run:
+        """Return some of the rows, which follow each other."""
+        rows = slice(start, stop)
+        columns = {name: column[rows].copy() for name, column in self.columns.items()}
+        return _Run(self.file, self.keys[rows], self.lines[rows], columns)
 
 
 def _read_runs(
@@ -181,18 +171,38 @@ def _read_runs(
     optional: tuple[str, ...],
     build: Callable[[_Run], Record],
 ) -> dict[RunKey, Record]:
+    table = read_text_table(path, by_hand=True)
+    rows = _rows(table, [*required, *(name for name in optional if name in table.titles)])
     records: dict[RunKey, Record] = {}
-    rows = _rows(path, _lines(path), required, optional)
-    for key, group in groupby(rows, key=lambda row: row.key):
-        members = list(group)
+    start = 0
+    for key, group in groupby(rows.keys):
+        run = rows.part(start, start := start + len(list(group)))
         if key in records:
             allowed = "rows of one prototype and repeat next to each other"
-            raise InvalidInput(f"{members[0].place}: (prototype, repeat)", key, allowed)
-        names = members[0].values
-        columns = {name: np.array([row.values[name] for row in members]) for name in names}
-        run = _Run(path, [row.line for row in members], columns)
+            place = f"{run.file}, line {run.lines[0]}"
+            raise InvalidInput(f"{place}: (prototype, repeat)", key, allowed)
         records[key] = _located(run, build)
     return records
+
+
+def _rows(table: TextTable, names: Sequence[str]) -> _Run:
+    """Return all rows of a table with these columns, which may hold any finite values."""
+    columns = table.numbers([*KEY, *names])
+    for name, values in columns.items():
+        allowed, good = _allowed(name, values)
+        for row in np.flatnonzero(~good)[:1]:
+            place = f"{table.file}, line {table.lines[row]}: {name}"
+            raise InvalidInput(place, float(values[row]), allowed)
+    prototypes, repeats = (columns.pop(name).astype(int).tolist() for name in KEY)
+    keys = list(zip(prototypes, repeats, strict=True))
+    return _Run(table.file, keys, table.lines, columns)
+
+
+def _allowed(name: str, values: NDArray[np.float64]) -> tuple[str, NDArray[np.bool_]]:
+    """Return what the values of a column may be, and which of them are that."""
+    if name in KEY:
+        return "a whole number of at least 1", (values >= 1.0) & (values == np.floor(values))
+    return f"at most {LARGEST:g} in size", np.abs(values) <= LARGEST
 
 
 def _located(run: _Run, build: Callable[[_Run], Record]) -> Record:
@@ -200,70 +210,14 @@ def _located(run: _Run, build: Callable[[_Run], Record]) -> Record:
     try:
         return build(run)
     except InvalidInput as error:
-        if error.field.startswith(run.path.name):
+        if error.field.startswith(run.file):
             raise
-        place = f"{run.path.name}, lines {run.lines[0]} to {run.lines[-1]}"
+        place = f"{run.file}, lines {run.lines[0]} to {run.lines[-1]}"
         raise InvalidInput(f"{place}: {error.field}", error.value, error.allowed) from None
 
 
 def _check_rising(run: _Run, name: str) -> None:
     values = run.columns[name]
-    falls = np.flatnonzero(np.diff(values) <= 0.0)
-    if falls.size:
-        where = int(falls[0]) + 1
-        place = f"{run.path.name}, line {run.lines[where]}: {name}"
-        raise InvalidInput(place, float(values[where]), f"above {values[where - 1]:g}, rising")
-
-
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Return line number and cells of the header and of every line that is not blank."""
-    lines = []
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        reader = csv.reader(file)
-        try:
-            for cells in reader:
-                if any(cell.strip() for cell in cells):
-                    lines.append((reader.line_num, [cell.strip() for cell in cells]))
-        except (UnicodeDecodeError, csv.Error) as error:
-            place = f"{path.name}, line {reader.line_num + 1}"
-            raise InvalidInput(place, str(error), "CSV text in UTF-8") from None
-    if len(lines) < 2:
-        field = f"{path.name}, line 1: number of lines"
-        raise InvalidInput(field, len(lines), "a header line and at least one row of numbers")
-    return lines
-
-
-def _rows(
-    path: Path,
-    lines: Sequence[tuple[int, list[str]]],
-    required: tuple[str, ...],
-    optional: tuple[str, ...],
-) -> Iterator[_Row]:
-    (header_line, header), *body = lines
-    required = (*KEY, *required)
-    if any(header.count(name) != 1 for name in required):
-        allowed = f"the columns {', '.join(required)}, each once"
-        raise InvalidInput(f"{path.name}, line {header_line}: columns", header, allowed)
-    wanted = {name: header.index(name) for name in (*required, *optional) if name in header}
-    for line, cells in body:
-        place = f"{path.name}, line {line}"
-        if len(cells) != len(header):
-            allowed = f"{len(header)}, as in the header"
-            raise InvalidInput(f"{place}: number of cells", len(cells), allowed)
-        values = {name: _number(f"{place}: {name}", cells[at]) for name, at in wanted.items()}
-        prototype, repeat = (_counted(f"{place}: {name}", values.pop(name)) for name in KEY)
-        yield _Row(path, line, (prototype, repeat), values)
-
-
-def _number(field: str, cell: str) -> float:
-    try:
-        number = real_number(field, float(cell))
-    except ValueError:
-        raise InvalidInput(field, cell, "a finite number") from None
-    return real_number(field, number, at_least=-LARGEST, at_most=LARGEST)
-
-
-def _counted(field: str, value: float) -> int:
-    if value < 1.0 or value != int(value):
-        raise InvalidInput(field, value, "a whole number of at least 1")
-    return int(value)
+    for row in 1 + np.flatnonzero(np.diff(values) <= 0.0)[:1]:
+        place = f"{run.file}, line {run.lines[row]}: {name}"
+        raise InvalidInput(place, float(values[row]), f"above {values[row - 1]:g}, rising")

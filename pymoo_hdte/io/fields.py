@@ -1,33 +1,13 @@
-"""Checked fields with units, read from TOML tables: for data sheets and model files."""
+"""Checked fields with units of a parsed TOML table: for data sheets, model files and rigs."""
 
 from __future__ import annotations
 
-import math
-import re
-import tomllib
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Collection, Mapping
 from difflib import get_close_matches
-from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
-from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
-
-UNITS: dict[str, dict[str, float]] = {
-    "angle": {"rad": 1.0, "deg": math.pi / 180.0, "arcsec": ARCSEC},
-    "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
-    "angle rate": {"rad/s": 1.0},
-    "time": {"s": 1.0},
-    "speed": {"rad/s": 1.0, "r/min": REVOLUTION_PER_MINUTE},
-    "torque": {"N.m": 1.0},
-    "stiffness": {"N.m/rad": 1.0},
-    "inertia": {"kg.m2": 1.0},
-    "damping": {"N.m.s/rad": 1.0},
-    "cubic stiffness": {"N.m/rad3": 1.0},
-    "quadratic drag": {"N.m.s2/rad2": 1.0},
-}
-"""For each quantity the units it may be given in, with the factor to SI."""
+from pymoo_hdte.units import UNITS
 
 
 class Fields:
@@ -129,73 +109,3 @@ class Fields:
         if self._left:
             field = next(iter(self._left))
             raise InvalidInput(self._name(field), self._left[field], "no such field here")
-
-
-def read_toml(path: Path) -> Fields:
-    """Return the top table of a TOML file.
-
-    Raises
-    ------
-    InvalidInput
-        If the file is not valid TOML.
-    OSError
-        If it cannot be read.
-    """
-    try:
-        with path.open("rb") as file:
-            return Fields(tomllib.load(file), path.name)
-    except (ValueError, RecursionError) as error:
-        # Beside what is no TOML: too many digits for Python, and brackets nested too deeply.
-        raise InvalidInput(str(path), str(error), "valid TOML") from None
-
-
-@contextmanager
-def toml_with_lines(path: Path) -> Iterator[Fields]:
-    """Give the top table of a file; errors about its fields leave the block with their line.
-
-    Raises
-    ------
-    InvalidInput
-        If the file is not valid TOML, or whatever is raised inside the block.
-    OSError
-        If it cannot be read.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-        table = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput(path.name, str(error), "valid TOML in UTF-8") from None
-    try:
-        yield Fields(table, path.name)
-    except InvalidInput as error:
-        if not error.field.startswith(f"{path.name}."):
-            raise
-        key = error.field.removeprefix(f"{path.name}.")
-        field = f"{path.name}, line {_line_of(text, key)}: {key}"
-        raise InvalidInput(field, error.value, error.allowed) from None
-
-
-def _line_of(text: str, key: str) -> int:
-    """Return the line of ``table[index].field``, or of its table if the field is absent."""
-    lines = _lines_of_keys(text)
-    while key not in lines and key:
-        key = re.sub(r"(^|[.\[: ])[^.\[: ]*$", "", key)
-    return lines.get(key, 1)
-
-
-def _lines_of_keys(text: str) -> dict[str, int]:
-    lines: dict[str, int] = {}
-    counts: dict[str, int] = {}
-    table = ""
-    for number, line in enumerate(text.splitlines(), start=1):
-        if header := re.match(r"\s*\[\[([^]]+)]]", line):
-            name = header[1].strip()
-            table = f"{name}[{counts.get(name, 0)}]"
-            counts[name] = counts.get(name, 0) + 1
-            lines[table] = number
-        elif header := re.match(r"\s*\[([^]]+)]", line):
-            table = header[1].strip()
-            lines[table] = number
-        elif field := re.match(r"\s*([\w-]+)\s*=", line):
-            lines.setdefault(f"{table}.{field[1]}".lstrip("."), number)
-    return lines

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import re
-import struct
-import zlib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,33 +14,31 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+from pymoo_hdte.io.matlab import read_vectors
+from pymoo_hdte.io.text_table import LARGEST, column_label, line_of_row, read_text_table
+from pymoo_hdte.units import UNITS
 
-TIME_UNITS = {"s": 1.0, "ms": 1e-3}
-ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180.0, "arcsec": ARCSEC, "rev": 2.0 * math.pi}
-UNITS: dict[str, float] = {
-    **(TIME_UNITS | ANGLE_UNITS),
-    **{"m": 1.0, "mm": 1e-3, "um": 1e-6, "m/s": 1.0, "mm/s": 1e-3, "m/s2": 1.0},
-    **{"rad/s": 1.0, "deg/s": math.pi / 180.0, "r/min": REVOLUTION_PER_MINUTE, "rad/s2": 1.0},
-    **{"N": 1.0, "N.m": 1.0, "N.mm": 1e-3, "A": 1.0, "mA": 1e-3, "V": 1.0, "mV": 1e-3, "1": 1.0},
-}
-"""Every unit a channel may have, with its factor to SI; ``"1"`` is dimensionless."""
+MEASURED = (
+    *("time", "angle", "length", "speed", "linear speed", "acceleration", "linear acceleration"),
+    *("force", "torque", "current", "voltage", "ratio"),
+)
+"""Quantities, among those of `pymoo_hdte.units`, that a channel may hold."""
+CHANNEL_UNITS = {unit: size for one in MEASURED for unit, size in UNITS[one].items()}
+"""Every unit a channel may have, with its factor to SI."""
 
 FEWEST_ROWS = 16
 STEP_SPREAD = 0.01  # Relative, of a time step from the median step.
 ROWS_PER_FILLED = 100  # Interpolated values may stand in fewer than one row in this many.
 LONGEST_GAP = 2  # Rows: across more of them a straight line is no motion.
-LARGEST = 1e15  # A double beyond it no longer holds tenths: it marks a fault, nobody measured it.
-COMPRESSED, COMPLEX, NUMERIC = 15, 0x800, range(6, 16)  # Codes of MATLAB v5, as are these:
-NUMBERS = dict(zip((1, 2, 3, 4, 5, 6, 7, 9, 12, 13), "bBhHiIfdqQ", strict=True))
-RawColumns = dict[str | int, NDArray[np.float64]]
+RawColumns = dict[Any, NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A column (in a plain table its number from 0) with a unit of `UNITS`, or `InvalidInput`.
+    """A column (in a plain table its number from 0) and its unit, one of `CHANNEL_UNITS`.
 
-    ``scale`` is a factor after the unit; ``unwrap`` is for angles that jump by a turn.
+    Another unit raises `InvalidInput`. ``scale`` is a factor after the unit; ``unwrap`` is for
+    angles that jump by a turn.
     """
 
     column: str | int
@@ -52,7 +47,7 @@ class Channel:
     unwrap: bool = False
 
     def __post_init__(self) -> None:
-        one_of("unit", self.unit, ANGLE_UNITS if self.unwrap else UNITS)
+        one_of("unit", self.unit, UNITS["angle"] if self.unwrap else CHANNEL_UNITS)
 
 
 @dataclass(frozen=True)
@@ -90,8 +85,8 @@ def layout_from_fields(table: Fields) -> TableLayout:
     names = list(channels.names())
     if not names:
         raise InvalidInput(table._name("channels"), {}, "at least one channel")
-    mapped = {name: _channel(channels.table(name), form, UNITS) for name in names}
-    time = _channel(table.table("time"), form, TIME_UNITS) if table.has("time") else None
+    mapped = {name: _channel(channels.table(name), form, CHANNEL_UNITS) for name in names}
+    time = _channel(table.table("time"), form, UNITS["time"]) if table.has("time") else None
     if time and table.has("sample_rate"):
         raise InvalidInput(table._name("time"), time.column, "absent if sample_rate is given")
     rate = None if time else table.number("sample_rate", at_least=1e-3, at_most=1e9)
@@ -105,7 +100,7 @@ def _channel(table: Fields, form: str, units: Collection[str]) -> Channel:
     unwrap = table.take("unwrap", "") if table.has("unwrap") else False
     if not isinstance(unwrap, bool):
         raise InvalidInput(table._name("unwrap"), unwrap, "true or false")
-    unit = table.choice("unit", ANGLE_UNITS if unwrap else units)
+    unit = table.choice("unit", UNITS["angle"] if unwrap else units)
     has_scale = table.has("scale")
     scale = table.number("scale", at_least=-LARGEST, at_most=LARGEST) if has_scale else 1.0
     table.finish()
@@ -121,10 +116,10 @@ def read_table(path: Path, layout: TableLayout) -> Table:
     """
     mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
     names = list(dict.fromkeys(channel.column for channel in mapped))
-    columns = (_read_matlab if layout.format == "matlab" else _read_text)(path, layout, names)
+    columns = _columns(path, layout, names)
 
     def refuse(row: int, column: str | int, allowed: str) -> InvalidInput:
-        field = _place(path, layout, row, f"column {column}")
+        field = _place(path, layout, row, column_label(column))
         return InvalidInput(field, float(columns[column][row]), allowed)
 
     for column, raw in columns.items():
@@ -172,86 +167,26 @@ def check_sha256(path: Path, expected: str) -> None:
         raise InvalidInput(f"{path.name}: sha256", actual, f"one that begins with {expected}")
 
 
+def _columns(path: Path, layout: TableLayout, names: list[Any]) -> RawColumns:
+    """Return columns as they stand in the file, without the rows to be skipped."""
+    if layout.format == "matlab":
+        found = read_vectors(path, names)
+        return {name: found[name][layout.skip_rows :] for name in names}
+    csv = layout.format == "csv"
+    table = read_text_table(path, titled=csv, skip_rows=layout.skip_rows)
+    return table.numbers(names, gaps=True)
+
+
 def _si(channel: Channel, kept: Mapping[str | int, NDArray[np.float64]]) -> NDArray[np.float64]:
     raw = kept[channel.column]
     at = np.flatnonzero(np.isfinite(raw))
-    values = raw[at] * UNITS[channel.unit]
+    values = raw[at] * CHANNEL_UNITS[channel.unit]
     # Unwrapped before anything is interpolated: halfway across a jump there is no angle.
     values = (np.unwrap(values) if channel.unwrap else values) * channel.scale
     return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
 
 
 def _place(path: Path, layout: TableLayout, row: int, what: str) -> str:
-    number = row + layout.skip_rows + (2 if layout.format == "csv" else 1)
+    row += layout.skip_rows
+    number = line_of_row(row) if layout.format == "csv" else row + 1
     return f"{path.name}, {'row' if layout.format == 'matlab' else 'line'} {number}: {what}"
-
-
-def _element(data: bytes, at: int, order: str) -> tuple[int, bytes, int]:
-    kind, size = struct.unpack_from(f"{order}II", data, at)
-    # Up to four bytes stand in the tag itself, their number in its upper half.
-    if kind >> 16:
-        return kind & 0xFFFF, data[at + 4 : at + 4 + (kind >> 16)], at + 8
-    after = at + 8 + size
-    return kind, data[at + 8 : after], after if kind == COMPRESSED else after + -size % 8
-
-
-@np.errstate(invalid="ignore")  # Damaged bytes may be signalling NaNs of single precision.
-def _read_matlab(path: Path, layout: TableLayout, names: list[Any]) -> RawColumns:
-    # Not scipy.io.loadmat: in 1.17 a damaged type of number still crashes the interpreter.
-    data, at = path.read_bytes(), 128
-    found, columns = dict[str, str](), RawColumns()
-    try:
-        order = {b"\0\1IM": "<", b"\1\0MI": ">"}[data[124:128]]
-        while at < len(data):
-            kind, matrix, at = _element(data, at, order)
-            matrix = zlib.decompress(matrix)[8:] if kind == COMPRESSED else matrix
-            flags = struct.unpack_from(f"{order}8xI", matrix)[0]
-            _, shape, start = _element(matrix, 16, order)
-            _, title, start = _element(matrix, start, order)
-            name, lengths = title.decode("latin-1"), np.frombuffer(shape, f"{order}i4")
-            found[name] = f"MATLAB class {flags & 0xFFF:#x} of shape {lengths.tolist()}"
-            if name in names and flags & 0xFF in NUMERIC and not flags & COMPLEX:
-                kind, numbers, _ = _element(matrix, start, order)
-                values = np.frombuffer(numbers, order + NUMBERS[kind]).reshape(lengths)
-                if values.size == max(lengths):
-                    columns[name] = values.ravel().astype(float)[layout.skip_rows :]
-    except (KeyError, ValueError, struct.error, zlib.error) as error:
-        allowed = "an intact MATLAB file (save v4 or v7.3, HDF5, as v5 or v7)"
-        raise InvalidInput(path.name, repr(error)[:200], allowed) from None
-    for name in names:
-        if name not in columns or columns[name].size != columns[names[0]].size:
-            allowed = f"a vector of real numbers, all of one length; there are {found}"
-            raise InvalidInput(f"{path.name}: {name}", found.get(name), allowed[:500])
-    return columns
-
-
-def _read_text(path: Path, layout: TableLayout, names: list[Any]) -> RawColumns:
-    text = re.sub("\r\n?", "\n", path.read_bytes().decode("utf-8-sig", "replace")).rstrip()
-    lines, headed = text.split("\n"), layout.format == "csv"
-    for number, line in enumerate(lines, start=1):
-        if "\0" in line or "\ufffd" in line:
-            raise InvalidInput(f"{path.name}, line {number}", line[:80], "UTF-8 without NUL bytes")
-    rows = lines[headed + layout.skip_rows :]
-    top = "".join(lines[:1] if headed else rows[:1])
-    mark = ";" if headed and ";" in top else "," if headed or "," in top else None
-    titles = [cell.strip(' \t"') for cell in top.split(mark)]
-    header: list[Any] = titles if headed else list(range(len(titles)))
-    for name in names:
-        if rows and header.count(name) != 1:
-            raise InvalidInput(f"{path.name}: column", name, f"one of {header}, there once"[:500])
-    # Every cell of a plain table is read: a decimal comma would pass for a separator.
-    columns = {name: np.empty(len(rows)) for name in (names if headed or not rows else header)}
-    for row, line in enumerate(rows):
-        cells = line.split(mark)
-        if len(cells) != len(header):
-            field = _place(path, layout, row, "number of cells")
-            raise InvalidInput(field, len(cells), f"{len(header)}, as in the first line")
-        for name, column in columns.items():
-            cell = cells[header.index(name)].strip(' \t"')
-            try:
-                # Python would read 1_000 as a thousand.
-                column[row] = float(cell.replace("_", "?") or "nan")
-            except ValueError:
-                field = _place(path, layout, row, f"column {name}")
-                raise InvalidInput(field, cell[:80], "a number (decimal point)") from None
-    return {name: columns[name] for name in names}

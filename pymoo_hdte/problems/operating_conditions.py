@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.drive import DriveModel, UnstableDrive
+from pymoo_hdte.io.text_table import read_text_table
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 COLUMNS = ("speed_rpm", "load_Nm", "weight")
@@ -80,15 +80,11 @@ def load_conditions(path: str | Path) -> tuple[OperatingCondition, ...]:
     OSError
         If the file cannot be read.
     """
-    path = Path(path)
-    (header_line, header), *rows = _lines(path)
-    if sorted(header) != sorted(COLUMNS):
-        allowed = f"{', '.join(COLUMNS)}, each once"
-        raise InvalidInput(f"{path.name}, line {header_line}: columns", header, allowed)
-    if not rows:
-        field = f"{path.name}, line {header_line}: rows below the header"
-        raise InvalidInput(field, 0, "at least 1")
-    return tuple(_condition(f"{path.name}, line {line}", header, cells) for line, cells in rows)
+    table = read_text_table(Path(path), by_hand=True)
+    table.require(COLUMNS, no_others=True)
+    columns = table.numbers(COLUMNS)
+    rows = zip(table.lines, *(columns[name].tolist() for name in COLUMNS), strict=True)
+    return tuple(_condition(f"{table.file}, line {line}", *values) for line, *values in rows)
 
 
 def hs_20_100_duty_cycle() -> tuple[OperatingCondition, ...]:
@@ -155,36 +151,9 @@ def duty_cycle_dte_arcsec(
     return average
 
 
-def _lines(path: Path) -> list[tuple[int, list[str]]]:
-    """Return number and cells of the header and of every row."""
-    lines = []
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InvalidInput(path.name, str(error), "CSV text in UTF-8") from None
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            try:
-                cells = next(csv.reader([line]))
-            except csv.Error as error:
-                place = f"{path.name}, line {number}"
-                raise InvalidInput(place, str(error), "cells separated by commas") from None
-            lines.append((number, [cell.strip() for cell in cells]))
-    return lines or [(1, [])]
-
-
-def _condition(place: str, header: list[str], cells: list[str]) -> OperatingCondition:
-    if len(cells) != len(header):
-        allowed = f"{len(header)}, as in the header"
-        raise InvalidInput(f"{place}: number of cells", len(cells), allowed)
-    values = {}
-    for name, cell in zip(header, cells, strict=True):
-        try:
-            values[name] = float(cell)
-        except ValueError:
-            raise InvalidInput(f"{place}: {name}", cell, "a finite number") from None
+def _condition(place: str, speed: float, load: float, weight: float) -> OperatingCondition:
     # Checked before the change of units, so that an error shows what the file says.
-    speed = real_number(f"{place}: speed_rpm", values["speed_rpm"], above=0.0)
-    load = real_number(f"{place}: load_Nm", values["load_Nm"], at_least=0.0)
-    weight = real_number(f"{place}: weight", values["weight"], above=0.0, at_most=LARGEST_WEIGHT)
+    speed = real_number(f"{place}: speed_rpm", speed, above=0.0)
+    load = real_number(f"{place}: load_Nm", load, at_least=0.0)
+    weight = real_number(f"{place}: weight", weight, above=0.0, at_most=LARGEST_WEIGHT)
     return OperatingCondition(speed * REVOLUTION_PER_MINUTE, load, weight)

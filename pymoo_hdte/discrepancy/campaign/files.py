@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.columns import line_of_row, read_columns, write_columns
 from pymoo_hdte.discrepancy.campaign.format import (
     BELIEVED,
     CAMPAIGN_FILE,
@@ -27,8 +26,9 @@ from pymoo_hdte.discrepancy.campaign.format import (
 )
 from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.drive.toml_text import toml_string
-from pymoo_hdte.io.fields import Fields, toml_with_lines
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.io.text_table import line_of_row, read_text_table, write_columns
+from pymoo_hdte.io.toml import toml_text, toml_with_lines
 
 Checked = TypeVar("Checked", BelievedDrive, Rig, RunningRecord | TorsionRecord)
 
@@ -103,7 +103,8 @@ def write_campaign(campaign: Campaign, folder: str | Path) -> None:
     with tempfile.TemporaryDirectory(prefix=".campaign-", dir=folder.parent) as workshop:
         draft = Path(workshop) / "campaign"
         draft.mkdir()
-        (draft / CAMPAIGN_FILE).write_text(_toml(campaign), encoding="utf-8", newline="\n")
+        text = toml_text(_table(campaign))
+        (draft / CAMPAIGN_FILE).write_text(text, encoding="utf-8", newline="\n")
         records: list[RunningRecord | TorsionRecord] = [*campaign.running, *campaign.torsion]
         for record in records:
             columns = {
@@ -115,36 +116,34 @@ def write_campaign(campaign: Campaign, folder: str | Path) -> None:
         draft.replace(folder)
 
 
-def _toml(campaign: Campaign) -> str:
-    lines = [
-        f"title = {toml_string(campaign.title)}",
-        f"drive = {toml_string(campaign.drive)}",
-        "\n[believed]",
-        *_lines(campaign.believed, BELIEVED),
-        "\n[rig]",
-        *_lines(campaign.rig, RIG),
-    ]
+def _table(campaign: Campaign) -> dict[str, Any]:
     tests = ((campaign.running, "running", RUNNING), (campaign.torsion, "torsion", TORSION))
-    for records, test, names in tests:
-        for record in records:
-            lines += ["\n[[record]]", f'file = "{record.name}{ENDING}"', f'test = "{test}"']
-            lines += [*_lines(record, names), f'role = "{record.role}"']
-    return "\n".join(lines) + "\n"
+    return {
+        "title": campaign.title,
+        "drive": campaign.drive,
+        "believed": _in_units(campaign.believed, BELIEVED),
+        "rig": _in_units(campaign.rig, RIG),
+        "record": [
+            {"file": f"{record.name}{ENDING}", "test": test}
+            | _in_units(record, names)
+            | {"role": record.role}
+            for records, test, names in tests
+            for record in records
+        ],
+    }
 
 
-def _lines(values: Any, names: Names) -> list[str]:
-    def text(value: float, factor: float) -> str:
-        # Twelve digits hide the rounding of the conversion and keep more than anybody knows.
-        return f"{value / factor:.12g}"
+def _in_units(values: Any, names: Names) -> dict[str, Any]:
+    """Return the attributes of an object under the names and in the units of the file."""
 
-    lines = []
-    for attribute, (key, factor) in names.items():
-        value = getattr(values, attribute)
+    def rounded(value: Any, factor: float) -> Any:
         if isinstance(value, tuple):
-            lines.append(f"{key} = [{', '.join(text(item, factor) for item in value)}]")
-        else:
-            lines.append(f"{key} = {text(value, factor)}")
-    return lines
+            return [rounded(item, factor) for item in value]
+        # Twelve digits hide the rounding of the conversion and keep more than anybody knows.
+        digits = f"{value / factor:.12g}"
+        return int(digits) if digits.lstrip("-").isdigit() else float(digits)
+
+    return {key: rounded(getattr(values, name), factor) for name, (key, factor) in names.items()}
 
 
 def _rig(table: Fields) -> Rig:
@@ -176,7 +175,7 @@ def _record(entry: Fields, file: str, place: str, folder: Path) -> RunningRecord
     kind: type[RunningRecord | TorsionRecord] = RunningRecord if running else TorsionRecord
     names = RUNNING if running else TORSION
     channels = [field.name for field in fields(kind) if field.name in COLUMNS]
-    columns = read_columns(path, [COLUMNS[channel][0] for channel in channels])
+    columns = read_text_table(path).numbers([COLUMNS[channel][0] for channel in channels])
     measured = {channel: columns[COLUMNS[channel][0]] for channel in channels}
     try:
         return _build(kind, names, entry, place, name=named[1], role=role, **measured)

@@ -36,7 +36,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
+from pymoo_hdte.units import factor_of_name
 
 CAMPAIGN_FILE = "campaign.toml"
 
@@ -48,45 +48,50 @@ PLAIN_ENDING = ".csv"
 Names = Mapping[str, tuple[str, float]]
 """For each attribute its name in the file and the factor to SI units."""
 
-BELIEVED: Names = {
-    "ratio": ("ratio", 1.0),
-    "stiffness": ("stiffness_Nm_per_rad", 1.0),
-    "damping": ("damping_output_Nms_per_rad", 1.0),
-    "input_inertia": ("input_inertia_kgm2", 1.0),
-    "input_damping": ("input_damping_Nms_per_rad", 1.0),
-    "output_damping": ("output_damping_Nms_per_rad", 1.0),
-    "output_inertia": ("output_inertia_kgm2", 1.0),
-    "load_inertia": ("load_inertia_kgm2", 1.0),
-    "error_orders": ("static_error_orders", 1.0),
-    "error_amplitudes": ("static_error_amplitudes_arcsec", ARCSEC),
-    "tolerance": ("tolerance", 1.0),
-    "error_tolerance": ("static_error_tolerance", 1.0),
-}
 
-RIG: Names = {
-    "proportional": ("proportional_Nms_per_rad", 1.0),
-    "integral": ("integral_Nm_per_rad", 1.0),
-    "angle_noise": ("angle_noise_arcsec", ARCSEC),
-    "angle_quantisation": ("angle_quantisation_arcsec", ARCSEC),
-    "input_torque_noise": ("input_torque_noise_Nm", 1.0),
-    "input_torque_gain": ("input_torque_gain", 1.0),
-    "input_torque_zero": ("input_torque_zero_Nm", 1.0),
-    "output_torque_noise": ("output_torque_noise_Nm", 1.0),
-    "output_torque_gain": ("output_torque_gain", 1.0),
-    "output_torque_zero": ("output_torque_zero_Nm", 1.0),
-    "repeatability": ("repeatability_arcsec", ARCSEC),
-    "torsion_angle_noise": ("torsion_angle_noise_arcsec", ARCSEC),
-}
+def _named(**names: str) -> Names:
+    return {attribute: (name, factor_of_name(name)) for attribute, name in names.items()}
 
-RUNNING: Names = {
-    "input_speed": ("input_speed_rpm", REVOLUTION_PER_MINUTE),
-    "load_torque": ("load_torque_Nm", 1.0),
-    "sample_rate": ("sample_rate_Hz", 1.0),
-    "samples_averaged": ("samples_averaged", 1.0),
-    "elapsed": ("elapsed_s", 1.0),
-}
 
-TORSION: Names = {"sample_rate": ("sample_rate_Hz", 1.0)}
+BELIEVED = _named(
+    ratio="ratio",
+    stiffness="stiffness_Nm_per_rad",
+    damping="damping_output_Nms_per_rad",
+    input_inertia="input_inertia_kgm2",
+    input_damping="input_damping_Nms_per_rad",
+    output_damping="output_damping_Nms_per_rad",
+    output_inertia="output_inertia_kgm2",
+    load_inertia="load_inertia_kgm2",
+    error_orders="static_error_orders",
+    error_amplitudes="static_error_amplitudes_arcsec",
+    tolerance="tolerance",
+    error_tolerance="static_error_tolerance",
+)
+
+RIG = _named(
+    proportional="proportional_Nms_per_rad",
+    integral="integral_Nm_per_rad",
+    angle_noise="angle_noise_arcsec",
+    angle_quantisation="angle_quantisation_arcsec",
+    input_torque_noise="input_torque_noise_Nm",
+    input_torque_gain="input_torque_gain",
+    input_torque_zero="input_torque_zero_Nm",
+    output_torque_noise="output_torque_noise_Nm",
+    output_torque_gain="output_torque_gain",
+    output_torque_zero="output_torque_zero_Nm",
+    repeatability="repeatability_arcsec",
+    torsion_angle_noise="torsion_angle_noise_arcsec",
+)
+
+RUNNING = _named(
+    input_speed="input_speed_rpm",
+    load_torque="load_torque_Nm",
+    sample_rate="sample_rate_Hz",
+    samples_averaged="samples_averaged",
+    elapsed="elapsed_s",
+)
+
+TORSION = _named(sample_rate="sample_rate_Hz")
 
 # Decimals far below the noise of any sensor.
 COLUMNS = {

@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.drive import OrderSpectrum
-from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.units import ARCSEC, UNITS
 from pymoo_hdte.validation import ValidationMetrics, validation_metrics
 
 _OVERLAY_TURNS = 2.0
@@ -143,7 +143,7 @@ def prove(finding: DriveFinding) -> Proof | None:
     floor = np.stack([_squares(data, noise, channel) for channel in range(3)], axis=1)
     gaps = {
         name: _gap(data, squares[:, :, place].sum(axis=2), floor[:, place].sum(axis=1), name)
-        for place, name in enumerate(UNITS)
+        for place, name in enumerate(SHOWN_IN)
     }
     error, error_floor = squares[:, :, 0], floor[:, 0]
     leading = max(gaps, key=lambda name: _height(gaps[name]))
@@ -193,7 +193,7 @@ def _squares(data: Data, squares: Values, channel: int) -> Values:
 
 def _gap(data: Data, squares: Values, noise: Values, channel: str) -> Gap:
     """Return the gap from mean squares (2, r) and those of the noise (r,)."""
-    unit, size = UNITS[channel]
+    unit, size = SHOWN_IN[channel]
     before, after = np.sqrt(squares.mean(axis=1)) / size
     floor = float(np.sqrt(noise.mean()) / size)
     return Gap(float(before), float(after), floor, unit, data.rules.least_gap_share)
@@ -223,7 +223,7 @@ def _metrics(dte: Values) -> tuple[ValidationMetrics, ValidationMetrics] | None:
 
 def _overlay(data: Data, predicted: Values, record: int, name: str) -> Overlay:
     """Return measured, before and after of a record, from the start of its first input turn."""
-    unit, size = UNITS[name]
+    unit, size = SHOWN_IN[name]
     channel = CHANNELS.index(name)
     raw = data.features.records[record]
     first = np.ceil(raw.input_angle.min() / (2.0 * np.pi))
@@ -254,15 +254,15 @@ def _overlay(data: Data, predicted: Values, record: int, name: str) -> Overlay:
 
 
 def _samples(data: Data, record: RunningRecord, channel: int) -> Values:
-    """Return the rows of a channel of `UNITS`, SI."""
+    """Return the rows of a channel of `SHOWN_IN`, SI."""
     error = record.transmission_error(data.campaign.believed.ratio)
     return (error, record.input_torque, record.output_torque)[channel]
 
 
-UNITS = {
-    "transmission_error": ("arcsec", ARCSEC),
-    "input_torque": ("mN.m", 1e-3),
-    "output_torque": ("mN.m", 1e-3),
+SHOWN_IN = {
+    "transmission_error": ("arcsec", UNITS["angle"]["arcsec"]),
+    "input_torque": ("mN.m", UNITS["torque"]["mN.m"]),
+    "output_torque": ("mN.m", UNITS["torque"]["mN.m"]),
 }
 """Channels whose gap is shown, with their unit and its size in SI."""
 

@@ -52,9 +52,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 
 from pymoo_hdte.checks import InvalidInput, one_of
-from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_from_fields
-from pymoo_hdte.io.fields import Fields, toml_with_lines
+from pymoo_hdte.discrepancy.mechanism.models import (
+    MechanismModel,
+    model_from_fields,
+)
+from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.tables import TableLayout, check_sha256, layout_from_fields, read_table
+from pymoo_hdte.io.toml import toml_with_lines
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.records import ROLES
 

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.drive.toml_text import toml_string
-from pymoo_hdte.io.fields import Fields, toml_with_lines
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.io.toml import toml_text, toml_with_lines
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import EFFECTS, OF_READINGS, law_from_values, values_of
 from pymoo_hdte.mechanism.mechanism import NOTHING
@@ -70,30 +68,27 @@ def model_text(model: MechanismModel) -> str:
         is not there, an empty title, a limit or cutoff that is not positive.
     """
     mechanism = model.mechanism
-    tables: list[tuple[str, Mapping[str, Any]]] = []
-    for name, inertia in mechanism.inertias.items():
-        tables.append((_heading("coordinates", name), {"inertia": _believed_table(inertia)}))
-    for port in mechanism.ports:
-        tables.append((_heading("ports", port.name), _port_table(port)))
-        lines = f"[{_heading('ports', port.name, 'error')}]"
-        tables += [(lines, vars(line)) for line in port.error]
-    for one in mechanism.inputs:
-        acting = {"acts": one.acts, "gain": _believed_table(one.gain)}
-        tables.append((_heading("inputs", one.name), acting))
-    for loop in mechanism.loops:
-        # The reader takes finite numbers only: a loop without saturation has no limit there.
-        kept = {name: one for name, one in vars(loop).items() if one != float("inf")}
-        tables.append(("[[loops]]", kept))
-    for effect in model.effects:
-        where = {"name": effect.name, "port": effect.port}
-        tables.append(("[[effects]]", {**where, **values_of(effect)}))
     top: dict[str, Any] = {"title": model.title}
     if model.cutoff is not None:
         top["cutoff"] = model.cutoff
-    text = _lines(top) + "".join(f"\n{heading}\n{_lines(table)}" for heading, table in tables)
+    top["coordinates"] = {
+        name: {"inertia": _believed_table(inertia)} for name, inertia in mechanism.inertias.items()
+    }
+    top["ports"] = {port.name: _port_table(port) for port in mechanism.ports}
+    top["inputs"] = {
+        one.name: {"acts": one.acts, "gain": _believed_table(one.gain)} for one in mechanism.inputs
+    }
+    # The reader takes finite numbers only: a loop without saturation has no limit there.
+    loops = [
+        {name: one for name, one in vars(loop).items() if one != float("inf")}
+        for loop in mechanism.loops
+    ]
+    rows = [{"name": one.name, "port": one.port, **values_of(one)} for one in model.effects]
+    # The reader takes no empty array of tables.
+    top |= {name: array for name, array in (("loops", loops), ("effects", rows)) if array}
     # What cannot be read back is better refused now than when the text is needed.
-    model_from_fields(Fields(tomllib.loads(text), "model"), "model")
-    return text
+    model_from_fields(Fields(top, "model"), "model")
+    return toml_text(top)
 
 
 def _believed_table(one: BelievedValue) -> dict[str, float]:
@@ -103,29 +98,8 @@ def _believed_table(one: BelievedValue) -> dict[str, float]:
 def _port_table(port: Port) -> dict[str, Any]:
     elements = {"stiffness": port.stiffness, "damping": port.damping}
     there = {name: _believed_table(one) for name, one in elements.items() if one != NOTHING}
-    return {"motion": port.motion, **there} | ({"read": True} if port.read else {})
-
-
-def _heading(*names: str) -> str:
-    return f"[{'.'.join(_key(name) for name in names)}]"
-
-
-def _lines(table: Mapping[str, Any]) -> str:
-    return "".join(f"{_key(name)} = {_value(value)}\n" for name, value in table.items())
-
-
-def _key(name: str) -> str:
-    return name if re.fullmatch("[A-Za-z0-9_-]+", name) else _value(name)
-
-
-def _value(value: Any) -> str:
-    """Return a text, number, truth value or table of these in TOML."""
-    if isinstance(value, Mapping):
-        inside = ", ".join(f"{_key(name)} = {_value(one)}" for name, one in value.items())
-        return f"{{ {inside} }}"
-    if isinstance(value, str):
-        return toml_string(value)
-    return "true" if value is True else repr(float(value))
+    error = {"error": [vars(line) for line in port.error]} if port.error else {}
+    return {"motion": port.motion, **there} | ({"read": True} if port.read else {}) | error
 
 
 def model_from_fields(top: Fields, file: str) -> MechanismModel:

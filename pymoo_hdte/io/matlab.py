@@ -1,0 +1,67 @@
+"""Vectors of real numbers in MATLAB files, v5 to v7; any bytes give numbers or a clear refusal.
+
+`scipy.io.loadmat` looks an unknown type of numbers up without a check, so that one damaged byte
+ends the Python process by a segmentation fault, which nothing can catch (seen in SciPy 1.17.1).
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+
+_COMPRESSED, _COMPLEX, _NUMERIC = 15, 0x800, range(6, 16)  # Codes of MATLAB v5, as are these:
+_NUMBERS = dict(zip((1, 2, 3, 4, 5, 6, 7, 9, 12, 13), "bBhHiIfdqQ", strict=True))
+
+
+@np.errstate(invalid="ignore")  # Damaged bytes may be signalling NaNs of single precision.
+def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
+    """Return rows or columns of real numbers by name, each of shape (n,), all of one length.
+
+    Raises
+    ------
+    InvalidInput
+        If the file is damaged or of another version, or a name stands for nothing of the kind.
+    OSError
+        If it cannot be read.
+    """
+    data, at = path.read_bytes(), 128
+    found, columns = dict[str, str](), dict[str, NDArray[np.float64]]()
+    try:
+        order = {b"\0\1IM": "<", b"\1\0MI": ">"}[data[124:128]]
+        while at < len(data):
+            kind, matrix, at = _element(data, at, order)
+            matrix = zlib.decompress(matrix)[8:] if kind == _COMPRESSED else matrix
+            flags = struct.unpack_from(f"{order}8xI", matrix)[0]
+            _, shape, start = _element(matrix, 16, order)
+            _, title, start = _element(matrix, start, order)
+            name, lengths = title.decode("latin-1"), np.frombuffer(shape, f"{order}i4")
+            found[name] = f"MATLAB class {flags & 0xFFF:#x} of shape {lengths.tolist()}"
+            if name in names and flags & 0xFF in _NUMERIC and not flags & _COMPLEX:
+                kind, numbers, _ = _element(matrix, start, order)
+                values = np.frombuffer(numbers, order + _NUMBERS[kind]).reshape(lengths)
+                if values.size == max(lengths):
+                    columns[name] = values.ravel().astype(float)
+    except (KeyError, ValueError, struct.error, zlib.error) as error:
+        allowed = "an intact MATLAB file (save v4 or v7.3, HDF5, as v5 or v7)"
+        raise InvalidInput(path.name, repr(error)[:200], allowed) from None
+    for name in names:
+        if name not in columns or columns[name].size != columns[names[0]].size:
+            allowed = f"a vector of real numbers, all of one length; there are {found}"
+            raise InvalidInput(f"{path.name}: {name}", found.get(name), allowed[:500])
+    return columns
+
+
+def _element(data: bytes, at: int, order: str) -> tuple[int, bytes, int]:
+    kind, size = struct.unpack_from(f"{order}II", data, at)
+    # Up to four bytes stand in the tag itself, their number in its upper half.
+    if kind >> 16:
+        return kind & 0xFFFF, data[at + 4 : at + 4 + (kind >> 16)], at + 8
+    after = at + 8 + size
+    return kind, data[at + 8 : after], after if kind == _COMPRESSED else after + -size % 8
