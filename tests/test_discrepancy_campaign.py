@@ -160,6 +160,11 @@ def test_the_comments_of_the_shared_form_are_the_defaults(campaign, folder):
     assert (read.believed.tolerance, read.believed.error_tolerance) == (0.1, 0.3)
 
 
+def test_a_record_is_fitted_or_held_out_as_its_role_says(campaign):
+    assert [record.name for record in campaign.train] == ["slow", "empty"]
+    assert [record.name for record in campaign.held_out] == ["back"]
+
+
 def test_no_held_out_record_is_no_error(campaign):
     alone = replace(campaign, running=campaign.train)
     assert alone.held_out == ()

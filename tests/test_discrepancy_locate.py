@@ -23,6 +23,15 @@ def test_false_discovery_rule_of_benjamini_and_hochberg():
     assert set(shuffled[benjamini_hochberg(shuffled, 0.05)]) == set(p_values[:4])
 
 
+@pytest.mark.parametrize("rank", [1, 2, 5, 10])
+def test_a_p_value_is_held_against_its_rank(rank):
+    """The k smallest of n are discoveries at a rate q if they are no larger than q k / n."""
+    for share, found in ((0.999, rank), (1.001, 0)):
+        p_values = np.ones(10)
+        p_values[:rank] = share * 0.05 * rank / 10.0
+        assert benjamini_hochberg(p_values, 0.05).sum() == found
+
+
 def test_a_cell_is_weighed_by_its_own_marginal_covariance():
     data = known_data()
     difference = np.zeros_like(data.features.values)

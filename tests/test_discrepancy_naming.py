@@ -6,8 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from planted_features import CONDITIONS, known_data, library, measured, with_sweep
+from pymoo_hdte.discrepancy.excess import Excess
+from pymoo_hdte.discrepancy.fit import fit
+from pymoo_hdte.discrepancy.naming import judge
+from pymoo_hdte.discrepancy.objective import Objective
+from pymoo_hdte.discrepancy.parameters import Layout
+from pymoo_hdte.discrepancy.rival import adequate
+from pymoo_hdte.discrepancy.verdict_file import sentence
 from scipy.stats import chi2
 
+from pymoo_hdte.discrepancy import naming, rival, second_effect
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
 from pymoo_hdte.discrepancy.engine import selection as second_effect
@@ -183,6 +191,25 @@ def test_an_error_of_the_encoder_s_scale_is_described_though_it_is_in_no_list():
     assert "encoder errs 46 times in its turn" in sentence(verdict)
 
 
+def test_a_listed_effect_is_named_before_one_in_no_list_that_does_as_well():
+    """A line at each second of a turn is one of the encoder or of the drive."""
+    order = 2.0 / 101.0
+    empty = known_data(CONDITIONS[::2], [order, 1.0, 2.0, 2.02])
+    found = {one.name: one for one in library(empty, [order])}
+    of_encoder, of_drive = found["encoder_line"], found["kinematic_error"]
+    better = []
+    for seed in range(4):
+        effects = of_encoder.build((2.0 * ARCSEC, 0.0))
+        data = measured(effects, np.random.default_rng(seed), empty)[0]
+        verdict = judge(data, fit(data), [of_encoder, of_drive])
+        assert (verdict.status, labels_of(verdict)) == ("class", {of_drive.label})
+        (other,) = verdict.equivalent
+        assert other.label == of_encoder.label
+        better.append(other.bic < verdict.chosen.bic)
+    # It is preferred though the other fits a little better.
+    assert any(better)
+
+
 def test_what_one_record_alone_shows_is_unlisted():
     verdict = verdict_on(disturbed(planted({}), 1000.0), FEW)
     assert verdict.status == "unlisted"
@@ -239,6 +266,20 @@ def test_what_one_record_alone_shows_does_not_speak_against_a_curve():
     assert not rival.unexplained(data, verdict.base, verdict.chosen.fit).any()
     excess = data.excess(verdict.chosen.fit)
     assert excess.of_parts[1] > (rival.PLAIN - 1.0) * excess.freedom.sum(axis=0)[1]
+
+
+@pytest.mark.parametrize(
+    ("left", "missed"),
+    [([0.0, 280.0, 0.0, 0.0], False), ([0.0, 680.0, 0.0, 600.0], True)],
+)
+def test_the_record_left_out_is_the_one_that_a_fit_misses_most(left, missed):
+    """Not the one that the base misses most, which the fit may explain."""
+    data = SimpleNamespace(excess=lambda one: one)
+    before, after = (
+        Excess(np.array([rows]).T, np.full((4, 1), 10.0))
+        for rows in ([900.0, 300.0, 100.0, 100.0], left)
+    )
+    assert rival.unexplained(data, before, after).tolist() == [missed]
 
 
 def test_an_effect_must_pay_for_its_unknowns():

@@ -184,6 +184,17 @@ def test_the_worst_record_is_that_of_the_largest_multiple_of_its_noise(ripple):
     assert prove(_With(ripple, drowned)).worst != worst
 
 
+def test_the_worst_record_is_not_one_that_the_base_predicts(ripple):
+    data, base = ripple.held_out, ripple.verdict.base
+    predicted = data.predict(base.values[None, : len(data.base)], ())[0]
+    for place, record in enumerate(data.features.records):
+        values = data.features.values.copy()
+        # Here the base is right, and the ripple that the revised model adds is not.
+        values[place] = predicted[place]
+        followed = replace(data, features=replace(data.features, values=values))
+        assert prove(_With(ripple, followed)).worst != record.name
+
+
 def test_statistics_are_relative_to_what_was_measured(ripple):
     proof = prove(ripple)
     measured = proof.dte[0]

@@ -137,11 +137,12 @@ def test_parametric_resonance_is_found_at_any_order():
         four.dte_arcsec(four.nominal[None])
 
 
-def test_multipliers_of_orders_together_belong_to_their_common_period():
+@pytest.mark.parametrize(("order", "periods"), [(3.0, 4), (1.5, 8), (4.0, 1)])
+def test_multipliers_of_orders_together_belong_to_their_common_period(order, periods):
     """A second order of no depth only lengthens the period: the multipliers are powers."""
     model = plain("resonant")
     alone = nominal(varying(model, MeshStiffnessVariation(0.1, 0.7, 4.0)))
-    idle = PeriodicStiffness(3.0, 0.0, 0.0)
+    idle = PeriodicStiffness(order, 0.0, 0.0)
     both = replace(alone, laws=(*alone.laws, ("mesh", idle)))
-    expected = np.sort(np.abs(floquet_multipliers(alone)[0]) ** 4)
+    expected = np.sort(np.abs(floquet_multipliers(alone)[0]) ** periods)
     assert np.sort(np.abs(floquet_multipliers(both)[0])) == pytest.approx(expected, rel=1e-4)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymoo_hdte.identification.error_statistics import holm
 from scipy import stats
 
 from pymoo_hdte.checks import InvalidInput
@@ -148,6 +149,12 @@ def test_a_planted_correlation_is_found_on_200_campaigns(rng):
         alarms += any(pair != (2, 9) for pair in pairs)
     assert consistent(found, 200, 0.98)
     assert consistent(200 - alarms, 200, 0.95)
+
+
+def test_holm_asks_less_of_each_further_p_value_and_keeps_their_order():
+    # Times 4, 3, 2 and 1 from the smallest on, and never below the one before.
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.5, 0.9]).tolist() == [1.0, 1.0]
 
 
 def test_false_alarms_keep_to_five_per_cent_of_campaigns(rng):

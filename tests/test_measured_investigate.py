@@ -17,6 +17,15 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_scale
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
 from pymoo_hdte.discrepancy.report.mechanism_document import (
+from pymoo_hdte.discrepancy.fit import fit
+from pymoo_hdte.drive.friction import CoulombFriction
+from pymoo_hdte.measured import investigate
+from pymoo_hdte.measured.data import measured_data
+from pymoo_hdte.measured.intervals import Spread
+from pymoo_hdte.measured.next_test import next_test
+from pymoo_hdte.measured.preconditions import check_scale, usual_cutoff
+from pymoo_hdte.measured.prove import prove_measured
+from pymoo_hdte.measured.verdict_document import (
     _parameters,
     effects,
     limits,
@@ -148,6 +157,16 @@ def test_steady_forces_that_differ_from_record_to_record_are_no_zero():
     record = rig.decay_record(rig.FORCE_NOISE)
     other = replace(with_zero(record, 0.5), name="other")
     check_scale(measured_data(OSCILLATOR, [record, other], 15.0))
+
+
+def test_the_motion_is_known_up_to_where_the_noisiest_record_knows_it():
+    clear = rig.relay_record(1)
+    noise = 1e-3 * np.random.default_rng(7).standard_normal(len(clear.time))
+    noisy = replace(clear, channels=clear.channels | {"x": clear.channels["x"] + noise})
+    highest, lowest = (usual_cutoff(OSCILLATOR, [record]) for record in (clear, noisy))
+    assert lowest < highest
+    for records in ([clear, noisy], [noisy, clear]):
+        assert usual_cutoff(OSCILLATOR, records) == lowest
 
 
 def test_a_held_out_record_that_cannot_be_judged_is_refused_by_name_at_once():
