@@ -29,9 +29,9 @@ def _document(table: Mapping[str, Any]) -> str:
     parts = [_fields(plain)]
     for name, value in table.items():
         if isinstance(value, Mapping):
-            parts.append(_table(f"[{name}]", value))
+            parts.append(toml_table(f"[{name}]", value))
         elif _holds_tables(value):
-            parts.extend(_table(f"[[{name}]]", row) for row in value)
+            parts.extend(toml_table(f"[[{name}]]", row) for row in value)
     return "\n".join(parts)
 
 
@@ -40,7 +40,8 @@ def _holds_tables(value: object) -> bool:
     return any(isinstance(row, Mapping) for row in rows)
 
 
-def _table(heading: str, fields: Mapping[str, object]) -> str:
+def toml_table(heading: str, fields: Mapping[str, object]) -> str:
+    """Return plain fields below the heading of their table."""
     return f"{heading}\n{_fields(fields)}"
 
 

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.believed_model import believed_from_fields
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.columns import line_of_row, read_columns, write_columns
 from pymoo_hdte.discrepancy.campaign.format import (
@@ -26,7 +27,8 @@ from pymoo_hdte.discrepancy.campaign.format import (
     Names,
 )
 from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
-from pymoo_hdte.drive.toml_text import toml_string
+from pymoo_hdte.drive.effects import effect_from_fields
+from pymoo_hdte.drive.toml_text import toml_string, toml_table
 from pymoo_hdte.io.fields import Fields, toml_with_lines
 
 Checked = TypeVar("Checked", BelievedDrive, Rig, RunningRecord | TorsionRecord)
@@ -57,9 +59,7 @@ def read_campaign(folder: str | Path) -> Campaign:
     folder = Path(folder)
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
         title, drive = top.text("title"), top.text("drive")
-        believed = _build(
-            BelievedDrive, BELIEVED, top.table("believed"), f"{CAMPAIGN_FILE}.believed"
-        )
+        believed = believed_from_fields(top, folder) if top.has("model") else _believed(top)
         rig = _rig(top.table("rig"))
         entries = top.tables("record")
         top.finish()
@@ -118,6 +118,7 @@ def _toml(campaign: Campaign) -> str:
         f"drive = {toml_string(campaign.drive)}",
         "\n[believed]",
         *_lines(campaign.believed, BELIEVED),
+        *_believed_beyond_values(campaign.believed),
         "\n[rig]",
         *_lines(campaign.rig, RIG),
     ]
@@ -127,6 +128,14 @@ def _toml(campaign: Campaign) -> str:
             lines += ["\n[[record]]", f'file = "{record.name}{ENDING}"', f'test = "{test}"']
             lines += [*_lines(record, names), f'role = "{record.role}"']
     return "\n".join(lines) + "\n"
+
+
+def _believed_beyond_values(believed: BelievedDrive) -> list[str]:
+    """Return tolerances of single values and effects, where there are any."""
+    lines = [f"{name} = {value!r}" for name, value in believed.tolerances.items()]
+    lines = ["\n[believed.tolerances]", *lines] if lines else []
+    effects = [toml_table("[[believed.effect]]", one.to_dict()) for one in believed.effects]
+    return [*lines, *(f"\n{effect}".rstrip() for effect in effects)]
 
 
 def _lines(values: Any, names: Names) -> list[str]:
@@ -142,6 +151,16 @@ def _lines(values: Any, names: Names) -> list[str]:
         else:
             lines.append(f"{key} = {text(value, factor)}")
     return lines
+
+
+def _believed(top: Fields) -> BelievedDrive:
+    table = top.table("believed")
+    rows = table.tables("effect") if table.has("effect") else []
+    effects = tuple(effect_from_fields(row) for row in rows)
+    single = table.table("tolerances") if table.has("tolerances") else Fields({}, "")
+    tolerances = {name: single.number(name) for name in single.names()}
+    place = f"{CAMPAIGN_FILE}.believed"
+    return _build(BelievedDrive, BELIEVED, table, place, effects=effects, tolerances=tolerances)
 
 
 def _rig(table: Fields) -> Rig:

@@ -42,6 +42,10 @@ def check_believed(believed: BelievedDrive) -> None:
         value = getattr(believed, name)
         if value < LEAST_TOLERANCE:
             raise InvalidInput(f"believed.{name}", value, f"at least {LEAST_TOLERANCE:g}")
+    for name, value in believed.tolerances.items():
+        if value < LEAST_TOLERANCE:
+            field = f"believed.tolerances.{name}"
+            raise InvalidInput(field, value, f"at least {LEAST_TOLERANCE:g}")
     heaviest = believed.stiffness / (2.0 * math.pi * LEAST_FREQUENCY) ** 2
     for name, referred in (
         ("input_inertia", believed.ratio**2),
