@@ -6,21 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from planted_features import CONDITIONS, known_data, library, measured, with_sweep
-from pymoo_hdte.discrepancy.excess import Excess
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.discrepancy.naming import judge
-from pymoo_hdte.discrepancy.objective import Objective
-from pymoo_hdte.discrepancy.parameters import Layout
-from pymoo_hdte.discrepancy.rival import adequate
-from pymoo_hdte.discrepancy.verdict_file import sentence
 from scipy.stats import chi2
 
-from pymoo_hdte.discrepancy import naming, rival, second_effect
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
 from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import adequate
 from pymoo_hdte.discrepancy.engine.verdict import judge

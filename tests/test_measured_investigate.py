@@ -14,18 +14,9 @@ from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
-from pymoo_hdte.discrepancy.mechanism.preconditions import check_scale
+from pymoo_hdte.discrepancy.mechanism.preconditions import check_scale, usual_cutoff
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
 from pymoo_hdte.discrepancy.report.mechanism_document import (
-from pymoo_hdte.discrepancy.fit import fit
-from pymoo_hdte.drive.friction import CoulombFriction
-from pymoo_hdte.measured import investigate
-from pymoo_hdte.measured.data import measured_data
-from pymoo_hdte.measured.intervals import Spread
-from pymoo_hdte.measured.next_test import next_test
-from pymoo_hdte.measured.preconditions import check_scale, usual_cutoff
-from pymoo_hdte.measured.prove import prove_measured
-from pymoo_hdte.measured.verdict_document import (
     _parameters,
     effects,
     limits,

@@ -8,7 +8,7 @@ import pytest
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE, read_rig
-from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_model
+from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_mechanism_model
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import law_from_values
 
@@ -234,12 +234,12 @@ def test_missing_files_are_errors_of_the_system(tmp_path):
         with pytest.raises(OSError, match="No such file"):
             read_rig(wrong)
     with pytest.raises(OSError, match="No such file"):
-        read_model(tmp_path / "none.toml")
+        read_mechanism_model(tmp_path / "none.toml")
 
 
 def test_model_alone_has_no_records(folder):
     with pytest.raises(InvalidInput, match=r"rig\.toml, line \d+: table is .* no such field here"):
-        read_model(folder / RIG_FILE)
+        read_mechanism_model(folder / RIG_FILE)
 
 
 def mutated(text, chance):
@@ -263,7 +263,7 @@ def test_mutated_files_give_a_rig_or_a_clear_error(folder):
             continue
         read += 1
         (folder / "model.toml").write_text(model_text(rig.model), encoding="utf-8")
-        assert read_model(folder / "model.toml") == rig.model
+        assert read_mechanism_model(folder / "model.toml") == rig.model
     assert 30 < read < 570
 
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_model
+from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_mechanism_model
 from pymoo_hdte.drive.port_effects import LAWS
 from pymoo_hdte.laws.linear import ConstantForce
 from pymoo_hdte.laws.stiffness import PeriodicClearance
@@ -22,7 +22,7 @@ FRICTION = law_from_values("coulomb_friction", {"level": 20.4})
 
 def through_file(folder, *parts):
     (folder / "model.toml").write_text(model_text(MechanismModel(*parts)), encoding="utf-8")
-    return read_model(folder / "model.toml")
+    return read_mechanism_model(folder / "model.toml")
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pymoo_hdte.discrepancy import write_campaign
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy import BelievedDrive, Rig, write_campaign
 from pymoo_hdte.units import ARCSEC
 from pymoo_hdte.virtual.hidden_forms import draw_effect
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign

@@ -10,8 +10,12 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import Command, Outcome, Say
 from pymoo_hdte.reports.folder import PAGE_FILE
 
+Believed = tuple[Path | None, Path | None]
+"""Files of a model and its data sheet."""
+
 _DETAILS = """example:
   pymoo-hdte discrepancy campaigns/rig-01 --out reports/rig-01
+  pymoo-hdte discrepancy campaigns/rig-01 --believed reports/rig-01/revised_model.toml --out again
 
 The campaign is a folder with campaign.toml and its records, of a harmonic drive, or with rig.toml
 and its records, of any other mechanism. DIR gets verdict.json, revised_model.toml and report.html;
@@ -24,20 +28,35 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--data", type=Path, metavar="DIR", help="folder of the records that rig.toml names"
     )
+    parser.add_argument(
+        "--believed",
+        type=Path,
+        metavar="MODEL.toml",
+        help="model to be questioned instead of what the campaign believes: a revised_model.toml",
+    )
+    parser.add_argument(
+        "--sheet",
+        type=Path,
+        metavar="SHEET.toml",
+        help="data sheet of a drive's model; by default MODEL_sheet.toml beside it",
+    )
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
-    document = _analysed(options.campaign, options.out, options.data, say)
+    believed = options.believed, options.sheet
+    document = _analysed(options.campaign, options.out, options.data, believed, say)
     return Outcome(document, _summary(document, options.out))
 
 
-def _analysed(folder: Path, out: Path, data: Path | None, say: Say) -> dict[str, Any]:
+def _analysed(
+    folder: Path, out: Path, data: Path | None, believed: Believed, say: Say
+) -> dict[str, Any]:
     """Analyse a campaign or a rig and write its report; return the verdict's document."""
     from pymoo_hdte.discrepancy import analyse, check_report_folder
 
     check_report_folder(out)
     say("reading the records")
-    measured = _measured(folder, data)
+    measured = _believing(_measured(folder, data), *believed)
     say("looking for what is missing")
     analysis = analyse(measured)
     say("locating the misfit")
@@ -62,6 +81,19 @@ def _measured(folder: Path, data: Path | None) -> Any:
         allowed = f"a folder with {CAMPAIGN_FILE}, of a harmonic drive, or {RIG_FILE}, of another"
         raise InvalidInput("CAMPAIGN", str(folder), allowed)
     return read_campaign(folder)
+
+
+def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
+    """Return what was measured, with the model of a file as what is believed."""
+    from pymoo_hdte.discrepancy import Campaign, read_drive_model, read_mechanism_model
+
+    of_drive = isinstance(measured, Campaign)
+    if sheet is not None and (model is None or not of_drive):
+        raise InvalidInput("--sheet", str(sheet), "none without --believed and a harmonic drive")
+    if model is None:
+        return measured
+    read = read_drive_model(model, sheet) if of_drive else read_mechanism_model(model)
+    return measured.believing(read)
 
 
 def _summary(document: dict[str, Any], out: Path) -> str:

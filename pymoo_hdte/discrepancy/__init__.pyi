@@ -4,6 +4,7 @@ from pymoo_hdte.discrepancy.analysis import (
     analyse,
     check_report_folder,
 )
+from pymoo_hdte.discrepancy.campaign.believed_model import read_drive_model
 from pymoo_hdte.discrepancy.campaign.campaign import (
     BelievedDrive,
     Campaign,
@@ -14,7 +15,7 @@ from pymoo_hdte.discrepancy.campaign.campaign import (
 from pymoo_hdte.discrepancy.campaign.files import read_campaign, write_campaign
 from pymoo_hdte.discrepancy.campaign.line_fit import OrderLines, order_lines, residual_spectrum
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
-from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, read_model
+from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, read_mechanism_model
 
 __all__ = [
     "BelievedDrive",
@@ -31,7 +32,8 @@ __all__ = [
     "check_report_folder",
     "order_lines",
     "read_campaign",
-    "read_model",
+    "read_drive_model",
+    "read_mechanism_model",
     "read_rig",
     "residual_spectrum",
     "write_campaign",

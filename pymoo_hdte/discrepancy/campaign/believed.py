@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 
-from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.drive import DampingReference, Effect, LoadInertia
+from pymoo_hdte.drive.effects import place_of
 from pymoo_hdte.units import ARCSEC
+
+MECHANICAL = (
+    "stiffness",
+    "damping",
+    "input_inertia",
+    "input_damping",
+    "output_damping",
+    "load_inertia",
+)
+"""Fields of `BelievedDrive` that are fitted; J_out, 1/100 of the load's inertia, is not."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +43,17 @@ class BelievedDrive:
         Relative half-width of every parameter but the static error.
     error_tolerance : float
         Relative half-width of the amplitudes.
+    effects : tuple of Effect
+        What the drive is believed to have beside Eq. (9), as it stands. The inertia of the load and
+        the damping of the torsion are values.
+    tolerances : dict of str to float
+        Relative half-widths of single values of `MECHANICAL`, in the place of ``tolerance``.
 
     Raises
     ------
     InvalidInput
-        For a value that is not finite or out of range, or orders that do not match.
+        For a value that is not finite or out of range, orders that do not match, or an effect that
+        stands twice at one place or is a value.
     """
 
     ratio: float
@@ -49,6 +68,12 @@ class BelievedDrive:
     error_amplitudes: tuple[float, ...]
     tolerance: float = 0.1
     error_tolerance: float = 0.3
+    effects: tuple[Effect, ...] = ()
+    tolerances: Mapping[str, float] = field(default_factory=dict, hash=False)
+
+    def tolerance_of(self, name: str) -> float:
+        """Return the relative half-width of a value of `MECHANICAL`."""
+        return self.tolerances.get(name, self.tolerance)
 
     def __post_init__(self) -> None:
         real_number("ratio", self.ratio, above=1.0)
@@ -70,6 +95,26 @@ class BelievedDrive:
         if len(self.error_amplitudes) != len(self.error_orders):
             allowed = f"one for each of the {len(self.error_orders)} error_orders"
             raise InvalidInput("error_amplitudes", self.error_amplitudes, allowed)
+        self._check_effects()
+        if not isinstance(self.tolerances, Mapping):
+            raise InvalidInput("tolerances", self.tolerances, "a number for each name")
+        for name, value in self.tolerances.items():
+            one_of("tolerances", name, MECHANICAL)
+            real_number(f"tolerances.{name}", value, at_least=0.0, below=1.0)
+
+    def _check_effects(self) -> None:
+        if not isinstance(self.effects, tuple) or not all(
+            hasattr(effect, "apply") for effect in self.effects
+        ):
+            raise InvalidInput("effects", self.effects, "a tuple of effects")
+        for effect in self.effects:
+            if isinstance(effect, LoadInertia | DampingReference):
+                allowed = "none that is a value: load_inertia or damping"
+                raise InvalidInput("effects", effect.name, allowed)
+        places = [place_of(effect) for effect in self.effects]
+        if len(set(places)) != len(places):
+            names = [effect.name for effect in self.effects]
+            raise InvalidInput("effects", names, "each effect once, at each port and order")
 
 
 @dataclass(frozen=True)
@@ -118,10 +163,10 @@ class Rig:
     output_torque_zero: float = 0.1
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
+        for one in fields(self):
+            value = getattr(self, one.name)
             # Without noise no misfit has a size, so that nothing can be weighted or tested.
-            if field.name.endswith("_noise"):
-                real_number(field.name, value, above=0.0)
+            if one.name.endswith("_noise"):
+                real_number(one.name, value, above=0.0)
             else:
-                real_number(field.name, value, at_least=0.0)
+                real_number(one.name, value, at_least=0.0)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import InitVar, dataclass
+from dataclasses import InitVar, dataclass, replace
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.believed_model import believed_of_model
 from pymoo_hdte.discrepancy.campaign.plausibility import (
     check_believed,
     check_noise,
@@ -17,6 +18,7 @@ from pymoo_hdte.discrepancy.campaign.plausibility import (
 )
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
+from pymoo_hdte.drive import DriveModel
 
 __all__ = ["BelievedDrive", "Campaign", "Rig", "RunningRecord", "TorsionRecord"]
 
@@ -74,6 +76,31 @@ class Campaign:
             with _named(sweep.name):
                 check_torsion(sweep, self.believed, rules)
         check_noise(self.running, self.torsion, self.believed, self.rig, rules)
+
+    def believing(self, model: DriveModel) -> Campaign:
+        """Return the same records with a drive model as what is believed.
+
+        Its values keep the tolerances of this campaign; its effects are believed as they stand.
+
+        Parameters
+        ----------
+        model : DriveModel
+            For instance `DriveAnalysis.revised_model`, or from `read_drive_model`.
+
+        Raises
+        ------
+        InvalidInput
+            If the model contradicts the records.
+
+        Examples
+        --------
+        >>> again = analyse(campaign.believing(analysis.revised_model()))
+        >>> again.verdict.status
+        'adequate'
+        """
+        old = self.believed
+        tolerances = old.tolerance, old.error_tolerance, old.tolerances
+        return replace(self, believed=believed_of_model(model, *tolerances))
 
     @property
     def train(self) -> tuple[RunningRecord, ...]:

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.believed_model import believed_from_fields
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.format import (
     BELIEVED,
@@ -26,6 +27,7 @@ from pymoo_hdte.discrepancy.campaign.format import (
 )
 from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
+from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.text_table import line_of_row, read_text_table, write_columns
 from pymoo_hdte.io.toml import toml_text, toml_with_lines
@@ -60,9 +62,7 @@ def read_campaign(folder: str | Path, rules: Rules = RULES) -> Campaign:
     folder = Path(folder)
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
         title, drive = top.text("title"), top.text("drive")
-        believed = _build(
-            BelievedDrive, BELIEVED, top.table("believed"), f"{CAMPAIGN_FILE}.believed"
-        )
+        believed = believed_from_fields(top, folder) if top.has("model") else _believed(top)
         rig = _rig(top.table("rig"))
         entries = top.tables("record")
         top.finish()
@@ -121,7 +121,7 @@ def _table(campaign: Campaign) -> dict[str, Any]:
     return {
         "title": campaign.title,
         "drive": campaign.drive,
-        "believed": _in_units(campaign.believed, BELIEVED),
+        "believed": _believed_table(campaign.believed),
         "rig": _in_units(campaign.rig, RIG),
         "record": [
             {"file": f"{record.name}{ENDING}", "test": test}
@@ -131,6 +131,13 @@ def _table(campaign: Campaign) -> dict[str, Any]:
             for record in records
         ],
     }
+
+
+def _believed_table(believed: BelievedDrive) -> dict[str, Any]:
+    """Return what is believed, with tolerances of single values and effects where there are any."""
+    effects = [effect.to_dict() for effect in believed.effects]
+    further = {"tolerances": dict(believed.tolerances), "effect": effects}
+    return _in_units(believed, BELIEVED) | {name: one for name, one in further.items() if one}
 
 
 def _in_units(values: Any, names: Names) -> dict[str, Any]:
@@ -144,6 +151,16 @@ def _in_units(values: Any, names: Names) -> dict[str, Any]:
         return int(digits) if digits.lstrip("-").isdigit() else float(digits)
 
     return {key: rounded(getattr(values, name), factor) for name, (key, factor) in names.items()}
+
+
+def _believed(top: Fields) -> BelievedDrive:
+    table = top.table("believed")
+    rows = table.tables("effect") if table.has("effect") else []
+    effects = tuple(effect_from_fields(row) for row in rows)
+    single = table.table("tolerances") if table.has("tolerances") else Fields({}, "")
+    tolerances = {name: single.number(name) for name in single.names()}
+    place = f"{CAMPAIGN_FILE}.believed"
+    return _build(BelievedDrive, BELIEVED, table, place, effects=effects, tolerances=tolerances)
 
 
 def _rig(table: Fields) -> Rig:

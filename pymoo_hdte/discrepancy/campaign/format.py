@@ -9,7 +9,13 @@ top                        ``title``, ``drive``
                            ``output_damping_Nms_per_rad``, ``output_inertia_kgm2``,
                            ``load_inertia_kgm2``, ``static_error_orders``,
                            ``static_error_amplitudes_arcsec``, ``tolerance = 0.1``,
-                           ``static_error_tolerance = 0.3``
+                           ``static_error_tolerance = 0.3``; ``[believed.tolerances]`` of single
+                           values and ``[[believed.effect]]`` as in a model file, both optional
+top, instead of it         ``model``, a drive model such as ``revised_model.toml``, and ``sheet``,
+                           its data sheet (without it ``MODEL_sheet.toml``), relative to the folder
+``[tolerance]``            of a model's values: ``default = 0.1``, ``static_error = 0.3``, and
+                           ``stiffness``, ``damping``, ``input_inertia``, ``input_damping``,
+                           ``output_damping``, ``load_inertia`` as ``default`` says
 ``[rig]``                  ``proportional_Nms_per_rad`` and ``integral_Nm_per_rad``, or the
                            sentence ``control`` with both numbers; ``angle_noise_arcsec``,
                            ``angle_quantisation_arcsec = 0.3``, ``input_torque_noise_Nm``,
@@ -25,6 +31,11 @@ top                        ``title``, ``drive``
 
 Columns of a running record: ``time_s, input_angle_rad, output_angle_rad, input_torque_Nm,
 output_torque_Nm``; of a torsion record: ``time_s, output_angle_rad, output_torque_Nm``.
+
+What is believed is a model: values, each with the relative tolerance that a fit keeps, and effects
+that are taken as they stand. The inertia of the load and the damping of the torsion are values,
+also where a model file has them as effects. The phases of the static error are fitted anew; those
+of effects are believed, so that the input encoder must have the zero that it had for the model.
 
 The ``role`` of a running record is ``"train"``, to be fitted, or ``"held_out"``, to judge the
 result; a torsion record is always ``"train"``. ``time_s`` counts from any origin, be it that of the

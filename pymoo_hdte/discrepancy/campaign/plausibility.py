@@ -33,6 +33,10 @@ def check_believed(believed: BelievedDrive, rules: Rules) -> None:
         value = getattr(believed, name)
         if value < rules.least_tolerance:
             raise InvalidInput(f"believed.{name}", value, f"at least {rules.least_tolerance:g}")
+    for name, value in believed.tolerances.items():
+        if value < rules.least_tolerance:
+            field = f"believed.tolerances.{name}"
+            raise InvalidInput(field, value, f"at least {rules.least_tolerance:g}")
     slowest = rules.least_natural_frequency
     heaviest = believed.stiffness / (2.0 * math.pi * slowest) ** 2
     for name, referred in (

@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.candidates import OfDrives, drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
+from pymoo_hdte.discrepancy.drive.prediction import moves_steadily
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
@@ -98,8 +99,9 @@ def examine_drive(
     Raises
     ------
     InvalidInput
-        If fewer than `Rules.fewest_records` records are there to be fitted, or a record cannot show
-        or tell apart the lines of the believed static error.
+        If fewer than `Rules.fewest_records` records are there to be fitted, a record cannot show or
+        tell apart the lines of the believed static error, or the believed effects let the drive
+        have no steady motion.
     """
     if len(campaign.train) < rules.fewest_records:
         allowed = f"at least {rules.fewest_records}, or base and effects cannot be told apart"
@@ -112,6 +114,9 @@ def examine_drive(
         orders = _apart(unexpected, campaign, expected, rules)
         features = measure(campaign, campaign.train, orders)
     data = training_data(campaign, features, rules)
+    if any(effect.name in CLEARANCES for effect in campaign.believed.effects):
+        data = _loaded(data)
+    _check_steady(data)
     base = fit(data)
     listed = _candidates(data, base, effects)
     if leading_sweep_effect(data, base, listed) in CLEARANCES:
@@ -121,6 +126,24 @@ def examine_drive(
     verdict = judge(data, base, listed)
     data, verdict = _with_noise_of(verdict, data, listed)
     return DriveFinding(campaign, data, verdict, tuple(unexpected))
+
+
+def _check_steady(data: Data) -> None:
+    """Refuse believed effects with which the drive has no steady motion in some record.
+
+    A fit would leave them out there, and judge another drive than the one that is believed.
+    """
+    campaign = data.campaign
+    believed = campaign.believed
+    if not believed.effects:
+        return
+    values = {one.name: np.array([one.start]) for one in data.base}
+    steady = moves_steadily(believed, campaign.rig, data.features.conditions, values)
+    if not steady.all():
+        lost = data.features.records[int(np.argmin(steady))].name
+        names = [effect.name for effect in believed.effects]
+        allowed = f"effects with which the drive has a steady motion in every record; not in {lost}"
+        raise InvalidInput("believed.effects", names, allowed)
 
 
 def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:

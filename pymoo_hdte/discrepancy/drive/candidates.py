@@ -14,6 +14,7 @@ from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine import candidate
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter, unknown
 from pymoo_hdte.drive import DampingReference, KinematicReaction, LoadInertia, ThermalDrift
+from pymoo_hdte.drive.effects import place_of
 
 _OF_THEIR_OWN = ("load_inertia", "damping")
 """Base parameters for which an effect of another name stands in the library."""
@@ -40,7 +41,7 @@ def drive_candidates(
     torque_scale: float,
     effects: Sequence[OfDrives] = (),
 ) -> list[Candidate]:
-    """Return all candidates for a drive.
+    """Return all candidates for a drive, none of them where a believed effect stands.
 
     Parameters
     ----------
@@ -55,13 +56,15 @@ def drive_candidates(
         Further effects that may be missing.
     """
     own = [effect.drive_candidates(believed, orders, seen, torque_scale) for effect in effects]
-    return [
+    known = {place_of(effect) for effect in believed.effects}
+    found = [
         *mesh_candidates(believed, orders, torque_scale),
         *friction_candidates(believed.ratio, orders, torque_scale),
         *line_candidates(believed, orders, seen, torque_scale),
         *_others(believed),
         *chain.from_iterable(own),
     ]
+    return [one for one in found if not one.places & known]
 
 
 def out_of_tolerance(base: Sequence[Parameter], at_bounds: Sequence[str]) -> list[Candidate]:

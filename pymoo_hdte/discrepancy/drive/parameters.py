@@ -9,18 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.believed import MECHANICAL, BelievedDrive, Rig
 from pymoo_hdte.discrepancy.engine.candidate import Parameter
 
-MECHANICAL = (
-    "stiffness",
-    "damping",
-    "input_inertia",
-    "input_damping",
-    "output_damping",
-    "load_inertia",
-)
-"""Fields of `BelievedDrive` that are fitted; J_out, 1/100 of the load's inertia, is not."""
+__all__ = ["MECHANICAL", "READING", "base_parameters"]
 
 READING = (
     "offset",
@@ -46,14 +38,16 @@ def base_parameters(
     offset : float
         First guess of the constant of the transmission error, rad.
     """
-    found = [_within(name, getattr(believed, name), believed.tolerance) for name in MECHANICAL]
+    found = [
+        _within(name, getattr(believed, name), believed.tolerance_of(name)) for name in MECHANICAL
+    ]
     for line, amplitude in enumerate(believed.error_amplitudes):
         found.append(_within(f"error_amplitude_{line}", amplitude, believed.error_tolerance))
         phase = phases[line]
         found.append(Parameter(f"error_phase_{line}", phase, phase - 9.0, phase + 9.0, 0.1))
     found.append(Parameter("offset", offset, offset - 1.0, offset + 1.0, 1e-5))
     # A stiffness that varies with the input angle is not its mean where the input was locked.
-    locked = _within("locked_stiffness", 1.0, believed.tolerance)
+    locked = _within("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
     # The prior only keeps it in place where no sweep speaks of it.
     found.append(replace(locked, prior=locked.scale))
     for name in READING[1:]:

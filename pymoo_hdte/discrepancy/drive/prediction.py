@@ -95,7 +95,7 @@ def predict(
     values : dict of ndarray, shape (v,)
         Parameters by name, those of `parameters.base_parameters`.
     effects : sequence of Effect
-        Shared by all vectors.
+        Beside the believed ones; shared by all vectors.
     start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
     """
@@ -106,9 +106,10 @@ def predict(
     near = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
     balance = steady_motions(coefficients, speed, load.ravel(), rig, near)
+    present = (*believed.effects, *effects)
     channels = [
         balance.transmission_error,
-        balance.motor_torque + _driving(balance, effects),
+        balance.motor_torque + _driving(balance, present),
         balance.coupling_torque,
         balance.lead,
     ]
@@ -116,7 +117,7 @@ def predict(
     means = np.array([channel[:, 0].real for channel in channels])
     phasors = np.moveaxis(lines, -1, 0).reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
-    _read(believed, conditions, orders, values, effects, mean, phasors)
+    _read(believed, conditions, orders, values, present, mean, phasors)
     return Prediction(mean, phasors, balance)
 
 
@@ -162,6 +163,32 @@ def steady_motions(
     return _merged(balance.rows(balance.converged), plain.rows(~held), held)
 
 
+def moves_steadily(
+    believed: BelievedDrive,
+    rig: Rig,
+    conditions: Conditions,
+    values: dict[str, NDArray[np.float64]],
+) -> NDArray[np.bool_]:
+    """Return for which records, shape (r,), the believed drive has a steady motion.
+
+    Parameters
+    ----------
+    believed, rig, conditions
+    values : dict of ndarray, shape (1,)
+        As of `predict`.
+    """
+    coefficients = coefficients_of(believed, values, (), len(conditions))
+    motion = harmonic_balance(
+        coefficients,
+        input_speed=conditions.input_speed,
+        load_torque=conditions.output_torque,
+        motor=SpeedLoop(rig.proportional, rig.integral),
+        torus=torus_of(coefficients),
+        tolerance=TOLERANCE,
+    )
+    return np.asarray(motion.converged)
+
+
 def _merged(held: SteadyMotion, plain: SteadyMotion, places: NDArray[np.bool_]) -> SteadyMotion:
     """Put rows together again: ``held`` where ``places``, ``plain`` elsewhere."""
     order = np.argsort(np.concatenate([np.flatnonzero(places), np.flatnonzero(~places)]))
@@ -177,7 +204,7 @@ def coefficients_of(
     effects: Sequence[Effect],
     records: int,
 ) -> Coefficients:
-    """Return the coefficients of all rows, vectors outermost."""
+    """Return the coefficients of all rows, vectors outermost, believed effects first."""
     rows = {name: np.repeat(values[name], records) for name in MECHANICAL}
     lines = [
         sine_phasor(values[f"error_amplitude_{line}"], values[f"error_phase_{line}"])
@@ -199,7 +226,7 @@ def coefficients_of(
         error_phasors=np.repeat(np.array(lines).T, records, axis=0),
         load_inertia=rows["load_inertia"],
     )
-    for effect in effects:
+    for effect in (*believed.effects, *effects):
         coefficients = effect.apply(coefficients)
     return coefficients
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
+from pymoo_hdte.discrepancy.campaign.believed_model import LEAST
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.engine.fitting import Fit
@@ -33,8 +34,6 @@ from pymoo_hdte.units import ARCSEC
 SHEET_FILE = "revised_model_sheet.toml"
 MODEL_FILE = "revised_model.toml"
 
-_LEAST = 1e-12
-"""What a data sheet, which refuses zero, gets in the place of zero, SI."""
 _LEAST_SCATTER = 1e-3
 """Least relative scatter of the static error over prototypes."""
 _LARGEST_TOOTH_DIVISOR = 100
@@ -55,6 +54,9 @@ def revised_model(finding: DriveFinding) -> DriveModel:
         what = "the believed drive with fitted values; nothing was found to be missing"
     else:
         what = "the believed drive with fitted values; what is missing is in no list, so none added"
+    if finding.campaign.believed.effects:
+        names = ", ".join(effect.name for effect in finding.campaign.believed.effects)
+        what = f"{what}; {names} as believed"
     return drive_model(finding.campaign, fitted, "revised", what)
 
 
@@ -93,7 +95,9 @@ def drive_model(campaign: Campaign, fitted: Fit, name: str, description: str) ->
             reading="peak_to_peak",
             std=scatter * static_error / 3.0,
         ),
-        effects=_merged(fitted.effects, values["load_inertia"], believed.ratio),
+        effects=_merged(
+            (*believed.effects, *fitted.effects), values["load_inertia"], believed.ratio
+        ),
     )
 
 
@@ -140,10 +144,10 @@ def _sheet(campaign: Campaign, values: Mapping[str, float], static_error: float)
             static_error=static_error,
             stiffness=values["stiffness"],
             input_inertia=values["input_inertia"],
-            input_damping=max(values["input_damping"], _LEAST),
-            mesh_damping=max(values["damping"], _LEAST) / believed.ratio**2,
+            input_damping=max(values["input_damping"], LEAST),
+            mesh_damping=max(values["damping"], LEAST) / believed.ratio**2,
             output_inertia=believed.output_inertia,
-            output_damping=max(values["output_damping"], _LEAST),
+            output_damping=max(values["output_damping"], LEAST),
         ),
         mesh=reference.mesh,
         error_sources=reference.error_sources,

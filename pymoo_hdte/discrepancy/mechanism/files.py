@@ -1,6 +1,8 @@
 """A rig in a folder: ``rig.toml`` has its mechanism and lists its records, all without code.
 
-Numbers of the mechanism are in SI; the columns of the records have units of their own::
+What is believed is a model: coordinates, ports, inputs, loops and effects, each value with its
+tolerance. The ``revised_model.toml`` of a report is one. Numbers of the mechanism are in SI; the
+columns of the records have units of their own::
 
     title = "An electro-mechanical positioning system"
     cutoff = 40.0                                  # optional, Hz
@@ -31,6 +33,8 @@ Numbers of the mechanism are in SI; the columns of the records have units of the
     port = "joint"
     level = 20.4
 
+    model = "revised_model.toml"                   # instead of all tables above: a file with them
+
     [noise]                                        # optional: standard deviations, SI
     q = 1e-6
 
@@ -55,6 +59,7 @@ from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.discrepancy.mechanism.models import (
     MechanismModel,
     model_from_fields,
+    read_mechanism_model,
 )
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.tables import TableLayout, check_sha256, layout_from_fields, read_table
@@ -113,7 +118,8 @@ class MeasuredMechanism:
         Parameters
         ----------
         model : MechanismModel
-            From `read_model` or `MechanismAnalysis.revised_model`; its cutoff holds if it has one.
+            From `read_mechanism_model` or `MechanismAnalysis.revised_model`; its cutoff holds if it
+            has one.
         """
         cutoff = self.cutoff if model.cutoff is None else model.cutoff
         return replace(self, mechanism=model.mechanism, effects=model.effects, cutoff=cutoff)
@@ -142,7 +148,7 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> MeasuredMech
     path = path / RIG_FILE if path.is_dir() else path
     files = path.parent if data is None else Path(data)
     with toml_with_lines(path) as top:
-        model = model_from_fields(top, path.name)
+        model = _model(top, path)
         shared = layout_from_fields(top.table("table")) if top.has("table") else None
         noise = _noise(top)
         entries = top.tables("records")
@@ -160,6 +166,15 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> MeasuredMech
         model.title,
         str(path),
     )
+
+
+def _model(top: Fields, path: Path) -> MechanismModel:
+    """Take what is believed out of a rig's file, or out of the file that it names."""
+    if not top.has("model"):
+        return model_from_fields(top, path.name)
+    model = read_mechanism_model(path.parent / top.text("model"))
+    cutoff = top.number("cutoff", above=0.0) if top.has("cutoff") else model.cutoff
+    return replace(model, title=top.text("title"), cutoff=cutoff)
 
 
 def _record(

@@ -36,7 +36,7 @@ class MechanismModel:
     cutoff: float | None = None
 
 
-def read_model(path: str | Path) -> MechanismModel:
+def read_mechanism_model(path: str | Path) -> MechanismModel:
     """Read a model of a mechanism, such as ``revised_model.toml`` of a report.
 
     Parameters
@@ -59,13 +59,13 @@ def read_model(path: str | Path) -> MechanismModel:
 
 
 def model_text(model: MechanismModel) -> str:
-    """Return the text that `read_model` reads back exactly, without tables and records.
+    """Return the text that `read_mechanism_model` reads back exactly, without tables and records.
 
     Raises
     ------
     InvalidInput
-        For what `read_model` would refuse: an effect whose name is none of `EFFECTS` or whose port
-        is not there, an empty title, a limit or cutoff that is not positive.
+        For what `read_mechanism_model` would refuse: an effect whose name is none of `EFFECTS` or
+        whose port is not there, an empty title, a limit or cutoff that is not positive.
     """
     mechanism = model.mechanism
     top: dict[str, Any] = {"title": model.title}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -106,6 +106,7 @@ def verdict_document(
             "degrees_of_freedom": verdict.degrees_of_freedom,
             "parameters": base_parameters(verdict.accepted, verdict.rules),
         },
+        **with_believed_effects([one.to_dict() for one in finding.campaign.believed.effects]),
         "held_out": absent if held_out is None else dict(held_out),
         "next_experiment": proposal.as_dict(),
         "location": location.summary(),
@@ -114,6 +115,27 @@ def verdict_document(
             **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy", "numba")},
         },
     }
+
+
+def with_believed_effects(effects: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the field ``believed_effects``, of plain types, if something is believed."""
+    return {"believed_effects": [dict(effect) for effect in effects]} if effects else {}
+
+
+def believed_in_words(document: Mapping[str, Any]) -> list[str]:
+    """Return the believed effects of a verdict's document, each with its numbers."""
+    found = []
+    for effect in document.get("believed_effects", ()):
+        parts = [
+            f"{name} {value['value']:.4g} {value['unit']}"
+            if isinstance(value, Mapping)
+            else f"{name} {value:.4g}"
+            for name, value in effect.items()
+            if name not in ("name", "port")
+        ]
+        where = f" ({effect['port']})" if "port" in effect else ""
+        found.append(f"{effect['name']}{where}: {', '.join(parts)}".replace("_", " "))
+    return found
 
 
 def sentence(verdict: Verdict) -> str:

@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechanism
+from pymoo_hdte.discrepancy.report.document import believed_in_words
 from pymoo_hdte.discrepancy.report.mechanism_document import mechanism_document
 from pymoo_hdte.discrepancy.report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy.report.mechanism_figures import (
@@ -90,6 +91,7 @@ def _page(finding: MechanismFinding, document: dict[str, Any], gaps: Sequence[Me
         shown=shown,
         pictures=pictures,
         proof_sentence=proof_sentence(finding, gaps),
+        believed_effects=believed_in_words(document),
         believed={name: one.value for name, one in finding.mechanism.quantities.items()},
     )
 

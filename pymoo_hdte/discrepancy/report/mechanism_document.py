@@ -19,7 +19,8 @@ from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
-from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence
+from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
+from pymoo_hdte.mechanism.effects import values_of
 
 
 def mechanism_document(
@@ -47,6 +48,9 @@ def mechanism_document(
             _evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
         ],
         "base": quantities(finding),
+        **with_believed_effects(
+            [{"name": one.name, "port": one.port, **values_of(one)} for one in finding.data.known]
+        ),
         "location": locate_in_mechanism(finding).summary(),
         "remainder": remainder(finding),
         "limits": limits(finding),

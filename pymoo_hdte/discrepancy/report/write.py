@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy.drive.revision import (
     revised_model,
 )
 from pymoo_hdte.discrepancy.engine.candidate import in_words
-from pymoo_hdte.discrepancy.report.document import verdict_document
+from pymoo_hdte.discrepancy.report.document import believed_in_words, verdict_document
 from pymoo_hdte.discrepancy.report.figures import (
     gap_by_channel,
     gap_by_order,
@@ -170,6 +170,7 @@ def _page(
         metrics=metric_rows(proof),
         records=record_rows(finding.campaign, proof),
         shift=shift,
+        believed_effects=believed_in_words(document),
     )
 
 

@@ -1,0 +1,131 @@
+"""A drive model as what is believed: its values become the base of a fit, its effects stand in it.
+
+The inertia of the load and the damping of the torsion are values of their own, which a fit may
+change within their tolerances; all other effects of the model are believed as they stand. The
+phases of the static error are fitted anew, because they hang on where an encoder has its zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.campaign.believed import MECHANICAL, BelievedDrive
+from pymoo_hdte.drive import (
+    DampingReference,
+    DriveModel,
+    LoadInertia,
+    load_datasheet,
+    load_model,
+)
+from pymoo_hdte.io.fields import Fields
+
+LEAST = 1e-12
+"""What a data sheet, which refuses zero, gets in the place of zero, SI."""
+_ROUNDED = 1.0 + 1e-9
+"""Of a value that was multiplied and divided on its way."""
+OF_VALUES = (LoadInertia.name, DampingReference.name)
+"""Effects that are values of `BelievedDrive`."""
+SHEET_SUFFIX = "_sheet"
+"""Of the name of a model's data sheet, where no other is given."""
+
+
+def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> DriveModel:
+    """Read a drive model with its data sheet, such as ``revised_model.toml`` of a report.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the model, in the format of `load_model`.
+    sheet : str or Path, optional
+        Of its data sheet; by default ``NAME_sheet.toml`` beside ``NAME.toml``.
+
+    Returns
+    -------
+    DriveModel
+
+    Raises
+    ------
+    InvalidInput
+        With the name of the file, for a wrong, missing or superfluous field, or a number of an
+        effect that is out of range.
+    OSError
+        If a file cannot be read.
+    """
+    path = Path(path)
+    sheet = path.with_name(f"{path.stem}{SHEET_SUFFIX}{path.suffix}") if sheet is None else sheet
+    try:
+        return load_model(path, load_datasheet(sheet))
+    except InvalidInput as error:
+        if error.field.startswith((path.name, Path(sheet).name, str(path), str(sheet))):
+            raise
+        raise InvalidInput(f"{path.name}: {error.field}", error.value, error.allowed) from None
+
+
+def believed_of_model(
+    model: DriveModel,
+    tolerance: float = 0.1,
+    error_tolerance: float = 0.3,
+    tolerances: Mapping[str, float] | None = None,
+) -> BelievedDrive:
+    """Return what a drive model says as what is believed.
+
+    Parameters
+    ----------
+    model : DriveModel
+    tolerance, error_tolerance, tolerances
+        Relative half-widths, as of `BelievedDrive`; a model has none.
+
+    Raises
+    ------
+    InvalidInput
+        Whatever `BelievedDrive` refuses.
+    """
+    of_values = tuple(one for one in model.effects if one.name in OF_VALUES)
+    plain = replace(model, effects=of_values).coefficients(model.nominal[None])
+    nominal = model.sheet.nominal
+
+    def known(value: float) -> float:
+        return 0.0 if value <= LEAST * _ROUNDED else float(value)
+
+    return BelievedDrive(
+        ratio=model.sheet.ratio,
+        stiffness=nominal.stiffness,
+        damping=known(plain.damping[0]),
+        input_inertia=nominal.input_inertia,
+        input_damping=known(nominal.input_damping),
+        output_damping=known(nominal.output_damping),
+        output_inertia=nominal.output_inertia,
+        load_inertia=float(np.max(plain.load_inertia)),
+        error_orders=tuple(model.kinematic_error.orders),
+        error_amplitudes=tuple(np.abs(plain.error_phasors[0]).tolist()),
+        tolerance=tolerance,
+        error_tolerance=error_tolerance,
+        effects=tuple(one for one in model.effects if one.name not in OF_VALUES),
+        tolerances=dict(tolerances or {}),
+    )
+
+
+def believed_from_fields(top: Fields, folder: Path) -> BelievedDrive:
+    """Take ``model``, ``sheet`` and ``[tolerance]`` out of a campaign's file.
+
+    Raises
+    ------
+    InvalidInput, OSError
+        As `read_drive_model` and `believed_of_model`.
+    """
+    sheet = folder / top.text("sheet") if top.has("sheet") else None
+    model = read_drive_model(folder / top.text("model"), sheet)
+    limits: dict[str, float] = {}
+    if top.has("tolerance"):
+        table = top.table("tolerance")
+        for name in ("default", "static_error", *MECHANICAL):
+            if table.has(name):
+                limits[name] = table.number(name, at_least=0.0, below=1.0)
+        table.finish()
+    default, error = limits.pop("default", 0.1), limits.pop("static_error", 0.3)
+    return believed_of_model(model, default, error, limits)
