@@ -14,17 +14,11 @@ from virtual_rig_cases import BELIEVED
 from pymoo_hdte.discrepancy.drive.candidates import candidates, out_of_tolerance
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
-from pymoo_hdte.discrepancy.engine.candidate import (
-    line_with_variance,
-    lines_of,
-    polar,
-    wave,
-    wave_starts,
-)
 from pymoo_hdte.drive import preset
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.drive.toml_text import model_toml
 from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.laws.unknowns import line_with_variance, lines_of, polar, wave, wave_starts
 from pymoo_hdte.units import ARCSEC
 
 NAMES = {

@@ -10,8 +10,9 @@ from pymoo_hdte.discrepancy.drive.line_candidates import line_candidates
 from pymoo_hdte.discrepancy.drive.mesh_candidates import mesh_candidates
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine import candidate
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter, unknown
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.drive import DampingReference, KinematicReaction, LoadInertia, ThermalDrift
+from pymoo_hdte.laws.unknowns import Parameter, unknown
 
 _OF_THEIR_OWN = ("load_inertia", "damping")
 """Base parameters for which an effect of another name stands in the library."""

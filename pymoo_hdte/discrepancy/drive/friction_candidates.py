@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pymoo_hdte.discrepancy.engine.candidate import (
-    Candidate,
-    Values,
-    harmonics_among,
-    lines_of,
-    unknown,
-    wave,
-    wave_starts,
-)
-from pymoo_hdte.drive import Effect, LawAtPort
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.drive import DriveEffect, LawAtPort
 from pymoo_hdte.laws.friction import (
     CoulombFriction,
     NonlinearDrag,
     PeriodicFriction,
     StribeckFriction,
 )
+from pymoo_hdte.laws.unknowns import Values, harmonics_among, lines_of, unknown, wave, wave_starts
 
 RATED_SPEED = 209.4
 """rad/s of the input; where the drag is scaled."""
@@ -74,7 +67,7 @@ def _periodic(
 ) -> Candidate:
     name = "position_dependent_friction"
 
-    def build(v: Values) -> tuple[Effect, ...]:
+    def build(v: Values) -> tuple[DriveEffect, ...]:
         varying = [
             LawAtPort(name, port, PeriodicFriction(multiple * order, phase, level))
             for multiple, level, phase in lines_of(v[:-1])

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.discrepancy.drive.analysis import Analysis, highest_order
-from pymoo_hdte.discrepancy.engine.candidate import harmonics_among
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
+from pymoo_hdte.laws.unknowns import harmonics_among
 
 _SAME_SPEED = 1.1
 """Ratio of the largest to the smallest speed up to which records run at one speed."""

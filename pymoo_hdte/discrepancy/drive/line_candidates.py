@@ -10,16 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.discrepancy.campaign.believed import Believed
-from pymoo_hdte.discrepancy.engine.candidate import (
-    Candidate,
-    Values,
-    harmonics_among,
-    lines_of,
-    wave,
-    wave_starts,
-)
-from pymoo_hdte.drive import Eccentricity, Effect, KinematicErrorLine, LawAtPort
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.drive import DriveEffect, Eccentricity, KinematicErrorLine, LawAtPort
+from pymoo_hdte.drive.effects import ENCODER_LINE
 from pymoo_hdte.laws.friction import PeriodicTorque
+from pymoo_hdte.laws.unknowns import Values, harmonics_among, lines_of, wave, wave_starts
 from pymoo_hdte.units import ARCSEC
 
 LARGEST_ERROR = 100 * ARCSEC
@@ -27,8 +22,6 @@ TYPICAL_ERROR = 2 * ARCSEC
 LARGEST_RIPPLE = 0.5
 TYPICAL_RIPPLE = 0.01
 """N.m of the motor, both for a `torque_scale` of 1."""
-ENCODER_LINE = "encoder_line"
-"""Name of an error of the encoder's scale, which no verdict names: see `Candidate.listed`."""
 
 
 def line_candidates(
@@ -67,7 +60,7 @@ def _holds(orders: Sequence[float], order: float) -> bool:
 
 
 def _kinematic_line(order: float, orders: Sequence[float]) -> Candidate:
-    def build(v: Values) -> tuple[Effect, ...]:
+    def build(v: Values) -> tuple[DriveEffect, ...]:
         return tuple(
             KinematicErrorLine(multiple * order, amplitude, phase + np.pi / 2.0)
             for multiple, amplitude, phase in lines_of(v)
@@ -87,7 +80,7 @@ def _kinematic_line(order: float, orders: Sequence[float]) -> Candidate:
 
 
 def _torque_ripple(order: float, orders: Sequence[float], torque_scale: float) -> Candidate:
-    def build(v: Values) -> tuple[Effect, ...]:
+    def build(v: Values) -> tuple[DriveEffect, ...]:
         return tuple(
             LawAtPort("torque_ripple", "input", PeriodicTorque(multiple * order, phase, amplitude))
             for multiple, amplitude, phase in lines_of(v)
@@ -108,7 +101,7 @@ def _torque_ripple(order: float, orders: Sequence[float], torque_scale: float) -
 
 
 def _encoder(name: str, turns: float, ratio: float, orders: Sequence[float]) -> Candidate:
-    def build(v: Values) -> tuple[Effect, ...]:
+    def build(v: Values) -> tuple[DriveEffect, ...]:
         return tuple(
             Eccentricity(amplitude, phase, multiple * turns)
             for multiple, amplitude, phase in lines_of(v)

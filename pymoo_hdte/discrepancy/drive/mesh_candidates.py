@@ -6,8 +6,11 @@ from collections.abc import Sequence
 
 from pymoo_hdte.discrepancy.campaign.believed import Believed
 from pymoo_hdte.discrepancy.campaign.campaign import RATED_TORQUE
-from pymoo_hdte.discrepancy.engine.candidate import (
-    Candidate,
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.drive import DriveEffect, LawAtPort, MeshStiffnessVariation
+from pymoo_hdte.laws.hysteresis import MaxwellSlip
+from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
+from pymoo_hdte.laws.unknowns import (
     Values,
     harmonics_among,
     lines_of,
@@ -16,9 +19,6 @@ from pymoo_hdte.discrepancy.engine.candidate import (
     wave,
     wave_starts,
 )
-from pymoo_hdte.drive import Effect, LawAtPort, MeshStiffnessVariation
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.units import ARCSEC
 
 TYPICAL_FORCE = 1.0
@@ -114,7 +114,7 @@ def _varying(orders: Sequence[float]) -> Candidate:
 
 
 def _clearance(order: float) -> Candidate:
-    def build(v: Values) -> tuple[Effect, ...]:
+    def build(v: Values) -> tuple[DriveEffect, ...]:
         variation, phase = polar(v[0], v[1])
         law = PeriodicClearance(order, phase, v[2] + variation, variation, locked=v[3])
         return (LawAtPort("clearance_variation", "mesh", law),)

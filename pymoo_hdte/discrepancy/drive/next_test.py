@@ -18,11 +18,11 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign.order_lines import CHANNELS
 from pymoo_hdte.discrepancy.drive.analysis import Analysis
 from pymoo_hdte.discrepancy.drive.features import MEANS
-from pymoo_hdte.discrepancy.drive.line_candidates import ENCODER_LINE
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive import LawAtPort
+from pymoo_hdte.drive.effects import ENCODER_LINE
 from pymoo_hdte.laws.friction import CoulombFriction
 
 TESTS = ("running", "torsion_sweep", "reclocked_encoder")

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pymoo_hdte.discrepancy.campaign.believed import Believed, Rig
-from pymoo_hdte.discrepancy.engine.candidate import Parameter
+from pymoo_hdte.laws.unknowns import Parameter
 
 MECHANICAL = (
     "stiffness",

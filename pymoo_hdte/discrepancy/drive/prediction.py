@@ -18,8 +18,8 @@ from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.drive import (
     Balance,
     Coefficients,
+    DriveEffect,
     Eccentricity,
-    Effect,
     LawAtPort,
     SpeedLoop,
     ThermalDrift,
@@ -81,7 +81,7 @@ def predict(
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
-    effects: Sequence[Effect] = (),
+    effects: Sequence[DriveEffect] = (),
     start: Balance | None = None,
 ) -> Prediction:
     """Return what the sensors would show.
@@ -94,7 +94,7 @@ def predict(
         Lines asked for, in cycles per input turn.
     values : dict of ndarray, shape (v,)
         Parameters by name, those of `parameters.base_parameters`.
-    effects : sequence of Effect
+    effects : sequence of DriveEffect
         Shared by all vectors.
     start : Balance, optional
         Steady states of the records for nearby values, to begin from.
@@ -174,7 +174,7 @@ def _merged(held: Balance, plain: Balance, places: NDArray[np.bool_]) -> Balance
 def coefficients_of(
     believed: Believed,
     values: dict[str, NDArray[np.float64]],
-    effects: Sequence[Effect],
+    effects: Sequence[DriveEffect],
     records: int,
 ) -> Coefficients:
     """Return the coefficients of all rows, vectors outermost."""
@@ -215,7 +215,7 @@ def _line(
     return phasors[:, column].conj() if conjugate else phasors[:, column]
 
 
-def _driving(balance: Balance, effects: Sequence[Effect]) -> NDArray[np.complex128]:
+def _driving(balance: Balance, effects: Sequence[DriveEffect]) -> NDArray[np.complex128]:
     """Return the harmonics of a motor's ripple, which its torque sensor sees; (1, n_harmonics)."""
     total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
     for effect in effects:
@@ -231,7 +231,7 @@ def _read(
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
-    effects: Sequence[Effect],
+    effects: Sequence[DriveEffect],
     mean: NDArray[np.float64],
     phasors: NDArray[np.complex128],
 ) -> None:

@@ -20,8 +20,8 @@ from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED, Verdict
 from pymoo_hdte.drive import (
     DampingReference,
     DataSheet,
+    DriveEffect,
     DriveModel,
-    Effect,
     KinematicError,
     LoadInertia,
     OrderSpectrum,
@@ -111,10 +111,12 @@ def _peak_to_peak(believed: Believed, amplitudes: list[float], phases: list[floa
     return float(spectrum.peak_to_peak(believed.ratio)[0])
 
 
-def _merged(effects: tuple[Effect, ...], load_inertia: float, ratio: float) -> tuple[Effect, ...]:
+def _merged(
+    effects: tuple[DriveEffect, ...], load_inertia: float, ratio: float
+) -> tuple[DriveEffect, ...]:
     """Return all effects, those of the believed drive included; a model takes each once."""
     factor = 1.0
-    others: list[Effect] = []
+    others: list[DriveEffect] = []
     for effect in effects:
         if isinstance(effect, LoadInertia):
             load_inertia += effect.inertia

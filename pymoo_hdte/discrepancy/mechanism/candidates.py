@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, unknown
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.discrepancy.mechanism.periodic_candidates import LARGEST, of_reading, periodic
-from pymoo_hdte.drive.effects import place_of
+from pymoo_hdte.laws.effect import place_of
 from pymoo_hdte.laws.friction import CoulombFriction, NonlinearDrag, StribeckFriction
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.linear import ConstantForce, DirectionalFriction, LinearDamper, LinearSpring
 from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, SoftWindup
+from pymoo_hdte.laws.unknowns import unknown
 from pymoo_hdte.mechanism import LawAt, Port
 
 CONTAINED = {
@@ -63,7 +64,7 @@ def mechanism_candidates(
             if read.read and dict(read.motion) == dict(port.motion):
                 found += periodic(port.name, orders.get(read.name, ()), force)[:1]
         found += _elastic(port.name, force, travel, port.stiffness.value, both)
-    known = {place_of(one) for one in data.known}  # type: ignore[arg-type]
+    known = {place_of(one) for one in data.known}
     return [one for one in found if not one.places & known]
 
 

@@ -11,8 +11,9 @@ from typing import Any
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.drive.toml_text import toml_string
 from pymoo_hdte.io.fields import Fields, toml_with_lines
+from pymoo_hdte.laws.effect import effect_named
 from pymoo_hdte.mechanism import Believed, ErrorLine, Input, LawAt, Loop, Mechanism, Port
-from pymoo_hdte.mechanism.effects import EFFECTS, OF_READINGS, law_from_values, values_of
+from pymoo_hdte.mechanism.effects import law_effects
 from pymoo_hdte.mechanism.mechanism import NOTHING
 
 Model = tuple[str, Mechanism, tuple[LawAt, ...]]
@@ -36,8 +37,8 @@ def rig_toml(
     Raises
     ------
     InvalidInput
-        For what `read_model` would refuse: an effect whose name is none of `EFFECTS` or whose port
-        is not there, an empty title, a limit or cutoff that is not positive.
+        For what `read_model` would refuse: an effect that is not registered or whose port is
+        not there, an empty title, a limit or cutoff that is not positive.
     """
     tables: list[tuple[str, Mapping[str, Any]]] = []
     for name, inertia in mechanism.inertias.items():
@@ -55,7 +56,9 @@ def rig_toml(
         tables.append(("[[loops]]", kept))
     for effect in effects:
         where = {"name": effect.name, "port": effect.port}
-        tables.append(("[[effects]]", {**where, **values_of(effect)}))
+        tables.append(
+            ("[[effects]]", {**where, **effect_named(effect.name).numbers_of(effect.law)})
+        )
     top = {"title": title} if cutoff is None else {"title": title, "cutoff": cutoff}
     text = _lines(top) + "".join(f"\n{heading}\n{_lines(table)}" for heading, table in tables)
     # What cannot be read back is better refused now than when the text is needed.
@@ -194,14 +197,15 @@ def _loop(row: Fields, inputs: Collection[str], coordinates: Collection[str]) ->
 
 
 def _effect(row: Fields, place: str, mechanism: Mechanism) -> LawAt:
-    name, port = row.choice("name", EFFECTS), row.choice("port", mechanism.port_names)
-    if name in OF_READINGS and not mechanism.port(port).read:
+    name = row.choice("name", [one.name for one in law_effects()])
+    effect, port = effect_named(name), row.choice("port", mechanism.port_names)
+    if effect.of_reading and not mechanism.port(port).read:
         allowed = f"a port with read = true: {name} is what its force sensor shows"
         raise InvalidInput(f"{place}.port", port, allowed)
-    numbers = {one: row.number(one) for one in EFFECTS[name][1] if row.has(one)}
+    numbers = {one: row.number(one) for one in effect.quantities if row.has(one)}
     row.finish()
     try:
-        return LawAt(name, port, law_from_values(name, numbers))
+        return LawAt(name, port, effect.law_of(numbers))
     except InvalidInput as error:
         field = error.field.removeprefix(f"{name}.")
         raise InvalidInput(f"{place}.{field}", error.value, error.allowed) from None

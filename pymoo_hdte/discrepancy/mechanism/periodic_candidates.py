@@ -7,16 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.engine.candidate import (
-    Candidate,
-    Parameter,
-    Values,
-    polar,
-    unknown,
-    wave,
-    wave_starts,
-)
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
+from pymoo_hdte.laws.unknowns import Parameter, Values, polar, unknown, wave, wave_starts
 from pymoo_hdte.mechanism import LawAt
 
 Parts = tuple[Parameter, ...]

@@ -14,16 +14,11 @@ from pymoo_hdte.discrepancy.drive.analysis import Analysis
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.revision import accepted_fit
-from pymoo_hdte.discrepancy.engine.candidate import (
-    HARMONIC_NAMES,
-    Candidate,
-    Parameter,
-    in_words,
-    line_with_variance,
-)
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.laws.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
 _DEVIATIONS = 1.959964
 """Half-width of a central 95 % interval of a normal value, in standard deviations."""

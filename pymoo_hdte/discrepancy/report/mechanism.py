@@ -59,7 +59,7 @@ def write_measured_report(title: str, finding: Finding, out: str | Path) -> dict
     model = rig_toml(
         f"{title}, revised",
         fitted_mechanism(finding.mechanism, accepted),
-        (*finding.data.known, *accepted.effects),  # type: ignore[arg-type]
+        (*finding.data.known, *accepted.effects),
         finding.cutoff,
     )
     FOLDER.write(Path(out), _page(finding, document, gaps), document, {MODEL_FILE: model})

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words, line_with_variance
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.report.document import sentence
+from pymoo_hdte.laws.unknowns import line_with_variance
 
 _OFFERED = 6.0
 """Gain of BIC with which a second effect that is not named is mentioned."""

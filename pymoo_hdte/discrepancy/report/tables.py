@@ -13,7 +13,7 @@ from pymoo_hdte.discrepancy.drive.analysis import Analysis
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
 from pymoo_hdte.discrepancy.drive.revision import accepted_fit
-from pymoo_hdte.discrepancy.engine.candidate import Parameter, in_words
+from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     EXACT_SHARE,
     SHARE,
@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.report.document import UNITS
+from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 METRICS = {
