@@ -15,6 +15,7 @@ from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
 from pymoo_hdte.discrepancy.drive.proof import Gap, prove
 from pymoo_hdte.discrepancy.drive.revision import drive_model, revised_model
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
@@ -37,7 +38,7 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
-LISTED = candidates(BELIEVED, [6.0], [6.0], 1.0)
+LISTED = candidates(port_sizes(BELIEVED, [6.0], [6.0], 1.0))
 
 
 def analysed(campaign, label=None, status="named"):

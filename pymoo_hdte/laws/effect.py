@@ -137,6 +137,11 @@ class Effect:
         """Whether parts may lose contact: see `Behaviour.rattles`."""
         return bool(getattr(self.law, "rattles", False))
 
+    @property
+    def drives(self) -> bool:
+        """Whether it is a force of the drive's own: see `Behaviour.driving`."""
+        return bool(getattr(self.law, "drives", False))
+
     def guesses(self, sizes: Sizes) -> Sequence[Guess]:
         """Return the forms in which it may be there, for the sizes of a port."""
         return [] if self.guess is None else self.guess(sizes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -205,6 +206,7 @@ register(
 class PeriodicTorque(Periodic):
     """A driving torque amplitude cos(order angle + phase), N.m: it acts with the motion."""
 
+    drives: ClassVar[bool] = True
     amplitude: float
 
     def __post_init__(self) -> None:

@@ -154,6 +154,8 @@ class Behaviour:
     """Number of inner states; above 0 the law is a `Memory`."""
     rattles: ClassVar[bool] = False
     """Whether the law takes the spring of its port away, so that parts may lose contact."""
+    drives: ClassVar[bool] = False
+    """Whether the force is the drive's own and acts on the motion, whatever its direction."""
     varies_stiffness: ClassVar[bool] = False
     """Whether it is K depth cos(order angle + phase) times the position, with these three numbers:
     then Hill's method and the stability of the drive know it too."""
@@ -170,7 +172,7 @@ class Behaviour:
 
     @property
     def driving(self) -> complex:
-        """Phasor of a force that is the drive's own, which a sensor of that force sees, or 0."""
+        """Phasor of the force of a law that drives, which a sensor of that force sees; 0 else."""
         return 0.0
 
 

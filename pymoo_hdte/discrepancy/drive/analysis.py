@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.candidates import candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
@@ -150,7 +151,8 @@ def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
     seen = _strong_lines(features, base)
     campaign = data.campaign
-    return candidates(campaign.believed, features.orders.tolist(), seen, campaign.torque_scale)
+    orders = features.orders.tolist()
+    return candidates(port_sizes(campaign.believed, orders, seen, campaign.torque_scale))
 
 
 def _loaded(data: Data) -> Data:

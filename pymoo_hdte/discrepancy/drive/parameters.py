@@ -31,6 +31,24 @@ READING = (
 )
 """Constant of the transmission error (rad), gains (relative) and zeros (N.m) of torque sensors."""
 
+BASE_UNITS = {
+    "stiffness": "N.m/rad",
+    "damping": "N.m.s/rad",
+    "input_inertia": "kg.m2",
+    "input_damping": "N.m.s/rad",
+    "output_damping": "N.m.s/rad",
+    "load_inertia": "kg.m2",
+    "error_amplitude": "rad",
+    "error_phase": "rad",
+    "offset": "rad",
+    "locked_stiffness": "1",
+    "input_torque_gain": "1",
+    "input_torque_zero": "N.m",
+    "output_torque_gain": "1",
+    "output_torque_zero": "N.m",
+}
+"""SI units of the base parameters, by name; those of lines without their number."""
+
 
 def base_parameters(
     believed: Believed, rig: Rig, phases: Sequence[float], offset: float

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.laws.effect import Place, place_of
+from pymoo_hdte.laws.effect import Effect, Place, place_of
+from pymoo_hdte.laws.guess import Guess
 from pymoo_hdte.laws.unknowns import Parameter, Values
 
 
@@ -45,6 +46,8 @@ class Candidate:
         Base parameter whose tolerance it lifts.
     form : str
         In a word, where the library holds several forms of one effect.
+    unit : callable or None
+        From an unknown, or the line that two of them are parts of, to its SI unit.
     """
 
     name: str
@@ -58,6 +61,7 @@ class Candidate:
     listed: bool = True
     frees: str | None = None
     form: str = ""
+    unit: Callable[[str], str] | None = None
 
     @property
     def label(self) -> str:
@@ -87,6 +91,50 @@ class Candidate:
     def unknowns(self) -> int:
         """Number of parameters that it adds to a fit or sets free."""
         return len(self.parameters) + (self.frees is not None)
+
+
+def candidate_of(
+    effect: Effect,
+    guess: Guess,
+    port: str,
+    force: str,
+    standing: Callable[[str, str, Any], Any],
+    slower: float = 1.0,
+) -> Candidate:
+    """Return an effect at a port as a candidate.
+
+    Parameters
+    ----------
+    effect : Effect
+    guess : Guess
+        The form in which it may be there.
+    port : str
+    force : str
+        What acts at the port, in a word.
+    standing : callable
+        From the name of an effect, port and law (or what else it is) to what a model takes.
+    slower : float
+        Turns of the reference shaft, in whose turns orders are, per turn of the port.
+    """
+    family = guess.family
+    order = None if family is None or family.order is None else family.order / slower
+    orders = family.words if family else ""
+    sentence = guess.sentence or effect.sentence
+    return Candidate(
+        guess.name or effect.name,
+        port,
+        guess.unknowns,
+        guess.begins,
+        lambda values: tuple(
+            standing(name, port, part) for name, part in effect.parts(guess, values)
+        ),
+        sentence.format(port=port, order=orders, force=force),
+        order,
+        effect.exact,
+        listed=not guess.name,
+        form=guess.form,
+        unit=effect.unit,
+    )
 
 
 def out_of_tolerance(name: str, words: str) -> Candidate:

@@ -27,7 +27,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 )
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED, FITTED, OF_ONE_NAME, Verdict, judge
-from pymoo_hdte.discrepancy.mechanism.candidates import CONTAINED, mechanism_candidates
+from pymoo_hdte.discrepancy.mechanism.candidates import mechanism_candidates
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.mechanism.preconditions import (
@@ -36,6 +36,7 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     check_signals,
     usual_cutoff,
 )
+from pymoo_hdte.laws.effect import is_contained
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 MAIN_SHARE = 0.5
@@ -283,7 +284,7 @@ def _contains(one: Rival, chosen: Rival) -> bool:
     """Tell whether a set of effects differs from another by laws that contain the other's only."""
     return all(
         candidate.port == other.port
-        and (candidate.name == other.name or candidate.name in CONTAINED.get(other.name, ()))
+        and (candidate.name == other.name or is_contained(other.name, candidate.name))
         for candidate, other in zip(
             *(sorted(each.candidates, key=lambda c: c.port) for each in (one, chosen)), strict=True
         )

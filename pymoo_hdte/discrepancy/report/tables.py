@@ -11,6 +11,7 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import Analysis
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
+from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
 from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
 from pymoo_hdte.discrepancy.drive.revision import accepted_fit
 from pymoo_hdte.discrepancy.engine.candidate import in_words
@@ -22,7 +23,6 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     unexplained,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.report.document import UNITS
 from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
@@ -259,7 +259,7 @@ def _parameter_row(
     half_width: float,
     at_bounds: tuple[str, ...],
 ) -> ParameterRow:
-    name, unit, size = parameter.name, _shown(UNITS.get(parameter.name, "")), 1.0
+    name, unit, size = parameter.name, _shown(BASE_UNITS.get(parameter.name, "")), 1.0
     if name.startswith(("error_amplitude_", "error_phase_")):
         kind, line = name.rsplit("_", 1)
         unit, size = ("arcsec", ARCSEC) if kind == "error_amplitude" else ("rad", 1.0)
