@@ -9,7 +9,7 @@ from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
 from pymoo_hdte.io.fields import Fields, read_toml
-from pymoo_hdte.laws.effect import with_unit
+from pymoo_hdte.laws.quantities import with_unit
 
 ERROR_CLASSES = ("e_m", "e_g", "e_w", "e_p", "e_h")
 """Classes of Eq. (1): stationary, with the flexspline, with the wave generator, pitch, tooth."""

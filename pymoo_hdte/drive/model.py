@@ -21,7 +21,8 @@ from pymoo_hdte.drive.solve.hill import steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.io.archive import FileFormat
 from pymoo_hdte.io.fields import Fields, read_toml
-from pymoo_hdte.laws.effect import place_of, with_unit
+from pymoo_hdte.laws.effect import place_of
+from pymoo_hdte.laws.quantities import with_unit
 from pymoo_hdte.units import ARCSEC
 
 PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")

@@ -16,9 +16,10 @@ from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Protocol
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.io.fields import UNITS, Fields
+from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.laws.guess import Guess, Sizes
 from pymoo_hdte.laws.law import PORTS
+from pymoo_hdte.laws.quantities import si_unit, with_unit
 
 Place = tuple[str, str, float | None]
 """Name, port and order of an effect."""
@@ -115,6 +116,9 @@ class Effect:
             raise InvalidInput(f"{self.name}.law", None, "a dataclass with the numbers of a law")
         for port in (*self.ports, *(self.sought or ())):
             one_of(f"{self.name}.ports", port, DRIVE_PORTS)
+        if getattr(self.law, "states", 0) and set(self.ports) - {"mesh"}:
+            allowed = '("mesh",): solvers keep inner states of laws at the mesh of a drive only'
+            raise InvalidInput(f"{self.name}.ports", self.ports, allowed)
         for number in self.quantities:
             one_of(f"{self.name}.quantities", number, [one.name for one in fields(self.kind)])
         if not str(self.sentence).strip():
@@ -234,20 +238,6 @@ class Effect:
             # Laws name themselves by another effect that they are too, or not at all.
             number = error.field.rpartition(".")[2]
             raise InvalidInput(f"{self.name}.{number}", error.value, error.allowed) from None
-
-
-def si_unit(quantity: str) -> str:
-    """Return the SI unit of a quantity of `fields.UNITS`, or of one that is its unit; 1 for none.
-
-    >>> si_unit("torque"), si_unit("N.m.s3/rad3"), si_unit("")
-    ('N.m', 'N.m.s3/rad3', '1')
-    """
-    return next(iter(UNITS.get(quantity, {quantity: 1.0}))) if quantity else "1"
-
-
-def with_unit(value: float, quantity: str) -> object:
-    """Return a value in SI with its unit, as model files have it."""
-    return {"value": value, "unit": si_unit(quantity)} if quantity else value
 
 
 _EFFECTS: dict[str, Effect] = {}

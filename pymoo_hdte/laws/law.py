@@ -104,6 +104,11 @@ class Law(Protocol):
         """See `Behaviour`."""
         ...
 
+    @property
+    def drives(self) -> bool:
+        """See `Behaviour`."""
+        ...
+
     def with_input_locked(self) -> Law | None:
         """See `Behaviour`."""
         ...

@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import SHARE
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
+from pymoo_hdte.laws.effect import effect_named
 
 FEWEST_RECORDS = 3
 """Below this no effect could be told from the base parameters."""
@@ -34,7 +35,6 @@ _MOST_LINES = 4
 _LINE_CHANCE = 1e-6
 _SECOND_CHANCE = 0.01
 """That noise alone makes a line of one speed seem to be one of two."""
-CLEARANCES = ("backlash", "clearance_variation")
 _SAME_NOISE = 1.5
 """Largest ratio of variances up to which the noise is that of the believed drive."""
 LEAST_LOAD = 0.5
@@ -119,7 +119,8 @@ def analyse(campaign: Campaign) -> Analysis:
     data = training_data(campaign, features)
     base = fit(data)
     listed = _candidates(data, base)
-    if leading_sweep_effect(data, base, listed) in CLEARANCES:
+    leading = leading_sweep_effect(data, base, listed)
+    if leading is not None and effect_named(leading).rattles:
         data = _loaded(data)
         base = fit(data)
         listed = _candidates(data, base)

@@ -21,9 +21,7 @@ from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.drive import LawAtPort
 from pymoo_hdte.drive.effects import ENCODER_LINE
-from pymoo_hdte.laws.friction import CoulombFriction
 
 TESTS = ("running", "torsion_sweep", "reclocked_encoder")
 
@@ -171,12 +169,10 @@ def _zero_twin(grid: Grid, analysis: Analysis, chosen: Fit) -> Proposal | None:
     """
     one_way = len({record.input_speed > 0.0 for record in analysis.campaign.train}) == 1
     for candidate, parts in zip(chosen.candidates, chosen.effects_by_candidate, strict=True):
-        effect = parts[0] if parts else None
-        if not (one_way and isinstance(effect, LawAtPort) and effect.port == "input"):
+        placed = parts[0].at_port() if parts else None
+        if not one_way or placed is None or placed[0] != "input" or not placed[1].constant:
             continue
-        if not isinstance(effect.law, CoulombFriction):
-            continue
-        level = abs(effect.law.level)
+        level = placed[1].constant
         triangles = grid.data.whiteners
         row = triangles[:, MEANS.index(CHANNELS.index("input_torque"))]
         influence = grid.model(chosen).influence[: len(row)]

@@ -5,6 +5,7 @@ from pymoo_hdte.drive.effects.base import (
     DriveEffect,
     DriveSizes,
     LawAtPort,
+    Session,
     drive_effects,
     effect_from_fields,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "LawAtPort",
     "LoadInertia",
     "MeshStiffnessVariation",
+    "Session",
     "ThermalDrift",
     "drive_effects",
     "effect_from_fields",
