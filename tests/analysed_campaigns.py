@@ -6,9 +6,10 @@ import numpy as np
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
-from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
+from pymoo_hdte.discrepancy.drive.candidates import candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
@@ -28,7 +29,7 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
-LISTED = drive_candidates(BELIEVED, [6.0], [6.0], 1.0)
+LISTED = candidates(port_sizes(BELIEVED, [6.0], [6.0], 1.0))
 
 
 def analysed(campaign, label=None, status="named"):

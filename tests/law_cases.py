@@ -1,6 +1,11 @@
 """One effect of every law, which the forward and the reverse tests of the drive share."""
 
-from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
+from pymoo_hdte.drive.effects import (
+    KinematicErrorLine,
+    KinematicReaction,
+    LawAtPort,
+    drive_effects,
+)
 from pymoo_hdte.laws.friction import (
     CoulombFriction,
     NonlinearDrag,
@@ -11,6 +16,9 @@ from pymoo_hdte.laws.friction import (
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.units import ARCSEC
+
+LAWS = {one.name: one for one in drive_effects() if one.change is None}
+"""Effects that are a law at a port of a drive."""
 
 EFFECTS = [
     LawAtPort("hardening_stiffness", "mesh", HardeningStiffness(1.2e9)),

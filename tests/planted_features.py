@@ -8,11 +8,12 @@ import numpy as np
 from virtual_rig_cases import BELIEVED, PHASES, RIG
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
-from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
+from pymoo_hdte.discrepancy.drive.candidates import candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.prediction import Conditions, coefficients_of
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
@@ -96,7 +97,7 @@ def with_sweep(data, effects=(), rng=None, **changes):
 
 def library(data, seen=()):
     """All candidates; lines of unexpected order at those that were seen."""
-    return drive_candidates(data.campaign.believed, data.features.orders.tolist(), seen, 1.0)
+    return candidates(port_sizes(data.campaign.believed, data.features.orders.tolist(), seen, 1.0))
 
 
 def listed(data, name, seen=()):

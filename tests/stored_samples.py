@@ -14,7 +14,7 @@ from pymoo_hdte.drive import (
     ThermalDrift,
 )
 from pymoo_hdte.drive.datasheet import ErrorSource, Mesh, Nominal
-from pymoo_hdte.drive.port_effects import LAWS
+from pymoo_hdte.laws.effect import effect_named
 
 MODEL = DriveModel(
     name="a sample",
@@ -48,7 +48,7 @@ MODEL = DriveModel(
         KinematicErrorLine(3.0, 1e-5, 0.7),
         KinematicReaction(0.9),
         *(
-            LawAtPort(name, port, LAWS[name][0](*values))
+            LawAtPort(name, port, effect_named(name).law(*values))
             for name, port, *values in (
                 ("hardening_stiffness", "mesh", 1.2e9, 0.1, 2e-4, 3.0),
                 ("soft_windup", "mesh", 0.3, 2e-4),

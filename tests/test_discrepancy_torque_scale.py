@@ -12,7 +12,8 @@ from virtual_rig_cases import BELIEVED, effect
 
 from pymoo_hdte.discrepancy.campaign.campaign import RATED_TORQUE, torque_scale
 from pymoo_hdte.discrepancy.drive.analysis import _flanks_held, examine_drive
-from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
+from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 
 OF_TORQUE = {
     "believed": ("stiffness", "damping", "input_inertia", "input_damping", "output_damping",
@@ -69,8 +70,8 @@ def test_a_verdict_does_not_depend_on_the_size_of_the_drive(rubbing, verdict, fa
 
 @pytest.mark.parametrize("factor", EXACT_FACTORS)
 def test_every_candidate_is_the_same_on_a_drive_of_another_size(factor):
-    usual = drive_candidates(BELIEVED, ORDERS, SEEN, 1.0)
-    large = drive_candidates(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, factor)
+    usual = candidates(port_sizes(BELIEVED, ORDERS, SEEN, 1.0))
+    large = candidates(port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, factor))
     for one, other in zip(usual, large, strict=True):
         assert one.label == other.label
         shares = []
@@ -86,7 +87,7 @@ def test_every_candidate_is_the_same_on_a_drive_of_another_size(factor):
 
 def test_an_angle_stays_and_a_torque_grows():
     usual, large = (
-        drive_candidates(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, factor)
+        candidates(port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, factor))
         for factor in (1.0, 32.0)
     )
     grown = {

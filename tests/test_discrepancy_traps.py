@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from quick_campaigns import quick_campaign
 
-from pymoo_hdte.discrepancy.campaign.plausibility import LEAST_TOLERANCE
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
 from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.rules import RULES
 
 
 @pytest.fixture(scope="module", params=[1, 2])
@@ -43,7 +43,7 @@ def test_a_clean_campaign_without_a_sweep_is_adequate(clean):
 
 
 def test_a_frozen_base_makes_effects_of_its_own_errors(clean, unsearched):
-    frozen = replace(clean.believed, tolerance=LEAST_TOLERANCE)
+    frozen = replace(clean.believed, tolerance=RULES.least_tolerance)
     assert examine_drive(replace(clean, believed=frozen)).verdict.status != "adequate"
 
 

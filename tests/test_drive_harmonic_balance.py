@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from law_cases import EFFECTS, memoryless
+from law_cases import EFFECTS, LAWS, memoryless
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
@@ -19,8 +19,12 @@ from pymoo_hdte.drive import (
     preset,
     simulate_drive,
 )
-from pymoo_hdte.drive.effects import effect_from_fields
-from pymoo_hdte.drive.port_effects import LAWS, KinematicErrorLine, KinematicReaction, LawAtPort
+from pymoo_hdte.drive.effects import (
+    KinematicErrorLine,
+    KinematicReaction,
+    LawAtPort,
+    effect_from_fields,
+)
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
 from pymoo_hdte.drive.solve.steady_motion import SpeedLoop
 from pymoo_hdte.drive.solve.torus import (

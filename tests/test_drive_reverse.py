@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from law_cases import EFFECTS as FORWARD
-from law_cases import memoryless
+from law_cases import LAWS, memoryless
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import MeshStiffnessVariation, SpeedLoop, harmonic_balance, preset
-from pymoo_hdte.drive.port_effects import LAWS, LawAtPort
+from pymoo_hdte.drive.effects import LawAtPort
 from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction
 from pymoo_hdte.laws.law import Periodic

@@ -13,7 +13,6 @@ import pytest
 
 from pymoo_hdte.discrepancy.engine import excess
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
-from pymoo_hdte.discrepancy.mechanism.analysis import MAIN_SHARE
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.surrogate import TruncatedNormal
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pymoo_hdte.identification.error_statistics import holm
 from scipy import stats
 
 from pymoo_hdte.checks import InvalidInput

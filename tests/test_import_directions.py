@@ -12,7 +12,8 @@ ROOT = Path(pymoo_hdte.__file__).parent
 EXPERIMENTS = Path(experiments.__file__).parent
 LOWEST_FIRST = (
     *("checks", "lazy", "units", "compilation", "io", "laws", "reports"),
-    *("drive.solve", "drive", "mechanism", "surrogate", "validation", "identification"),
+    *("drive.solve", "drive.effects", "drive", "mechanism", "surrogate", "validation"),
+    "identification",
     *(
         "discrepancy.engine",
         "discrepancy.campaign",

@@ -8,7 +8,6 @@ from scipy.optimize import curve_fit
 from scipy.stats import t
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
@@ -16,6 +15,7 @@ from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.report.mechanism_document import effects, limits
+from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.motion import motion_of
 

@@ -9,8 +9,16 @@ import pytest
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE, read_rig
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_mechanism_model
-from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
-from pymoo_hdte.mechanism.effects import law_from_values
+from pymoo_hdte.laws.effect import effect_named
+from pymoo_hdte.mechanism import (
+    BelievedValue,
+    ErrorLine,
+    Input,
+    LawAt,
+    Loop,
+    Mechanism,
+    Port,
+)
 
 MODEL = """\
 title = "A rig"
@@ -87,9 +95,11 @@ MECHANISM = Mechanism(
     [Input("vir", {"q": 1.0}, BelievedValue(35.15))],
     [Loop("vir", "qg", "q", 38995.8, 243.45, 10.0)],
 )
-FRICTION = LawAt("coulomb_friction", "joint", law_from_values("coulomb_friction", {"level": 20.4}))
+FRICTION = LawAt(
+    "coulomb_friction", "joint", effect_named("coulomb_friction").law_of({"level": 20.4})
+)
 READING = {"order": 3.0, "phase": 0.5, "amplitude": 0.1}
-ERROR = LawAt("kinematic_error", "cell", law_from_values("kinematic_error", READING))
+ERROR = LawAt("kinematic_error", "cell", effect_named("kinematic_error").law_of(READING))
 ROWS = "t,q\n" + "".join(f"{row / 100:.2f},{row * row}\n" for row in range(20))
 
 

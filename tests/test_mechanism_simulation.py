@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset
-from pymoo_hdte.drive.port_effects import KinematicReaction
+from pymoo_hdte.drive.effects import KinematicReaction
 from pymoo_hdte.drive.solve import time_domain
 from pymoo_hdte.laws import friction
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque

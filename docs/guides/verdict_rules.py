@@ -16,8 +16,8 @@ from pymoo_hdte.discrepancy import MeasuredMechanism, analyse
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
 from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
-from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
 # %%

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pymoo_hdte.discrepancy.drive.line_candidates import ENCODER_LINE
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine.verdict import STATUSES as VERDICTS
+from pymoo_hdte.drive.effects import ENCODER_LINE
 from pymoo_hdte.virtual.hidden_forms import HIDDEN_FORMS
 
 ERROR = "error"

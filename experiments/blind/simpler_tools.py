@@ -25,7 +25,8 @@ from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.objective import LOST
 from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
-from pymoo_hdte.discrepancy.engine.candidate import Layout, Parameter
+from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.laws.unknowns import Parameter
 
 FALSE_ALARMS = 0.01
 """Chance that noise alone moves the largest of all cells, or the best of all terms, so far."""

@@ -26,6 +26,7 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest, next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.drive import DriveModel
+from pymoo_hdte.laws.effect import Effect, register
 
 ONE_THREAD = threadpool_limits.wrap(limits=1)
 """The matrices are small: threads that wait for each other cost a multiple."""
@@ -33,15 +34,15 @@ ONE_THREAD = threadpool_limits.wrap(limits=1)
 
 @overload
 def analyse(
-    measured: Campaign, effects: Sequence[Any] = (), rules: Rules = RULES
+    measured: Campaign, effects: Sequence[Effect] = (), rules: Rules = RULES
 ) -> DriveAnalysis: ...
 @overload
 def analyse(
-    measured: MeasuredMechanism, effects: Sequence[Any] = (), rules: Rules = RULES
+    measured: MeasuredMechanism, effects: Sequence[Effect] = (), rules: Rules = RULES
 ) -> MechanismAnalysis: ...
 @ONE_THREAD
 def analyse(
-    measured: Campaign | MeasuredMechanism, effects: Sequence[Any] = (), rules: Rules = RULES
+    measured: Campaign | MeasuredMechanism, effects: Sequence[Effect] = (), rules: Rules = RULES
 ) -> DriveAnalysis | MechanismAnalysis:
     """Return what the believed model lacks beside measurements.
 
@@ -55,8 +56,9 @@ def analyse(
     measured : Campaign or MeasuredMechanism
         From `read_campaign`, of a harmonic drive; from `read_rig` or made in Python, of any other
         machine.
-    effects : sequence, optional
-        Effects of your own that may be missing, beside those of the library.
+    effects : sequence of Effect, optional
+        Effects of your own that may be missing, beside those of the library. They are registered
+        if they are not yet, so that reports and model files know them.
     rules : Rules, optional
         Thresholds of the verdict.
 
@@ -68,7 +70,8 @@ def analyse(
     ------
     InvalidInput
         If too few records are to be fitted, or they cannot show what is believed: of a drive, a
-        line of its static error; of a mechanism, a channel, motion, or what sets the scale.
+        line of its static error; of a mechanism, a channel, motion, or what sets the scale. For
+        an effect whose name another one has.
 
     Examples
     --------
@@ -79,11 +82,13 @@ def analyse(
     ['torque_ripple:input@2']
     >>> problem = RobustDTE(model=analysis.revised_model())
     """
+    for effect in effects:
+        register(effect)
     if isinstance(measured, Campaign):
-        return DriveAnalysis(examine_drive(measured, effects, rules))
+        return DriveAnalysis(examine_drive(measured, rules))
     if isinstance(measured, MeasuredMechanism):
         believed = measured.mechanism, measured.records, measured.cutoff, measured.effects
-        return MechanismAnalysis(measured, examine_mechanism(*believed, effects, rules))
+        return MechanismAnalysis(measured, examine_mechanism(*believed, rules))
     raise InvalidInput("measured", type(measured).__name__, "a Campaign or a MeasuredMechanism")
 
 

@@ -1,7 +1,17 @@
 """The machine: data sheet, static error, equations of motion, steady state, time integration."""
 
 from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100, load_datasheet
-from pymoo_hdte.drive.effects import DampingReference, Effect, LoadInertia, MeshStiffnessVariation
+from pymoo_hdte.drive.effects import (
+    DampingReference,
+    DriveEffect,
+    Eccentricity,
+    KinematicErrorLine,
+    KinematicReaction,
+    LawAtPort,
+    LoadInertia,
+    MeshStiffnessVariation,
+    ThermalDrift,
+)
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.measurement import low_pass, measured_dte
 from pymoo_hdte.drive.model import (
@@ -12,8 +22,6 @@ from pymoo_hdte.drive.model import (
     load_model,
     preset,
 )
-from pymoo_hdte.drive.port_effects import KinematicErrorLine, KinematicReaction, LawAtPort
-from pymoo_hdte.drive.sensor_effects import Eccentricity, ThermalDrift
 from pymoo_hdte.drive.simulation import Run, simulate_drive
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
@@ -31,9 +39,9 @@ __all__ = [
     "Coefficients",
     "DampingReference",
     "DataSheet",
+    "DriveEffect",
     "DriveModel",
     "Eccentricity",
-    "Effect",
     "KinematicError",
     "KinematicErrorLine",
     "KinematicReaction",

@@ -21,15 +21,16 @@ from pymoo_hdte.drive.datasheet import (
     sheet_table,
     unit_of,
 )
-from pymoo_hdte.drive.effects import Effect, effect_from_fields, place_of
+from pymoo_hdte.drive.effects import DriveEffect, effect_from_fields
 from pymoo_hdte.drive.kinematic_error import KinematicError
-from pymoo_hdte.drive.port_effects import with_unit
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.hill import hill_steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.io.archive import FileFormat
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import read_toml
+from pymoo_hdte.laws.effect import place_of
+from pymoo_hdte.laws.quantities import with_unit
 from pymoo_hdte.units import ARCSEC
 
 PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")
@@ -60,7 +61,7 @@ class DriveModel:
         The drive and its rated condition.
     kinematic_error : KinematicError
         What theta_s is over the input angle.
-    effects : tuple of Effect
+    effects : tuple of DriveEffect
         In the order in which they are applied.
 
     Raises
@@ -74,7 +75,7 @@ class DriveModel:
     provenance: str
     sheet: DataSheet
     kinematic_error: KinematicError
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[DriveEffect, ...] = ()
 
     def __post_init__(self) -> None:
         places = [place_of(effect) for effect in self.effects]

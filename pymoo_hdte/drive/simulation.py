@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
 from pymoo_hdte.drive.model import PARAMETERS, DriveModel
-from pymoo_hdte.drive.solve.time_domain import StartUp, _springs, equations_of_motion
-from pymoo_hdte.laws.hysteresis import SPRINGS
+from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion, memories
 from pymoo_hdte.units import ARCSEC
 
 METHODS = ("LSODA", "DOP853", "Radau", "RK45", "BDF")
@@ -125,7 +124,7 @@ def simulate_drive(
     if times[0] < ramp:
         raise InvalidInput("settle", settle, f"at least {margin:.3g} s, the margin of the record")
 
-    memory = SPRINGS * len(_springs(coefficients))
+    memory = sum(law.states for law in memories(coefficients))
     start = np.array([start_up.angle(0.0), *np.zeros(3 + memory)])
     # theta_d is of the order of arcseconds and its rate of the order of arcseconds times 100 1/s.
     atol = np.array([1e-8, 1e-6, 1e-4 * ARCSEC, 1e-2 * ARCSEC, *[1e-4 * ARCSEC] * memory])

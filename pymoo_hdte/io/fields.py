@@ -84,8 +84,11 @@ class Fields:
         )
 
     def quantity(self, field: str, kind: str, **limits: float) -> float:
-        """Return a quantity in SI units, given as ``{ value = ..., unit = "..." }``."""
-        units = UNITS[kind]
+        """Return a quantity in SI units, given as ``{ value = ..., unit = "..." }``.
+
+        ``kind`` is one of `UNITS`, or the only unit that it may be given in, one of SI.
+        """
+        units = UNITS.get(kind, {kind: 1.0})
         allowed = f'{{ value = ..., unit = "..." }} with a unit among {", ".join(units)}'
         raw = self.take(field, allowed)
         if not isinstance(raw, Mapping) or set(raw) != {"value", "unit"}:

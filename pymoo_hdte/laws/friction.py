@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.laws.law import Aperiodic, Periodic, PortState, Response, Values
+from pymoo_hdte.laws.effect import Effect, register
+from pymoo_hdte.laws.guess import Guess, Sizes
+from pymoo_hdte.laws.law import Aperiodic, Law, Periodic, PortState, Response, Values
+from pymoo_hdte.laws.unknowns import Family, unknown, wave_starts
+
+FRICTION_PORTS = ("input", "output")
 
 SMOOTHING_SPEED = 1e-4
 """rad/s. Dry friction follows tanh(speed / this): exact to rounding wherever a drive turns, and its
@@ -33,6 +40,29 @@ class CoulombFriction(Aperiodic):
         """Return torque and tangents."""
         sign, slope = _sign(state.speed)
         return Response(self.level * sign, damping=self.level * slope)
+
+    @property
+    def breakaway(self) -> float:
+        """The level, N.m."""
+        return max(self.level, 0.0)
+
+    @property
+    def constant(self) -> float:
+        """The level, N.m."""
+        return abs(self.level)
+
+
+register(
+    Effect(
+        "coulomb_friction",
+        CoulombFriction,
+        FRICTION_PORTS,
+        {"level": "torque"},
+        "Dry friction at the {port}: a {force} that does not depend on speed.",
+        lambda sizes: [Guess((unknown("level", 0.0, sizes.largest, sizes.force),))],
+        special_case_of=("stribeck_friction", "hysteresis", "position_dependent_friction"),
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -60,6 +90,36 @@ class StribeckFriction(Aperiodic):
         falling = -2.0 * ratio / self.fading * extra * sign
         return Response((self.level + extra) * sign, damping=falling + (self.level + extra) * slope)
 
+    @property
+    def breakaway(self) -> float:
+        """Level and excess, N.m."""
+        return max(self.level + self.excess, 0.0)
+
+
+def _falling(sizes: Sizes) -> list[Guess]:
+    """Guess friction that falls with the speed, slowly or before the port moves fast."""
+    speed, force = sizes.speed, sizes.force
+    unknowns = (
+        unknown("level", 0.0, sizes.largest, force),
+        unknown("excess", 0.0, sizes.largest, 0.3 * force),
+        unknown("fading", 0.005 * speed, speed, 0.1 * speed),
+    )
+    return [Guess(unknowns, [(force, 0.3 * force, share * speed) for share in (0.02, 0.06, 0.2)])]
+
+
+register(
+    Effect(
+        "stribeck_friction",
+        StribeckFriction,
+        FRICTION_PORTS,
+        {"level": "torque", "excess": "torque", "fading": "speed"},
+        "Dry friction at the {port} that falls with speed.",
+        _falling,
+        # At the output only the friction itself shows, over a range of speeds N times as narrow.
+        sought=("input",),
+    )
+)
+
 
 @dataclass(frozen=True)
 class NonlinearDrag(Aperiodic):
@@ -76,6 +136,24 @@ class NonlinearDrag(Aperiodic):
         return Response(
             self.coefficient * state.speed * size, damping=2.0 * self.coefficient * size
         )
+
+
+def _drag(sizes: Sizes) -> list[Guess]:
+    typical = sizes.force / sizes.speed**2
+    return [Guess((unknown("coefficient", 0.0, 20.0 * typical, typical),))]
+
+
+register(
+    Effect(
+        "nonlinear_drag",
+        NonlinearDrag,
+        FRICTION_PORTS,
+        {"coefficient": "quadratic drag"},
+        "A drag at the {port} that grows faster than the speed.",
+        _drag,
+        sought=("input",),
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -95,10 +173,40 @@ class PeriodicFriction(Periodic):
         return Response(level * sign, damping=level * slope)
 
 
+def _varying(sizes: Sizes) -> list[Guess]:
+    """Guess friction that varies about a mean, which is Coulomb's."""
+    found = []
+    for family in sizes.varying:
+        mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
+        unknowns = (*family.waves("level", sizes.largest, sizes.force), mean)
+
+        def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
+            lines = family.lines(values[:-1])
+            varying = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
+            return (*varying, CoulombFriction(values[-1]))
+
+        found.append(Guess(unknowns, wave_starts(unknowns), build, family, family.form))
+    return found
+
+
+register(
+    Effect(
+        "position_dependent_friction",
+        PeriodicFriction,
+        FRICTION_PORTS,
+        {"order": "", "phase": "angle", "level": "torque"},
+        "Friction that varies with the position of the {port}, order {order}.",
+        _varying,
+        of_fit={"mean": "torque"},
+    )
+)
+
+
 @dataclass(frozen=True)
 class PeriodicTorque(Periodic):
     """A driving torque amplitude cos(order angle + phase), N.m: it acts with the motion."""
 
+    drives: ClassVar[bool] = True
     amplitude: float
 
     def __post_init__(self) -> None:
@@ -108,3 +216,36 @@ class PeriodicTorque(Periodic):
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents; negative, as the driving torque does not oppose."""
         return Response(-self.amplitude * self.cosine(state))
+
+    @property
+    def driving(self) -> complex:
+        """Its phasor, N.m: the torque is the motor's."""
+        return complex(self.amplitude * np.exp(1j * self.phase))
+
+
+def _ripple(sizes: Sizes) -> list[Guess]:
+    found = []
+    for family in sizes.lines:
+        unknowns = family.waves("amplitude", sizes.largest, sizes.force)
+
+        def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
+            lines = family.lines(values)
+            return tuple(
+                PeriodicTorque(order, phase, amplitude) for order, amplitude, phase in lines
+            )
+
+        found.append(Guess(unknowns, wave_starts(unknowns), build, family, family.form))
+    return found
+
+
+register(
+    Effect(
+        "torque_ripple",
+        PeriodicTorque,
+        ("input",),
+        {"order": "", "phase": "angle", "amplitude": "torque"},
+        "A ripple at the {port}, order {order} of its position, that acts on the motion.",
+        _ripple,
+        exact=True,
+    )
+)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.compilation import compiled
+from pymoo_hdte.laws.effect import Effect, register
+from pymoo_hdte.laws.guess import Guess, Sizes
 from pymoo_hdte.laws.law import Aperiodic, PortState, Response, Values
+from pymoo_hdte.laws.unknowns import unknown
 
 SPRINGS = 4
 
@@ -25,6 +29,7 @@ class MaxwellSlip(Aperiodic):
     Al-Bender, Lampaert, Swevers, IEEE Trans. Automatic Control 50 (2005).
     """
 
+    states: ClassVar[int] = SPRINGS
     force: float
     torsion: float
     spread: float = 1.0
@@ -61,14 +66,52 @@ class MaxwellSlip(Aperiodic):
         weights = self._stiffnesses[:, None, None] * sticking * (last >= 0)
         return weights, np.maximum(last, 0)
 
-    def rates(self, speed: float, stretch: Values) -> Values:
+    def rates(self, speed: float, kept: Values) -> Values:
         """Return how fast the springs stretch, (4,), for an integrator that keeps their state."""
-        slipping = (np.abs(stretch) >= self._slips) & (stretch * speed > 0.0)
+        slipping = (np.abs(kept) >= self._slips) & (kept * speed > 0.0)
         return np.where(slipping, 0.0, speed)
 
-    def torque(self, stretch: Values) -> float:
+    def torque(self, kept: Values) -> float:
         """Return the torque of stretched springs (4,), N.m."""
-        return float(self._stiffnesses @ np.clip(stretch, -self._slips, self._slips))
+        return float(self._stiffnesses @ np.clip(kept, -self._slips, self._slips))
+
+    def moved(self, kept: Values, way: float) -> Values:
+        """Return how far springs (4,) are stretched after a way (rad) without a turn."""
+        return np.clip(kept + way, -self._slips, self._slips)
+
+    def tangent(self, kept: Values, direction: float) -> float:
+        """Return the slope of the torque in a direction: at the slip, that of the way it moves."""
+        return float(self._stiffnesses @ np.abs(self.rates(direction, kept)))
+
+    @property
+    def shortest(self) -> float:
+        """The torsion of full slip, rad."""
+        return self.torsion
+
+
+def _slipping(sizes: Sizes) -> list[Guess]:
+    """Guess springs that slip; in a motion without a reversal they would be dry friction."""
+    if not sizes.both_ways:
+        return []
+    travel, force = sizes.travel, sizes.force
+    unknowns = (
+        unknown("force", 0.0, sizes.largest, force),
+        unknown("torsion", 0.003 * travel, 2.0 * travel, 0.1 * travel),
+        unknown("spread", 0.3, 4.0, 1.5),
+    )
+    return [Guess(unknowns, [(force, share * travel, 1.5) for share in (0.03, 0.1, 0.4)])]
+
+
+register(
+    Effect(
+        "hysteresis",
+        MaxwellSlip,
+        ("mesh",),
+        {"force": "torque", "torsion": "angle", "spread": ""},
+        "The {force} at the {port} lags behind the motion: springs that slip.",
+        _slipping,
+    )
+)
 
 
 def slip_along(path: Values, slips: Values) -> tuple[Values, Values]:

@@ -3,14 +3,15 @@
 A port is a place where two parts move against each other: ``input`` (wave generator against the
 housing), ``output`` (circular spline against the housing), ``mesh`` (the torsion d). A law answers
 with the torque that opposes the motion; which port it stands at decides which effect it is. The
-laws themselves are in `friction`, `stiffness` and `hysteresis`.
+laws themselves are in `friction`, `stiffness`, `hysteresis` and `linear`, each beside the `Effect`
+that says everything else about it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,9 +74,115 @@ class Law(Protocol):
         """Return torque and tangents for the motion at the port."""
         ...
 
+    @property
+    def states(self) -> int:
+        """See `Behaviour`, which gives a law this and the following."""
+        ...
+
+    @property
+    def breakaway(self) -> float:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def constant(self) -> float:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def driving(self) -> complex:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def rattles(self) -> bool:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def varies_stiffness(self) -> bool:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def drives(self) -> bool:
+        """See `Behaviour`."""
+        ...
+
+    def with_input_locked(self) -> Law | None:
+        """See `Behaviour`."""
+        ...
+
+
+class Memory(Law, Protocol):
+    """A law whose force hangs on the way so far, by inner states that solvers keep.
+
+    Attributes
+    ----------
+    states : int
+        Number of inner states, above 0; all are 0 at rest, and of the unit of the motion.
+    shortest : float
+        The least way in which a state changes its course, m or rad: what integrators resolve.
+    """
+
+    shortest: float
+
+    def rates(self, speed: float, kept: Values) -> Values:
+        """Return how fast the states (states,) change at a speed of the port."""
+        ...
+
+    def moved(self, kept: Values, way: float) -> Values:
+        """Return the states after a way without a turn."""
+        ...
+
+    def torque(self, kept: Values) -> float:
+        """Return the force or torque that the states make."""
+        ...
+
+    def tangent(self, kept: Values, direction: float) -> float:
+        """Return the slope of the force by the position, moving in a direction, 1 or -1."""
+        ...
+
+    def recall(self, path: Values) -> tuple[Values, NDArray[np.int_]]:
+        """Return how forces along paths (n, steps) hang on earlier steps: weights and steps.
+
+        Both of shape (k, n, steps): the force changes by minus weight times the change of the
+        position at that step, beside what ``respond`` gives as its slope.
+        """
+        ...
+
+
+class Behaviour:
+    """What solvers and sensors ask of a law beyond its force; a law overrides what is its own."""
+
+    states: ClassVar[int] = 0
+    """Number of inner states; above 0 the law is a `Memory`."""
+    rattles: ClassVar[bool] = False
+    """Whether the law takes the spring of its port away, so that parts may lose contact."""
+    drives: ClassVar[bool] = False
+    """Whether the force is the drive's own and acts on the motion, whatever its direction."""
+    varies_stiffness: ClassVar[bool] = False
+    """Whether it is K depth cos(order angle + phase) times the position, with these three numbers:
+    then Hill's method and the stability of the drive know it too."""
+
+    @property
+    def breakaway(self) -> float:
+        """Force up to which the law holds a port at rest."""
+        return 0.0
+
+    @property
+    def constant(self) -> float:
+        """Size of the force, where it is one constant against the motion at any speed, or 0."""
+        return 0.0
+
+    @property
+    def driving(self) -> complex:
+        """Phasor of the force of a law that drives, which a sensor of that force sees; 0 else."""
+        return 0.0
+
 
 @dataclass(frozen=True)
-class Aperiodic:
+class Aperiodic(Behaviour):
     """Base of laws that depend on no angle."""
 
     @property
@@ -83,9 +190,13 @@ class Aperiodic:
         """No orders."""
         return ()
 
+    def with_input_locked(self) -> Law | None:
+        """Return what the law is at the mesh while the input is locked: itself."""
+        return cast(Law, self)
+
 
 @dataclass(frozen=True)
-class Periodic:
+class Periodic(Behaviour):
     """Base of laws that vary with an angle as cos(order angle + phase)."""
 
     order: float
@@ -99,6 +210,13 @@ class Periodic:
     def orders(self) -> tuple[float, ...]:
         """The one order."""
         return (self.order,)
+
+    def with_input_locked(self) -> Law | None:
+        """Return what the law is at the mesh while the input is locked at an unknown angle.
+
+        On average over all angles, where a cosine is nothing.
+        """
+        return None
 
     def cosine(self, state: PortState) -> Values:
         """Return the cosine at the port."""

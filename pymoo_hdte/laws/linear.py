@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pymoo_hdte.checks import real_number
+from pymoo_hdte.laws.effect import Effect, register
 from pymoo_hdte.laws.friction import SMOOTHING_SPEED
+from pymoo_hdte.laws.guess import Guess, Sizes
 from pymoo_hdte.laws.law import Aperiodic, PortState, Response
+from pymoo_hdte.laws.unknowns import unknown
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,24 @@ class ConstantForce(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return force and tangents."""
         return Response(np.full_like(state.position, self.force))
+
+
+def _offset(sizes: Sizes) -> list[Guess]:
+    """Guess a constant force, which only two directions tell from dry friction."""
+    most = sizes.largest
+    return [Guess((unknown("force", -most, most, sizes.force),))] if sizes.both_ways else []
+
+
+register(
+    Effect(
+        "force_offset",
+        ConstantForce,
+        (),
+        {"force": "torque"},
+        "A constant {force} at the {port}: gravity, or a bias.",
+        _offset,
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -49,6 +70,31 @@ class DirectionalFriction(Aperiodic):
         return Response(force * moving, damping=force * slope + self.viscous * sign * moving)
 
 
+def _one_sided(sizes: Sizes) -> list[Guess]:
+    """Guess what two directions tell from friction that is the same in both."""
+    if not sizes.both_ways:
+        return []
+    force, slope = sizes.force, sizes.force / sizes.speed
+    steepest = sizes.largest / sizes.speed
+    unknowns = (
+        unknown("level", -sizes.largest, sizes.largest, force),
+        unknown("viscous", -steepest, steepest, slope),
+    )
+    return [Guess(unknowns, [(force, 0.0), (0.0, slope), (force, -slope)])]
+
+
+register(
+    Effect(
+        "direction_dependent_friction",
+        DirectionalFriction,
+        (),
+        {"level": "torque", "viscous": "damping"},
+        "Friction at the {port} that is not the same in both directions.",
+        _one_sided,
+    )
+)
+
+
 @dataclass(frozen=True)
 class LinearSpring(Aperiodic):
     """T = coefficient d: a spring from position zero; N/m or N.m/rad."""
@@ -63,6 +109,24 @@ class LinearSpring(Aperiodic):
         return Response(self.coefficient * state.position, self.coefficient)
 
 
+def _spring(sizes: Sizes) -> list[Guess]:
+    typical, most = sizes.force / sizes.travel, sizes.largest / sizes.travel
+    # Where a spring is believed to stand, its stiffness is a quantity of the machine.
+    return [] if sizes.stiffness else [Guess((unknown("coefficient", 0.0, most, typical),))]
+
+
+register(
+    Effect(
+        "linear_stiffness",
+        LinearSpring,
+        (),
+        {"coefficient": "stiffness"},
+        "There is a spring at the {port} where none is believed.",
+        _spring,
+    )
+)
+
+
 @dataclass(frozen=True)
 class LinearDamper(Aperiodic):
     """T = coefficient speed; N.s/m or N.m.s/rad."""
@@ -75,3 +139,20 @@ class LinearDamper(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return force and tangents."""
         return Response(self.coefficient * state.speed, damping=self.coefficient)
+
+
+def _damper(sizes: Sizes) -> list[Guess]:
+    typical, most = sizes.force / sizes.speed, sizes.largest / sizes.speed
+    return [] if sizes.damping else [Guess((unknown("coefficient", 0.0, most, typical),))]
+
+
+register(
+    Effect(
+        "viscous_friction",
+        LinearDamper,
+        (),
+        {"coefficient": "damping"},
+        "There is a friction that grows with speed at the {port} where none is believed.",
+        _damper,
+    )
+)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import expit
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.laws.law import Aperiodic, Periodic, PortState, Response, Values
+from pymoo_hdte.laws.effect import Effect, register
+from pymoo_hdte.laws.guess import Guess, Sizes
+from pymoo_hdte.laws.law import Aperiodic, Law, Periodic, PortState, Response, Values
+from pymoo_hdte.laws.unknowns import Family, Parameter, polar, unknown, wave
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,41 @@ class HardeningStiffness(Aperiodic):
         return Response(torque, slope)
 
 
+def _sharpness() -> Parameter:
+    """Guess the corner of a curve: from no corner to one that measured points cannot resolve."""
+    return unknown("sharpness", 1.0, 20.0, 3.0)
+
+
+def _hardening(sizes: Sizes) -> list[Guess]:
+    """Guess a cubic, and for a port that is wound up by a load also a corner on the way."""
+    if sizes.stiffness == 0.0:
+        return []
+    travel, typical = sizes.travel, sizes.force / sizes.travel**3
+    found = [Guess((unknown("coefficient", 0.0, 20.0 * typical, typical),))]
+    if sizes.loaded:
+        corner = (
+            unknown("stiffening", 0.0, 0.9, 0.2),
+            unknown("torsion", 0.05 * travel, travel, 0.4 * travel),
+            _sharpness(),
+        )
+        starts = [(0.2, share * travel, 3.0) for share in (0.25, 0.5)]
+        sentence = "The {port} grows stiffer beyond a {force}."
+        found.append(Guess(corner, starts, form="corner", sentence=sentence))
+    return found
+
+
+register(
+    Effect(
+        "hardening_stiffness",
+        HardeningStiffness,
+        ("mesh",),
+        {"coefficient": "cubic stiffness", "stiffening": "", "torsion": "angle", "sharpness": ""},
+        "The {port} grows stiffer with its deflection.",
+        _hardening,
+    )
+)
+
+
 @dataclass(frozen=True)
 class SoftWindup(Aperiodic):
     """T = -softening K torsion g(d / torsion): K is lower by this share near zero torsion.
@@ -70,6 +110,30 @@ class SoftWindup(Aperiodic):
         return Response(-lost * wound, -lost * slope)
 
 
+def _soft(sizes: Sizes) -> list[Guess]:
+    if sizes.stiffness == 0.0:
+        return []
+    travel = sizes.travel
+    unknowns = (
+        unknown("softening", 0.0, 0.95, 0.2),
+        unknown("torsion", 1e-3 * travel, travel, 0.2 * travel),
+        _sharpness(),
+    )
+    return [Guess(unknowns, [(0.2, share * travel, 3.0) for share in (0.05, 0.15, 0.4)])]
+
+
+register(
+    Effect(
+        "soft_windup",
+        SoftWindup,
+        ("mesh",),
+        {"softening": "", "torsion": "angle", "sharpness": ""},
+        "The {port} is softer near its rest position.",
+        _soft,
+    )
+)
+
+
 def _wound(position: Values, torsion: float, sharpness: float) -> tuple[Values, Values]:
     """Return torsion x g(position / torsion), which ends at the torsion, and its slope."""
     share = position / torsion
@@ -82,6 +146,7 @@ def _wound(position: Values, torsion: float, sharpness: float) -> tuple[Values, 
 class PeriodicStiffness(Periodic):
     """T = depth K cos(order angle + phase) d: what a varying stiffness adds to its mean."""
 
+    varies_stiffness: ClassVar[bool] = True
     depth: float
 
     def __post_init__(self) -> None:
@@ -116,6 +181,7 @@ def _soft_plus(x: Values) -> Values:
 class DeadZone(Aperiodic):
     """T = K (dz(d) - d): no spring torque within +-half_width (rad) of zero torsion."""
 
+    rattles: ClassVar[bool] = True
     half_width: float
 
     def __post_init__(self) -> None:
@@ -124,6 +190,27 @@ class DeadZone(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
         return _dead_zone(state, self.half_width)
+
+
+def _play(sizes: Sizes) -> list[Guess]:
+    if sizes.stiffness == 0.0:
+        return []
+    travel = sizes.travel
+    width = unknown("half_width", 0.0, 0.5 * travel, 0.05 * travel)
+    return [Guess((width,), [(0.02 * travel,), (0.1 * travel,)])]
+
+
+register(
+    Effect(
+        "backlash",
+        DeadZone,
+        ("mesh",),
+        {"half_width": "angle"},
+        "There is play at the {port}.",
+        _play,
+        special_case_of=("clearance_variation",),
+    )
+)
 
 
 @dataclass(frozen=True)
@@ -139,6 +226,7 @@ class PeriodicClearance(Periodic):
         is known: of a rig, not of a drive.
     """
 
+    rattles: ClassVar[bool] = True
     half_width: float
     variation: float
     locked: float | None = field(default=None, compare=False)
@@ -155,7 +243,52 @@ class PeriodicClearance(Periodic):
         """Half-width where the input was locked, rad."""
         return self.half_width if self.locked is None else self.locked
 
+    def with_input_locked(self) -> Law | None:
+        """Return the clearance where the input was locked, its mean where that is not known."""
+        return DeadZone(self.at_rest)
+
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
         width = self.half_width + self.variation * self.cosine(state)
         return _dead_zone(state, np.maximum(width, 0.0))
+
+
+def _uneven(sizes: Sizes) -> list[Guess]:
+    """Guess a play that varies with the shaft, by half of what it is and more.
+
+    Its least width is an unknown of its own: a play that would fall below nothing stays there, and
+    no search finds its way out of that.
+    """
+    if sizes.stiffness == 0.0:
+        return []
+    travel, found = sizes.travel, []
+    size, widest = 0.02 * travel, 0.5 * travel
+    for order in sizes.expected:
+
+        def build(values: Sequence[float], order: float = order) -> tuple[Law, ...]:
+            variation, phase = polar(values[0], values[1])
+            half_width = values[2] + variation
+            return (PeriodicClearance(order, phase, half_width, variation, values[3]),)
+
+        unknowns = (
+            *wave("variation", widest / 2.0, size),
+            unknown("narrowest", 0.0, widest, size, linear=True),
+            unknown("locked", 0.0, 2.0 * widest, size, linear=True),
+        )
+        shapes = ((1, 0, 1, 1), (0, 1, 1, 1), (0, 0, 1, 1), (0, 0, 1, 2))
+        starts = [[size * one for one in shape] for shape in shapes]
+        found.append(Guess(unknowns, starts, build, Family((order,))))
+    return found
+
+
+register(
+    Effect(
+        "clearance_variation",
+        PeriodicClearance,
+        ("mesh",),
+        {"order": "", "phase": "angle", "half_width": "angle", "variation": "angle"},
+        "The play at the {port} varies, order {order} of the shaft.",
+        _uneven,
+        of_fit={"narrowest": "angle", "locked": "angle"},
+    )
+)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.law import Law, PortState, periodic_phase
+from pymoo_hdte.laws.law import Law, Memory, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Loop, Mechanism, Port
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 from pymoo_hdte.mechanism.records import Record
@@ -36,9 +35,9 @@ class PortForce:
         self.lines = [(mechanism.coordinates.index(one.coordinate), one) for one in port.error]
         self.turning = [line.order * np.eye(len(self.row))[place] for place, line in self.lines]
         self.turning += [order * self.row for law in laws for order in law.orders]
-        self.laws = [law for law in laws if not isinstance(law, MaxwellSlip)]
-        self.slips = [law for law in laws if isinstance(law, MaxwellSlip)]
-        self.stretches = [np.zeros_like(law._slips) for law in self.slips]
+        self.laws = [law for law in laws if not law.states]
+        self.memories = [cast(Memory, law) for law in laws if law.states]
+        self.kept = [np.zeros(law.states) for law in self.memories]
         self.since = self.motion(begin)[0]
 
     def motion(self, states: Values) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
@@ -71,37 +70,37 @@ class PortForce:
                 # A law's slope holds the phase, which turns with the position here.
                 turned = law.respond(replace(here, phase=periodic_phase(d + _TURN)))
                 stiffness += np.asarray(turned.torque - found.torque).item() / _TURN
-        for law, stretch in zip(self.slips, self.stretches, strict=True):
-            moved = stretch + (d - self.since)
+        for law, kept in zip(self.memories, self.kept, strict=True):
+            moved = kept + (d - self.since)
             force += law.torque(moved)
-            # At the slip the tangent is that of the way in which it moves.
-            sticking = np.abs(law.rates(math.copysign(1.0, rate), moved))
-            stiffness += float(law._stiffnesses @ sticking)
+            stiffness += law.tangent(moved, math.copysign(1.0, rate))
         slopes[0], slopes[1] = stiffness * self.row, damping * self.row
         for place, slope, bend in bends:
             slopes[:, place] += stiffness * slope + damping * bend, damping * slope
         return force, 0.0
 
     def turns(self, before: Values, after: Values, step: float, rtol: float) -> float:
-        """Return the share of a step after which slipping springs turn back, 1 for none."""
+        """Return the share of a step after which laws with memory turn back, 1 for none."""
         first, last = self.motion(before)[1], self.motion(after)[1]
         missed = min(abs(first), abs(last)) * step
-        if first * last >= 0.0 or missed <= rtol * min(law.torsion for law in self.slips):
+        if first * last >= 0.0 or missed <= rtol * min(law.shortest for law in self.memories):
             return 1.0
         return float(min(max(first / (first - last), 0.01), 0.99))
 
     def settle(self, state: Values) -> None:
-        """Keep how far springs are stretched, which up to a turn only the way decides."""
+        """Keep the inner states of laws, which up to a turn only the way decides."""
         d = self.motion(state)[0]
-        for law, stretch in zip(self.slips, self.stretches, strict=True):
-            stretch[:] = np.clip(stretch + (d - self.since), -law._slips, law._slips)
+        for law, kept in zip(self.memories, self.kept, strict=True):
+            kept[:] = law.moved(kept, d - self.since)
         self.since = d
 
     def along(self, path: Values) -> Values:
         """Return the force on a path of shape (n, 2, coordinates)."""
         d, rate, _ = self.motion(path)
         stiffness, damping = self.spring
-        laws = [law_force(law, PortMotion(d, rate), stiffness) for law in (*self.laws, *self.slips)]
+        laws = [
+            law_force(law, PortMotion(d, rate), stiffness) for law in (*self.laws, *self.memories)
+        ]
         return np.asarray(stiffness * d + damping * rate + sum(laws))
 
 
@@ -109,6 +108,7 @@ class Command:
     """What a loop commands."""
 
     linear = False
+    memories: tuple[Memory, ...] = ()
     turning: tuple[Values, ...] = ()
 
     def __init__(self, loop: Loop, mechanism: Mechanism, record: Record) -> None:

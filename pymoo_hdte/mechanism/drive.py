@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.drive.model import PARAMETERS, DriveModel
-from pymoo_hdte.drive.port_effects import LawAtPort
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.mechanism.mechanism import BelievedValue, ErrorLine, Input, LawAt, Mechanism, Port
 
@@ -66,8 +65,8 @@ def drive_mechanism(
             Input("load_torque", {"output_angle": -1.0}),
         ),
     )
-    laws = [effect for effect in model.effects if isinstance(effect, LawAtPort)]
-    return mechanism, tuple(LawAt(effect.name, effect.port, effect.law) for effect in laws)
+    standing = [(effect.name, effect.at_port()) for effect in model.effects]
+    return mechanism, tuple(LawAt(name, *place) for name, place in standing if place is not None)
 
 
 def _refuse(coefficients: Coefficients) -> None:

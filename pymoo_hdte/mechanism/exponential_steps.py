@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ class ExponentialIntegrator:
     ) -> None:
         n = len(inertias)
         self.curved = [one for one in forces if not one.linear]
-        self.memories = [one for one in self.curved if isinstance(one, PortForce) and one.slips]
+        self.memories = [cast(PortForce, one) for one in self.curved if one.memories]
         linear, whole = np.zeros((2, n, n)), np.zeros((2, n, n))
         for one in forces:
             slopes = one.slopes[:, None] * (one.column / inertias)[:, None]

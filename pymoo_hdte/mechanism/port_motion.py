@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.law import Law, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Port
 from pymoo_hdte.mechanism.motion import SmoothedMotion
@@ -39,8 +38,8 @@ def law_force(law: Law, motion: PortMotion | SmoothedMotion, stiffness: float) -
 
     ``stiffness`` is that of its port, N/m or N.m/rad.
     """
-    # Springs that slip start unstretched, wherever the position has its zero.
-    rests = isinstance(law, MaxwellSlip)
+    # Laws with memory start from rest, wherever the position has its zero.
+    rests = law.states > 0
     state = PortState(
         motion.position - rests * motion.position[0],
         motion.speed,

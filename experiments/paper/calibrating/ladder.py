@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive import (
     DampingReference,
+    DriveEffect,
     DriveModel,
-    Effect,
     KinematicError,
     LoadInertia,
     MeshStiffnessVariation,
@@ -127,7 +127,7 @@ class Candidate:
         )
 
 
-def _effect(name: str, parameters: dict[str, float]) -> Effect:
+def _effect(name: str, parameters: dict[str, float]) -> DriveEffect:
     if name == LoadInertia.name:
         return LoadInertia(parameters["load_inertia"])
     if name == DampingReference.name:

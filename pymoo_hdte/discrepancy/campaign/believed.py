@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.drive import DampingReference, Effect, LoadInertia
-from pymoo_hdte.drive.effects import place_of
+from pymoo_hdte.drive import DampingReference, DriveEffect, LoadInertia
+from pymoo_hdte.laws.effect import place_of
 from pymoo_hdte.units import ARCSEC
 
 MECHANICAL = (
@@ -68,7 +68,7 @@ class BelievedDrive:
     error_amplitudes: tuple[float, ...]
     tolerance: float = 0.1
     error_tolerance: float = 0.3
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[DriveEffect, ...] = ()
     tolerances: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def tolerance_of(self, name: str) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,17 +13,17 @@ from threadpoolctl import threadpool_limits
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
-from pymoo_hdte.discrepancy.drive.candidates import OfDrives, drive_candidates
+from pymoo_hdte.discrepancy.drive.candidates import candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
 from pymoo_hdte.discrepancy.drive.prediction import moves_steadily
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
-
-CLEARANCES = ("backlash", "clearance_variation")
+from pymoo_hdte.laws.effect import effect_named
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +80,7 @@ def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
 
 
 @threadpool_limits.wrap(limits=1)
-def examine_drive(
-    campaign: Campaign, effects: Sequence[OfDrives] = (), rules: Rules = RULES
-) -> DriveFinding:
+def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     """Return the verdict on a campaign.
 
     In one thread: the matrices are small, and threads that wait for each other cost a multiple.
@@ -91,8 +88,6 @@ def examine_drive(
     Parameters
     ----------
     campaign : Campaign
-    effects : sequence of OfDrives
-        Effects that may be missing beside those of the library.
     rules : Rules
         Thresholds of the verdict.
 
@@ -114,15 +109,16 @@ def examine_drive(
         orders = _apart(unexpected, campaign, expected, rules)
         features = measure(campaign, campaign.train, orders)
     data = training_data(campaign, features, rules)
-    if any(effect.name in CLEARANCES for effect in campaign.believed.effects):
+    if any(effect_named(effect.name).rattles for effect in campaign.believed.effects):
         data = _loaded(data)
     _check_steady(data)
     base = fit(data)
-    listed = _candidates(data, base, effects)
-    if leading_sweep_effect(data, base, listed) in CLEARANCES:
+    listed = _candidates(data, base)
+    leading = leading_sweep_effect(data, base, listed)
+    if leading is not None and effect_named(leading).rattles:
         data = _loaded(data)
         base = fit(data)
-        listed = _candidates(data, base, effects)
+        listed = _candidates(data, base)
     verdict = judge(data, base, listed)
     data, verdict = _with_noise_of(verdict, data, listed)
     return DriveFinding(campaign, data, verdict, tuple(unexpected))
@@ -166,13 +162,12 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
     return (data, verdict) if again.chosen is None else (renewed, again)
 
 
-def _candidates(data: Data, base: Fit, effects: Sequence[OfDrives]) -> list[Candidate]:
+def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
     seen = _strong_lines(features, base, data.rules)
     campaign = data.campaign
-    return drive_candidates(
-        campaign.believed, features.orders.tolist(), seen, campaign.torque_scale, effects
-    )
+    believed, orders = campaign.believed, features.orders.tolist()
+    return candidates(port_sizes(believed, orders, seen, campaign.torque_scale), believed.effects)
 
 
 def _loaded(data: Data) -> Data:

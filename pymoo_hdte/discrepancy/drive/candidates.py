@@ -1,70 +1,41 @@
-"""The library: every effect that the workflow can name."""
+"""The library: every registered effect that could be in a drive, as candidates of a campaign."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import chain
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
-from pymoo_hdte.discrepancy.drive.friction_candidates import friction_candidates
-from pymoo_hdte.discrepancy.drive.line_candidates import line_candidates
-from pymoo_hdte.discrepancy.drive.mesh_candidates import mesh_candidates
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine import candidate
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter, unknown
-from pymoo_hdte.drive import DampingReference, KinematicReaction, LoadInertia, ThermalDrift
-from pymoo_hdte.drive.effects import place_of
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, candidate_of
+from pymoo_hdte.drive.effects import DriveEffect, DriveSizes, LawAtPort, drive_effects
+from pymoo_hdte.laws.effect import effect_named, place_of
+from pymoo_hdte.laws.unknowns import Parameter
 
 _OF_THEIR_OWN = ("load_inertia", "damping")
 """Base parameters for which an effect of another name stands in the library."""
 
 
-class OfDrives(Protocol):
-    """An effect that may be missing in a drive."""
-
-    def drive_candidates(
-        self,
-        believed: BelievedDrive,
-        orders: Sequence[float],
-        seen: Sequence[float],
-        torque_scale: float,
-    ) -> Sequence[Candidate]:
-        """Return what a fit may add; parameters as those of the function of this name."""
-        ...
-
-
-def drive_candidates(
-    believed: BelievedDrive,
-    orders: Sequence[float],
-    seen: Sequence[float],
-    torque_scale: float,
-    effects: Sequence[OfDrives] = (),
+def candidates(
+    sizes: Mapping[str, DriveSizes], believed: Sequence[DriveEffect] = ()
 ) -> list[Candidate]:
-    """Return all candidates for a drive, none of them where a believed effect stands.
+    """Return all candidates for a drive, for the sizes of each of its ports.
 
-    Parameters
-    ----------
-    believed : BelievedDrive
-    orders : sequence of float
-        All orders of the features.
-    seen : sequence of float
-        Orders at which something was seen, for effects whose order is not known beforehand.
-    torque_scale : float
-        Of the campaign: how much larger its torques are than those the library is sized for.
-    effects : sequence of OfDrives
-        Further effects that may be missing.
+    None of them stands where a believed effect does.
     """
-    own = [effect.drive_candidates(believed, orders, seen, torque_scale) for effect in effects]
-    known = {place_of(effect) for effect in believed.effects}
+    known = {place_of(effect) for effect in believed}
     found = [
-        *mesh_candidates(believed, orders, torque_scale),
-        *friction_candidates(believed.ratio, orders, torque_scale),
-        *line_candidates(believed, orders, seen, torque_scale),
-        *_others(believed),
-        *chain.from_iterable(own),
+        candidate_of(effect, guess, port, "torque", _standing, sizes[port].slower)
+        for effect in drive_effects()
+        for port in effect.sought_at
+        for guess in effect.guesses(sizes[port])
     ]
     return [one for one in found if not one.places & known]
+
+
+def _standing(name: str, port: str, part: Any) -> Any:
+    """Return a law at its port; what is no law stands in a drive as it is."""
+    return LawAtPort(name, port, part) if effect_named(name).change is None else part
 
 
 def out_of_tolerance(base: Sequence[Parameter], at_bounds: Sequence[str]) -> list[Candidate]:
@@ -77,44 +48,4 @@ def out_of_tolerance(base: Sequence[Parameter], at_bounds: Sequence[str]) -> lis
         candidate.out_of_tolerance(name, name.replace("_", " "))
         for name in at_bounds
         if name in MECHANICAL and name not in _OF_THEIR_OWN and believed[name] > 0.0
-    ]
-
-
-def _others(believed: BelievedDrive) -> list[Candidate]:
-    inertia = max(believed.load_inertia, 10.0 * believed.output_inertia)
-    return [
-        Candidate(
-            "kinematic_reaction",
-            "input",
-            (unknown("share", -3.0, 3.0, 1.0),),
-            ((1.0,),),
-            lambda v: (KinematicReaction(v[0]),),
-            "The mesh torque acts back on the input through the slope of the static error.",
-            exact=True,
-        ),
-        Candidate(
-            "load_inertia",
-            "output",
-            (unknown("inertia", 0.0, 10 * inertia, 0.3 * inertia),),
-            ((0.15 * inertia,), (0.4 * inertia,), (1.0 * inertia,)),
-            lambda v: (LoadInertia(v[0]),),
-            "There is more inertia on the output than believed.",
-            exact=True,
-        ),
-        Candidate(
-            "damping_reference",
-            "mesh",
-            (unknown("factor", 0.02, 50.0, 2.0),),
-            ((3.0,), (0.4,), (8.0,)),
-            lambda v: (DampingReference(v[0] / believed.ratio**2),),
-            "The damping of the torsion is referred to another shaft than believed.",
-        ),
-        Candidate(
-            "thermal_drift",
-            "sensor",
-            (unknown("rate", -1e-6, 1e-6, 1e-9), unknown("time", 50.0, 1e5, 1000.0)),
-            ((1e-9, 200.0), (1e-9, 1000.0), (1e-9, 1e4)),
-            lambda v: (ThermalDrift(v[0], v[1]),),
-            "The reading of the output angle drifts with time.",
-        ),
     ]

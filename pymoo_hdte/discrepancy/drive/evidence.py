@@ -20,11 +20,12 @@ from pymoo_hdte.discrepancy.drive.observations import (
 )
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Response
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.drive import Effect
+from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.laws.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ class Data(Observations):
         before_torsion = self.torsion_residuals(base, fitted.effects)
         priors = np.zeros(len(fitted.residuals) - before.size - before_torsion.size)
 
-        def change(added: Sequence[Effect]) -> Vector:
+        def change(added: Sequence[DriveEffect]) -> Vector:
             effects = (*fitted.effects, *added)
             running = self.whiten(self.predict(base, effects, stands.balance) - before)[0]
             torsion = self.torsion_residuals(base, effects) - before_torsion

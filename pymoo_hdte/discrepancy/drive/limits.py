@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, highest_order
-from pymoo_hdte.discrepancy.engine.candidate import harmonics_among
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
+from pymoo_hdte.laws.unknowns import harmonics_among
 
 _SAME_ORDER = 1e-6
 """Largest distance at which a line is that of an order: one beside it is not predicted for it."""

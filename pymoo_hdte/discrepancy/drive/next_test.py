@@ -18,12 +18,10 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.features import MEANS
-from pymoo_hdte.discrepancy.drive.line_candidates import ENCODER_LINE
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.drive import LawAtPort
-from pymoo_hdte.laws.friction import CoulombFriction
+from pymoo_hdte.drive.effects import ENCODER_LINE
 
 TESTS = ("running", "torsion_sweep", "reclocked_encoder")
 
@@ -169,12 +167,10 @@ def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit) -> Proposal | Non
     """
     one_way = len({record.input_speed > 0.0 for record in finding.campaign.train}) == 1
     for candidate, parts in zip(chosen.candidates, chosen.effects_by_candidate, strict=True):
-        effect = parts[0] if parts else None
-        if not (one_way and isinstance(effect, LawAtPort) and effect.port == "input"):
+        placed = parts[0].at_port() if parts else None
+        if not one_way or placed is None or placed[0] != "input" or not placed[1].constant:
             continue
-        if not isinstance(effect.law, CoulombFriction):
-            continue
-        level = abs(effect.law.level)
+        level = placed[1].constant
         triangles = grid.data.whiteners
         row = triangles[:, MEANS.index(CHANNELS.index("input_torque"))]
         influence = grid.model(chosen).influence[: len(row)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.drive.observations import Observations
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Unknowns, Vector, built
-from pymoo_hdte.drive import Effect, SteadyMotion
+from pymoo_hdte.drive import DriveEffect, SteadyMotion
 
 LOST = 1e3
 """Residual of a point at which the model cannot carry the torque."""
@@ -77,7 +77,7 @@ class Objective(Unknowns):
         return np.array(features), np.concatenate([np.array(sweeps), priors], axis=1)
 
     def _torsion(
-        self, vectors: NDArray[np.float64], effects: tuple[Effect, ...]
+        self, vectors: NDArray[np.float64], effects: tuple[DriveEffect, ...]
     ) -> NDArray[np.float64]:
         return np.nan_to_num(self.data.torsion_residuals(vectors, effects), nan=LOST)
 
@@ -91,14 +91,14 @@ class Objective(Unknowns):
         )
         return (features[1:] - features[0]) / steps[:, None, None]
 
-    def _parts(self, values: Vector) -> tuple[NDArray[np.float64], tuple[Effect, ...]]:
+    def _parts(self, values: Vector) -> tuple[NDArray[np.float64], tuple[DriveEffect, ...]]:
         """Return the base parameters as one row, and the effects."""
         n_base = len(self.data.base)
         parts = built(self.candidates, values[n_base:])
         return values[None, :n_base], tuple(effect for part in parts for effect in part)
 
     def _features(
-        self, vectors: NDArray[np.float64], effects: tuple[Effect, ...]
+        self, vectors: NDArray[np.float64], effects: tuple[DriveEffect, ...]
     ) -> NDArray[np.float64]:
         """Return predicted features, the first vector's steady states being kept to begin from."""
         prediction = self.data.prediction(vectors, effects, self.nearby)

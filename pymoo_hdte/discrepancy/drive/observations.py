@@ -23,8 +23,9 @@ from pymoo_hdte.discrepancy.drive.features import (
 )
 from pymoo_hdte.discrepancy.drive.prediction import Prediction, coefficients_of, predict
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
-from pymoo_hdte.discrepancy.engine.candidate import Layout, Parameter
-from pymoo_hdte.drive import Effect, SteadyMotion, mean_torsion
+from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.drive import DriveEffect, SteadyMotion, mean_torsion
+from pymoo_hdte.laws.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 Values = NDArray[np.float64]
@@ -43,7 +44,7 @@ class Observations:
         Sweeps with the input locked.
     reference : ndarray, shape (n_base,), optional
         Base values at which the repeatability is carried to all channels; by default the starts.
-    reference_effects : tuple of Effect
+    reference_effects : tuple of DriveEffect
         Effects that are there then: a resonance that they move magnifies what does not repeat.
     """
 
@@ -52,7 +53,7 @@ class Observations:
     base: tuple[Parameter, ...]
     torsion: tuple[TorsionPoints, ...] = ()
     reference: Vector | None = None
-    reference_effects: tuple[Effect, ...] = ()
+    reference_effects: tuple[DriveEffect, ...] = ()
 
     @cached_property
     def whiteners(self) -> NDArray[np.float64]:
@@ -87,13 +88,13 @@ class Observations:
         return covariance
 
     def predict(
-        self, vectors: Vector, effects: Sequence[Effect], start: SteadyMotion | None = None
+        self, vectors: Vector, effects: Sequence[DriveEffect], start: SteadyMotion | None = None
     ) -> NDArray[np.float64]:
         """Return features, shape (v, r, f), of vectors (v, n_base) of base parameters."""
         return self.features.of_prediction(self.prediction(vectors, effects, start))
 
     def prediction(
-        self, vectors: Vector, effects: Sequence[Effect], start: SteadyMotion | None = None
+        self, vectors: Vector, effects: Sequence[DriveEffect], start: SteadyMotion | None = None
     ) -> Prediction:
         """Return what `predict` is made of, steady states included."""
         values = self._named(vectors)
@@ -105,7 +106,9 @@ class Observations:
     def _named(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}
 
-    def torsion_residuals(self, vectors: Vector, effects: Sequence[Effect]) -> NDArray[np.float64]:
+    def torsion_residuals(
+        self, vectors: Vector, effects: Sequence[DriveEffect]
+    ) -> NDArray[np.float64]:
         """Return whitened residuals (v, n_points) of the sweeps; none where there is no sweep."""
         values = self._named(vectors)
         coefficients = coefficients_of(self.campaign.believed, values, effects, 1)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pymoo_hdte.discrepancy.campaign.believed import MECHANICAL, BelievedDrive, Rig
-from pymoo_hdte.discrepancy.engine.candidate import Parameter
+from pymoo_hdte.laws.unknowns import Parameter
 
 __all__ = ["MECHANICAL", "READING", "base_parameters"]
 
@@ -22,6 +22,24 @@ READING = (
     "output_torque_zero",
 )
 """Constant of the transmission error (rad), gains (relative) and zeros (N.m) of torque sensors."""
+
+BASE_UNITS = {
+    "stiffness": "N.m/rad",
+    "damping": "N.m.s/rad",
+    "input_inertia": "kg.m2",
+    "input_damping": "N.m.s/rad",
+    "output_damping": "N.m.s/rad",
+    "load_inertia": "kg.m2",
+    "error_amplitude": "rad",
+    "error_phase": "rad",
+    "offset": "rad",
+    "locked_stiffness": "1",
+    "input_torque_gain": "1",
+    "input_torque_zero": "N.m",
+    "output_torque_gain": "1",
+    "output_torque_zero": "N.m",
+}
+"""SI units of the base parameters, by name; those of lines without their number."""
 
 
 def base_parameters(

@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy.drive.prediction import Conditions
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.drive import Effect
+from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 _SPEEDS = 4
@@ -103,7 +103,7 @@ class Grid:
         predicted = self.predict(fitted.values[: len(self.data.base)], fitted.effects)
         return Model(label, predicted, self._by_test(influence))
 
-    def predict(self, base: Values, effects: Sequence[Effect]) -> Values:
+    def predict(self, base: Values, effects: Sequence[DriveEffect]) -> Values:
         """Return predictions in units of the noise, (n_tests, f)."""
         running = self.data.whiten(self.data.predict(base[None], effects))[0]
         torsion = np.nan_to_num(self.data.torsion_residuals(base[None], effects)[0])

@@ -17,22 +17,17 @@ from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.drive import (
     Coefficients,
-    Eccentricity,
-    Effect,
-    LawAtPort,
+    DriveEffect,
     SpeedLoop,
     SteadyMotion,
-    ThermalDrift,
     harmonic_balance,
 )
+from pymoo_hdte.drive.effects import Session
 from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
 from pymoo_hdte.drive.solve.steady_motion import BY_CASE
 from pymoo_hdte.drive.solve.torus import Torus
-from pymoo_hdte.laws.friction import PeriodicTorque
-from pymoo_hdte.laws.stiffness import DeadZone, PeriodicClearance
 
-CLEARANCES = (DeadZone, PeriodicClearance)
 TOLERANCE = 1e-7
 """Of the harmonic balance: far below the noise, and twice as fast as full precision."""
 
@@ -81,7 +76,7 @@ def predict(
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
-    effects: Sequence[Effect] = (),
+    effects: Sequence[DriveEffect] = (),
     start: SteadyMotion | None = None,
 ) -> Prediction:
     """Return what the sensors would show.
@@ -94,7 +89,7 @@ def predict(
         Lines asked for, in cycles per input turn.
     values : dict of ndarray, shape (v,)
         Parameters by name, those of `parameters.base_parameters`.
-    effects : sequence of Effect
+    effects : sequence of DriveEffect
         Beside the believed ones; shared by all vectors.
     start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
@@ -109,7 +104,7 @@ def predict(
     present = (*believed.effects, *effects)
     channels = [
         balance.transmission_error,
-        balance.motor_torque + _driving(balance, present),
+        balance.motor_torque + _driving(balance, coefficients),
         balance.coupling_torque,
         balance.lead,
     ]
@@ -148,7 +143,7 @@ def steady_motions(
         )
 
     torus, every = torus_of(coefficients), np.arange(len(speed))
-    if not any(isinstance(law, CLEARANCES) for _, law in coefficients.laws):
+    if not any(law.rattles for _, law in coefficients.laws):
         balance = solve(coefficients, every, torus)
         if np.all(balance.converged):
             return balance
@@ -201,7 +196,7 @@ def _merged(held: SteadyMotion, plain: SteadyMotion, places: NDArray[np.bool_]) 
 def coefficients_of(
     believed: BelievedDrive,
     values: dict[str, NDArray[np.float64]],
-    effects: Sequence[Effect],
+    effects: Sequence[DriveEffect],
     records: int,
 ) -> Coefficients:
     """Return the coefficients of all rows, vectors outermost, believed effects first."""
@@ -242,14 +237,13 @@ def _line(
     return phasors[:, column].conj() if conjugate else phasors[:, column]
 
 
-def _driving(balance: SteadyMotion, effects: Sequence[Effect]) -> NDArray[np.complex128]:
+def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
     """Return the harmonics of a motor's ripple, which its torque sensor sees; (1, n_harmonics)."""
     total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
-    for effect in effects:
-        if isinstance(effect, LawAtPort) and isinstance(law := effect.law, PeriodicTorque):
-            column, conjugate = balance.torus.place(law.order)
-            phasor = law.amplitude * np.exp(1j * law.phase)
-            total[:, column] += phasor.conjugate() if conjugate else phasor
+    for port, law in coefficients.laws:
+        for order in law.orders if port == "input" and law.drives else ():
+            column, conjugate = balance.torus.place(order)
+            total[:, column] += law.driving.conjugate() if conjugate else law.driving
     return total
 
 
@@ -258,21 +252,18 @@ def _read(
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
-    effects: Sequence[Effect],
+    effects: Sequence[DriveEffect],
     mean: NDArray[np.float64],
     phasors: NDArray[np.complex128],
 ) -> None:
     """Add in place what the sensors add: offset, drift, eccentricity, gains and zeros."""
     mean[..., 0] += values["offset"][:, None]
+    session = Session(orders, believed.ratio, conditions.elapsed, conditions.bends)
     for effect in effects:
-        if isinstance(effect, ThermalDrift):
-            left = np.einsum("kr,rkm->rm", effect.bends(conditions.elapsed), conditions.bends)
-            mean[..., 0] -= effect.after(conditions.elapsed) + left[:, 0].real
-            phasors[..., 0, :] -= left[:, 1:]
-        if isinstance(effect, Eccentricity):
-            line = np.isclose(orders, effect.order / believed.ratio)
-            # theta_out is theta_in / N but for the transmission error, a part in 10^3.
-            phasors[..., 0, line] -= effect.amplitude * np.exp(1j * effect.phase)
+        added = effect.reading_lines(session)
+        if added is not None:
+            mean[..., 0] -= added[0]
+            phasors[..., 0, :] -= added[1]
     for channel, name in ((1, "input_torque"), (2, "output_torque")):
         gain = 1.0 + values[f"{name}_gain"][:, None]
         mean[..., channel] = gain * mean[..., channel] + values[f"{name}_zero"][:, None]

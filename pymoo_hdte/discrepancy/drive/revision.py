@@ -20,8 +20,8 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive import (
     DampingReference,
     DataSheet,
+    DriveEffect,
     DriveModel,
-    Effect,
     KinematicError,
     LoadInertia,
     OrderSpectrum,
@@ -29,6 +29,7 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.drive.datasheet import Nominal
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
+from pymoo_hdte.laws.effect import Place, place_of
 from pymoo_hdte.units import ARCSEC
 
 SHEET_FILE = "revised_model_sheet.toml"
@@ -107,19 +108,16 @@ def _peak_to_peak(believed: BelievedDrive, amplitudes: list[float], phases: list
     return float(spectrum.peak_to_peak(believed.ratio)[0])
 
 
-def _merged(effects: tuple[Effect, ...], load_inertia: float, ratio: float) -> tuple[Effect, ...]:
+def _merged(
+    effects: tuple[DriveEffect, ...], load_inertia: float, ratio: float
+) -> tuple[DriveEffect, ...]:
     """Return all effects, those of the believed drive included; a model takes each once."""
-    factor = 1.0
-    others: list[Effect] = []
-    for effect in effects:
-        if isinstance(effect, LoadInertia):
-            load_inertia += effect.inertia
-        elif isinstance(effect, DampingReference):
-            # In the fit it stood in front of c, here in front of B_fc = c / N^2.
-            factor *= effect.factor * ratio**2
-        else:
-            others.append(effect)
-    return (LoadInertia(load_inertia), DampingReference(factor), *others)
+    merged: dict[Place, DriveEffect] = {}
+    believed = (LoadInertia(load_inertia), DampingReference(1.0))
+    for effect in (*believed, *(effect.on_sheet(ratio) for effect in effects)):
+        place = place_of(effect)
+        merged[place] = merged[place].joined(effect) if place in merged else effect
+    return tuple(merged.values())
 
 
 def _sheet(campaign: Campaign, values: Mapping[str, float], static_error: float) -> DataSheet:

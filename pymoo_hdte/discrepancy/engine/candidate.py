@@ -1,30 +1,22 @@
 """A candidate: one effect that the workflow can name, with its unknowns, their ranges, its words.
 
-A candidate turns a vector of values into effects of the drive model; the laws themselves stand in
-`pymoo_hdte.drive`. Amplitude and phase of a line are searched as its cosine and sine parts, in
-which the prediction is close to linear. A periodic effect brings its harmonics along: a ripple of
-order 6 with a little of order 12 is one effect and not two.
+A candidate turns a vector of values into what a model of the machine takes as effects. What it is
+made of stands with the effect: see `pymoo_hdte.laws.guess`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.drive import Effect
-from pymoo_hdte.drive.effects import Place, place_of
-
-Values = Sequence[float]
-
-HARMONIC_NAMES = ("", "second_", "third_")
-"""Prefixes of the parameters of a line's harmonics."""
-_LINEAR = ("_cosine", "_sine", "mean", "narrowest", "locked")
-_HARMONIC_SHARE = 0.2
-"""Typical size of a further harmonic, as a share of the first."""
+from pymoo_hdte.laws.effect import Effect, Place, place_of
+from pymoo_hdte.laws.guess import Guess
+from pymoo_hdte.laws.unknowns import Parameter, Values
 
 
 @dataclass(frozen=True)
@@ -39,7 +31,7 @@ class Candidate:
     starts : tuple of tuple of float
         Where the joint fit begins, and the directions that the screening tries.
     build : callable
-        From values to the effects of the drive model that make it up.
+        From values to the effects of the model that make it up.
     sentence : str
         What it is, for the report.
     order : float or None
@@ -54,19 +46,22 @@ class Candidate:
         Base parameter whose tolerance it lifts.
     form : str
         In a word, where the library holds several forms of one effect.
+    unit : callable or None
+        From an unknown, or the line that two of them are parts of, to its SI unit.
     """
 
     name: str
     port: str
     parameters: tuple[Parameter, ...]
     starts: tuple[tuple[float, ...], ...]
-    build: Callable[[Values], tuple[Effect, ...]]
+    build: Callable[[Values], tuple[Any, ...]]
     sentence: str
     order: float | None = None
     exact: bool = False
     listed: bool = True
     frees: str | None = None
     form: str = ""
+    unit: Callable[[str], str] | None = None
 
     @property
     def label(self) -> str:
@@ -90,12 +85,56 @@ class Candidate:
 
         Each of `starts` then goes along one of them.
         """
-        return all(one.name.endswith(_LINEAR) for one in self.parameters)
+        return all(one.linear for one in self.parameters)
 
     @property
     def unknowns(self) -> int:
         """Number of parameters that it adds to a fit or sets free."""
         return len(self.parameters) + (self.frees is not None)
+
+
+def candidate_of(
+    effect: Effect,
+    guess: Guess,
+    port: str,
+    force: str,
+    standing: Callable[[str, str, Any], Any],
+    slower: float = 1.0,
+) -> Candidate:
+    """Return an effect at a port as a candidate.
+
+    Parameters
+    ----------
+    effect : Effect
+    guess : Guess
+        The form in which it may be there.
+    port : str
+    force : str
+        What acts at the port, in a word.
+    standing : callable
+        From the name of an effect, port and law (or what else it is) to what a model takes.
+    slower : float
+        Turns of the reference shaft, in whose turns orders are, per turn of the port.
+    """
+    family = guess.family
+    order = None if family is None or family.order is None else family.order / slower
+    orders = family.words if family else ""
+    sentence = guess.sentence or effect.sentence
+    return Candidate(
+        guess.name or effect.name,
+        port,
+        guess.unknowns,
+        guess.begins,
+        lambda values: tuple(
+            standing(name, port, part) for name, part in effect.parts(guess, values)
+        ),
+        sentence.format(port=port, order=orders, force=force),
+        order,
+        effect.exact,
+        listed=not guess.name,
+        form=guess.form,
+        unit=effect.unit,
+    )
 
 
 def out_of_tolerance(name: str, words: str) -> Candidate:
@@ -110,97 +149,6 @@ def out_of_tolerance(name: str, words: str) -> Candidate:
         exact=True,
         frees=name,
     )
-
-
-def unknown(name: str, lower: float, upper: float, typical: float) -> Parameter:
-    """Return a parameter that starts at its typical size."""
-    return Parameter(name, typical, lower, upper, abs(typical))
-
-
-def wave(name: str, largest: float, typical: float, harmonics: int = 1) -> tuple[Parameter, ...]:
-    """Return the cosine and sine parts of a line and of its harmonics.
-
-    Parameters
-    ----------
-    name : str
-        Of the amplitude.
-    largest, typical : float
-        Amplitudes.
-    harmonics : int
-        1 for the line alone.
-    """
-    found = []
-    for place, prefix in enumerate(HARMONIC_NAMES[:harmonics]):
-        size = typical if place == 0 else _HARMONIC_SHARE * typical
-        start = typical if place == 0 else 0.0
-        found.append(Parameter(f"{prefix}{name}_cosine", start, -largest, largest, size))
-        found.append(Parameter(f"{prefix}{name}_sine", 0.0, -largest, largest, size))
-    return tuple(found)
-
-
-def wave_starts(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:
-    """Return one start along each part of a `wave`, and along its mean."""
-    sizes = np.diag([parameter.scale for parameter in parameters])
-    return tuple(tuple(row) for row in sizes.tolist())
-
-
-def lines_of(values: Values) -> list[tuple[int, float, float]]:
-    """Return (multiple of the order, amplitude, phase) for the values of a `wave`."""
-    parts = np.reshape(values, (-1, 2))
-    return [(place + 1, *polar(cosine, sine)) for place, (cosine, sine) in enumerate(parts)]
-
-
-def harmonics_among(orders: Sequence[float], order: float, most: int) -> int:
-    """Return how many of order, 2 order, 3 order, ... the ``orders`` hold; at least 1."""
-    count = 1
-    while count < most and any(abs((count + 1) * order - one) < 1e-6 for one in orders):
-        count += 1
-    return count
-
-
-def line_with_variance(
-    cosine: float, sine: float, covariance: NDArray[np.float64]
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return amplitude and phase of a line, each with its variance.
-
-    ``covariance`` is that of its cosine and sine part, shape (2, 2). A phase is never less certain
-    than one of which nothing is known.
-    """
-    amplitude, phase = polar(cosine, sine)
-    along = np.array([np.cos(phase), np.sin(phase)])
-    across = np.array([-np.sin(phase), np.cos(phase)])
-    sidewise = float(across @ covariance @ across)
-    nothing_known = np.pi**2 / 3.0
-    of_phase = sidewise / amplitude**2 if sidewise < nothing_known * amplitude**2 else nothing_known
-    return (amplitude, float(along @ covariance @ along)), (phase, of_phase)
-
-
-def polar(cosine: float, sine: float) -> tuple[float, float]:
-    """Return amplitude and phase of cosine cos(x) - sine sin(x) = amplitude cos(x + phase)."""
-    return float(np.hypot(cosine, sine)), float(np.arctan2(sine, cosine))
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One unknown.
-
-    Attributes
-    ----------
-    name : str
-    start, lower, upper : float
-        SI.
-    scale : float
-        Its natural size, the unit of the search.
-    prior : float
-        Standard deviation around ``start``; infinite for a parameter with bounds only.
-    """
-
-    name: str
-    start: float
-    lower: float
-    upper: float
-    scale: float
-    prior: float = np.inf
 
 
 @dataclass(frozen=True)

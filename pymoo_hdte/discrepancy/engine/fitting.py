@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout, Parameter
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.drive import Effect
+from pymoo_hdte.laws.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 Response = Callable[[Sequence[Any]], Vector]
@@ -56,12 +56,12 @@ class Fit:
         return float(self.residuals @ self.residuals)
 
     @property
-    def effects(self) -> tuple[Effect, ...]:
+    def effects(self) -> tuple[Any, ...]:
         """The fitted effects."""
         return tuple(effect for parts in self.effects_by_candidate for effect in parts)
 
     @property
-    def effects_by_candidate(self) -> tuple[tuple[Effect, ...], ...]:
+    def effects_by_candidate(self) -> tuple[tuple[Any, ...], ...]:
         """The fitted effects of each candidate."""
         return built(self.candidates, self.values[len(self.values) - count(self.candidates) :])
 
@@ -258,7 +258,7 @@ def count(candidates: Sequence[Candidate]) -> int:
 
 def built(
     candidates: Sequence[Candidate], values: Sequence[float] | Vector
-) -> tuple[tuple[Effect, ...], ...]:
+) -> tuple[tuple[Any, ...], ...]:
     """Return the effects of each of the candidates for their values, one after the other."""
     effects, start = [], 0
     for candidate in candidates:

@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.candidate import HARMONIC_NAMES, Candidate
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
+from pymoo_hdte.laws.unknowns import HARMONIC_NAMES
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,11 +27,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
-from pymoo_hdte.discrepancy.mechanism.candidates import (
-    CONTAINED,
-    OfMechanisms,
-    mechanism_candidates,
-)
+from pymoo_hdte.discrepancy.mechanism.candidates import mechanism_candidates
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.mechanism.preconditions import (
@@ -40,6 +36,7 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     check_signals,
     usual_cutoff,
 )
+from pymoo_hdte.laws.effect import is_contained
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 
@@ -113,7 +110,6 @@ def examine_mechanism(
     records: Sequence[Record],
     cutoff: float | None = None,
     known: Sequence[LawAt] = (),
-    effects: Sequence[OfMechanisms] = (),
     rules: Rules = RULES,
 ) -> MechanismFinding:
     """Return the verdict on records of a mechanism.
@@ -132,8 +128,6 @@ def examine_mechanism(
         Hz, up to which the motion is known; by default where it ceases to stand out of its noise.
     known : sequence of LawAt
         Effects that the mechanism is known to have.
-    effects : sequence of OfMechanisms
-        Effects that may be missing beside those of the library.
     rules : Rules
         Thresholds of the verdict.
 
@@ -157,13 +151,13 @@ def examine_mechanism(
     sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
     base = fit(sensors)
-    candidates = _candidates(sensors, base, effects)
+    candidates = _candidates(sensors, base)
     data = _with_rest(sensors, base, candidates)
     verdict = _judged(sensors, data, candidates)
     return MechanismFinding(mechanism, tuple(records), cutoff, data, verdict)
 
 
-def _candidates(data: MeasuredData, base: Fit, effects: Sequence[OfMechanisms]) -> list[Candidate]:
+def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
     left = dict(zip(data.names, root_mean_square(data, base.residuals), strict=True))
     forces = {
         port.name: left[port.name]
@@ -171,7 +165,7 @@ def _candidates(data: MeasuredData, base: Fit, effects: Sequence[OfMechanisms]) 
         else max(left[name] / abs(share) for name, share in port.motion.items() if share)
         for port in data.mechanism.ports
     }
-    return mechanism_candidates(data, forces, position_orders(data, base), effects)
+    return mechanism_candidates(data, forces, position_orders(data, base))
 
 
 def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:
@@ -290,7 +284,7 @@ def _contains(one: Rival, chosen: Rival) -> bool:
     """Tell whether a set of effects differs from another by laws that contain the other's only."""
     return all(
         candidate.port == other.port
-        and (candidate.name == other.name or candidate.name in CONTAINED.get(other.name, ()))
+        and (candidate.name == other.name or is_contained(other.name, candidate.name))
         for candidate, other in zip(
             *(sorted(each.candidates, key=lambda c: c.port) for each in (one, chosen)), strict=True
         )

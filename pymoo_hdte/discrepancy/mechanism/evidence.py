@@ -14,10 +14,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, Parameter, out_of_tolerance
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, out_of_tolerance
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Response, Unknowns, Vector, built
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
+from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import ForceBalance, balance_names, quantity_names
 
@@ -256,7 +257,7 @@ class BalanceObjective(Unknowns):
 
     def _effects(self, values: Vector) -> tuple[LawAt, ...]:
         parts = built(self.candidates, values)
-        return tuple(effect for part in parts for effect in part)  # type: ignore[misc]
+        return tuple(effect for part in parts for effect in part)
 
 
 def measured_data(

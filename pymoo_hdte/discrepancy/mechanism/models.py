@@ -10,8 +10,11 @@ from typing import Any
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import toml_text, toml_with_lines
+from pymoo_hdte.laws.effect import effect_named
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
-from pymoo_hdte.mechanism.effects import EFFECTS, OF_READINGS, law_from_values, values_of
+from pymoo_hdte.mechanism.effects import (
+    law_effects,
+)
 from pymoo_hdte.mechanism.mechanism import NOTHING
 
 
@@ -64,8 +67,8 @@ def model_text(model: MechanismModel) -> str:
     Raises
     ------
     InvalidInput
-        For what `read_mechanism_model` would refuse: an effect whose name is none of `EFFECTS` or
-        whose port is not there, an empty title, a limit or cutoff that is not positive.
+        For what `read_mechanism_model` would refuse: an effect that is not registered or whose
+        port is not there, an empty title, a limit or cutoff that is not positive.
     """
     mechanism = model.mechanism
     top: dict[str, Any] = {"title": model.title}
@@ -83,7 +86,10 @@ def model_text(model: MechanismModel) -> str:
         {name: one for name, one in vars(loop).items() if one != float("inf")}
         for loop in mechanism.loops
     ]
-    rows = [{"name": one.name, "port": one.port, **values_of(one)} for one in model.effects]
+    rows = [
+        {"name": one.name, "port": one.port, **effect_named(one.name).numbers_of(one.law)}
+        for one in model.effects
+    ]
     # The reader takes no empty array of tables.
     top |= {name: array for name, array in (("loops", loops), ("effects", rows)) if array}
     # What cannot be read back is better refused now than when the text is needed.
@@ -201,14 +207,15 @@ def _loop(row: Fields, inputs: Collection[str], coordinates: Collection[str]) ->
 
 
 def _effect(row: Fields, place: str, mechanism: Mechanism) -> LawAt:
-    name, port = row.choice("name", EFFECTS), row.choice("port", mechanism.port_names)
-    if name in OF_READINGS and not mechanism.port(port).read:
+    name = row.choice("name", [one.name for one in law_effects()])
+    effect, port = effect_named(name), row.choice("port", mechanism.port_names)
+    if effect.of_reading and not mechanism.port(port).read:
         allowed = f"a port with read = true: {name} is what its force sensor shows"
         raise InvalidInput(f"{place}.port", port, allowed)
-    numbers = {one: row.number(one) for one in EFFECTS[name][1] if row.has(one)}
+    numbers = {one: row.number(one) for one in effect.quantities if row.has(one)}
     row.finish()
     try:
-        return LawAt(name, port, law_from_values(name, numbers))
+        return LawAt(name, port, effect.law_of(numbers))
     except InvalidInput as error:
         field = error.field.removeprefix(f"{name}.")
         raise InvalidInput(f"{place}.{field}", error.value, error.allowed) from None

@@ -160,9 +160,9 @@ def _separation(
                 imitated += [position, speed, np.gradient(speed)]
                 for sign, one in ((1.0, chosen), (-1.0, rival)):
                     for effect in one.fit.effects:
-                        if effect.port == port.name:  # type: ignore[attr-defined]
+                        if effect.port == port.name:
                             scaled = PortMotion(position, speed)
-                            force = law_force(effect.law, scaled, port.stiffness.value)  # type: ignore[attr-defined]
+                            force = law_force(effect.law, scaled, port.stiffness.value)
                             difference += sign * share * force
         base = np.column_stack(imitated)
         left = difference - base @ np.linalg.lstsq(base, difference, rcond=None)[0]

@@ -13,66 +13,19 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
-from pymoo_hdte.discrepancy.engine.candidate import (
-    HARMONIC_NAMES,
-    Candidate,
-    Parameter,
-    in_words,
-    line_with_variance,
-)
+from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.laws.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
 SCHEMA_VERSION = 1
 """Of ``verdict.json``: it grows when a field goes, or changes its name, type or meaning."""
 
 _DEVIATIONS = 1.959964
 """Half-width of a central 95 % interval of a normal value, in standard deviations."""
-
-UNITS = {
-    "stiffness": "N.m/rad",
-    "damping": "N.m.s/rad",
-    "input_inertia": "kg.m2",
-    "input_damping": "N.m.s/rad",
-    "output_damping": "N.m.s/rad",
-    "load_inertia": "kg.m2",
-    "offset": "rad",
-    "locked_stiffness": "1",
-    "input_torque_gain": "1",
-    "input_torque_zero": "N.m",
-    "output_torque_gain": "1",
-    "output_torque_zero": "N.m",
-    "error_amplitude": "rad",
-    "error_phase": "rad",
-    "coefficient": "N.m/rad3",
-    "softening": "1",
-    "stiffening": "1",
-    "sharpness": "1",
-    "spread": "1",
-    "torsion": "rad",
-    "half_width": "rad",
-    "force": "N.m",
-    "depth": "1",
-    "level": "N.m",
-    "mean": "N.m",
-    "narrowest": "rad",
-    "locked": "rad",
-    "variation": "rad",
-    "excess": "N.m",
-    "fading": "rad/s",
-    "amplitude": "rad",
-    "share": "1",
-    "inertia": "kg.m2",
-    "factor": "1",
-    "rate": "rad/s",
-    "time": "s",
-    "phase": "rad",
-    "torque_ripple.amplitude": "N.m",
-    "nonlinear_drag.coefficient": "N.m.s2/rad2",
-}
-"""Of parameters, by name or, where the name has several meanings, by effect and name."""
 
 
 def verdict_document(
@@ -192,30 +145,32 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> di
     for row in rows:
         name, variance = fitted.parameters[row].name, fitted.covariance[row, row]
         if name.endswith("_cosine"):
-            found |= _line(name.removesuffix("_cosine"), candidate.name, fitted, row)
+            found |= _line(name.removesuffix("_cosine"), candidate, fitted, row)
         elif not name.endswith("_sine"):
-            found[name] = quantity(fitted.values[row], variance, candidate.name, name)
+            found[name] = quantity(fitted.values[row], variance, _unit(candidate, name))
     return found
 
 
-def _line(name: str, effect: str, fitted: Fit, row: int) -> dict[str, Any]:
+def _unit(candidate: Candidate, name: str) -> str:
+    return BASE_UNITS[name] if candidate.unit is None else candidate.unit(name)
+
+
+def _line(name: str, candidate: Candidate, fitted: Fit, row: int) -> dict[str, Any]:
     """Return amplitude and phase, with intervals, of the cosine part at a row and the sine next."""
     rows = np.array([row, row + 1])
     covariance = fitted.covariance[np.ix_(rows, rows)]
     cosine, sine = fitted.values[rows]
     amplitude, phase = line_with_variance(cosine, sine, covariance)
     prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
-    quantity_name = name.removeprefix(prefix)
     return {
-        name: quantity(*amplitude, effect, quantity_name),
-        f"{prefix}phase": quantity(*phase, effect, "phase"),
+        name: quantity(*amplitude, _unit(candidate, name.removeprefix(prefix))),
+        f"{prefix}phase": quantity(*phase, _unit(candidate, "phase")),
     }
 
 
-def quantity(value: float, variance: float, effect: str, name: str) -> dict[str, Any]:
+def quantity(value: float, variance: float, unit: str) -> dict[str, Any]:
     """Return a value with its unit and its 95 % interval."""
     half = _DEVIATIONS * float(np.sqrt(max(variance, 0.0)))
-    unit = UNITS.get(f"{effect}.{name}", UNITS.get(name, ""))
     return {
         "value": float(value),
         "unit": unit,
@@ -229,7 +184,7 @@ def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
     found = {}
     for row, parameter in enumerate(fitted.parameters[: len(fitted.parameters) - added]):
         kind = parameter.name.rstrip("0123456789").rstrip("_")
-        entry = quantity(fitted.values[row], fitted.covariance[row, row], "base", kind)
+        entry = quantity(fitted.values[row], fitted.covariance[row, row], BASE_UNITS[kind])
         entry["interval95"] = _within_bounds(parameter, entry["interval95"], rules)
         found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
     return found

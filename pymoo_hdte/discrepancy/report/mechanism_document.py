@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words, line_with_variance
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Rival
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
@@ -20,7 +20,8 @@ from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
-from pymoo_hdte.mechanism.effects import values_of
+from pymoo_hdte.laws.effect import effect_named
+from pymoo_hdte.laws.unknowns import line_with_variance
 
 
 def mechanism_document(
@@ -49,7 +50,10 @@ def mechanism_document(
         ],
         "base": quantities(finding),
         **with_believed_effects(
-            [{"name": one.name, "port": one.port, **values_of(one)} for one in finding.data.known]
+            [
+                {"name": one.name, "port": one.port, **effect_named(one.name).numbers_of(one.law)}
+                for one in finding.data.known
+            ]
         ),
         "location": locate_in_mechanism(finding).summary(),
         "remainder": remainder(finding),

@@ -11,15 +11,16 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
+from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
 from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
-from pymoo_hdte.discrepancy.engine.candidate import Parameter, in_words
+from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Rival,
     adequate,
     unexplained,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.report.document import UNITS
+from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 METRICS = {
@@ -256,7 +257,7 @@ def _parameter_row(
     half_width: float,
     at_bounds: tuple[str, ...],
 ) -> ParameterRow:
-    name, unit, size = parameter.name, _shown(UNITS.get(parameter.name, "")), 1.0
+    name, unit, size = parameter.name, _shown(BASE_UNITS.get(parameter.name, "")), 1.0
     if name.startswith(("error_amplitude_", "error_phase_")):
         kind, line = name.rsplit("_", 1)
         unit, size = ("arcsec", ARCSEC) if kind == "error_amplitude" else ("rad", 1.0)

@@ -14,6 +14,7 @@ The mean of 1/w is that of the wanted speed, whose sign w has: a drive may turn 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +22,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.steady_motion import CONSTANT_TORQUE, Phasors, SpeedLoop
 from pymoo_hdte.drive.solve.torus import Matrices, Torus
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.law import PortState, Response
+from pymoo_hdte.laws.law import Memory, PortState, Response
 
 _STATIC_STEPS = 8
 
@@ -170,14 +170,14 @@ class AngleEquations:
 
         Shape (n, 2 H, 2 H), to be added to what ``mesh_slope`` gives.
         """
-        springs = [law for _, law in self.coefficients.laws if isinstance(law, MaxwellSlip)]
-        if not springs:
+        memories = [cast(Memory, law) for _, law in self.coefficients.laws if law.states]
+        if not memories:
             return None
         along = self._path(self.torus.signal(torsion))
         every = np.arange(self.torus.size, dtype=float)
         passed = self._path(np.tile(every, (len(along), 1)))
         total = np.zeros((len(along), *[2 * len(self.torus.orders)] * 2))
-        for law in springs:
+        for law in memories:
             weights, steps = law.recall(along)
             places = np.take_along_axis(np.broadcast_to(passed, steps.shape), steps, axis=2)
             on_grid = np.array([self._back(one) for one in weights])

@@ -12,6 +12,7 @@ stands here once.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,7 +125,7 @@ class Coefficients:
     @property
     def stiffness_variations(self) -> tuple[PeriodicStiffness, ...]:
         """All that the stiffness varies by with the input angle: its own order 2, and laws."""
-        laws = tuple(law for _, law in self.laws if isinstance(law, PeriodicStiffness))
+        laws = tuple(cast(PeriodicStiffness, law) for _, law in self.laws if law.varies_stiffness)
         if self.stiffness_depth == 0.0:
             return laws
         return (PeriodicStiffness(2.0, self.stiffness_phase, self.stiffness_depth), *laws)

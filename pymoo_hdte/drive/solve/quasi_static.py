@@ -13,9 +13,7 @@ import numpy as np
 
 from pymoo_hdte.checks import finite_array
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.laws.friction import CoulombFriction, StribeckFriction
 from pymoo_hdte.laws.law import Law, PortState, Response, Values, periodic_phase
-from pymoo_hdte.laws.stiffness import DeadZone, PeriodicClearance, PeriodicStiffness
 
 _STEPS = 100
 _TOLERANCE = 1e-12
@@ -165,15 +163,10 @@ class _Leg:
 def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     """Yield the legs of the path from rest."""
     torque = finite_array("torque", torque, (None,))
-    mesh_laws = tuple(
-        _at_mean(law)
-        for port, law in coefficients.laws
-        if port == "mesh" and not isinstance(law, PeriodicStiffness)
-    )
+    locked = [law.with_input_locked() for port, law in coefficients.laws if port == "mesh"]
+    mesh_laws = tuple(law for law in locked if law is not None)
     mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
-    held = _play(
-        torque, sum(_breakaway(law) for port, law in coefficients.laws if port == "output")
-    )
+    held = _play(torque, sum(law.breakaway for port, law in coefficients.laws if port == "output"))
     steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
     moving = np.flatnonzero(moves)
     turning = moving[1:][moves[moving[1:]] * moves[moving[:-1]] < 0.0]
@@ -184,20 +177,6 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
         yield _Leg(mesh, steps[rows], held[rows], torsion, before, turns)
         before = torsion[:, -1:]
         turns = np.hstack([turns, before])
-
-
-def _at_mean(law: Law) -> Law:
-    return DeadZone(law.at_rest) if isinstance(law, PeriodicClearance) else law
-
-
-def _breakaway(law: Law) -> float:
-    """Return the torque at which dry friction gives way, N.m."""
-    match law:
-        case StribeckFriction():
-            return max(law.level + law.excess, 0.0)
-        case CoulombFriction():
-            return max(law.level, 0.0)
-    return 0.0
 
 
 def _play(torque: Values, breakaway: float) -> Values:

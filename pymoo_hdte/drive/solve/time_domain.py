@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -17,8 +18,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.law import PORTS, Law, PortState, periodic_phase
+from pymoo_hdte.laws.law import PORTS, Law, Memory, PortState, periodic_phase
 
 
 def smooth_step(x: float) -> tuple[float, float]:
@@ -91,7 +91,8 @@ def equations_of_motion(
         return dry("input", 0.0, rate, 0.0) + dry("output", 0.0, rate / ratio, 0.0) / ratio
 
     # What is left of the holding torque is second order: speed and torsion fluctuate.
-    springs = _springs(coefficients)
+    remembering = memories(coefficients)
+    places = np.cumsum([4, *(law.states for law in remembering)])[:-1]
     left = _holding_torque(coefficients) - holding - losses(speed)
 
     def right_hand_side(time: float, state: NDArray[np.float64]) -> list[float]:
@@ -111,9 +112,9 @@ def equations_of_motion(
         varying = 1.0 + depth * math.cos(2.0 * position + phase)
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
         mesh_torque += laws("mesh", torsion, torsion_rate, position)
-        stretches = np.split(state[4:], len(springs)) if springs else []
-        for spring, stretch in zip(springs, stretches, strict=True):
-            mesh_torque += spring.torque(stretch)
+        kept = np.split(state, places)[1:] if remembering else []
+        for law, states in zip(remembering, kept, strict=True):
+            mesh_torque += law.torque(states)
         input_torque = accelerating * envelope_rate + (holding + left) * envelope
         input_torque += losses(speed * envelope)
         resisting = bearing_in * input_speed + laws("input", position, input_speed, position)
@@ -125,8 +126,8 @@ def equations_of_motion(
         resisting += laws("output", output_angle, output_speed, output_angle)
         output_acceleration = (mesh_torque - resisting) / inertia_out
         rates = [input_speed, acceleration, error_rate, acceleration / ratio - output_acceleration]
-        for spring, stretch in zip(springs, stretches, strict=True):
-            rates += spring.rates(torsion_rate, stretch).tolist()
+        for law, states in zip(remembering, kept, strict=True):
+            rates += law.rates(torsion_rate, states).tolist()
         return rates
 
     return right_hand_side
@@ -150,15 +151,11 @@ def _aperiodic(coefficients: Coefficients) -> tuple[tuple[str, Law], ...]:
 def _laws_at_ports(coefficients: Coefficients) -> Callable[[str, float, float, float], float]:
     """Return a function from port, position, speed and angle to the torque of its laws.
 
-    Laws with memory are left out: their state is the integrator's (see `_springs`).
+    Laws with memory are left out: their state is the integrator's (see `memories`).
     """
     stiffness = coefficients.stiffness[:1]
     at_port = {
-        port: [
-            law
-            for place, law in coefficients.laws
-            if place == port and not isinstance(law, MaxwellSlip)
-        ]
+        port: [law for place, law in coefficients.laws if place == port and not law.states]
         for port in PORTS
     }
 
@@ -172,6 +169,6 @@ def _laws_at_ports(coefficients: Coefficients) -> Callable[[str, float, float, f
     return torque
 
 
-def _springs(coefficients: Coefficients) -> list[MaxwellSlip]:
+def memories(coefficients: Coefficients) -> list[Memory]:
     """Return the laws with memory, all at the mesh."""
-    return [law for _, law in coefficients.laws if isinstance(law, MaxwellSlip)]
+    return [cast(Memory, law) for _, law in coefficients.laws if law.states]

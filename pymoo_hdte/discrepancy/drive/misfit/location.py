@@ -29,7 +29,7 @@ from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
 from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.drive import Effect
+from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 __all__ = ["Location", "locate", "refit_clean"]
@@ -171,7 +171,7 @@ def _weakened(data: Data, factor: Values, without_sweep: bool) -> Data:
     return replace(data, features=weakened, torsion=() if without_sweep else data.torsion)
 
 
-def _sweep_p_value(data: Data, values: Values, effects: tuple[Effect, ...]) -> float | None:
+def _sweep_p_value(data: Data, values: Values, effects: tuple[DriveEffect, ...]) -> float | None:
     """Return the chance of a larger misfit of the torsion sweeps; None where there is none."""
     residuals = data.torsion_residuals(values[None, : len(data.base)], effects)[0]
     if not residuals.size:

@@ -1,21 +1,27 @@
-"""Named effects of the output encoder: they change what is read, not the motion."""
+"""Effects of the output encoder: they change what is read, not the motion."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.drive.port_effects import with_unit
-from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes, Lines, Session
+from pymoo_hdte.laws.effect import Effect, register
+from pymoo_hdte.laws.guess import Guess
 from pymoo_hdte.laws.law import Values
+from pymoo_hdte.laws.unknowns import unknown, wave_starts
+
+ENCODER_LINE = "encoder_line"
+"""Name of an error of the encoder's scale, which no verdict names: see `Guess.name`."""
 
 
 @dataclass(frozen=True)
-class Eccentricity:
+class Eccentricity(DriveEffect):
     """The disc of the output encoder is off centre: amplitude cos(theta_out + phase) is added.
 
     A once-per-turn error of the drive itself reads the same unless the encoder is clocked anew.
@@ -46,10 +52,6 @@ class Eccentricity:
         real_number("eccentricity.phase", self.phase)
         real_number("eccentricity.order", self.order, above=0.0)
 
-    def apply(self, coefficients: Coefficients) -> Coefficients:
-        """Return the coefficients as they are."""
-        return coefficients
-
     def reading(self, output_angle: Values, elapsed: Values | float) -> Values:
         """Return what is added to the reading of true output angles.
 
@@ -67,15 +69,66 @@ class Eccentricity:
         """
         return np.asarray(self.amplitude * np.cos(self.order * output_angle + self.phase))
 
-    def to_dict(self) -> dict[str, object]:
-        """Return the effect as a TOML-like table."""
-        amplitude, phase = with_unit(self.amplitude, "angle"), with_unit(self.phase, "angle")
-        table = {"name": self.name, "amplitude": amplitude, "phase": phase}
-        return table if self.order == 1.0 else table | {"order": self.order}
+    def reading_lines(self, records: Session) -> tuple[Values, Lines]:
+        """Return means (r,) and lines (r, m) of what is added to the reading, rad.
+
+        Parameters
+        ----------
+        records : Session
+            Of r records, each with m lines.
+        """
+        found = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
+        # theta_out is theta_in / N but for the transmission error, a part in 10^3.
+        line = np.isclose(records.orders, self.order / records.ratio)
+        found[:, line] = self.amplitude * np.exp(1j * self.phase)
+        return np.zeros(len(found)), found
+
+
+_CLOSED = 1e-6
+"""Cycles per output turn by which a line of the encoder's scale may miss a whole number."""
+
+
+def _off_centre(sizes: DriveSizes) -> list[Guess]:
+    """Guess a disc off centre, and errors of its scale wherever whole cycles per turn are seen."""
+    found = [_turning(sizes, 1.0)]
+    for order in sizes.further().seen:
+        turns = order * sizes.slower
+        if turns > 1.5 and abs(turns - round(turns)) < _CLOSED:
+            found.append(_turning(sizes, float(round(turns))))
+    return found
+
+
+def _turning(sizes: DriveSizes, turns: float) -> Guess:
+    family = sizes.family(turns)
+    unknowns = family.waves("amplitude", sizes.largest_error, sizes.error)
+
+    def build(values: Sequence[float]) -> tuple[DriveEffect, ...]:
+        lines = family.lines(values)
+        return tuple(Eccentricity(amplitude, phase, order) for order, amplitude, phase in lines)
+
+    starts = wave_starts(unknowns)
+    if turns == 1.0:
+        return Guess(unknowns, starts, build, family)
+    sentence = "The output encoder errs {order} times in its turn."
+    return Guess(unknowns, starts, build, family, sentence=sentence, name=ENCODER_LINE)
+
+
+register(
+    Effect(
+        Eccentricity.name,
+        None,
+        ("sensor",),
+        {"amplitude": "angle", "phase": "angle", "order": ""},
+        "The output encoder sits off centre.",
+        _off_centre,
+        change=Eccentricity,
+        exact=True,
+    )
+)
 
 
 @dataclass(frozen=True)
-class ThermalDrift:
+class ThermalDrift(DriveEffect):
     """The output angle reads what grows while the rig warms up: rate time (1 - exp(-t / time)).
 
     Attributes
@@ -102,10 +155,6 @@ class ThermalDrift:
         real_number("thermal_drift.rate", self.rate)
         if self.time != math.inf:
             real_number("thermal_drift.time", self.time, above=0.0)
-
-    def apply(self, coefficients: Coefficients) -> Coefficients:
-        """Return the coefficients as they are."""
-        return coefficients
 
     def after(self, elapsed: Values) -> Values:
         """Return what is added to the reading, rad, after elapsed seconds of the session.
@@ -150,7 +199,32 @@ class ThermalDrift:
         drift = self.after(np.asarray(elapsed, dtype=float))
         return np.broadcast_to(drift, np.shape(output_angle))
 
-    def to_dict(self) -> dict[str, object]:
-        """Return the effect as a TOML-like table."""
-        table = {"name": self.name, "rate": with_unit(self.rate, "angle rate")}
-        return table if self.time == math.inf else table | {"time": with_unit(self.time, "time")}
+    def reading_lines(self, records: Session) -> tuple[Values, Lines]:
+        """Return means (r,) and lines (r, m) of what is added to the reading, rad.
+
+        Parameters
+        ----------
+        records : Session
+            Of r records, each with m lines.
+        """
+        left = np.einsum("kr,rkm->rm", self.bends(records.elapsed), records.bends)
+        return self.after(records.elapsed) + left[:, 0].real, left[:, 1:]
+
+
+def _drift(sizes: DriveSizes) -> list[Guess]:
+    """Guess a drift that settles early in the session, in it, or hardly."""
+    unknowns = (unknown("rate", -1e-6, 1e-6, 1e-9), unknown("time", 50.0, 1e5, 1000.0))
+    return [Guess(unknowns, [(1e-9, 200.0), (1e-9, 1000.0), (1e-9, 1e4)])]
+
+
+register(
+    Effect(
+        ThermalDrift.name,
+        None,
+        ("sensor",),
+        {"rate": "angle rate", "time": "time"},
+        "The reading of the output angle drifts with time.",
+        _drift,
+        change=ThermalDrift,
+    )
+)

@@ -1,0 +1,33 @@
+"""Effects of a drive beside the laws at its ports, one file each or a few that belong together."""
+
+from pymoo_hdte import laws
+from pymoo_hdte.drive.effects.base import (
+    DriveEffect,
+    DriveSizes,
+    LawAtPort,
+    Session,
+    drive_effects,
+    effect_from_fields,
+)
+from pymoo_hdte.drive.effects.encoder import ENCODER_LINE, Eccentricity, ThermalDrift
+from pymoo_hdte.drive.effects.mesh_stiffness import MeshStiffnessVariation
+from pymoo_hdte.drive.effects.shafts import DampingReference, LoadInertia
+from pymoo_hdte.drive.effects.static_error import KinematicErrorLine, KinematicReaction
+
+__all__ = [
+    "ENCODER_LINE",
+    "DampingReference",
+    "DriveEffect",
+    "DriveSizes",
+    "Eccentricity",
+    "KinematicErrorLine",
+    "KinematicReaction",
+    "LawAtPort",
+    "LoadInertia",
+    "MeshStiffnessVariation",
+    "Session",
+    "ThermalDrift",
+    "drive_effects",
+    "effect_from_fields",
+    "laws",
+]

@@ -1,0 +1,85 @@
+"""A mesh stiffness that varies with the input angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.laws.effect import Effect, register
+from pymoo_hdte.laws.guess import Guess
+from pymoo_hdte.laws.stiffness import PeriodicStiffness
+from pymoo_hdte.laws.unknowns import wave_starts
+
+WAVE_GENERATOR_ORDER = 2.0
+"""Order of what the two lobes of the wave generator do, in cycles per input turn."""
+
+
+@dataclass(frozen=True)
+class MeshStiffnessVariation(DriveEffect):
+    """Stiffness that varies with the input angle, K (1 + depth cos(order theta_in + phase)).
+
+    Under load it excites its order by itself and couples all orders that differ by it. Gu, Tong,
+    Huang, Li (J. Vibroengineering 2021, article 21633) use and measure a time-varying stiffness.
+
+    Attributes
+    ----------
+    name : str
+        ``"mesh_stiffness_variation"``, in model files and verdicts.
+    depth : float
+        kappa, dimensionless, at least 0 and below 1.
+    phase : float
+        psi, rad.
+    order : float
+        Cycles per input turn; 2 is that of the wave generator's two lobes.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite or out of range.
+    """
+
+    name: ClassVar[str] = "mesh_stiffness_variation"
+    depth: float
+    phase: float
+    order: float = WAVE_GENERATOR_ORDER
+
+    def __post_init__(self) -> None:
+        real_number("mesh_stiffness_variation.depth", self.depth, at_least=0.0, below=1.0)
+        real_number("mesh_stiffness_variation.phase", self.phase)
+        real_number("mesh_stiffness_variation.order", self.order, above=0.0)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the varying stiffness; Hill's method knows order 2 only."""
+        if self.order == WAVE_GENERATOR_ORDER:
+            return replace(coefficients, stiffness_depth=self.depth, stiffness_phase=self.phase)
+        law = PeriodicStiffness(self.order, self.phase, self.depth)
+        return replace(coefficients, laws=(*coefficients.laws, ("mesh", law)))
+
+
+def _varying(sizes: DriveSizes) -> list[Guess]:
+    """Guess the order of the two lobes with two harmonics, up to a quarter of the stiffness."""
+    family = sizes.family(WAVE_GENERATOR_ORDER, 3)
+    unknowns = family.waves("depth", 0.25, 0.02)
+
+    def build(values: Sequence[float]) -> tuple[DriveEffect, ...]:
+        lines = family.lines(values)
+        return tuple(MeshStiffnessVariation(depth, phase, order) for order, depth, phase in lines)
+
+    return [Guess(unknowns, wave_starts(unknowns), build, family)]
+
+
+register(
+    Effect(
+        MeshStiffnessVariation.name,
+        None,
+        ("mesh",),
+        {"depth": "", "phase": "angle", "order": ""},
+        "The stiffness varies {order} times in an input turn.",
+        _varying,
+        change=MeshStiffnessVariation,
+    )
+)

@@ -1,0 +1,158 @@
+"""More inertia on the output, and mesh damping that is referred to another shaft.
+
+Together with `mesh_stiffness` these are the candidates of the calibration: the printed equations
+with the printed values respond to the static error as a rigid drive would.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.laws.effect import Effect, register
+from pymoo_hdte.laws.guess import Guess
+from pymoo_hdte.laws.unknowns import unknown
+
+
+@dataclass(frozen=True)
+class LoadInertia(DriveEffect):
+    """Inertia rigidly on the output: loading motor, couplings, torque sensor or robot link.
+
+    Attributes
+    ----------
+    name : str
+        ``"load_inertia"``, in model files and verdicts.
+    inertia : float
+        J_L, kg.m2, added to J_out of Eq. (9).
+
+    Raises
+    ------
+    InvalidInput
+        If the inertia is negative or not finite.
+    """
+
+    name: ClassVar[str] = "load_inertia"
+    inertia: float
+
+    def __post_init__(self) -> None:
+        real_number("load_inertia.inertia", self.inertia, at_least=0.0)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the inertia added to the output."""
+        return replace(
+            coefficients,
+            output_inertia=coefficients.output_inertia + self.inertia,
+            load_inertia=coefficients.load_inertia + self.inertia,
+        )
+
+    def joined(self, other: LoadInertia) -> LoadInertia:
+        """Return both inertias as one.
+
+        Parameters
+        ----------
+        other : LoadInertia
+        """
+        return LoadInertia(self.inertia + other.inertia)
+
+
+def _inertia(sizes: DriveSizes) -> list[Guess]:
+    """Guess up to ten times the inertia of the load.
+
+    Half as much again moves a resonance past lines, so that fits begin on both sides of it.
+    """
+    size = sizes.inertia
+    added = unknown("inertia", 0.0, 10.0 * size, 0.3 * size)
+    return [Guess((added,), [(0.15 * size,), (0.4 * size,), (1.0 * size,)])]
+
+
+register(
+    Effect(
+        LoadInertia.name,
+        None,
+        ("output",),
+        {"inertia": "inertia"},
+        "There is more inertia on the {port} than believed.",
+        _inertia,
+        change=LoadInertia,
+        exact=True,
+    )
+)
+
+
+@dataclass(frozen=True)
+class DampingReference(DriveEffect):
+    """Mesh damping acts on the torsion at the output: c = factor N^2 B_fc.
+
+    B_fc is identified as a torque per speed of the *input* shaft (Section 3); the same losses
+    referred to the output carry a factor of the order of N^2. Without this effect c = B_fc, as
+    Eq. (9) prints it.
+
+    Attributes
+    ----------
+    name : str
+        ``"damping_reference"``, in model files and verdicts.
+    factor : float
+        Multiple of N^2, dimensionless.
+
+    Raises
+    ------
+    InvalidInput
+        If the factor is not above 0 or not finite.
+    """
+
+    name: ClassVar[str] = "damping_reference"
+    factor: float
+
+    def __post_init__(self) -> None:
+        real_number("damping_reference.factor", self.factor, above=0.0)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the damping referred to the output."""
+        scale = self.factor * coefficients.ratio**2
+        return replace(coefficients, damping=scale * coefficients.damping)
+
+    def on_sheet(self, ratio: float) -> DampingReference:
+        """Return the factor in front of B_fc.
+
+        Parameters
+        ----------
+        ratio : float
+            Transmission ratio N, dimensionless.
+        """
+        return DampingReference(self.factor * ratio**2)
+
+    def joined(self, other: DampingReference) -> DampingReference:
+        """Return the product of both factors.
+
+        Parameters
+        ----------
+        other : DampingReference
+        """
+        return DampingReference(self.factor * other.factor)
+
+
+def _damping(sizes: DriveSizes) -> list[Guess]:
+    """Guess a factor of the believed damping: a few times more or less."""
+    squared = sizes.ratio**2
+
+    def build(values: Sequence[float]) -> tuple[DriveEffect, ...]:
+        return (DampingReference(values[0] / squared),)
+
+    return [Guess((unknown("factor", 0.02, 50.0, 2.0),), [(3.0,), (0.4,), (8.0,)], build)]
+
+
+register(
+    Effect(
+        DampingReference.name,
+        None,
+        ("mesh",),
+        {"factor": ""},
+        "The damping of the torsion is referred to another shaft than believed.",
+        _damping,
+        change=DampingReference,
+    )
+)

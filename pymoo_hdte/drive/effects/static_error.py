@@ -1,0 +1,163 @@
+"""What Eq. (9) leaves out of the static error: further lines, and their reaction on the input."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
+from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
+from pymoo_hdte.laws.effect import Effect, register
+from pymoo_hdte.laws.friction import PeriodicTorque
+from pymoo_hdte.laws.guess import Guess, Sizes
+from pymoo_hdte.laws.unknowns import Family, unknown, wave_starts
+
+
+@dataclass(frozen=True)
+class KinematicErrorLine(DriveEffect):
+    """A further order of theta_s: amplitude sin(order theta_in + phase).
+
+    It does not scale with theta_s, which is a property of the orders of Eq. (1).
+
+    Attributes
+    ----------
+    name : str
+        ``"kinematic_error"``, in model files and verdicts.
+    order : float
+        Cycles per input turn, above 0.
+    amplitude, phase : float
+        rad at the output, and rad.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite, or an order that is not above 0.
+    """
+
+    name: ClassVar[str] = "kinematic_error"
+    order: float
+    amplitude: float
+    phase: float
+
+    def __post_init__(self) -> None:
+        real_number("kinematic_error.order", self.order, above=0.0)
+        real_number("kinematic_error.amplitude", self.amplitude)
+        real_number("kinematic_error.phase", self.phase)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the order added."""
+        phasor = sine_phasor(self.amplitude, self.phase)
+        column = np.full((len(coefficients.stiffness), 1), phasor)
+        return replace(
+            coefficients,
+            error_orders=np.append(coefficients.error_orders, self.order),
+            error_phasors=np.hstack([coefficients.error_phasors, column]),
+        )
+
+
+def _lines(sizes: Any) -> list[Guess]:
+    """Guess lines at orders that are seen: of a drive's static error, or of a sensor's reading."""
+    return _of_reading(sizes) if sizes.read else _of_drive(sizes)
+
+
+def _of_drive(sizes: DriveSizes) -> list[Guess]:
+    found = []
+    for family in sizes.further().lines:
+        unknowns = family.waves("amplitude", sizes.largest_error, sizes.error)
+
+        def build(values: Sequence[float], family: Family = family) -> tuple[DriveEffect, ...]:
+            return tuple(
+                # Lines are cosines, the static error is a sum of sines.
+                KinematicErrorLine(order, amplitude, phase + np.pi / 2.0)
+                for order, amplitude, phase in family.lines(values)
+            )
+
+        found.append(Guess(unknowns, wave_starts(unknowns), build, family))
+    return found
+
+
+def _of_reading(sizes: Sizes) -> list[Guess]:
+    found = []
+    for family in sizes.lines:
+        unknowns = family.waves("amplitude", sizes.largest, sizes.force)
+
+        def build(values: Sequence[float], family: Family = family) -> tuple[PeriodicTorque, ...]:
+            lines = family.lines(values)
+            return tuple(PeriodicTorque(order, phase, size) for order, size, phase in lines)
+
+        sentence = (
+            "The reading of {port} varies with the position, orders {order}, and has one amplitude "
+            "at all speeds run: it is kinematic, and no {force} that moves inertias."
+        )
+        starts = wave_starts(unknowns)
+        found.append(Guess(unknowns, starts, build, family, family.form, sentence))
+    return found
+
+
+register(
+    Effect(
+        KinematicErrorLine.name,
+        PeriodicTorque,
+        ("mesh",),
+        {"order": "", "amplitude": "angle", "phase": "angle"},
+        "A line of the static error at order {order} that the model does not hold.",
+        _lines,
+        change=KinematicErrorLine,
+        exact=True,
+        of_reading=True,
+    )
+)
+
+
+@dataclass(frozen=True)
+class KinematicReaction(DriveEffect):
+    """The mesh torque acts back on the input through the slope of theta_s.
+
+    Eq. (9) leaves out this term of Lagrange's equation.
+
+    Attributes
+    ----------
+    name : str
+        ``"kinematic_reaction"``, in model files and verdicts.
+    share : float
+        Of the reaction that is there, dimensionless: 1 by virtual work.
+
+    Raises
+    ------
+    InvalidInput
+        If the share is not finite.
+    """
+
+    name: ClassVar[str] = "kinematic_reaction"
+    share: float = 1.0
+
+    def __post_init__(self) -> None:
+        real_number("kinematic_reaction.share", self.share)
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the reaction."""
+        return replace(coefficients, reaction=self.share)
+
+
+def _reaction(sizes: DriveSizes) -> list[Guess]:
+    """Guess the share that virtual work demands, give or take."""
+    return [Guess((unknown("share", -3.0, 3.0, 1.0),))]
+
+
+register(
+    Effect(
+        KinematicReaction.name,
+        None,
+        ("input",),
+        {"share": ""},
+        "The mesh torque acts back on the input through the slope of the static error.",
+        _reaction,
+        change=KinematicReaction,
+        exact=True,
+    )
+)

@@ -1,0 +1,291 @@
+"""What an effect is, and the register of all that are known.
+
+An effect says everything about itself in one place: its law or what else it changes in a drive, the
+ports where it makes sense, its quantities with their units, its sentence, what it is a special case
+of, and a guess of its values from the sizes of a machine. How it behaves (memory, clearance, what
+a sensor shows of it) its law says: see `Behaviour`. What is registered is known to model files, to
+the solvers of drives and mechanisms, to verdicts and to reports.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, Protocol
+
+from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.laws.guess import Guess, Sizes
+from pymoo_hdte.laws.law import PORTS
+from pymoo_hdte.laws.quantities import si_unit, with_unit
+
+Place = tuple[str, str, float | None]
+"""Name, port and order of an effect."""
+DRIVE_PORTS = (*PORTS, "sensor")
+"""Ports of a drive: where laws stand, and the reading of its output angle."""
+
+
+class Standing(Protocol):
+    """An effect as it stands in a model: what model, port and values it has is its own."""
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        ...
+
+
+def place_of(standing: Standing) -> Place:
+    """Return where an effect stands in a model, which takes one at each place."""
+    law = getattr(standing, "law", standing)
+    return standing.name, str(getattr(standing, "port", "")), getattr(law, "order", None)
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """One effect, with everything that the package knows about it.
+
+    Attributes
+    ----------
+    name : str
+        In model files and verdicts: lower case with underscores, e.g. ``"coulomb_friction"``.
+    law : type or None
+        Dataclass of the law, whose fields are numbers in SI; None for what is no law at a port.
+    ports : tuple of str
+        Ports of a drive where it may stand, of ``"input"``, ``"output"``, ``"mesh"`` and
+        ``"sensor"``; empty for an effect of other mechanisms only. A law may stand at any port of
+        a mechanism.
+    quantities : mapping of str to str
+        For each number its quantity, of `fields.UNITS`, or a unit of SI; empty for a dimensionless
+        one. Fields of the law that are not here stand in no file.
+    sentence : str
+        What it says in a report. ``{port}``, ``{order}`` and ``{force}`` (``"torque"`` in a drive)
+        may stand in it.
+    guess : callable or None
+        From `Sizes` of a port to `Guess` es, empty where it cannot be there; None for an effect
+        that is never looked for.
+    sought : tuple of str or None
+        Ports of a drive where a campaign looks for it; by default all of ``ports``.
+    change : type or None
+        What it is in a drive, where that is no law at a port.
+    of_fit : mapping of str to str
+        Quantities of unknowns of its guesses that are no numbers of the law.
+    special_case_of, contains : tuple of str
+        Effects of which this one is a special case, and effects that are special cases of this one:
+        Coulomb friction is Stribeck friction without the excess. One that contains another and
+        does no better says no more.
+    exact : bool
+        Whether its form leaves nothing open, so that it must explain records down to the noise; the
+        curve of a friction is only ever approximately that of a real one.
+    of_reading : bool
+        Whether, in a mechanism, nothing but the reading of a force sensor shows it.
+
+    Raises
+    ------
+    InvalidInput
+        For a name that is no such word, neither law nor change, quantities that are no fields of
+        the law, an unknown port, or an empty sentence.
+
+    Examples
+    --------
+    >>> from pymoo_hdte.laws import effect_named
+    >>> coulomb = effect_named("coulomb_friction")
+    >>> coulomb.ports, coulomb.unit("level")
+    (('input', 'output'), 'N.m')
+    """
+
+    name: str
+    law: type[Any] | None
+    ports: tuple[str, ...]
+    quantities: Mapping[str, str]
+    sentence: str
+    guess: Callable[[Any], Sequence[Guess]] | None = None
+    sought: tuple[str, ...] | None = None
+    change: type[Any] | None = None
+    of_fit: Mapping[str, str] = field(default_factory=dict)
+    special_case_of: tuple[str, ...] = ()
+    contains: tuple[str, ...] = ()
+    exact: bool = False
+    of_reading: bool = False
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[a-z]+(_[a-z]+)*", str(self.name)):
+            raise InvalidInput("effect.name", self.name, "words in lower case with underscores")
+        if self.law is None and self.change is None:
+            raise InvalidInput(f"{self.name}.law", None, "a dataclass with the numbers of a law")
+        for port in (*self.ports, *(self.sought or ())):
+            one_of(f"{self.name}.ports", port, DRIVE_PORTS)
+        if getattr(self.law, "states", 0) and set(self.ports) - {"mesh"}:
+            allowed = '("mesh",): solvers keep inner states of laws at the mesh of a drive only'
+            raise InvalidInput(f"{self.name}.ports", self.ports, allowed)
+        for number in self.quantities:
+            one_of(f"{self.name}.quantities", number, [one.name for one in fields(self.kind)])
+        if not str(self.sentence).strip():
+            raise InvalidInput(f"{self.name}.sentence", self.sentence, "a sentence")
+
+    @property
+    def kind(self) -> type[Any]:
+        """What the effect is in a drive, or else its law."""
+        kind = self.change or self.law
+        assert kind is not None
+        return kind
+
+    @property
+    def sought_at(self) -> tuple[str, ...]:
+        """Ports of a drive where a campaign looks for it."""
+        return self.ports if self.sought is None else self.sought
+
+    @property
+    def rattles(self) -> bool:
+        """Whether parts may lose contact: see `Behaviour.rattles`."""
+        return bool(getattr(self.law, "rattles", False))
+
+    @property
+    def drives(self) -> bool:
+        """Whether it is a force of the drive's own: see `Behaviour.driving`."""
+        return bool(getattr(self.law, "drives", False))
+
+    def guesses(self, sizes: Sizes) -> Sequence[Guess]:
+        """Return the forms in which it may be there, for the sizes of a port."""
+        return [] if self.guess is None else self.guess(sizes)
+
+    def parts(self, guess: Guess, values: Sequence[float]) -> tuple[tuple[str, Any], ...]:
+        """Return laws (or what else it is) for the values of a guess, each with its name."""
+        if guess.build is None:
+            names = [one.name for one in guess.unknowns]
+            return ((self.name, self.kind(**dict(zip(names, values, strict=True)))),)
+        return tuple((self._name_of(part), part) for part in guess.build(values))
+
+    def _name_of(self, part: Any) -> str:
+        """Return the name of a part: an effect may bring another's law along."""
+        if type(part) in (self.law, self.change):
+            return self.name
+        return next(one.name for one in _EFFECTS.values() if one.law is type(part))
+
+    def unit(self, unknown: str) -> str:
+        """Return the SI unit of a number, of an unknown of a guess or of a phase; 1 for none."""
+        return si_unit({"phase": "angle", **self.of_fit, **self.quantities}.get(unknown, ""))
+
+    def law_of(self, values: Mapping[str, float]) -> Any:
+        """Return the law with these numbers.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            In SI; those for which the law has a default may be absent.
+
+        Raises
+        ------
+        InvalidInput
+            With the field ``name.number``: for an unknown number, or one that is missing or that
+            the law does not take.
+        """
+        return self._made(self.law, values)
+
+    def numbers_of(self, law: Any) -> dict[str, float]:
+        """Return the numbers of a law in SI, of which `law_of` makes an equal one.
+
+        Raises
+        ------
+        InvalidInput
+            For a law of another effect.
+        """
+        if type(law) is not self.law:
+            wanted = getattr(self.law, "__name__", "no law")
+            raise InvalidInput(f"{self.name}.law", law, f"a {wanted}")
+        return {one: float(getattr(law, one)) for one in self.quantities}
+
+    def from_fields(self, table: Fields) -> Any:
+        """Return the law, or what else it is in a drive, from a table of a model file.
+
+        Raises
+        ------
+        InvalidInput
+            For a wrong or missing field.
+        """
+        values = {
+            number: table.quantity(number, quantity) if quantity else table.number(number)
+            for number, quantity in self.quantities.items()
+            if number not in self._defaults or table.has(number)
+        }
+        return self.kind(**values)
+
+    def to_fields(self, numbers: Any) -> dict[str, object]:
+        """Return the numbers with their units, as `from_fields` reads them, but for defaults."""
+        values = {number: getattr(numbers, number) for number in self.quantities}
+        return {
+            number: with_unit(value, self.quantities[number])
+            for number, value in values.items()
+            if number not in self._defaults or value != self._defaults[number]
+        }
+
+    @property
+    def _defaults(self) -> dict[str, float]:
+        return {one.name: one.default for one in fields(self.kind) if one.default is not MISSING}
+
+    def _made(self, kind: Any, values: Mapping[str, float]) -> Any:
+        for one in values:
+            one_of(f"number of {self.name}", one, tuple(self.quantities))
+        for number in self.quantities:
+            if number not in values and number not in self._defaults:
+                allowed = "a finite number (it is missing)"
+                raise InvalidInput(f"{self.name}.{number}", None, allowed)
+        numbers = {one: real_number(f"{self.name}.{one}", value) for one, value in values.items()}
+        try:
+            return kind(**numbers)
+        except InvalidInput as error:
+            # Laws name themselves by another effect that they are too, or not at all.
+            number = error.field.rpartition(".")[2]
+            raise InvalidInput(f"{self.name}.{number}", error.value, error.allowed) from None
+
+
+_EFFECTS: dict[str, Effect] = {}
+
+
+def register(effect: Effect) -> Effect:
+    """Make an effect known to model files, simulation, verdicts and reports, and return it.
+
+    An effect that is registered already stays as it is.
+
+    Raises
+    ------
+    InvalidInput
+        If another effect has its name.
+    """
+    if _EFFECTS.get(effect.name, effect) is not effect:
+        allowed = "a name that no other effect has"
+        raise InvalidInput("effect.name", effect.name, allowed)
+    _EFFECTS[effect.name] = effect
+    return effect
+
+
+@contextmanager
+def registered(*more: Effect) -> Iterator[None]:
+    """Make effects known inside a block only; errors as of `register`."""
+    before = dict(_EFFECTS)
+    try:
+        for effect in more:
+            register(effect)
+        yield
+    finally:
+        _EFFECTS.clear()
+        _EFFECTS.update(before)
+
+
+def effects() -> tuple[Effect, ...]:
+    """Return all effects that are known: those of the package first, in the order of its files."""
+    return tuple(_EFFECTS.values())
+
+
+def effect_named(name: str) -> Effect:
+    """Return the effect of a name; raises `InvalidInput` where there is none."""
+    return _EFFECTS[one_of("effect.name", name, _EFFECTS)]
+
+
+def is_contained(one: str, other: str) -> bool:
+    """Tell whether an effect is a special case of another, both by name, known or not."""
+    this, that = _EFFECTS.get(one), _EFFECTS.get(other)
+    return (this is not None and other in this.special_case_of) or (
+        that is not None and one in that.contains
+    )

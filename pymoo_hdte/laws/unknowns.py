@@ -1,0 +1,172 @@
+"""Unknowns of an effect: their bounds and sizes, and the lines that two of them make.
+
+Amplitude and phase of a line are searched as its cosine and sine parts, in which a prediction is
+close to linear. A periodic effect brings its harmonics along: a ripple of order 6 with a little of
+order 12 is one effect and not two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Values = Sequence[float]
+
+HARMONIC_NAMES = ("", "second_", "third_")
+"""Prefixes of the parameters of a line's harmonics."""
+_HARMONIC_SHARE = 0.2
+"""Typical size of a further harmonic, as a share of the first."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One unknown.
+
+    Attributes
+    ----------
+    name : str
+    start, lower, upper : float
+        SI.
+    scale : float
+        Its natural size, the unit of the search.
+    prior : float
+        Standard deviation around ``start``; infinite for a parameter with bounds only.
+    linear : bool
+        Whether a prediction is close to linear in it: part of a line, or a level.
+    """
+
+    name: str
+    start: float
+    lower: float
+    upper: float
+    scale: float
+    prior: float = np.inf
+    linear: bool = False
+
+
+def unknown(
+    name: str, lower: float, upper: float, typical: float, linear: bool = False
+) -> Parameter:
+    """Return a parameter that starts at its typical size; the arguments as of `Parameter`."""
+    return Parameter(name, typical, lower, upper, abs(typical), linear=linear)
+
+
+def wave(name: str, largest: float, typical: float, harmonics: int = 1) -> tuple[Parameter, ...]:
+    """Return the cosine and sine parts of a line and of its harmonics.
+
+    Parameters
+    ----------
+    name : str
+        Of the amplitude.
+    largest, typical : float
+        Amplitudes.
+    harmonics : int
+        1 for the line alone.
+    """
+    found = []
+    for place, prefix in enumerate(HARMONIC_NAMES[:harmonics]):
+        size = typical if place == 0 else _HARMONIC_SHARE * typical
+        start = typical if place == 0 else 0.0
+        found += _parts(f"{prefix}{name}", start, largest, size)
+    return tuple(found)
+
+
+def _parts(name: str, start: float, largest: float, size: float) -> list[Parameter]:
+    """Return cosine and sine part of one line."""
+    return [
+        Parameter(f"{name}_{part}", begin, -largest, largest, size, linear=True)
+        for part, begin in (("cosine", start), ("sine", 0.0))
+    ]
+
+
+def wave_starts(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:
+    """Return one start along each part of a `wave`, and along its mean."""
+    sizes = np.diag([parameter.scale for parameter in parameters])
+    return tuple(tuple(row) for row in sizes.tolist())
+
+
+def lines_of(values: Values) -> list[tuple[int, float, float]]:
+    """Return (multiple of the order, amplitude, phase) for the values of a `wave`."""
+    parts = np.reshape(values, (-1, 2))
+    return [(place + 1, *polar(cosine, sine)) for place, (cosine, sine) in enumerate(parts)]
+
+
+@dataclass(frozen=True)
+class Family:
+    """Orders at which something varies as one effect.
+
+    Attributes
+    ----------
+    orders : tuple of float
+        Cycles per turn of the angle of a port, or per unit of its position.
+    harmonic : bool
+        Whether all are multiples of the first, which then stands for all of them.
+    """
+
+    orders: tuple[float, ...]
+    harmonic: bool = True
+
+    @property
+    def order(self) -> float | None:
+        """The order that stands for all of them."""
+        return self.orders[0] if self.harmonic else None
+
+    @property
+    def form(self) -> str:
+        """All orders in a word, where none stands for them."""
+        return "" if self.harmonic else "+".join(f"{order:g}" for order in self.orders)
+
+    @property
+    def words(self) -> str:
+        """What a sentence says of the orders."""
+        return ", ".join(f"{order:g}" for order in self.orders[: 1 if self.harmonic else None])
+
+    def waves(self, name: str, largest: float, typical: float) -> tuple[Parameter, ...]:
+        """Return cosine and sine parts of a line at each order; the arguments as of `wave`."""
+        if self.harmonic:
+            return wave(name, largest, typical, len(self.orders))
+        return tuple(
+            part
+            for order in self.orders
+            for part in wave(f"order_{order:g}_{name}", largest, typical)
+        )
+
+    def lines(self, values: Values) -> list[tuple[float, float, float]]:
+        """Return (order, amplitude, phase) for the values of `waves`."""
+        return [
+            (order, amplitude, phase)
+            for order, (_, amplitude, phase) in zip(self.orders, lines_of(values), strict=True)
+        ]
+
+
+def harmonics_among(orders: Sequence[float], order: float, most: int) -> int:
+    """Return how many of order, 2 order, 3 order, ... the ``orders`` hold; at least 1."""
+    count = 1
+    while count < most and any(abs((count + 1) * order - one) < 1e-6 for one in orders):
+        count += 1
+    return count
+
+
+def line_with_variance(
+    cosine: float, sine: float, covariance: NDArray[np.float64]
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return amplitude and phase of a line, each with its variance.
+
+    ``covariance`` is that of its cosine and sine part, shape (2, 2). A phase is never less certain
+    than one of which nothing is known.
+    """
+    amplitude, phase = polar(cosine, sine)
+    along = np.array([np.cos(phase), np.sin(phase)])
+    across = np.array([-np.sin(phase), np.cos(phase)])
+    sidewise = float(across @ covariance @ across)
+    nothing_known = np.pi**2 / 3.0
+    of_phase = sidewise / amplitude**2 if sidewise < nothing_known * amplitude**2 else nothing_known
+    return (amplitude, float(along @ covariance @ along)), (phase, of_phase)
+
+
+def polar(cosine: float, sine: float) -> tuple[float, float]:
+    """Return amplitude and phase of cosine cos(x) - sine sin(x) = amplitude cos(x + phase)."""
+    return float(np.hypot(cosine, sine)), float(np.arctan2(sine, cosine))
