@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from typing import Any
 from experiments.runner.provenance import report_fingerprint
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.io.text_table import csv_text
+from pymoo_hdte.io.whole_file import write_whole
 
 RESULT = "result.json"
 TIMES = "times"
@@ -45,15 +45,9 @@ class StoredResult:
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file that is either complete or not there, whenever the program is interrupted."""
+    """Write a file as `write_whole` does, in a folder that is made if need be."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_bytes(content)
-        os.replace(temporary, path)
-    finally:
-        # A full disk leaves a part behind, which would keep it full.
-        temporary.unlink(missing_ok=True)
+    write_whole(path, content)
 
 
 def save(out: Path, name: str, result: Result) -> None:

@@ -6,7 +6,6 @@ are compared with what is really there, nothing is unpacked, and nothing is ever
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import math
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.io.whole_file import write_whole
 
 LARGEST_FILE = 2**22
 """Bytes; half a million coefficients, as of order 12 in five variables."""
@@ -81,7 +81,7 @@ class FileFormat:
         text = _as_json({"format": self.name, "version": self.version, **header})
         np.savez(contents, header=np.array(text), **arrays)  # type: ignore[arg-type]
         self._parsed(contents.getvalue(), str(path))
-        _replace(Path(path), contents.getvalue())
+        write_whole(Path(path), contents.getvalue())
 
     def read(
         self, path: str | os.PathLike[str]
@@ -130,16 +130,6 @@ class FileFormat:
         wanted = {"format", "version", *self.fields}
         if set(header) != wanted:
             raise InvalidInput("header of the file", sorted(header), f"just {sorted(wanted)}")
-
-
-def _replace(target: Path, contents: bytes) -> None:
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_bytes(contents)
-        os.replace(temporary, target)
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            temporary.unlink()
 
 
 def _contents_of(path: Path) -> bytes:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import false_discovery_control
 
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
@@ -97,7 +98,7 @@ class Location:
 
 def benjamini_hochberg(p_value: Values, rate: float) -> Flags:
     """Return which hypotheses are rejected at a false discovery rate; nan never is."""
-    ordered = np.sort(p_value[np.isfinite(p_value)])
-    passed = np.flatnonzero(ordered <= rate * np.arange(1, len(ordered) + 1) / len(ordered))
-    limit = ordered[passed[-1]] if passed.size else -1.0
-    return np.asarray(p_value <= limit, dtype=bool)
+    known = np.isfinite(p_value)
+    rejected = np.zeros(p_value.shape, dtype=bool)
+    rejected[known] = false_discovery_control(p_value[known]) <= rate
+    return rejected
