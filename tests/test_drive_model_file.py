@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from places import STORED
 from stored_samples import MODEL
 
 from pymoo_hdte.checks import InvalidInput
@@ -28,8 +28,6 @@ from pymoo_hdte.drive import (
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, ErrorSource, Mesh, Nominal
 from pymoo_hdte.drive.effects import EFFECT_NAMES, place_of
 from pymoo_hdte.drive.port_effects import LAWS
-
-STORED = Path(__file__).parent / "stored" / "drive_model_version_1.npz"
 
 any_size = st.floats(allow_nan=False, allow_infinity=False)
 at_least_0 = st.floats(min_value=0.0, allow_infinity=False)
@@ -128,7 +126,7 @@ def test_a_round_trip_changes_no_bit(model, tmp_path):
 
 
 def test_a_file_of_version_1_still_holds_its_model():
-    loaded = DriveModel.load(STORED)
+    loaded = DriveModel.load(STORED / "drive_model_version_1.npz")
     assert bits(loaded) == bits(MODEL)
     assert {effect.name for effect in loaded.effects} == set(EFFECT_NAMES)
     linear = replace(loaded, effects=loaded.effects[:3])

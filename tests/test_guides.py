@@ -6,10 +6,10 @@ import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from kept_results import kept
+from places import DOCS, ROOT
 
 from pymoo_hdte.discrepancy.engine import excess
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
@@ -17,8 +17,6 @@ from pymoo_hdte.discrepancy.mechanism.analysis import MAIN_SHARE
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.surrogate import TruncatedNormal
 
-ROOT = Path(__file__).parents[1]
-DOCS = ROOT / "docs"
 GUIDES = {path.stem: path for path in (DOCS / "guides").glob("*.py")}
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (DOCS / "reference").glob("*.md")}
 NOISE = TruncatedNormal(0.0, 1.0)

@@ -76,7 +76,8 @@ def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
 
 
 def test_hysteresis_of_another_form_is_named():
-    finding = investigate(OSCILLATOR, with_held_out(bouc_wen))
+    records = [rig.record_of(bouc_wen), rig.record_of(bouc_wen, "held_out", seed=3)]
+    finding = investigate(OSCILLATOR, records)
     assert [one["name"] for one in effects(finding)] == ["hysteresis"]
     simulated, balanced = prove_measured(finding)
     assert simulated.shrinkage > 0.95

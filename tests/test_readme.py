@@ -13,6 +13,7 @@ import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
+from places import ROOT
 
 from experiments.blind.cases import MOST_WRONG_CONFIDENT
 from experiments.blind.data import read_outcomes
@@ -40,7 +41,6 @@ from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import accuracy, latin_hypercube
 
-ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 WORDS = " ".join(README.split())
 SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
