@@ -3,12 +3,12 @@
 import gzip
 import shutil
 from dataclasses import fields, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from places import SHARED
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import (
@@ -23,7 +23,7 @@ from pymoo_hdte.discrepancy import (
 from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
-SHARED = Path("/work/shared/rig")
+RIGS = SHARED / "rig"
 
 BELIEVED = BelievedDrive(
     ratio=50.0,
@@ -354,13 +354,11 @@ def test_a_garbled_line_gives_an_error_or_a_campaign(folder, tmp_path, file, at,
     assert refused == "" or ".toml" in refused or ".csv.gz" in refused
 
 
-needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="the shared rig data are not here")
+needs_shared = pytest.mark.skipif(not RIGS.is_dir(), reason="the shared rig data are not here")
 
 
 @needs_shared
-@pytest.mark.parametrize(
-    "path", sorted(SHARED.glob("*/campaign.toml")), ids=lambda p: p.parent.name
-)
+@pytest.mark.parametrize("path", sorted(RIGS.glob("*/campaign.toml")), ids=lambda p: p.parent.name)
 def test_shared_campaigns_are_read(path):
     read = read_campaign(path.parent)
     assert (len(read.train), len(read.held_out), len(read.torsion)) == (13, 6, 1)

@@ -1,12 +1,12 @@
 """The torsion sweep: closed forms of the quasi-static drive, and points with their covariance."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import SHARED
 from scipy.integrate import trapezoid
 from scipy.stats import chi2
 
@@ -263,13 +263,13 @@ def test_a_wrong_torque_is_refused(torque):
             function(drive(), torque)
 
 
-SHARED = Path("/work/shared/rig")
+RIGS = SHARED / "rig"
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared rig data are not here")
+@pytest.mark.skipif(not RIGS.is_dir(), reason="the shared rig data are not here")
 def test_the_clean_shared_sweep_is_linear_to_its_noise():
     """The example's only effect, a torque ripple of the motor, is absent with a locked input."""
-    campaign = read_campaign(SHARED / "example-torque-ripple")
+    campaign = read_campaign(RIGS / "example-torque-ripple")
     points = torsion_points(campaign.torsion[0], campaign.rig)
     line, left = points.whitening @ points.torque, points.whitening @ points.angle
     left = left - line * (line @ left) / (line @ line)

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from law_cases import LAWS
+from places import STORED
 from stored_samples import MODEL
 
 from pymoo_hdte.checks import InvalidInput
@@ -29,8 +29,6 @@ from pymoo_hdte.drive import (
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, ErrorSource, Mesh, Nominal
 from pymoo_hdte.drive.effects import drive_effects
 from pymoo_hdte.laws.effect import place_of
-
-STORED = Path(__file__).parent / "stored" / "drive_model_version_1.npz"
 
 any_size = st.floats(allow_nan=False, allow_infinity=False)
 at_least_0 = st.floats(min_value=0.0, allow_infinity=False)
@@ -129,7 +127,7 @@ def test_a_round_trip_changes_no_bit(model, tmp_path):
 
 
 def test_a_file_of_version_1_still_holds_its_model():
-    loaded = DriveModel.load(STORED)
+    loaded = DriveModel.load(STORED / "drive_model_version_1.npz")
     assert bits(loaded) == bits(MODEL)
     assert {effect.name for effect in loaded.effects} == {one.name for one in drive_effects()}
     linear = replace(loaded, effects=loaded.effects[:3])

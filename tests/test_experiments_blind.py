@@ -5,9 +5,9 @@ import sys
 import tomllib
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
+import places
 import pytest
 from planted_features import analysed, known_data, listed, measured
 from virtual_rig_cases import BELIEVED as SHARED_DRIVE
@@ -419,6 +419,6 @@ def test_without_the_extra_a_full_campaign_ends_with_one_line(tmp_path, monkeypa
     assert (blank, message) == ("", "blind: pysindy is not installed: pip install '.[blind]'")
     assert list(tmp_path.iterdir()) == []
     # The extra that the line names is one that brings it.
-    project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())
+    project = tomllib.loads((places.ROOT / "pyproject.toml").read_text())
     (needed,) = project["project"]["optional-dependencies"]["blind"]
     assert needed.startswith("pysindy")

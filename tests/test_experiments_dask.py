@@ -15,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import walk_jobs
+from places import ROOT
 from walk_jobs import DeadlyWalk, EndlesslyDeadlyWalk, Walk
 
 from experiments.comparison.runs import OptimisationRun
@@ -24,7 +26,7 @@ from pymoo_hdte.checks import InvalidInput
 
 pytest.importorskip("distributed", reason="needs the extra dask")
 
-TESTS = Path(__file__).parent
+HELPERS = Path(walk_jobs.__file__).parent
 PATIENCE = 60.0
 """Seconds after which what should happen at once has failed."""
 
@@ -55,12 +57,12 @@ class Cluster:
         )
         self.address = wait_for(lambda: json.loads(connection.read_text())["address"])
 
-    def worker(self, *options: str, source: Path = TESTS) -> subprocess.Popen:
+    def worker(self, *options: str, source: Path = HELPERS) -> subprocess.Popen:
         return self._start(
             *("worker", self.address, "--nthreads", "1", "--no-dashboard"),
             *("--death-timeout", "60", "--local-directory", str(self._folder / "scratch")),
             *options,
-            environment={"PYTHONPATH": os.pathsep.join([str(source), str(TESTS.parent)])},
+            environment={"PYTHONPATH": os.pathsep.join([str(source), str(ROOT)])},
         )
 
     def _start(self, *arguments: str, environment: dict[str, str]) -> subprocess.Popen:
@@ -231,7 +233,7 @@ def test_an_interrupt_leaves_whole_files_and_a_cluster_that_does_the_rest(tmp_pa
 def test_a_worker_with_another_source_or_none_is_refused(tmp_path):
     other, none = tmp_path / "other", tmp_path / "none"
     other.mkdir()
-    shutil.copy(TESTS / "walk_jobs.py", other)
+    shutil.copy(HELPERS / "walk_jobs.py", other)
     (none / "experiments").mkdir(parents=True)
     (none / "experiments" / "__init__.py").touch()
     with cluster(tmp_path / "cluster") as dask, make_executor(1, dask.address) as executor:

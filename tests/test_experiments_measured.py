@@ -1,5 +1,6 @@
 """Other people's measurements: the verdicts that the literature lets one expect, and the twins."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -10,6 +11,8 @@ from experiments.measured.rigs import MEASURED
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import Finding
+from pymoo_hdte.discrepancy.mechanism import investigate
+from pymoo_hdte.discrepancy.mechanism.files import read_rig
 
 
 def result_of(experiment, folder, out):
@@ -18,6 +21,7 @@ def result_of(experiment, folder, out):
     return experiment.run(Context(1, out, Campaign(out)))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("experiment", "folder"), [(emps, "emps"), (kinova, "kinova_gen3_j7")], ids=["emps", "kinova"]
 )
@@ -26,6 +30,22 @@ def test_every_demand_on_a_real_rig_holds(experiment, folder, tmp_path):
     findings = [finding for table in result.tables for finding in table.findings]
     assert len(findings) >= 4
     assert [finding.sentence for finding in findings if not finding.agrees] == []
+
+
+def names_in(rig, records):
+    finding = investigate(rig.mechanism, records, rig.cutoff, rig.effects)
+    return {candidate.name for candidate in finding.accepted.candidates}
+
+
+def test_a_quarter_of_a_record_shows_the_friction_of_a_real_rig():
+    if not (MEASURED / "emps").is_dir():
+        pytest.skip(f"the measurements are not at {MEASURED}")
+    rig = read_rig(measured_rigs.RIGS / "emps.toml", MEASURED / "emps")
+    whole = next(record for record in rig.records if record.role == "train")
+    n = len(whole.time) // 4
+    channels = {name: channel[:n] for name, channel in whole.channels.items()}
+    found = names_in(rig, [replace(whole, time=whole.time[:n], channels=channels)])
+    assert found == {"coulomb_friction", "direction_dependent_friction"}
 
 
 @pytest.mark.parametrize("experiment", [emps, kinova], ids=["emps", "kinova"])

@@ -7,10 +7,10 @@ import subprocess
 import sys
 from contextlib import redirect_stdout
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import ROOT
 
 from experiments.__main__ import main
 from experiments.reliability import experiment as reliability
@@ -46,7 +46,6 @@ from experiments.runner.campaign import Campaign, Run
 from experiments.runner.registry import Context
 
 LOADERS = [name for name in KINDS if name not in THROUGH_COMMANDS]
-ROOT = Path(__file__).parents[1]
 
 
 @pytest.mark.parametrize("kind", LOADERS)

@@ -6,25 +6,25 @@ import os
 import re
 import subprocess
 import sys
-from functools import cache
-from pathlib import Path
 
 import pytest
+from kept_results import kept
+from places import DOCS, ROOT
 
 from pymoo_hdte.discrepancy.engine import excess
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.surrogate import TruncatedNormal
 
-ROOT = Path(__file__).parents[1]
-DOCS = ROOT / "docs"
 GUIDES = {path.stem: path for path in (DOCS / "guides").glob("*.py")}
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (DOCS / "reference").glob("*.md")}
 NOISE = TruncatedNormal(0.0, 1.0)
+LONG = ("drive_data_sheet", "extend", "robust_study")
+"""Guides that the documentation is built with and nightly runs judge; the suite runs the others."""
 NUMBER = r"(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 
 
-@cache
+@kept
 def output_of(guide):
     """Return what a guide prints in a process of its own, in which a warning is an error."""
     done = subprocess.run(
@@ -40,6 +40,13 @@ def output_of(guide):
     return done.stdout
 
 
+def guide_cases(*cases):
+    """Return cases, each beginning with the name of a guide, with those of long ones marked."""
+    return [
+        pytest.param(*case, marks=pytest.mark.nightly if case[0] in LONG else ()) for case in cases
+    ]
+
+
 def numbers_of(guide, pattern):
     """Return the numbers in the place of each # of a line, a list for each such line."""
     expression = re.escape(pattern).replace(r"\#", NUMBER)
@@ -53,7 +60,7 @@ def texts_of(guide):
     return " ".join(re.sub(r"^# ?", "", GUIDES[guide].read_text(), flags=re.M).split())
 
 
-@pytest.mark.parametrize("guide", sorted(GUIDES))
+@pytest.mark.parametrize("guide", guide_cases(*((name,) for name in sorted(GUIDES))))
 def test_guide_runs_and_its_checks_hold(guide):
     lines = output_of(guide).splitlines()
     assert lines
@@ -62,7 +69,7 @@ def test_guide_runs_and_its_checks_hold(guide):
 
 @pytest.mark.parametrize(
     ("guide", "pattern", "tolerance"),
-    [
+    guide_cases(
         ("exact_moments", "closed form #, Gauss-Legendre #", 1e-11),
         ("exact_moments", "recurrence #, rule #", 1e-9),
         ("exact_moments", "exact #, quadrature #", 2e-9),
@@ -77,13 +84,14 @@ def test_guide_runs_and_its_checks_hold(guide):
         ("drive_data_sheet", "model #, surrogate # arcsec", 0.1),
         ("verdict_rules", "standard deviation #, ordinary least squares #", 2e-4),
         ("verdict_rules", "evidence #, by integration #", 0.1),
-    ],
+    ),
 )  # fmt: skip
 def test_two_ways_to_one_number_agree(guide, pattern, tolerance):
     for first, second in numbers_of(guide, pattern):
         assert abs(first - second) <= tolerance
 
 
+@pytest.mark.nightly
 def test_algorithms_of_the_study_find_the_front():
     values = numbers_of("robust_study", "points  IGD #  HV #")
     (best,) = numbers_of("robust_study", "1001 points, hypervolume #")
@@ -93,6 +101,7 @@ def test_algorithms_of_the_study_find_the_front():
         assert 0.95 * best[0] < hypervolume < best[0]
 
 
+@pytest.mark.nightly
 def test_members_of_the_family_are_as_the_study_says():
     printed = numbers_of("robust_study", "# variables, # objectives, # points")
     assert [row[:2] for row in printed] == [[4, 2]] * 3 + [[5, 3]]
@@ -100,6 +109,7 @@ def test_members_of_the_family_are_as_the_study_says():
     assert min(row[2] for row in printed) >= 1000
 
 
+@pytest.mark.nightly
 def test_the_invented_drive_does_what_its_guide_says():
     assert "ratio 81\n" in output_of("drive_data_sheet")
     assert "wrong.toml.nominal.stiffness is 11000.0, allowed: " in output_of("drive_data_sheet")
@@ -123,6 +133,7 @@ def test_own_problems_meet_their_closed_forms():
     )
 
 
+@pytest.mark.nightly
 def test_parts_of_the_swarm_differ_as_the_guide_says():
     line = r"(.+?) +median IGD of 11 seeds (.+), from (.+) to (.+)"
     printed = re.findall(line, output_of("extend"))

@@ -2,19 +2,19 @@
 
 import math
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.io
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from places import SHARED
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.io import tables
 from pymoo_hdte.io.fields import Fields
 
-EMPS = Path(__file__).parents[2] / "shared" / "measured" / "emps" / "DATA_EMPS.mat"
+EMPS = SHARED / "measured" / "emps" / "DATA_EMPS.mat"
 KINOVA = EMPS.parents[1] / "kinova_gen3_j7"
 FILES = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25)
 NUMBERS = st.floats(-tables.LARGEST, tables.LARGEST, allow_subnormal=False)

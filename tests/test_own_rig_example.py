@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DOCS
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
 from pymoo_hdte.mechanism.effects import law_effects
 
-DOCS = Path(__file__).parents[1] / "docs"
 EXAMPLE = DOCS / "examples" / "own_rig.py"
 PAGE = (DOCS / "bring_your_own_rig.md").read_text(encoding="utf-8")
 HIDDEN = "hardening_stiffness: coefficient"

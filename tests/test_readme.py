@@ -14,6 +14,7 @@ import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
+from places import ROOT
 from pymoo.indicators.igd import IGD
 from pymoo.indicators.spacing import SpacingIndicator
 from pymoo.optimize import minimize
@@ -48,7 +49,6 @@ from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import accuracy, latin_hypercube
 from pymoo_hdte.units import ARCSEC
 
-ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 WORDS = " ".join(README.split())
 SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)

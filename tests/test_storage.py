@@ -7,19 +7,18 @@ import struct
 import tracemalloc
 import zipfile
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from places import DOCS, STORED
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.io.archive import DEEPEST_HEADER, LARGEST_FILE, LARGEST_HEADER, FileFormat
 from pymoo_hdte.surrogate import ChebyshevSurrogate
 
-STORED = Path(__file__).parent / "stored"
 KINDS = {
     "surrogate": (ChebyshevSurrogate, STORED / "surrogate_version_1.npz"),
     "drive model": (DriveModel, STORED / "drive_model_version_1.npz"),
@@ -121,7 +120,7 @@ def test_a_file_is_read_by_numpy_alone(kind):
 
 
 def test_the_documented_reading_by_numpy_gives_the_surrogate_s_value(tmp_path, monkeypatch, capsys):
-    document = Path(__file__).parents[1] / "docs" / "file_format.md"
+    document = DOCS / "file_format.md"
     snippet = document.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
     (tmp_path / "surrogate.npz").write_bytes(SURROGATE)
     monkeypatch.chdir(tmp_path)
