@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.excess import DEVIATIONS
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, count, fit
 from pymoo_hdte.discrepancy.engine.screening import Screened
+from pymoo_hdte.laws.effect import is_contained
 
 SHARE = 0.9
 """Least share of the excess chi-square that named effects remove."""
@@ -150,6 +151,23 @@ def alike(one: Rival, chosen: Rival, freedom: int, margin: float = 1.0) -> bool:
     if near or misfit <= adequate(freedom) or (one.exact and chosen.exact):
         return near
     return one.fit.chi_square - freedom < margin * ALIKE * (chosen.fit.chi_square - freedom)
+
+
+def contains(one: Rival, other: Rival) -> bool:
+    """Tell whether a set differs from another only by laws that hold the other's as special cases.
+
+    Stribeck's friction without its excess is Coulomb's: it always explains as much.
+    """
+    if len(one.candidates) != len(other.candidates):
+        return False
+    pairs = zip(
+        *(sorted(each.candidates, key=lambda c: c.port) for each in (one, other)), strict=True
+    )
+    return all(
+        wide.port == special.port
+        and (wide.name == special.name or is_contained(special.name, wide.name))
+        for wide, special in pairs
+    )
 
 
 def refined(data: Evidence, one: Rival, excess: float) -> Rival:
