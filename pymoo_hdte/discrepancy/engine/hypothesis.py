@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, count, fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened
+from pymoo_hdte.laws.effect import is_contained
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +126,23 @@ def alike(one: Rival, chosen: Rival, freedom: int, rules: Rules, margin: float =
         return near
     left = chosen.fit.chi_square - freedom
     return one.fit.chi_square - freedom < margin * rules.form_ratio * left
+
+
+def contains(one: Rival, other: Rival) -> bool:
+    """Tell whether a set differs from another only by laws that hold the other's as special cases.
+
+    Stribeck's friction without its excess is Coulomb's: it always explains as much.
+    """
+    if len(one.candidates) != len(other.candidates):
+        return False
+    pairs = zip(
+        *(sorted(each.candidates, key=lambda c: c.port) for each in (one, other)), strict=True
+    )
+    return all(
+        wide.port == special.port
+        and (wide.name == special.name or is_contained(special.name, wide.name))
+        for wide, special in pairs
+    )
 
 
 def refined(data: Evidence, one: Rival, excess: float) -> Rival:

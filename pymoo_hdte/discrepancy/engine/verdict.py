@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Rival,
     alike,
+    contains,
     down_to_noise,
     explains,
     fit_all,
@@ -92,7 +93,7 @@ def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict
         singles[0] = _searched(data, base, singles[0], excess)
     chosen, rivals = with_second(data, base, singles, candidates)
     others = [rival for rival in rivals if rival is not chosen]
-    chosen = refined(data, chosen, excess)
+    chosen, others = _least_special(data, refined(data, chosen, excess), others, excess)
     if not explains(data, chosen, base, freedom):
         return Verdict("unlisted", base, chosen, tuple(others), (), freedom, rules)
     near = [alike(rival, chosen, freedom, rules, rules.refit_margin) for rival in others]
@@ -112,6 +113,21 @@ def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict
         chosen = listed[0]
     status = _status(chosen, equivalent)
     return Verdict(status, base, chosen, tuple(others), equivalent, freedom, rules)
+
+
+def _least_special(
+    data: Evidence, chosen: Rival, others: list[Rival], excess: float
+) -> tuple[Rival, list[Rival]]:
+    """Return the chosen set, or a special case of it that is no worse fitted to the end; others.
+
+    Fits of few steps stall now and then, and of two that do the one with more unknowns may lead.
+    """
+    fitted = [
+        refined(data, one, excess) if one.names != chosen.names and contains(chosen, one) else one
+        for one in others
+    ]
+    best = min([chosen, *(one for one in fitted if one not in others)], key=lambda one: one.bic)
+    return best, [one for one in (chosen, *fitted) if one is not best]
 
 
 def _status(chosen: Rival, equivalent: Sequence[Rival]) -> str:

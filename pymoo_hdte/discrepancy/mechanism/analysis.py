@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Rival,
+    contains,
     down_to_noise,
     fit_all,
     rival,
@@ -36,7 +37,6 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     check_signals,
     usual_cutoff,
 )
-from pymoo_hdte.laws.effect import is_contained
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 
@@ -274,21 +274,10 @@ def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
     equivalent = tuple(
         one
         for one in verdict.equivalent
-        if np.all(data.power(one.fit.residuals) <= most) and not _contains(one, chosen)
+        if np.all(data.power(one.fit.residuals) <= most) and not contains(one, chosen)
     )
     status = "class" if equivalent else "named"
     return replace(verdict, status=status, equivalent=equivalent)
-
-
-def _contains(one: Rival, chosen: Rival) -> bool:
-    """Tell whether a set of effects differs from another by laws that contain the other's only."""
-    return all(
-        candidate.port == other.port
-        and (candidate.name == other.name or is_contained(other.name, candidate.name))
-        for candidate, other in zip(
-            *(sorted(each.candidates, key=lambda c: c.port) for each in (one, chosen)), strict=True
-        )
-    )
 
 
 def _unknowns(one: Rival) -> int:

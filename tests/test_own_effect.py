@@ -1,0 +1,211 @@
+"""An effect of a user's own, defined in one file, goes everywhere an effect of the package goes."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from quick_campaigns import CONDITIONS
+from virtual_rig_cases import BELIEVED, RIG
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.drive.analysis import analyse
+from pymoo_hdte.discrepancy.drive.misfit.location import locate
+from pymoo_hdte.discrepancy.drive.next_test import next_experiment
+from pymoo_hdte.discrepancy.drive.proof import prove
+from pymoo_hdte.discrepancy.drive.revision import revised_model
+from pymoo_hdte.discrepancy.mechanism import investigate
+from pymoo_hdte.discrepancy.mechanism.models import read_model
+from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
+from pymoo_hdte.discrepancy.report.optimum import OptimumShift
+from pymoo_hdte.discrepancy.report.write import write_report
+from pymoo_hdte.drive import (
+    DriveModel,
+    LawAtPort,
+    harmonic_balance,
+    load_datasheet,
+    load_model,
+    preset,
+    simulate,
+)
+from pymoo_hdte.laws import effects, register, registered
+from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.simulation import simulate as simulate_mechanism
+from pymoo_hdte.problems import RobustDTE
+from pymoo_hdte.virtual.rig import draw_rig, run_campaign
+from pymoo_hdte.virtual.runs import Condition
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "examples"))
+
+from eyring_drag import EYRING_DRAG, EyringDrag
+
+PLANTED = EyringDrag(level=0.03, knee=8.0)
+SLOW = tuple(Condition(speed, 20.0, 500.0, 2, "train") for speed in (300.0, 400.0, 800.0))
+ROTOR = Mechanism(
+    {"angle": Believed(0.01)},
+    [Port("bearing", {"angle": 1.0})],
+    [Input("torque", {"angle": 1.0})],
+)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def known():
+    with registered(EYRING_DRAG):
+        yield
+
+
+@pytest.fixture(scope="module")
+def drive():
+    calm = preset("calibrated")
+    drag = LawAtPort("eyring_drag", "input", PLANTED)
+    return replace(calm, name="draggy", effects=(*calm.effects, drag))
+
+
+@pytest.fixture(scope="module")
+def analysis():
+    """A campaign on a rig whose motor has to overcome the drag too."""
+    rng = np.random.default_rng(3)
+    rig = draw_rig(BELIEVED, (), rng)
+    campaign = run_campaign(rig, BELIEVED, RIG, rng, (*CONDITIONS, *SLOW))
+    running = [
+        replace(
+            record,
+            input_torque=record.input_torque
+            + PLANTED.level * np.arcsinh(record.input_speed / PLANTED.knee),
+        )
+        for record in campaign.running
+    ]
+    return analyse(replace(campaign, running=tuple(running)))
+
+
+@pytest.fixture(scope="module")
+def report(analysis, tmp_path_factory):
+    out = tmp_path_factory.mktemp("own") / "report"
+    proposal = next_experiment(analysis)
+    write_report(
+        analysis,
+        locate(analysis),
+        prove(analysis),
+        proposal,
+        lambda *_: OptimumShift((), "not tried"),
+        out,
+    )
+    return out
+
+
+def test_drive_overcomes_it():
+    calm = preset("published")
+    draggy = replace(calm, effects=(LawAtPort("eyring_drag", "input", PLANTED),))
+    mean = [
+        harmonic_balance(model.coefficients(calm.nominal[None])).motor_torque[0, 0].real
+        for model in (calm, draggy)
+    ]
+    expected = PLANTED.level * np.arcsinh(calm.sheet.input_speed / PLANTED.knee)
+    assert mean[1] - mean[0] == pytest.approx(expected, rel=1e-4)
+    steady = draggy.dte_arcsec(calm.nominal[None])[0]
+    integrated = simulate(draggy, calm.nominal, ramp=0.2, settle=0.3).dte_arcsec()
+    assert integrated == pytest.approx(steady, rel=2e-3)
+
+
+def test_model_files_hold_it(drive, tmp_path):
+    drive.save(tmp_path / "model")
+    assert DriveModel.load(tmp_path / "model") == drive
+    assert drive.effects[-1].to_dict() == {
+        "name": "eyring_drag",
+        "port": "input",
+        "level": {"value": 0.03, "unit": "N.m"},
+        "knee": {"value": 8.0, "unit": "rad/s"},
+    }
+
+
+def test_robust_problem_takes_it(drive):
+    calm = RobustDTE("calibrated", order=1)
+    own = RobustDTE(drive, order=1)
+    design = drive.nominal[None, 1:]
+    difference = own.evaluate(design) - calm.evaluate(design)
+    assert np.all(np.isfinite(difference))
+    assert np.any(difference != 0.0)
+
+
+def test_campaign_names_it(analysis):
+    verdict = analysis.verdict
+    assert verdict.status == "named"
+    assert [one.label for one in verdict.chosen.candidates] == ["eyring_drag:input"]
+
+
+def test_report_tells_values_units_and_sentence(report):
+    document = json.loads((report / "verdict.json").read_text())
+    (effect,) = document["effects"]
+    for name, unit in (("level", "N.m"), ("knee", "rad/s")):
+        found = effect["parameters"][name]
+        low, high = found["interval95"]
+        assert low < getattr(PLANTED, name) < high
+        assert high - low < 0.5 * getattr(PLANTED, name)
+        assert found["unit"] == unit
+    assert effect["sentence"] == EYRING_DRAG.sentence.format(port="input")
+    assert document["held_out"]["channels"]["input_torque"]["after"] < 0.1
+
+
+def test_revised_model_has_it(report, analysis):
+    sheet = load_datasheet(report / "revised_model_sheet.toml")
+    model = load_model(report / "revised_model.toml", sheet)
+    assert model == revised_model(analysis)
+    (drag,) = [one for one in model.effects if one.name == "eyring_drag"]
+    assert drag.law.level == pytest.approx(PLANTED.level, rel=0.2)
+
+
+def test_mechanism_is_slowed_down_and_names_it(tmp_path):
+    records = [rotor_record(seed, role) for seed, role in ((1, "train"), (2, "held_out"))]
+    finding = investigate(ROTOR, records)
+    out = tmp_path / "rotor"
+    document = write_measured_report("rotor", finding, out)
+    assert document["status"] == "named"
+    (effect,) = document["effects"]
+    assert (effect["name"], effect["port"]) == ("eyring_drag", "bearing")
+    for name in ("level", "knee"):
+        low, high = effect["parameters"][name]["interval95"]
+        assert low < getattr(PLANTED, name) < high
+    _, _, (drag,) = read_model(out / "revised_model.toml")
+    assert drag == finding.accepted.effects[0]
+
+
+def rotor_record(seed, role):
+    """A rotor that is driven to and fro, simulated with the drag, and noise of its sensors."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 20.0, 0.004)
+    lines = np.arange(2, 40) / 20.0
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(lines))
+    torque = 0.03 * np.cos(2.0 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
+    plan = Record(f"{role} {seed}", role, time, {"torque": torque})
+    course = simulate_mechanism(ROTOR, plan, [LawAt("eyring_drag", "bearing", PLANTED)])
+    channels = {
+        "angle": course.position["angle"] + 1e-5 * rng.standard_normal(len(time)),
+        "torque": torque + 1e-4 * rng.standard_normal(len(time)),
+    }
+    return Record(f"{role} {seed}", role, time, channels)
+
+
+def test_name_belongs_to_one_effect_and_only_inside_its_block():
+    with pytest.raises(InvalidInput, match="no other effect has"):
+        register(replace(EYRING_DRAG, sentence="Another."))
+    names = [one.name for one in effects()]
+    with registered(replace(EYRING_DRAG, name="own_drag")):
+        assert [one.name for one in effects()] == [*names, "own_drag"]
+    assert [one.name for one in effects()] == names
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"name": "Eyring drag"},
+        {"law": None},
+        {"ports": ("wrist",)},
+        {"quantities": {"heat": "torque"}},
+        {"sentence": " "},
+    ],
+)
+def test_effects_that_say_nothing_are_refused(changes):
+    with pytest.raises(InvalidInput):
+        replace(EYRING_DRAG, **changes)
