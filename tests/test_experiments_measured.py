@@ -11,7 +11,6 @@ from experiments.measured.rigs import MEASURED
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import Finding
-from pymoo_hdte.discrepancy.mechanism import investigate
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
 
 

@@ -11,14 +11,10 @@ from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.drive.analysis import analyse
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import next_experiment
 from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import revised_model
-from pymoo_hdte.discrepancy.mechanism import investigate
-from pymoo_hdte.discrepancy.mechanism.models import read_model
-from pymoo_hdte.discrepancy.report.mechanism import write_measured_report
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
 from pymoo_hdte.discrepancy.report.write import write_report
 from pymoo_hdte.drive import (
@@ -28,11 +24,9 @@ from pymoo_hdte.drive import (
     load_datasheet,
     load_model,
     preset,
-    simulate,
 )
 from pymoo_hdte.laws import effects, register, registered
-from pymoo_hdte.mechanism import Believed, Input, LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.simulation import simulate as simulate_mechanism
+from pymoo_hdte.mechanism import Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
