@@ -14,6 +14,7 @@ from quick_campaigns import quick_campaign
 from virtual_rig_cases import effect
 
 from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.discrepancy import analysis as api
 from pymoo_hdte.discrepancy import write_campaign
 from pymoo_hdte.discrepancy.drive import analysis as workflow
 from pymoo_hdte.discrepancy.report import write as report
@@ -184,10 +185,10 @@ def test_a_bad_campaign_is_one_clear_line_and_nothing_is_written(fault, folder, 
 
 @pytest.fixture
 def no_analysis(monkeypatch):
-    def fail(campaign):
+    def fail(campaign, effects):
         raise AssertionError("nobody should wait for this")
 
-    monkeypatch.setattr(workflow, "examine_drive", fail)
+    monkeypatch.setattr(api, "examine_drive", fail)
 
 
 @pytest.mark.parametrize("target", ["thesis", "thesis/text", "thesis/text/below", "rig", "."])
@@ -227,7 +228,7 @@ def test_an_interrupted_run_leaves_nothing(
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(workflow, "examine_drive", lambda campaign: analysed)
+    monkeypatch.setattr(api, "examine_drive", lambda campaign, effects: analysed)
     monkeypatch.setattr(module, stage, stop)
     assert run(folder, tmp_path / "deep" / "out") == cli.INTERRUPTED
     assert [path.name for path in tmp_path.iterdir()] == ["rig"]

@@ -73,8 +73,11 @@ def check_sampling(mechanism: Mechanism, records: Sequence[Record], cutoff: floa
 def check_scale(data: MeasuredData) -> None:
     """Raise `InvalidInput` if nothing that is known exactly stands out of the noise of data.
 
-    A gain that is known sets the scale only where its input drives the mechanism.
+    A gain that is known sets the scale only where its input drives the mechanism. Where all is
+    known, nothing is left whose scale could be in question.
     """
+    if all(one.tolerance == 0.0 for one in data.mechanism.quantities.values()):
+        return
     ratio = data.known_over_noise()
     if not ratio > _STANDS_OUT:
         known = ", ".join(_scales(data.mechanism))
