@@ -28,7 +28,7 @@ _MEANINGFUL = 0.05
 """Least share of what is left that it removes."""
 
 
-def mechanism_document(
+def mechanism_verdict_document(
     title: str, finding: MechanismFinding, gaps: Sequence[MeasuredGap], test: NextTest
 ) -> dict[str, Any]:
     """Return the verdict as plain types.
