@@ -7,7 +7,14 @@ from experiments.paper.calibrating import experiment as calibration
 from experiments.paper.calibrating.data import Outcome, format_outcomes, gap, read_outcomes
 from experiments.paper.calibrating.experiment import OUTCOMES, best_rungs
 from experiments.paper.calibrating.fitting import Budget, Fit, _refine, _residuals, outcome_row
-from experiments.paper.calibrating.ladder import EFFECTS, KNOWN, NARROW, WIDE, Candidate, ladder
+from experiments.paper.calibrating.ladder import (
+    EFFECTS,
+    KNOWN,
+    NARROW,
+    WIDE,
+    Candidate,
+    ladder_rungs,
+)
 from experiments.paper.calibrating.predictions import (
     BAND,
     FITS,
@@ -32,12 +39,12 @@ FULL_LADDER = Candidate(EFFECTS, "semi_amplitude", NARROW)
 
 
 def test_ladder_has_every_combination_once():
-    rungs = ladder()
+    rungs = ladder_rungs()
     assert len(rungs) == 2**3 * 2 * 2
     assert len({rung.name for rung in rungs}) == len(rungs)
 
 
-@pytest.mark.parametrize("rung", ladder(), ids=lambda rung: rung.name)
+@pytest.mark.parametrize("rung", ladder_rungs(), ids=lambda rung: rung.name)
 def test_parameters_survive_the_way_to_the_search_space_and_back(rung):
     parameters = {name: KNOWN[0][name] for name in rung.bounds}
     assert rung.physical(rung.searched(parameters)) == pytest.approx(parameters)
@@ -125,7 +132,7 @@ def test_traits_of_the_printed_model_show_no_trade_off():
 
 def test_the_committed_ladder_is_what_its_parameters_predict():
     best = best_rungs(read_outcomes(committed_file(OUTCOMES, "calibration")), "table8")
-    assert len(best) == len(ladder())
+    assert len(best) == len(ladder_rungs())
     for one in (best[0], best[3]):
         model = one.candidate.model(one.parameters)
         found = predict(model, one.candidate.bands, tuple(PUBLISHED))
@@ -143,7 +150,7 @@ def test_the_report_is_made_from_the_committed_ladder(tmp_path):
     assert all(finding.agrees for finding in checks)
     assert step.verdict == "Missed by the fit"
     assert "-0.022 and +0.021 arcsec by the best rung, by +0.468 and -0.136 in" in step.sentence
-    assert len(result.tables[1].rows) == len(ladder())
+    assert len(result.tables[1].rows) == len(ladder_rungs())
 
 
 def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):

@@ -13,6 +13,7 @@ import pytest
 from quick_campaigns import put_ripple_report, quick_campaign, write_ripple_campaign
 
 from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.discrepancy import analysis as api
 from pymoo_hdte.discrepancy import write_campaign
 from pymoo_hdte.discrepancy.drive import analysis as workflow
 from pymoo_hdte.discrepancy.report import write as report
@@ -186,10 +187,10 @@ def test_a_bad_campaign_is_one_clear_line_and_nothing_is_written(fault, folder, 
 
 @pytest.fixture
 def no_analysis(monkeypatch):
-    def fail(campaign):
+    def fail(campaign, effects):
         raise AssertionError("nobody should wait for this")
 
-    monkeypatch.setattr(workflow, "examine_drive", fail)
+    monkeypatch.setattr(api, "examine_drive", fail)
 
 
 @pytest.mark.parametrize("target", ["thesis", "thesis/text", "thesis/text/below", "rig", "."])
@@ -229,7 +230,7 @@ def test_an_interrupted_run_leaves_nothing(
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(workflow, "examine_drive", lambda campaign: analysed)
+    monkeypatch.setattr(api, "examine_drive", lambda campaign, effects: analysed)
     monkeypatch.setattr(module, stage, stop)
     assert run(folder, tmp_path / "deep" / "out") == cli.INTERRUPTED
     assert [path.name for path in tmp_path.iterdir()] == ["rig"]

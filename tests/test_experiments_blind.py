@@ -18,7 +18,7 @@ from experiments.__main__ import FAILED, main
 from experiments.blind import cases as blind_cases
 from experiments.blind import experiment as blind
 from experiments.blind import scoring as blind_scoring
-from experiments.blind.cases import BELIEVED, OUT_OF_TOLERANCE, RIG, Case, cases
+from experiments.blind.cases import BELIEVED, OUT_OF_TOLERANCE, RIG, Case, all_cases
 from experiments.blind.codes import NAMES, code_of_set, words_of_set
 from experiments.blind.data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
 from experiments.blind.limits import size_at
@@ -62,7 +62,7 @@ def channels(campaign):
 
 
 def test_the_list_holds_what_the_issue_asks_for():
-    listed_cases = cases()
+    listed_cases = all_cases()
     assert len({case.key for case in listed_cases}) == len(listed_cases)
     of = {kind: [c for c in listed_cases if c.kind == kind] for kind in
           ("none", "single", "unlisted", "pair", "detection")}  # fmt: skip
@@ -75,7 +75,7 @@ def test_the_list_holds_what_the_issue_asks_for():
 
 
 def test_pairs_are_two_effects_that_one_rig_can_hold():
-    for case in (case for case in cases(ROOT) if case.kind == "pair"):
+    for case in (case for case in all_cases(ROOT) if case.kind == "pair"):
         assert len(set(case.names)) == 2
         assert tuple(effect.name for effect in case.effects()) == case.names
         TrueRig(BELIEVED, (0.0, 0.0, 0.0), case.effects())
@@ -385,15 +385,15 @@ def test_outcomes_survive_their_csv(tmp_path):
 
 
 def test_a_job_names_itself_by_all_that_it_does():
-    keys = {BlindJob(case).key for case in [*cases(), *cases(ROOT)]}
-    assert len(keys) == 2 * len(cases())
+    keys = {BlindJob(case).key for case in [*all_cases(), *all_cases(ROOT)]}
+    assert len(keys) == 2 * len(all_cases())
 
 
 def test_the_committed_outcomes_are_those_of_the_committed_cases():
     files = (committed_file(name, "blind") for name in (blind.OUTCOMES, blind.SECONDS))
     found = read_outcomes(*files)
     # Detection limits come last, and may be missing.
-    assert [one.case for one in found] == cases()[: len(found)]
+    assert [one.case for one in found] == all_cases()[: len(found)]
     assert {one.case.kind for one in found} >= {"none", "single", "unlisted", "pair"}
 
 

@@ -25,7 +25,7 @@ from experiments.paper.static_error.statistics import (
     components,
     of_component,
     prototypes,
-    statistics,
+    sample_statistics,
     tooth_order_error,
 )
 from experiments.published_values import TABLE_2, TABLE_3, TABLE_6
@@ -105,7 +105,7 @@ def few(monkeypatch):
 
 
 def test_statistics_are_those_of_the_signal(few):
-    found = statistics(few)
+    found = sample_statistics(few)
     angle = np.linspace(0.0, 2 * np.pi * 101, 101 * 8000)
     one_turn = slice(0, 8001)
     amplitudes = [np.abs(few.class_phasor(name)) / ARCSEC for name in ("e_w", "e_g", "e_h")]
@@ -128,9 +128,9 @@ def test_the_tooth_order_may_be_added_as_twice_its_amplitude(few):
 
 def test_readings_change_the_factor_as_they_say(few):
     ours, root, plain, one_phase = (
-        statistics(reading.sample(20.0, few))["rms"] for reading in READINGS
+        sample_statistics(reading.sample(20.0, few))["rms"] for reading in READINGS
     )
-    np.testing.assert_allclose(ours, statistics(few)["rms"], rtol=1e-12)
+    np.testing.assert_allclose(ours, sample_statistics(few)["rms"], rtol=1e-12)
     np.testing.assert_allclose(root, ours / 0.9**0.5, rtol=1e-12)
     np.testing.assert_allclose(plain, ours / 50**0.5, rtol=1e-12)
     assert np.all(one_phase > ours)
@@ -143,7 +143,7 @@ def test_readings_change_the_factor_as_they_say(few):
 
 def test_the_angle_that_gives_a_mean_is_found_again(few):
     reading = READINGS[0]
-    at = statistics(reading.sample(37.0, few))
+    at = sample_statistics(reading.sample(37.0, few))
     for name in ("peak-to-peak, output turn", "rms"):
         wanted = float(at[name].mean())
         found = angle_ranges(reading, few, wanted)[name]

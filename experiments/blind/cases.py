@@ -143,7 +143,7 @@ class Case:
         return of_effect, of_rig
 
 
-def cases(root: int = SCORING_SEED) -> list[Case]:
+def all_cases(root: int = SCORING_SEED) -> list[Case]:
     """Return all cases of a root seed, those of the detection limit last."""
     found = [Case("none", (), 1.0, number, root) for number in range(NONE_CASES)]
     for name in LISTED_FORMS:

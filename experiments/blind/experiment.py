@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from experiments.blind.cases import SCORING_SEED, Case, cases
+from experiments.blind.cases import SCORING_SEED, Case, all_cases
 from experiments.blind.data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
 from experiments.blind.figures import confusion_matrix, detection_limits
 from experiments.blind.scoring import BlindJob
@@ -100,7 +100,7 @@ def run(context: Context) -> Result:
 
 def _unfinished(outcomes: list[Outcome]) -> tuple[str, ...]:
     """Return what has not been run yet, in words."""
-    missing = Counter(case.kind for case in cases()[len(outcomes) :])
+    missing = Counter(case.kind for case in all_cases()[len(outcomes) :])
     if not missing:
         return ()
     kinds = ", ".join(f"{count} of kind {kind}" for kind, count in missing.items())
@@ -118,7 +118,7 @@ def _campaign(context: Context) -> list[Outcome]:
     require("pysindy", "blind")
     outcomes: list[Outcome] = []
     for title, limits in (("blind campaigns", False), ("detection limits", True)):
-        chosen = [case for case in cases() if (case.kind == "detection") == limits]
+        chosen = [case for case in all_cases() if (case.kind == "detection") == limits]
         outcomes += score_cases(chosen, context.campaign, title)
         target, seconds = context.out / "blind", context.out / TIMES / "blind"
         write_atomically(target / OUTCOMES, format_outcomes(outcomes).encode())

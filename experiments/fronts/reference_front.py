@@ -23,10 +23,10 @@ from experiments.fronts.level_search import without_local_optima
 from experiments.fronts.tolerance_front import (
     POINTS,
     TOLERANCES,
+    find_tolerance_front,
     tolerance_disagreement,
-    tolerance_front,
 )
-from experiments.fronts.true_front import true_front
+from experiments.fronts.true_front import find_true_front
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table
 from experiments.runner.store import write_atomically
@@ -101,8 +101,8 @@ def run(context: Context) -> Result:
 def _search(problem: RobustDTE | RobustDTETolerance, seed: int) -> ReferenceFront:
     rng = np.random.default_rng(seed)
     if isinstance(problem, RobustDTETolerance):
-        return tolerance_front(problem, rng)
-    found = ReferenceFront(*true_front(problem, N_POINTS, rng))
+        return find_tolerance_front(problem, rng)
+    found = ReferenceFront(*find_true_front(problem, N_POINTS, rng))
     return without_local_optima(problem, found, rng)
 
 

@@ -29,7 +29,7 @@ _FINE_GRID = 1000
 _DECIMALS = 6
 
 
-def tolerance_front(problem: RobustDTETolerance, rng: np.random.Generator) -> ReferenceFront:
+def find_tolerance_front(problem: RobustDTETolerance, rng: np.random.Generator) -> ReferenceFront:
     """Return the front, sorted by tolerance and then by mean."""
     designs = []
     for tolerance in tqdm(_even_tolerances(problem), desc="tolerances", leave=False):

@@ -171,7 +171,7 @@ def _ends(cube: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     return copies
 
 
-def true_front(
+def find_true_front(
     problem: Problem, n_points: int, rng: np.random.Generator
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return front (n, 2) and designs (n, n_var), sorted by the first objective.

@@ -40,7 +40,7 @@ class Twin:
         return tuple(candidate.name for candidate in self.finding.accepted.candidates)
 
 
-def twins(one: Study, port: str, force: float) -> tuple[Twin, ...]:
+def find_twins(one: Study, port: str, force: float) -> tuple[Twin, ...]:
     """Return a twin without a missing effect, and two in which a drag is hidden.
 
     Parameters

@@ -234,13 +234,15 @@ class Mechanism:
             found[f"gain of {one.name}"] = one.gain
         return {name: one for name, one in found.items() if one.value > 0.0}
 
-    def with_values(self, values: Mapping[str, float]) -> Mechanism:
-        """Return the mechanism with other values of `quantities`, as known ones.
+    def with_values(self, values: Mapping[str, float], exactly: bool = True) -> Mechanism:
+        """Return the mechanism with other values of `quantities`.
 
         Parameters
         ----------
         values : mapping of str to float
             SI, by name as in `quantities`; what is not there stays as it is.
+        exactly : bool
+            Whether they are known exactly; otherwise each keeps its relative tolerance.
 
         Returns
         -------
@@ -253,7 +255,8 @@ class Mechanism:
         """
 
         def known(name: str, before: BelievedValue) -> BelievedValue:
-            return BelievedValue(float(values[name])) if name in values else before
+            tolerance = 0.0 if exactly else before.tolerance
+            return BelievedValue(float(values[name]), tolerance) if name in values else before
 
         inertias = {name: known(f"inertia of {name}", one) for name, one in self.inertias.items()}
         ports = [

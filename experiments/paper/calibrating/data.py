@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from experiments.paper.calibrating.fitting import Bootstrap, Fit
-from experiments.paper.calibrating.ladder import EFFECTS, Candidate, ladder
+from experiments.paper.calibrating.ladder import EFFECTS, Candidate, ladder_rungs
 from experiments.paper.calibrating.predictions import PUBLISHED
 from experiments.paper.calibrating.trade_off import TRAITS
 from experiments.runner.campaign import Run
@@ -81,7 +81,7 @@ def format_outcomes(outcomes: Sequence[Outcome]) -> str:
 
 def read_outcomes(path: Path) -> list[Outcome]:
     """Read what `format_outcomes` wrote."""
-    rungs = {rung.name: rung for rung in ladder()}
+    rungs = {rung.name: rung for rung in ladder_rungs()}
     return [
         Outcome(
             kind=row["kind"],

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from experiments.comparison.figures import BLUE, GREY, ORANGE, grid
 from experiments.paper.calibrating.data import Outcome, collect, format_outcomes, gap, read_outcomes
 from experiments.paper.calibrating.fitting import BUDGETS, Bootstrap, Fit
-from experiments.paper.calibrating.ladder import NARROW, ladder
+from experiments.paper.calibrating.ladder import NARROW, ladder_rungs
 from experiments.paper.calibrating.predictions import (
     FITS,
     PUBLISHED,
@@ -98,7 +98,7 @@ def best_rungs(outcomes: Sequence[Outcome], direction: str) -> list[Outcome]:
 
 
 def _campaign(context: Context) -> list[Outcome]:
-    rungs = sorted(ladder(), key=lambda rung: -len(rung.effects))
+    rungs = sorted(ladder_rungs(), key=lambda rung: -len(rung.effects))
     fits = [
         Fit(rung, direction, seed, budget)
         for direction, budget in BUDGETS.items()
@@ -197,7 +197,7 @@ def _step_finding(best: Outcome) -> Finding:
 def _ladder_table(outcomes: Sequence[Outcome], direction: str, title: str) -> Table:
     unseen = held_out(direction)
     fitted = best_rungs(outcomes, direction)
-    title = f"The ladder, {title}: {len(fitted)} of {len(ladder())} rungs"
+    title = f"The ladder, {title}: {len(fitted)} of {len(ladder_rungs())} rungs"
     rows: list[tuple[Cell, ...]] = []
     for one in fitted:
         widths = [one.traits[name] for name in WIDTHS]

@@ -135,7 +135,7 @@ def _effect(name: str, parameters: dict[str, float]) -> DriveEffect:
     return MeshStiffnessVariation(parameters["depth"], parameters["phase"])
 
 
-def ladder() -> list[Candidate]:
+def ladder_rungs() -> list[Candidate]:
     """Return all candidates, from no effect to all three, under every pair of readings."""
     subsets = [subset for size in range(len(EFFECTS) + 1) for subset in combinations(EFFECTS, size)]
     return [Candidate(*rung) for rung in product(subsets, READINGS, (WIDE, NARROW))]

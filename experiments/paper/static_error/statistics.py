@@ -33,7 +33,7 @@ NORMAL_95 = 1.96
 Values = NDArray[np.float64]
 
 
-def statistics(sample: StaticErrorSample) -> dict[str, Values]:
+def sample_statistics(sample: StaticErrorSample) -> dict[str, Values]:
     """Return every statistic of theta_s that 36.251 arcsec might be, shape (n,) each, arcsec.
 
     The tooth order, 404, adds twice its amplitude to a peak-to-peak, less than 0.01 arcsec short of
@@ -118,7 +118,7 @@ def tooth_order_error(sample: StaticErrorSample) -> float:
     """Return by how much adding twice the tooth amplitude overstates the peak-to-peak, arcsec."""
     exact = sample.peak_to_peak() / ARCSEC
     return float(
-        np.abs(statistics(sample)["peak-to-peak, output turn, with order 404"] - exact).max()
+        np.abs(sample_statistics(sample)["peak-to-peak, output turn, with order 404"] - exact).max()
     )
 
 
@@ -126,7 +126,7 @@ def angle_ranges(
     reading: Reading, drawn: StaticErrorSample, wanted: float
 ) -> dict[str, AngleRange]:
     """Return for every statistic the pressure angles that give the mean ``wanted``, arcsec."""
-    samples = [statistics(reading.sample(angle, drawn)) for angle in _TRIED]
+    samples = [sample_statistics(reading.sample(angle, drawn)) for angle in _TRIED]
     return {name: _angle_range([at[name] for at in samples], wanted) for name in samples[0]}
 
 

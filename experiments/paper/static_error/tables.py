@@ -19,7 +19,7 @@ from experiments.paper.static_error.statistics import (
     angle_ranges,
     components,
     of_component,
-    statistics,
+    sample_statistics,
     tooth_order_error,
 )
 from experiments.published_values import TABLE_6
@@ -38,7 +38,7 @@ OUTPUT_TURN = "peak-to-peak, output turn"
 def statistic_table(drawn: StaticErrorSample) -> Table:
     """Set the mean of every statistic at every pressure angle beside the printed theta_s."""
     reading = READINGS[0]
-    means = {angle: statistics(reading.sample(angle, drawn)) for angle in ANGLES}
+    means = {angle: sample_statistics(reading.sample(angle, drawn)) for angle in ANGLES}
     ranges = angle_ranges(reading, drawn, PRINTED)
     rows = []
     for name, values in means[ASSUMED_ANGLE].items():
@@ -67,7 +67,7 @@ def statistic_table(drawn: StaticErrorSample) -> Table:
 def reading_table(drawn: StaticErrorSample) -> Table:
     """Show every statistic under the other readings of Eqs. (1) and (2)."""
     readings = READINGS[1:]
-    found = {r: statistics(r.sample(ASSUMED_ANGLE, drawn)) for r in readings}
+    found = {r: sample_statistics(r.sample(ASSUMED_ANGLE, drawn)) for r in readings}
     ranges = {r: angle_ranges(r, drawn, PRINTED) for r in readings}
     rows = tuple(
         (name, *(c for r in readings for c in (found[r][name].mean(), ranges[r][name].exact)))
@@ -100,7 +100,7 @@ def component_picture(drawn: StaticErrorSample) -> Picture:
         ]
         for (symbol, values), colour in zip(members, COLOURS, strict=False):
             _density(upper, values, colour, symbol)
-        _density(lower, statistics(alone)[OUTPUT_TURN], BLUE, "without order 404")
+        _density(lower, sample_statistics(alone)[OUTPUT_TURN], BLUE, "without order 404")
         upper.set_title(name, fontsize=10)
         upper.set_xlabel("error [µm]")
         lower.set_xlabel("theta_s of this component alone [arcsec]")
@@ -120,7 +120,7 @@ def total_picture(drawn: StaticErrorSample) -> Picture:
     """Show the distribution of theta_s under several statistics."""
     figure, axes = grid(1, 1, width=7.5, height=4.0)
     axis = axes[0, 0]
-    found = statistics(READINGS[0].sample(ASSUMED_ANGLE, drawn))
+    found = sample_statistics(READINGS[0].sample(ASSUMED_ANGLE, drawn))
     shown = [name for name in found if name.startswith("peak-to-peak")]
     shown.append("sum of the order amplitudes, with order 404")
     for name, colour in zip(shown, COLOURS, strict=True):

@@ -72,7 +72,13 @@ class BelievedDrive:
     tolerances: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def tolerance_of(self, name: str) -> float:
-        """Return the relative half-width of a value of `MECHANICAL`."""
+        """Return the relative half-width of a value.
+
+        Parameters
+        ----------
+        name : str
+            One of `MECHANICAL`.
+        """
         return self.tolerances.get(name, self.tolerance)
 
     def __post_init__(self) -> None:

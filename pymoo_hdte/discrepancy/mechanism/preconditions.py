@@ -70,8 +70,11 @@ def check_sampling(mechanism: Mechanism, records: Sequence[Record], cutoff: floa
 def check_scale(data: MeasuredData) -> None:
     """Raise `InvalidInput` if nothing that is known exactly stands out of the noise of data.
 
-    A gain that is known sets the scale only where its input drives the mechanism.
+    A gain that is known sets the scale only where its input drives the mechanism. Where all is
+    known, nothing is left whose scale could be in question.
     """
+    if all(one.tolerance == 0.0 for one in data.mechanism.quantities.values()):
+        return
     ratio, least = data.known_over_noise(), data.rules.noise_power_ratio
     if not ratio > least:
         known = ", ".join(_scales(data.mechanism))

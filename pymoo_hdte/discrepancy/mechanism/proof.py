@@ -101,13 +101,17 @@ def prove_measured(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
 
 
 def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:
-    """Return a mechanism with the values of a fit."""
-    values = {
+    """Return a mechanism with the values of a fit, as known ones."""
+    return mechanism.with_values(fitted_values(mechanism, fitted))
+
+
+def fitted_values(mechanism: Mechanism, fitted: Fit) -> dict[str, float]:
+    """Return the values of a fit that are quantities of the mechanism, SI, by name."""
+    return {
         parameter.name: float(value)
         for parameter, value in zip(fitted.parameters, fitted.values, strict=True)
         if parameter.name in mechanism.quantities
     }
-    return mechanism.with_values(values)
 
 
 def _simulated(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:

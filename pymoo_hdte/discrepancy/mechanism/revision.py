@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
-from pymoo_hdte.discrepancy.mechanism.proof import fitted_mechanism, laws_of
+from pymoo_hdte.discrepancy.mechanism.proof import fitted_values, laws_of
 
 MODEL_FILE = "revised_model.toml"
 
 
 def revised_mechanism(title: str, finding: MechanismFinding) -> MechanismModel:
     """Return the mechanism with fitted values, believed effects, and those that are named.
+
+    Its values keep the relative tolerances that were believed: the same records have the same fit.
 
     Parameters
     ----------
@@ -19,9 +21,10 @@ def revised_mechanism(title: str, finding: MechanismFinding) -> MechanismModel:
     finding : MechanismFinding
     """
     accepted = finding.accepted
+    values = fitted_values(finding.mechanism, accepted)
     return MechanismModel(
         f"{title}, revised",
-        fitted_mechanism(finding.mechanism, accepted),
+        finding.mechanism.with_values(values, exactly=False),
         (*finding.data.known, *laws_of(accepted.effects)),
         finding.cutoff,
     )

@@ -14,7 +14,7 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechanism
 from pymoo_hdte.discrepancy.report.document import believed_in_words
-from pymoo_hdte.discrepancy.report.mechanism_document import mechanism_document
+from pymoo_hdte.discrepancy.report.mechanism_document import mechanism_verdict_document
 from pymoo_hdte.discrepancy.report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy.report.mechanism_figures import (
     misfit_over_frequency,
@@ -62,7 +62,7 @@ def write_mechanism_report(
         If it cannot be written.
     """
     FOLDER.check(Path(out))
-    document = mechanism_document(title, finding, gaps, test)
+    document = mechanism_verdict_document(title, finding, gaps, test)
     document["revised_model"] = {"file": MODEL_FILE}
     model = model_text(revised_mechanism(title, finding))
     FOLDER.write(Path(out), _page(finding, document, gaps), document, {MODEL_FILE: model})

@@ -24,7 +24,7 @@ from pymoo_hdte.laws.effect import effect_named
 from pymoo_hdte.laws.unknowns import line_with_variance
 
 
-def mechanism_document(
+def mechanism_verdict_document(
     title: str, finding: MechanismFinding, gaps: Sequence[MeasuredGap], test: NextTest
 ) -> dict[str, Any]:
     """Return the verdict as plain types.

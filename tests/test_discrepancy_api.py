@@ -1,0 +1,163 @@
+"""The calls that users make: one analysis from the measurement to the report, of any machine."""
+
+import json
+import subprocess
+import sys
+
+import measured_oscillator as rig
+import pytest
+from quick_campaigns import quick_campaign
+from virtual_rig_cases import effect
+
+import pymoo_hdte.discrepancy
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy import (
+    MeasuredMechanism,
+    analyse,
+    read_drive_model,
+    read_mechanism_model,
+)
+from pymoo_hdte.discrepancy import analysis as api
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.drive import load_datasheet, load_model
+from pymoo_hdte.lazy import lazy_names
+from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
+
+OSCILLATOR = Mechanism(
+    inertias={"x": BelievedValue(1.0, 0.1)},
+    ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
+    inputs=[Input("force", {"x": 1.0})],
+)
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    return quick_campaign(5, effect("input", ripple=0.02, ripple_order=3.0))
+
+
+@pytest.fixture(scope="module")
+def analysis(campaign):
+    return analyse(campaign)
+
+
+@pytest.fixture(scope="module")
+def reported(analysis, tmp_path_factory):
+    out = tmp_path_factory.mktemp("reported") / "report"
+    return out, analysis.report(out)
+
+
+@pytest.fixture(scope="module")
+def records():
+    return [rig.record_of(rig.cubic), rig.record_of(rig.cubic, "held_out", seed=3)]
+
+
+@pytest.fixture(scope="module")
+def of_mechanism(records):
+    return analyse(MeasuredMechanism(OSCILLATOR, records, title="oscillator"))
+
+
+# --- names --------------------------------------------------------------------------------------
+
+
+def test_every_name_of_a_stub_is_there_and_no_other():
+    assert {"analyse", "read_campaign", "read_rig"} <= set(pymoo_hdte.discrepancy.__all__)
+    for name in pymoo_hdte.discrepancy.__all__:
+        assert getattr(pymoo_hdte.discrepancy, name).__name__ == name
+    assert set(pymoo_hdte.discrepancy.__all__) < set(dir(pymoo_hdte.discrepancy))
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = pymoo_hdte.discrepancy.nonsense
+
+
+def test_lazy_names_come_from_the_stub(tmp_path, monkeypatch):
+    (tmp_path / "lazily").mkdir()
+    (tmp_path / "lazily" / "__init__.py").write_text("")
+    stub = "from math import (\n    pi,\n    tau,\n)\nfrom fractions import Fraction\n"
+    (tmp_path / "lazily" / "__init__.pyi").write_text(stub)
+    monkeypatch.syspath_prepend(tmp_path)
+    import lazily
+
+    get, names, public = lazy_names("lazily", lazily.__file__)
+    assert public == ["Fraction", "pi", "tau"]
+    assert not hasattr(lazily, "pi")
+    assert get("tau") == 2.0 * get("pi") == 2.0 * lazily.pi
+    assert {"__name__", "Fraction", "pi"} <= set(names())
+
+
+def test_the_package_imports_nothing_before_a_name_is_used():
+    code = "import sys, pymoo_hdte.discrepancy; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert not {"numpy", "scipy", "pymoo_hdte.drive"} & set(done.stdout.split())
+
+
+# --- one analysis -------------------------------------------------------------------------------
+
+
+def test_a_drive_from_verdict_to_report(analysis, reported):
+    out, document = reported
+    assert analysis.verdict.status == document["status"] == "named"
+    assert document["location"] == analysis.locate().summary()
+    assert document["held_out"] == analysis.prove().as_dict()
+    assert document["next_experiment"] == analysis.next_experiment().as_dict()
+    written = json.loads((out / "verdict.json").read_text())
+    assert next(iter(written)) == "schema_version"
+    assert written["schema_version"] == 1
+    sheet = load_datasheet(out / "revised_model_sheet.toml")
+    assert load_model(out / "revised_model.toml", sheet) == analysis.revised_model()
+    assert read_drive_model(out / "revised_model.toml") == analysis.revised_model()
+
+
+def test_a_mechanism_from_verdict_to_report(of_mechanism, tmp_path):
+    document = of_mechanism.report(tmp_path / "report")
+    assert of_mechanism.verdict.status == document["status"] == "named"
+    assert document["location"] == of_mechanism.locate().summary()
+    assert document["held_out"] == [gap.as_dict() for gap in of_mechanism.prove()]
+    assert document["next_experiment"] == of_mechanism.next_experiment().as_dict()
+    assert next(iter(document.items())) == ("schema_version", 1)
+    written = read_mechanism_model(tmp_path / "report" / "revised_model.toml")
+    assert written == of_mechanism.revised_model()
+
+
+def test_nothing_is_worked_out_twice(analysis, reported, monkeypatch):
+    def again(*_):
+        raise AssertionError("worked out twice")
+
+    for name in ("examine_drive", "locate", "prove", "next_experiment"):
+        monkeypatch.setattr(api, name, again)
+    assert analysis.locate() is analysis.locate()
+    assert analysis.prove() is analysis.prove()
+    assert analysis.next_experiment() is analysis.next_experiment()
+
+
+def test_other_things_are_not_analysed():
+    with pytest.raises(InvalidInput, match="measured is 'str', allowed: a Campaign or"):
+        analyse("campaign")
+
+
+class Recorded:
+    """An effect of the user's own that is asked for candidates; here one that changes nothing."""
+
+    def __init__(self):
+        self.asked = []
+
+    def drive_candidates(self, *arguments):
+        self.asked.append(arguments)
+        return [self.candidate("input")]
+
+    def mechanism_candidates(self, *arguments):
+        self.asked.append(arguments)
+        return [self.candidate("spring")]
+
+    def candidate(self, port):
+        level = unknown("level", -1.0, 1.0, 1.0)
+        return Candidate("own_effect", port, (level,), ((1.0,),), lambda v: (), "An own effect.")
+
+
+def test_effects_of_the_user_are_candidates(campaign, records):
+    own = Recorded()
+    analyse(campaign, effects=[own])
+    ((believed, *_),) = own.asked
+    assert believed is campaign.believed
+    analyse(MeasuredMechanism(OSCILLATOR, records[:1]), effects=[own])
+    data, forces, _ = own.asked[-1]
+    assert data.mechanism is OSCILLATOR
+    assert set(forces) == {"spring"}
