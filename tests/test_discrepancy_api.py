@@ -18,8 +18,9 @@ from pymoo_hdte.discrepancy import (
     read_mechanism_model,
 )
 from pymoo_hdte.discrepancy import analysis as api
-from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.drive import load_datasheet, load_model
+from pymoo_hdte.laws import Effect, effect_named, registered
+from pymoo_hdte.laws.friction import CoulombFriction
 from pymoo_hdte.lazy import lazy_names
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 
@@ -133,31 +134,21 @@ def test_other_things_are_not_analysed():
         analyse("campaign")
 
 
-class Recorded:
-    """An effect of the user's own that is asked for candidates; here one that changes nothing."""
+def test_effects_of_the_user_are_looked_for_and_known_from_then_on(campaign, records):
+    asked = []
 
-    def __init__(self):
-        self.asked = []
+    def guess(sizes):
+        asked.append(sizes)
+        return []
 
-    def drive_candidates(self, *arguments):
-        self.asked.append(arguments)
-        return [self.candidate("input")]
-
-    def mechanism_candidates(self, *arguments):
-        self.asked.append(arguments)
-        return [self.candidate("spring")]
-
-    def candidate(self, port):
-        level = unknown("level", -1.0, 1.0, 1.0)
-        return Candidate("own_effect", port, (level,), ((1.0,),), lambda v: (), "An own effect.")
-
-
-def test_effects_of_the_user_are_candidates(campaign, records):
-    own = Recorded()
-    analyse(campaign, effects=[own])
-    ((believed, *_),) = own.asked
-    assert believed is campaign.believed
-    analyse(MeasuredMechanism(OSCILLATOR, records[:1]), effects=[own])
-    data, forces, _ = own.asked[-1]
-    assert data.mechanism is OSCILLATOR
-    assert set(forces) == {"spring"}
+    own = Effect("own_effect", CoulombFriction, ("input",), {"level": "torque"}, "Own.", guess)
+    with registered():
+        analyse(campaign, effects=[own])
+        (of_drive,) = {one.stiffness for one in asked}
+        assert of_drive == campaign.believed.stiffness
+        asked.clear()
+        analyse(MeasuredMechanism(OSCILLATOR, records[:1]), effects=[own])
+        assert {one.stiffness for one in asked} == {OSCILLATOR.ports[0].stiffness.value}
+        assert effect_named("own_effect") is own
+    with pytest.raises(InvalidInput, match=r"effect\.name is 'own_effect'"):
+        effect_named("own_effect")

@@ -21,8 +21,10 @@ from pymoo_hdte.discrepancy import (
     write_campaign,
 )
 from pymoo_hdte.discrepancy.campaign.believed_model import believed_of_model
+from pymoo_hdte.discrepancy.drive.candidates import candidates
 from pymoo_hdte.discrepancy.drive.evidence import training_data
 from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.drive import (
     DampingReference,
@@ -32,6 +34,7 @@ from pymoo_hdte.drive import (
     preset,
 )
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
+from pymoo_hdte.laws.effect import place_of
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicTorque
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 from pymoo_hdte.units import ARCSEC
@@ -146,9 +149,10 @@ def test_a_believed_effect_predicts_as_an_added_one(campaign):
 
 def test_no_candidate_stands_where_an_effect_is_believed():
     orders, seen = [1.0, 2.0, 2.02, 3.0, 3.7, 6.0], [3.0, 3.7]
-    plain = drive_candidates(BELIEVED, orders, seen, 1.0)
+    sizes = port_sizes(BELIEVED, orders, seen, 1.0)
+    plain = candidates(sizes)
     holding = replace(BELIEVED, effects=(FRICTION, RIPPLE, LINE))
-    left = drive_candidates(holding, orders, seen, 1.0)
+    left = candidates(sizes, holding.effects)
     places = {place_of(one) for one in holding.effects}
     assert all(any(one.places & {place} for one in plain) for place in places)
     assert not any(one.places & places for one in left)

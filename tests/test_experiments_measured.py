@@ -11,6 +11,7 @@ from experiments.measured.rigs import MEASURED
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.runner.result import Finding
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
 
 
@@ -32,7 +33,7 @@ def test_every_demand_on_a_real_rig_holds(experiment, folder, tmp_path):
 
 
 def names_in(rig, records):
-    finding = investigate(rig.mechanism, records, rig.cutoff, rig.effects)
+    finding = examine_mechanism(rig.mechanism, records, rig.cutoff, rig.effects)
     return {candidate.name for candidate in finding.accepted.candidates}
 
 

@@ -15,6 +15,7 @@ from pymoo_hdte.identification import (
     find_outliers,
     largest_deviation,
 )
+from pymoo_hdte.identification.error_samples import holm
 from pymoo_hdte.identification.outliers import mean_of_valid
 from pymoo_hdte.virtual.bench import draw_prototypes, plant_outliers, repeat_measurements
 

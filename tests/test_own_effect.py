@@ -11,10 +11,14 @@ from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import next_experiment
 from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import revised_model
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.models import read_mechanism_model
+from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
 from pymoo_hdte.discrepancy.report.write import write_report
 from pymoo_hdte.drive import (
@@ -24,9 +28,11 @@ from pymoo_hdte.drive import (
     load_datasheet,
     load_model,
     preset,
+    simulate_drive,
 )
 from pymoo_hdte.laws import effects, register, registered
-from pymoo_hdte.mechanism import Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.simulation import simulate_mechanism
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
@@ -38,7 +44,7 @@ from eyring_drag import EYRING_DRAG, EyringDrag
 PLANTED = EyringDrag(level=0.03, knee=8.0)
 SLOW = tuple(Condition(speed, 20.0, 500.0, 2, "train") for speed in (300.0, 400.0, 800.0))
 ROTOR = Mechanism(
-    {"angle": Believed(0.01)},
+    {"angle": BelievedValue(0.01)},
     [Port("bearing", {"angle": 1.0})],
     [Input("torque", {"angle": 1.0})],
 )
@@ -71,7 +77,7 @@ def analysis():
         )
         for record in campaign.running
     ]
-    return analyse(replace(campaign, running=tuple(running)))
+    return examine_drive(replace(campaign, running=tuple(running)))
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +105,7 @@ def test_drive_overcomes_it():
     expected = PLANTED.level * np.arcsinh(calm.sheet.input_speed / PLANTED.knee)
     assert mean[1] - mean[0] == pytest.approx(expected, rel=1e-4)
     steady = draggy.dte_arcsec(calm.nominal[None])[0]
-    integrated = simulate(draggy, calm.nominal, ramp=0.2, settle=0.3).dte_arcsec()
+    integrated = simulate_drive(draggy, calm.nominal, ramp=0.2, settle=0.3).dte_arcsec()
     assert integrated == pytest.approx(steady, rel=2e-3)
 
 
@@ -152,16 +158,16 @@ def test_revised_model_has_it(report, analysis):
 
 def test_mechanism_is_slowed_down_and_names_it(tmp_path):
     records = [rotor_record(seed, role) for seed, role in ((1, "train"), (2, "held_out"))]
-    finding = investigate(ROTOR, records)
+    finding = examine_mechanism(ROTOR, records)
     out = tmp_path / "rotor"
-    document = write_measured_report("rotor", finding, out)
+    document = write_mechanism_report("rotor", finding, out)
     assert document["status"] == "named"
     (effect,) = document["effects"]
     assert (effect["name"], effect["port"]) == ("eyring_drag", "bearing")
     for name in ("level", "knee"):
         low, high = effect["parameters"][name]["interval95"]
         assert low < getattr(PLANTED, name) < high
-    _, _, (drag,) = read_model(out / "revised_model.toml")
+    (drag,) = read_mechanism_model(out / "revised_model.toml").effects
     assert drag == finding.accepted.effects[0]
 
 
