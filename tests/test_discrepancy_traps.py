@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from quick_campaigns import quick_campaign
 
-from pymoo_hdte.discrepancy.campaign.plausibility import LEAST_TOLERANCE
 from pymoo_hdte.discrepancy.drive.analysis import analyse
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.engine import hypothesis as rival
 from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.rules import RULES
 
 
 @pytest.fixture(scope="module", params=[1, 2])
@@ -29,7 +29,7 @@ def unsearched(monkeypatch):
 
     for module in (naming, rival, second_effect):
         monkeypatch.setattr(module, "fit", as_screened)
-    monkeypatch.setattr(naming, "FITTED", 1)
+    return replace(RULES, most_fitted=1)
 
 
 def test_a_clean_drive_is_adequate(clean):
@@ -43,13 +43,13 @@ def test_a_clean_campaign_without_a_sweep_is_adequate(clean):
 
 
 def test_a_frozen_base_makes_effects_of_its_own_errors(clean, unsearched):
-    frozen = replace(clean.believed, tolerance=LEAST_TOLERANCE)
-    assert analyse(replace(clean, believed=frozen)).verdict.status != "adequate"
+    frozen = replace(clean.believed, tolerance=RULES.least_tolerance)
+    assert analyse(replace(clean, believed=frozen), unsearched).verdict.status != "adequate"
 
 
 def test_repeatability_left_out_is_a_false_alarm(clean, unsearched):
     exact = replace(clean.rig, repeatability=0.0)
-    assert analyse(replace(clean, rig=exact)).verdict.status != "adequate"
+    assert analyse(replace(clean, rig=exact), unsearched).verdict.status != "adequate"
 
 
 def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, monkeypatch):
@@ -61,4 +61,4 @@ def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, m
         return carried(self, layout, start) * np.outer(own, own)
 
     monkeypatch.setattr(Data, "_repeatability", of_the_transmission_error)
-    assert analyse(clean).verdict.status != "adequate"
+    assert analyse(clean, unsearched).verdict.status != "adequate"
