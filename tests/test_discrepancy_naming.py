@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import adequate
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.discrepancy.report.document import sentence
 from pymoo_hdte.units import ARCSEC
@@ -59,7 +60,9 @@ def disturbed(data, chi_square, record=3):
     )
 
 
-def verdict_on(data, labels=None, seen=SEEN):
+def verdict_on(data, labels=None, seen=SEEN, **changed):
+    """The verdict by the rules of the data, or by those that are changed."""
+    data = replace(data, rules=replace(data.rules, **changed))
     rivals = library(data, seen) if labels is None else of_labels(labels, seen)
     return judge(data, fit(data), rivals)
 
@@ -75,11 +78,11 @@ def ripple():
 
 
 def test_adequacy_in_closed_form():
-    assert adequate(1400) == pytest.approx(1.0 + 4.0 * np.sqrt(2.0 / 1400.0))
-    assert adequate(1400) == pytest.approx(1.15, abs=0.005)
+    assert adequate(1400, RULES) == pytest.approx(1.0 + 4.0 * np.sqrt(2.0 / 1400.0))
+    assert adequate(1400, RULES) == pytest.approx(1.15, abs=0.005)
     # Chi-square has the variance 2 f: four standard deviations, of a normal one in 30000.
     for freedom in (100, 1000, 10000):
-        assert chi2.sf(freedom * adequate(freedom), freedom) < 3e-4
+        assert chi2.sf(freedom * adequate(freedom, RULES), freedom) < 3e-4
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -111,7 +114,8 @@ def test_a_planted_effect_is_named_with_its_values(label, values):
     objective = Objective(data, fitted.candidates)
     truth = objective.residuals(np.append(objective.start[: len(data.base)], values))
     assert truth @ truth - fitted.chi_square < chi2.isf(1e-4, len(fitted.values))
-    assert fitted.chi_square < adequate(verdict.degrees_of_freedom) * verdict.degrees_of_freedom
+    freedom = verdict.degrees_of_freedom
+    assert fitted.chi_square < adequate(freedom, RULES) * freedom
 
 
 def test_evidence_in_closed_form(ripple):
@@ -209,24 +213,23 @@ def test_what_one_record_alone_shows_is_unlisted():
     assert verdict.chosen.share < 0.5
 
 
-def test_a_line_too_small_for_the_whole_chi_square_is_found_by_its_gain(monkeypatch):
+def test_a_line_too_small_for_the_whole_chi_square_is_found_by_its_gain():
     data = planted({RIPPLE: (3e-5, 0.0)})
     verdict = verdict_on(data, [RIPPLE, LINE])
     freedom = verdict.degrees_of_freedom
-    assert verdict.base.chi_square < adequate(freedom) * freedom
+    assert verdict.base.chi_square < adequate(freedom, RULES) * freedom
     assert (verdict.status, labels_of(verdict)) == ("named", {RIPPLE})
-    monkeypatch.setattr(naming, "GAIN", 1e9)
-    assert verdict_on(data, [RIPPLE, LINE]).status == "adequate"
+    insensitive = verdict_on(data, [RIPPLE, LINE], single_effect_gain=1e9)
+    assert insensitive.status == "adequate"
 
 
-def test_a_line_must_explain_down_to_the_noise(monkeypatch):
+def test_a_line_must_explain_down_to_the_noise():
     """Most of an excess is not enough for a form that leaves nothing open."""
     data = disturbed(planted({RIPPLE: (5e-4, 0.0)}), 1000.0)
     verdict = verdict_on(data, [RIPPLE, LINE])
     assert verdict.status == "unlisted"
-    assert rival.SHARE < verdict.chosen.share < rival.EXACT_SHARE
-    monkeypatch.setattr(rival, "EXACT", 10.0)
-    found = verdict_on(data, [RIPPLE, LINE])
+    assert RULES.explained_share < verdict.chosen.share < RULES.exact_share
+    found = verdict_on(data, [RIPPLE, LINE], exact_chi_square=10.0)
     assert (found.status, labels_of(found)) == ("named", {RIPPLE})
 
 
@@ -234,21 +237,20 @@ def test_a_curve_need_explain_its_share_only():
     data = disturbed(planted({CUBIC: (2e9,)}), 500.0)
     verdict = verdict_on(data, [CUBIC, RIPPLE])
     freedom = verdict.degrees_of_freedom
-    assert verdict.chosen.fit.chi_square > rival.EXACT * freedom
+    assert verdict.chosen.fit.chi_square > RULES.exact_chi_square * freedom
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC})
 
 
-def test_what_explains_one_channel_is_not_the_cause_of_what_another_shows(monkeypatch):
+def test_what_explains_one_channel_is_not_the_cause_of_what_another_shows():
     data = planted({CUBIC: (6e9,)})
     for record in (1, 3):
         data = disturbed(data, 1500.0, record)
     verdict = verdict_on(data, [CUBIC, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
-    assert verdict.chosen.share > rival.SHARE
+    assert verdict.chosen.share > RULES.explained_share
     left = rival.unexplained(data, verdict.base, verdict.chosen.fit)
     assert left.tolist() == [False, True, False, False, False]
-    monkeypatch.setattr(rival, "PART_SHARE", 0.0)
-    assert verdict_on(data, [CUBIC, RIPPLE]).status == "named"
+    assert verdict_on(data, [CUBIC, RIPPLE], explained_part_share=0.0).status == "named"
 
 
 def test_what_one_record_alone_shows_does_not_speak_against_a_curve():
@@ -258,7 +260,8 @@ def test_what_one_record_alone_shows_does_not_speak_against_a_curve():
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC})
     assert not rival.unexplained(data, verdict.base, verdict.chosen.fit).any()
     excess = data.excess(verdict.chosen.fit)
-    assert excess.of_parts[1] > (rival.PLAIN - 1.0) * excess.freedom.sum(axis=0)[1]
+    contradicting = RULES.contradicting_chi_square - 1.0
+    assert excess.of_parts[1] > contradicting * excess.freedom.sum(axis=0)[1]
 
 
 @pytest.mark.parametrize(
@@ -283,7 +286,8 @@ def test_an_effect_must_pay_for_its_unknowns():
         one = SimpleNamespace(
             fit=found, candidates=[SimpleNamespace(unknowns=2)], exact=True, share=1.0
         )
-        assert rival.explains(None, one, base, freedom) == named
+        data = SimpleNamespace(rules=RULES)
+        assert rival.explains(data, one, base, freedom) == named
 
 
 def test_rivals_are_compared_by_their_evidence():
@@ -294,7 +298,8 @@ def test_rivals_are_compared_by_their_evidence():
     chosen = alternative("chosen", 1050.0)
     # Both leave the same; what counts is how much of its bounds each had to give up.
     for more, equal in ((9.9, True), (10.1, False)):
-        assert rival.alike(alternative("other", 1050.0 + more), chosen, 1000) == equal
+        other = alternative("other", 1050.0 + more)
+        assert rival.alike(other, chosen, 1000, RULES) == equal
 
 
 def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent():
@@ -312,26 +317,25 @@ def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent(
     assert total == pytest.approx(found.chi_square - priors)
 
 
-def test_a_second_effect_must_remove_most_of_what_is_left(monkeypatch):
+def test_a_second_effect_must_remove_most_of_what_is_left():
     # The first leaves 200 beyond the noise, of which the second takes 100.
     data = disturbed(planted({RIPPLE: (3e-3, 0.0), LINE: (0.04 * ARCSEC, 0.0)}), 110.0)
-    monkeypatch.setattr(rival, "EXACT", 10.0)
-    assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE}
-    monkeypatch.setattr(second_effect, "SHARE", 0.4)
-    assert labels_of(verdict_on(data, [RIPPLE, LINE])) == {RIPPLE, LINE}
+    lenient = {"exact_chi_square": 10.0}
+    assert labels_of(verdict_on(data, [RIPPLE, LINE], **lenient)) == {RIPPLE}
+    lenient["explained_share"] = 0.4
+    assert labels_of(verdict_on(data, [RIPPLE, LINE], **lenient)) == {RIPPLE, LINE}
 
 
-def test_a_second_effect_is_looked_for_where_the_first_explains_least(monkeypatch):
+def test_a_second_effect_is_looked_for_where_the_first_explains_least():
     """The curve takes 96 % of the excess, and nothing of that of the input torque."""
     data = planted({CUBIC: (6e9,), DRAG: (2e-7,)})
     verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC, DRAG})
     alone = next(one for one in verdict.alternatives if one.label == CUBIC)
-    assert alone.share > rival.SHARE
+    assert alone.share > RULES.explained_share
     left = rival.unexplained(data, verdict.base, alone.fit)
     assert left.tolist() == [False, True, False, False, False]
-    monkeypatch.setattr(second_effect, "HOPE", np.inf)
-    verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE])
+    verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE], second_hope_share=1e9)
     assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
 
 
@@ -351,9 +355,9 @@ def test_a_second_effect_is_looked_for_in_the_sweep_alone(monkeypatch):
     assert labels_of(judge(data, fit(data), [drag, friction])) == {DRAG}
 
 
-def test_a_second_effect_beside_a_curve_must_count_beside_the_whole(monkeypatch):
+def test_a_second_effect_beside_a_curve_must_count_beside_the_whole():
     data = planted({CUBIC: (6e9,), LINE: (0.034 * ARCSEC, 0.0)})
     verdict = verdict_on(data, [CUBIC, LINE])
     assert labels_of(verdict) == {CUBIC}
-    monkeypatch.setattr(second_effect, "SECOND_LEAST", 0.0)
-    assert labels_of(verdict_on(data, [CUBIC, LINE])) == {CUBIC, LINE}
+    found = verdict_on(data, [CUBIC, LINE], second_form_share=0.0)
+    assert labels_of(found) == {CUBIC, LINE}

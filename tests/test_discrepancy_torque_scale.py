@@ -14,6 +14,7 @@ from pymoo_hdte.discrepancy.campaign.campaign import RATED_TORQUE, torque_scale
 from pymoo_hdte.discrepancy.drive.analysis import _flanks_held, examine_drive
 from pymoo_hdte.discrepancy.drive.candidates import candidates
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
+from pymoo_hdte.discrepancy.engine.rules import RULES
 
 OF_TORQUE = {
     "believed": ("stiffness", "damping", "input_inertia", "input_damping", "output_damping",
@@ -129,5 +130,5 @@ def test_a_soft_drive_has_the_size_of_its_loads():
 def test_a_load_that_holds_the_flanks_together_is_one_of_its_drive():
     data = known_data([(1000.0, load) for load in (0.0, 0.1, 0.3)])
     still = replace(data.features, values=np.zeros_like(data.features.values))
-    assert _flanks_held(still, 1.0).tolist() == [False, False, False]
-    assert _flanks_held(still, 0.25).tolist() == [False, False, True]
+    assert _flanks_held(still, 1.0, RULES).tolist() == [False, False, False]
+    assert _flanks_held(still, 0.25, RULES).tolist() == [False, False, True]

@@ -29,7 +29,7 @@ def unsearched(monkeypatch):
 
     for module in (naming, rival, second_effect):
         monkeypatch.setattr(module, "fit", as_screened)
-    monkeypatch.setattr(naming, "FITTED", 1)
+    return replace(RULES, most_fitted=1)
 
 
 def test_a_clean_drive_is_adequate(clean):
@@ -44,12 +44,12 @@ def test_a_clean_campaign_without_a_sweep_is_adequate(clean):
 
 def test_a_frozen_base_makes_effects_of_its_own_errors(clean, unsearched):
     frozen = replace(clean.believed, tolerance=RULES.least_tolerance)
-    assert examine_drive(replace(clean, believed=frozen)).verdict.status != "adequate"
+    assert examine_drive(replace(clean, believed=frozen), unsearched).verdict.status != "adequate"
 
 
 def test_repeatability_left_out_is_a_false_alarm(clean, unsearched):
     exact = replace(clean.rig, repeatability=0.0)
-    assert examine_drive(replace(clean, rig=exact)).verdict.status != "adequate"
+    assert examine_drive(replace(clean, rig=exact), unsearched).verdict.status != "adequate"
 
 
 def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, monkeypatch):
@@ -61,4 +61,4 @@ def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, m
         return carried(self, layout, start) * np.outer(own, own)
 
     monkeypatch.setattr(Data, "_repeatability", of_the_transmission_error)
-    assert examine_drive(clean).verdict.status != "adequate"
+    assert examine_drive(clean, unsearched).verdict.status != "adequate"

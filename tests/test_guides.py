@@ -11,8 +11,7 @@ import pytest
 from kept_results import kept
 from places import DOCS, ROOT
 
-from pymoo_hdte.discrepancy.engine import excess
-from pymoo_hdte.discrepancy.engine import hypothesis as rival
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.drive import hs_20_100
 from pymoo_hdte.surrogate import TruncatedNormal
 
@@ -161,9 +160,9 @@ def test_verdicts_of_the_guide():
 @pytest.mark.parametrize(
     ("guide", "words", "value", "stated"),
     [
-        ("verdict_rules", "four standard deviations", excess.DEVIATIONS, 4.0),
-        ("verdict_rules", "a distance of 10", rival.VERY_STRONG, 10.0),
-        ("verdict_rules", "removes at least half of the power", MAIN_SHARE, 0.5),
+        ("verdict_rules", "four standard deviations", RULES.false_alarm_deviations, 4.0),
+        ("verdict_rules", "a distance of 10", RULES.evidence_distance, 10.0),
+        ("verdict_rules", "removes at least half of the power", RULES.main_share, 0.5),
         ("exact_moments", "128 nodes and more", len(NOISE.quadrature(0)[0]), 128),
         ("robust_study", "101 turns of a motor", hs_20_100().ratio, 101.0),
     ],

@@ -3,9 +3,12 @@ Mathematics: the rules of a verdict
 ===================================
 
 ``pymoo-hdte discrepancy`` says of a model and of measurements whether something is missing, and
-what. This page says by which rules, and shows the statistics behind them. Every threshold below is
-read from the code that uses it.
+what. This page says by which rules, and shows the statistics behind them. All thresholds stand in
+`pymoo_hdte.discrepancy.engine.rules.Rules`, from which this page reads them.
 """
+
+from dataclasses import replace
+from textwrap import fill
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,10 +16,12 @@ from scipy.integrate import quad
 from scipy.stats import chi2, ncx2
 
 from pymoo_hdte.discrepancy import MeasuredMechanism, analyse
-from pymoo_hdte.discrepancy.engine import hypothesis as rival
-from pymoo_hdte.discrepancy.engine import selection as second_effect
-from pymoo_hdte.discrepancy.engine import verdict as naming
+from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.hypothesis import adequate
+from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.verdict import STATUSES
+from pymoo_hdte.discrepancy.mechanism import investigate
 from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
@@ -45,10 +50,10 @@ from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 # thousand features.
 
 for freedom in (100, 1400):
-    limit = rival.adequate(freedom)
+    limit = adequate(freedom, RULES)
     chance = chi2.sf(limit * freedom, freedom)
     print(f"nu = {freedom:4}: limit {limit:.3f}, passed by noise with probability {chance:.0e}")
-print(f"gain that speaks against an adequate model: {naming.GAIN:g}")
+print(f"gain that speaks against an adequate model: {RULES.single_effect_gain:g}")
 
 # %%
 # An effect that adds a signal of :math:`\lambda` to the sum of squares (:math:`\lambda` = features
@@ -56,7 +61,7 @@ print(f"gain that speaks against an adequate model: {naming.GAIN:g}")
 # passes the limit one sees what a campaign can detect at all:
 
 freedom = 400
-limit = rival.adequate(freedom)
+limit = adequate(freedom, RULES)
 size = np.linspace(0.0, 250.0, 200)
 x = np.linspace(0.6, 2.0, 400)
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.5), layout="constrained")
@@ -135,14 +140,14 @@ print(f"evidence {found.evidence:.3f}, by integration {-2.0 * np.log(integral):.
 # the data by itself. An effect whose form is certain, such as a sensor's zero, must do better than
 # a friction curve whose form is only ever close.
 
-print(f"gain of BIC at least                       {rival.BIC_GAIN:g}")
-print(f"share of the excess removed at least       {rival.SHARE:g}")
-print(f"  in each part of the data                 {rival.PART_SHARE:g}")
-print(f"  by effects of an exact form              {rival.EXACT_SHARE:g}")
-print(f"chi-square / nu that does for exact forms  {rival.EXACT:g}")
-print(f"a second effect removes of what is left    {second_effect.SECOND_SHARE:g}")
-print(f"rivals are alike within an evidence of     {rival.VERY_STRONG:g}")
-print(f"  or, of forms not exact, if they leave    {rival.ALIKE:g} times as much")
+print(f"gain of BIC at least                       {RULES.bic_gain:g}")
+print(f"share of the excess removed at least       {RULES.explained_share:g}")
+print(f"  in each part of the data                 {RULES.explained_part_share:g}")
+print(f"  by effects of an exact form              {RULES.exact_share:.6f}")
+print(f"chi-square / nu that does for exact forms  {RULES.exact_chi_square:g}")
+print(f"a second effect removes of what is left    {RULES.second_share:g}")
+print(f"rivals are alike within an evidence of     {RULES.evidence_distance:g}")
+print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as much")
 
 # %%
 # The verdict follows:
@@ -166,7 +171,7 @@ print(f"  or, of forms not exact, if they leave    {rival.ALIKE:g} times as much
 #    * - ``parameter``
 #      - The set that explains it is no effect but a base parameter beyond its tolerance.
 
-print(", ".join(naming.STATUSES))
+print(", ".join(STATUSES))
 
 # %%
 # Intervals
@@ -236,3 +241,24 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 # of the power of the misfit beyond the noise of the sensors; of models that leave about as much,
 # the one with the fewest unknowns is named; and a rival that merely contains the named law is no
 # other explanation.
+
+# %%
+# Change a rule
+# -------------
+#
+# `investigate`, `analyse` and `read_campaign` take rules of your own. Whoever believes that a name
+# should remove nearly all of a misfit, and not the better half, asks for it:
+
+strict = investigate(joint, [record_of(0.3)], rules=replace(RULES, main_share=1.0)).verdict
+print(f"main_share {RULES.main_share:g}: {verdict.status}; main_share 1: {strict.status}")
+
+# %%
+# All rules
+# ---------
+#
+# Each with its value, its unit, what it decides and where it comes from:
+
+for one in RULES.explained():
+    print(f"{one.name} = {one.value:g} ({one.unit})")
+    print(fill(one.meaning, 96, initial_indent="    ", subsequent_indent="    "))
+    print(fill(one.derivation, 96, initial_indent="    ", subsequent_indent="    "))

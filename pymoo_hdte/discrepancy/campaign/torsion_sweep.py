@@ -22,6 +22,7 @@ from pymoo_hdte.discrepancy.campaign.records import TorsionRecord
 
 Values = NDArray[np.float64]
 
+# How rows become points with their covariance, which is told on: no rule of the verdict.
 ROWS_A_POINT = 24
 """Rows of which a point is the mean, or some more."""
 FEWEST_ROWS = 2 * ROWS_A_POINT

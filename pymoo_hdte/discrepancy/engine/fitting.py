@@ -19,6 +19,7 @@ from pymoo_hdte.laws.unknowns import Parameter
 Vector = NDArray[np.float64]
 Response = Callable[[Sequence[Any]], Vector]
 """From effects that are added to a fit to what its whitened residuals change by, shape (n,)."""
+# Of the search; how long it may take is a rule of `Rules`.
 _STEP = 1e-3
 """Step of difference quotients, in units of a parameter's scale."""
 _FREED = 10.0

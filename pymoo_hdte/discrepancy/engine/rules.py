@@ -52,7 +52,8 @@ class Rules(ReportRules, RecordRules):
         "chi-square",
         "A base that is adequate as a whole is not, if one candidate would reduce chi-square by "
         "this much: one line of one channel is lost among a thousand features.",
-        "SIMULATED",
+        "Simulation: of 1000 campaigns of noise alone one gave some candidate of 28 this much; one "
+        "in 100 gave 18.",
     )
 
     # Which effect, and does it explain the misfit?

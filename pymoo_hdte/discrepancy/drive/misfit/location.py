@@ -34,6 +34,7 @@ from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 __all__ = ["Location", "locate", "refit_clean"]
 
+# Of the robust fit, which ends in the same place with finer ones; what is flagged is in `Rules`.
 _LINEARISATIONS = 2
 _ROUNDS = 15
 """Of renewed weights, for one linearisation."""

@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.drive.misfit.nature import (
 )
 
 _WORDS = [name.replace("_", " ") for name in CHANNELS]
+# How much a sentence lists; what is flagged and claimed is in `Rules`.
 _SHOWN = 3
 """Most orders that a sentence lists."""
 _MINOR = 0.05
