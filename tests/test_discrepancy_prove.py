@@ -4,6 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from planted_features import SCALES
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.checks import InvalidInput
@@ -38,7 +39,7 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
-LISTED = candidates(port_sizes(BELIEVED, [6.0], [6.0], 1.0))
+LISTED = candidates(port_sizes(BELIEVED, [6.0], [6.0], SCALES))
 
 
 def analysed(campaign, label=None, status="named"):

@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.candidates import candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
-from pymoo_hdte.discrepancy.drive.sizes import port_sizes
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
@@ -151,9 +151,8 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
 def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
     seen = _strong_lines(features, base)
-    campaign = data.campaign
     orders = features.orders.tolist()
-    return candidates(port_sizes(campaign.believed, orders, seen, campaign.torque_scale))
+    return candidates(port_sizes(data.campaign.believed, orders, seen, scales_of(data, base)))
 
 
 def _loaded(data: Data) -> Data:
