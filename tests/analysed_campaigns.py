@@ -3,6 +3,7 @@
 from functools import cache
 
 import numpy as np
+from planted_features import SCALES
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
@@ -29,7 +30,7 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
-LISTED = candidates(port_sizes(BELIEVED, [6.0], [6.0], 1.0))
+LISTED = candidates(port_sizes(BELIEVED, [6.0], [6.0], SCALES))
 
 
 def analysed(campaign, label=None, status="named"):

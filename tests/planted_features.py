@@ -13,7 +13,7 @@ from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.prediction import Conditions, coefficients_of
-from pymoo_hdte.discrepancy.drive.sizes import port_sizes
+from pymoo_hdte.discrepancy.drive.sizes import Scales, port_sizes
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
@@ -23,6 +23,8 @@ from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 ORDERS = np.array([1.0 / 101.0, 1.0, 2.0, 2.02, 3.0, 6.0])
+SCALES = Scales(210.0, 40.0, 2000.0, 8.0 * ARCSEC, 0.01, 1.0)
+"""Of a typical campaign on a drive of this size with something missing."""
 SWEEP_NOISE = 0.05 * ARCSEC
 CONDITIONS = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 30.0, 40.0)]
 
@@ -97,7 +99,8 @@ def with_sweep(data, effects=(), rng=None, **changes):
 
 def library(data, seen=()):
     """All candidates; lines of unexpected order at those that were seen."""
-    return candidates(port_sizes(data.campaign.believed, data.features.orders.tolist(), seen, 1.0))
+    orders = data.features.orders.tolist()
+    return candidates(port_sizes(data.campaign.believed, orders, seen, SCALES))
 
 
 def listed(data, name, seen=()):

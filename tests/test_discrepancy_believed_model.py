@@ -7,6 +7,7 @@ from dataclasses import replace
 import measured_oscillator as rig
 import numpy as np
 import pytest
+from planted_features import SCALES
 from quick_campaigns import quick_campaign
 from virtual_rig_cases import BELIEVED, effect
 
@@ -149,7 +150,7 @@ def test_a_believed_effect_predicts_as_an_added_one(campaign):
 
 def test_no_candidate_stands_where_an_effect_is_believed():
     orders, seen = [1.0, 2.0, 2.02, 3.0, 3.7, 6.0], [3.0, 3.7]
-    sizes = port_sizes(BELIEVED, orders, seen, 1.0)
+    sizes = port_sizes(BELIEVED, orders, seen, SCALES)
     plain = candidates(sizes)
     holding = replace(BELIEVED, effects=(FRICTION, RIPPLE, LINE))
     left = candidates(sizes, holding.effects)

@@ -18,9 +18,10 @@ from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import alike
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import judge
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_scale
-from pymoo_hdte.mechanism import Input, Mechanism, Port, Record
+from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.units import ARCSEC
 
 ORDERS = [1.0 / 101.0, 1.0, 2.0, 2.02, 3.0, 4.0, 5.0, 6.0]
@@ -172,8 +173,10 @@ def test_records_of_a_mechanism_are_refused_by_the_rules_that_they_are_given():
     torque = -0.05 * 4.4**2 * np.sin(4.4 * time) + 0.01 * noise[0]
     record = Record("joint", "train", time, {"q": angle + 1e-6 * noise[1], "torque": torque})
     joint = Mechanism(
-        {"q": Believed(0.06, 0.5)}, [Port("bearing", {"q": 1.0})], [Input("torque", {"q": 1.0})]
+        {"q": BelievedValue(0.06, 0.5)},
+        [Port("bearing", {"q": 1.0})],
+        [Input("torque", {"q": 1.0})],
     )
     check_scale(measured_data(joint, [record], 10.0))
     with pytest.raises(InvalidInput, match="only ratios are known"):
-        investigate(joint, [record], 10.0, rules=replace(RULES, noise_power_ratio=1e9))
+        examine_mechanism(joint, [record], 10.0, rules=replace(RULES, noise_power_ratio=1e9))

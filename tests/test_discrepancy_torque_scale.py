@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from planted_features import known_data
+from planted_features import SCALES, known_data
 from quick_campaigns import quick_campaign
 from virtual_rig_cases import BELIEVED, effect
 
@@ -52,6 +52,14 @@ def rubbing():
     return replace(campaign, running=tuple(few))
 
 
+def scales(factor):
+    """The scales of a campaign on a drive whose torques are so much larger."""
+    torques = {
+        name: factor * getattr(SCALES, name) for name in ("torque", "input_torque", "output_torque")
+    }
+    return replace(SCALES, **torques)
+
+
 @pytest.fixture(scope="module")
 def verdict(rubbing):
     return examine_drive(rubbing).verdict
@@ -71,8 +79,10 @@ def test_a_verdict_does_not_depend_on_the_size_of_the_drive(rubbing, verdict, fa
 
 @pytest.mark.parametrize("factor", EXACT_FACTORS)
 def test_every_candidate_is_the_same_on_a_drive_of_another_size(factor):
-    usual = candidates(port_sizes(BELIEVED, ORDERS, SEEN, 1.0))
-    large = candidates(port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, factor))
+    usual = candidates(port_sizes(BELIEVED, ORDERS, SEEN, SCALES))
+    large = candidates(
+        port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, scales(factor))
+    )
     for one, other in zip(usual, large, strict=True):
         assert one.label == other.label
         shares = []
@@ -88,7 +98,7 @@ def test_every_candidate_is_the_same_on_a_drive_of_another_size(factor):
 
 def test_an_angle_stays_and_a_torque_grows():
     usual, large = (
-        candidates(port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, factor))
+        candidates(port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, scales(factor)))
         for factor in (1.0, 32.0)
     )
     grown = {

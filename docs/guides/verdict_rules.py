@@ -16,12 +16,10 @@ from scipy.integrate import quad
 from scipy.stats import chi2, ncx2
 
 from pymoo_hdte.discrepancy import MeasuredMechanism, analyse
-from pymoo_hdte.discrepancy.engine.candidate import Parameter
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import adequate
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.verdict import STATUSES
-from pymoo_hdte.discrepancy.mechanism import investigate
 from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 

@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.drive.candidates import candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
 from pymoo_hdte.discrepancy.drive.prediction import moves_steadily
-from pymoo_hdte.discrepancy.drive.sizes import port_sizes
+from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
@@ -165,9 +165,8 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
 def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
     seen = _strong_lines(features, base, data.rules)
-    campaign = data.campaign
-    believed, orders = campaign.believed, features.orders.tolist()
-    return candidates(port_sizes(believed, orders, seen, campaign.torque_scale), believed.effects)
+    believed, orders = data.campaign.believed, features.orders.tolist()
+    return candidates(port_sizes(believed, orders, seen, scales_of(data, base)), believed.effects)
 
 
 def _loaded(data: Data) -> Data:

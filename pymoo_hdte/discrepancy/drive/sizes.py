@@ -1,25 +1,91 @@
-"""Sizes of the ports of a drive, from which effects are guessed: see `pymoo_hdte.laws.guess`."""
+"""Sizes of the ports of a drive, from which effects are guessed: see `pymoo_hdte.laws.guess`.
+
+All of them come from the records and the believed drive: how fast and how heavily loaded it ran,
+and what the base leaves in each channel.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
-from pymoo_hdte.discrepancy.campaign.campaign import RATED_TORQUE
+from pymoo_hdte.discrepancy.drive.features import MEANS, Features
+from pymoo_hdte.discrepancy.drive.observations import Observations
+from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive.effects import DriveSizes
-from pymoo_hdte.units import ARCSEC
 
-RATED_SPEED = 209.4
-TYPICAL = {"input": 0.01, "output": 1.0, "mesh": 1.0, "sensor": 0.0}
-LARGEST = {"input": 0.5, "output": 20.0, "mesh": 20.0, "sensor": 0.0}
+LARGEST = 5.0
+"""Largest size of what is missing, in units of what the base leaves: within its tolerances the base
+takes up a part of an effect, but no more than four fifths of one that stands out of the noise. That
+of mechanisms is the same."""
 _SHAFTS = {"input": (1.0, 2.0), "output": (1.0,), "mesh": (1.0, 2.0), "sensor": (1.0,)}
 """Orders at which a shaft is uneven by its making: once a turn, and twice where it is the wave
 generator, which has two lobes."""
 
 
+@dataclass(frozen=True)
+class Scales:
+    """How the records of a campaign were taken, and what the base leaves of them; SI.
+
+    Attributes
+    ----------
+    speed, torque : float
+        Largest speed of the input, rad/s, and torque at the output, N.m.
+    duration : float
+        From the first record of the session to the last, s.
+    error, input_torque, output_torque : float
+        What the base leaves of the transmission error, rad, and of the two torques, N.m: root of
+        the mean square over a record, means and lines together.
+    """
+
+    speed: float
+    torque: float
+    duration: float
+    error: float
+    input_torque: float
+    output_torque: float
+
+
+def scales_of(data: Observations, base: Fit) -> Scales:
+    """Return the scales of records with a fitted base."""
+    features = data.features
+    n_running = features.values.size
+    whitened = base.residuals[:n_running].reshape(features.values.shape)
+    left = np.einsum("rij,rj->ri", data.whiteners, whitened)
+    noise = np.sqrt(np.diagonal(features.covariance, axis1=1, axis2=2))
+    error, input_torque, output_torque = (
+        max(_size(features, left, channel), _size(features, noise, channel)) for channel in range(3)
+    )
+    swept = base.residuals[n_running : n_running + sum(len(one.angle) - 1 for one in data.torsion)]
+    if len(swept):
+        deviation = np.median(np.concatenate([one.deviation for one in data.torsion]))
+        error = max(error, float(deviation * np.sqrt(np.mean(swept**2))))
+    when = features.conditions
+    paths = [np.abs(one.path).max() for one in data.torsion]
+    return Scales(
+        speed=float(np.abs(when.input_speed).max()),
+        torque=float(max([np.abs(when.output_torque).max(), *paths])),
+        duration=float(np.ptp(when.elapsed)),
+        error=error,
+        input_torque=input_torque,
+        output_torque=output_torque,
+    )
+
+
+def _size(features: Features, values: NDArray[np.float64], channel: int) -> float:
+    """Return the root mean square of one channel of all records, for features (r, f)."""
+    square = np.sum(values[:, features.places(channel)] ** 2, axis=(1, 2)) / 2.0
+    if channel in MEANS:
+        square = square + values[:, MEANS.index(channel)] ** 2
+    return float(np.sqrt(np.mean(square)))
+
+
 def port_sizes(
-    believed: BelievedDrive, orders: Sequence[float], seen: Sequence[float], torque_scale: float
+    believed: BelievedDrive, orders: Sequence[float], seen: Sequence[float], scales: Scales
 ) -> dict[str, DriveSizes]:
     """Return the sizes of each port.
 
@@ -30,31 +96,41 @@ def port_sizes(
         All orders of the features: harmonics beyond them would be guesses.
     seen : sequence of float
         Orders at which something was seen.
-    torque_scale : float
+    scales : Scales
     """
+    at_output = max(scales.output_torque, believed.ratio * scales.input_torque)
+    force = {
+        "input": scales.input_torque,
+        # What brakes the output is missing at the input, N times as small.
+        "output": at_output,
+        # A torsion that is missing is a torque by the stiffness.
+        "mesh": max(at_output, believed.stiffness * scales.error),
+        "sensor": 0.0,
+    }
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
     shared = DriveSizes(
         force=0.0,
         largest=0.0,
-        speed=RATED_SPEED,
-        travel=torque_scale * RATED_TORQUE / believed.stiffness,
+        speed=scales.speed,
+        travel=scales.torque / believed.stiffness,
         stiffness=believed.stiffness,
         loaded=True,
         seen=tuple(sorted(seen)),
         shown=tuple(orders),
-        error=2.0 * ARCSEC,
-        largest_error=100.0 * ARCSEC,
+        error=scales.error,
+        largest_error=LARGEST * scales.error,
         # A line believed to be nothing is missing where it is something.
         believed_orders=tuple(order for order, amplitude in lines if amplitude > 0.0),
         ratio=believed.ratio,
         inertia=max(believed.load_inertia, 10.0 * believed.output_inertia),
+        duration=scales.duration,
     )
     slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
     return {
         port: replace(
             shared,
-            force=torque_scale * TYPICAL[port],
-            largest=torque_scale * LARGEST[port],
+            force=force[port],
+            largest=LARGEST * force[port],
             speed=shared.speed / slower[port],
             slower=slower[port],
             expected=_SHAFTS[port],

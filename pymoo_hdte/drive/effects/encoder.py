@@ -212,9 +212,20 @@ class ThermalDrift(DriveEffect):
 
 
 def _drift(sizes: DriveSizes) -> list[Guess]:
-    """Guess a drift that settles early in the session, in it, or hardly."""
-    unknowns = (unknown("rate", -1e-6, 1e-6, 1e-9), unknown("time", 50.0, 1e5, 1000.0))
-    return [Guess(unknowns, [(1e-9, 200.0), (1e-9, 1000.0), (1e-9, 1e4)])]
+    """Guess a drift that settles early in the session, in it, or hardly.
+
+    One that settles within a twentieth of the session is over before two records are taken; one
+    that takes twenty sessions is a straight line. The fastest has settled in that shortest time.
+    """
+    duration = sizes.duration
+    if duration == 0.0:
+        return []
+    typical, fastest = sizes.error / duration, 20.0 * sizes.largest_error / duration
+    unknowns = (
+        unknown("rate", -fastest, fastest, typical),
+        unknown("time", duration / 20.0, 20.0 * duration, duration / 2.0),
+    )
+    return [Guess(unknowns, [(typical, share * duration) for share in (0.1, 0.5, 5.0)])]
 
 
 register(
