@@ -13,8 +13,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy import BelievedDrive, Rig, write_campaign
 from pymoo_hdte.units import ARCSEC
-from pymoo_hdte.virtual.hidden_forms import draw_effect
-from pymoo_hdte.virtual.rig import draw_rig, run_campaign
+from pymoo_hdte.virtual import draw_effect, draw_rig, run_campaign
 
 BELIEVED = BelievedDrive(
     ratio=101.0,

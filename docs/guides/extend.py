@@ -22,8 +22,15 @@ from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange
 from pymoo_hdte.drive import harmonic_balance, preset, simulate_drive
 from pymoo_hdte.laws.law import Aperiodic, Response
-from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.simulation import simulate_mechanism
+from pymoo_hdte.mechanism import (
+    BelievedValue,
+    Input,
+    LawAt,
+    Mechanism,
+    Port,
+    Record,
+    simulate_mechanism,
+)
 from pymoo_hdte.problems import RobustDTE
 
 # %%

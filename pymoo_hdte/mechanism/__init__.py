@@ -1,23 +1,5 @@
 """Lumped mechanisms of any kind: what they are, how they move, and what force balances miss."""
 
-from pymoo_hdte.mechanism.mechanism import (
-    BelievedValue,
-    ErrorLine,
-    Input,
-    LawAt,
-    Loop,
-    Mechanism,
-    Port,
-)
-from pymoo_hdte.mechanism.records import Record
+from pymoo_hdte.lazy import lazy_names
 
-__all__ = [
-    "BelievedValue",
-    "ErrorLine",
-    "Input",
-    "LawAt",
-    "Loop",
-    "Mechanism",
-    "Port",
-    "Record",
-]
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

@@ -27,17 +27,18 @@ _FARTHEST = 1e6
 
 @dataclass(frozen=True, eq=False)
 class SimulatedCourse:
-    """Course of a mechanism at the samples of a record; SI, arrays of shape (n,).
+    """Course of a mechanism at the samples of a record, in SI.
 
     Attributes
     ----------
-    time : ndarray
-    position, speed : dict of str to ndarray
-        By coordinate.
-    inputs : dict of str to ndarray
-        As they acted: of the record, or commanded by a loop.
-    forces : dict of str to ndarray
-        By port that is ``read``.
+    time : ndarray, shape (n,)
+        s.
+    position, speed : dict of str to ndarray, shape (n,)
+        By coordinate, m and m/s or rad and rad/s.
+    inputs : dict of str to ndarray, shape (n,)
+        As they acted: of the record, or commanded by a loop; in its unit.
+    forces : dict of str to ndarray, shape (n,)
+        By port that is ``read``, N or N.m.
     """
 
     time: Values
@@ -67,8 +68,9 @@ def simulate_mechanism(
     effects : sequence of LawAt
         Springs of hysteresis start unstretched.
     start : mapping of str to (float, float), optional
-        Position and speed of coordinates. Others start at the first sample of their channel with
-        the speed of a parabola through its first 20, those without a channel at rest at 0.
+        Position and speed of coordinates, shape (2,), SI. Others start at the first sample of their
+        channel with the speed of a parabola through its first 20, those without a channel at rest
+        at 0.
     closed_loop : bool, optional
         Whether loops command their inputs; by default those do whose reference the record has.
     rtol : float

@@ -1,0 +1,24 @@
+from pymoo_hdte.mechanism.mechanism import (
+    BelievedValue,
+    ErrorLine,
+    Input,
+    LawAt,
+    Loop,
+    Mechanism,
+    Port,
+)
+from pymoo_hdte.mechanism.records import Record
+from pymoo_hdte.mechanism.simulation import SimulatedCourse, simulate_mechanism
+
+__all__ = [
+    "BelievedValue",
+    "ErrorLine",
+    "Input",
+    "LawAt",
+    "Loop",
+    "Mechanism",
+    "Port",
+    "Record",
+    "SimulatedCourse",
+    "simulate_mechanism",
+]
