@@ -244,10 +244,11 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 # Change a rule
 # -------------
 #
-# `investigate`, `analyse` and `read_campaign` take rules of your own. Whoever believes that a name
-# should remove nearly all of a misfit, and not the better half, asks for it:
+# `analyse` and `read_campaign` take rules of your own. If a name should remove nearly all of a
+# misfit, and not only the better half, ask for it:
 
-strict = investigate(joint, [record_of(0.3)], rules=replace(RULES, main_share=1.0)).verdict
+measured = MeasuredMechanism(joint, [record_of(0.3)])
+strict = analyse(measured, rules=replace(RULES, main_share=1.0)).verdict
 print(f"main_share {RULES.main_share:g}: {verdict.status}; main_share 1: {strict.status}")
 
 # %%
