@@ -55,7 +55,8 @@ def rubbing():
 def scales(factor):
     """The scales of a campaign on a drive whose torques are so much larger."""
     torques = {
-        name: factor * getattr(SCALES, name) for name in ("torque", "input_torque", "output_torque")
+        name: factor * getattr(SCALES, name)
+        for name in ("torque", "motor_torque", "input_torque", "output_torque")
     }
     return replace(SCALES, **torques)
 

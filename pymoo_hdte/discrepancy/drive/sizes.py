@@ -19,9 +19,9 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive.effects import DriveSizes
 
 LARGEST = 5.0
-"""Largest size of what is missing, in units of what the base leaves: within its tolerances the base
-takes up a part of an effect, but no more than four fifths of one that stands out of the noise. That
-of mechanisms is the same."""
+"""Largest line of the transmission error that is missing, in units of what the base leaves of it:
+nothing in the base takes up a line, but at a resonance it may be some times as small in one record
+as in another."""
 _SHAFTS = {"input": (1.0, 2.0), "output": (1.0,), "mesh": (1.0, 2.0), "sensor": (1.0,)}
 """Orders at which a shaft is uneven by its making: once a turn, and twice where it is the wave
 generator, which has two lobes."""
@@ -35,6 +35,8 @@ class Scales:
     ----------
     speed, torque : float
         Largest speed of the input, rad/s, and torque at the output, N.m.
+    motor_torque : float
+        Largest torque at the input, N.m.
     duration : float
         From the first record of the session to the last, s.
     error, input_torque, output_torque : float
@@ -44,6 +46,7 @@ class Scales:
 
     speed: float
     torque: float
+    motor_torque: float
     duration: float
     error: float
     input_torque: float
@@ -69,6 +72,7 @@ def scales_of(data: Observations, base: Fit) -> Scales:
     return Scales(
         speed=float(np.abs(when.input_speed).max()),
         torque=float(max([np.abs(when.output_torque).max(), *paths])),
+        motor_torque=_largest(features, 1),
         duration=float(np.ptp(when.elapsed)),
         error=error,
         input_torque=input_torque,
@@ -82,6 +86,13 @@ def _size(features: Features, values: NDArray[np.float64], channel: int) -> floa
     if channel in MEANS:
         square = square + values[:, MEANS.index(channel)] ** 2
     return float(np.sqrt(np.mean(square)))
+
+
+def _largest(features: Features, channel: int) -> float:
+    """Return the largest value of one channel with a mean, lines and mean added, of all records."""
+    lines = features.values[:, features.places(channel)]
+    mean = np.abs(features.values[:, MEANS.index(channel)])
+    return float(np.max(mean + np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)))
 
 
 def port_sizes(
@@ -99,12 +110,19 @@ def port_sizes(
     scales : Scales
     """
     at_output = max(scales.output_torque, believed.ratio * scales.input_torque)
-    force = {
+    left = {
         "input": scales.input_torque,
         # What brakes the output is missing at the input, N times as small.
         "output": at_output,
         # A torsion that is missing is a torque by the stiffness.
         "mesh": max(at_output, believed.stiffness * scales.error),
+        "sensor": 0.0,
+    }
+    # No friction is larger than all the torque, whatever part of it the base takes up.
+    largest = {
+        "input": scales.motor_torque,
+        "output": believed.ratio * scales.motor_torque,
+        "mesh": scales.torque,
         "sensor": 0.0,
     }
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
@@ -129,8 +147,10 @@ def port_sizes(
     return {
         port: replace(
             shared,
-            force=force[port],
-            largest=LARGEST * force[port],
+            # What is missing lies between what the base leaves of it, which takes up the rest, and
+            # the whole torque: of values on a logarithmic scale, in the middle.
+            force=(left[port] * largest[port]) ** 0.5,
+            largest=largest[port],
             speed=shared.speed / slower[port],
             slower=slower[port],
             expected=_SHAFTS[port],
