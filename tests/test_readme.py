@@ -91,13 +91,25 @@ def test_the_commands_for_a_design_run_one_after_the_other(tmp_path, monkeypatch
     assert (tmp_path / "reports" / "simulation" / "report.html").is_file()
 
 
+def campaign_to_try():
+    """Return the script that makes the campaign, its folder and the arguments of the command."""
+    make, look = next(block for block in COMMANDS if "virtual_campaign" in block).splitlines()
+    (_, script, folder), (_, *arguments) = shlex.split(make), shlex.split(look)
+    return script, folder, arguments
+
+
+def test_the_command_looks_at_the_campaign_that_is_made():
+    script, folder, arguments = campaign_to_try()
+    compile((ROOT / script).read_text(), script, "exec")
+    assert cli._parser().parse_args(arguments).campaign == Path(folder)
+
+
+@pytest.mark.nightly
 def test_the_campaign_to_try_holds_the_effect_that_is_named(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    make, look = next(block for block in COMMANDS if "virtual_campaign" in block).splitlines()
-    _, script, folder = shlex.split(make)
+    script, folder, arguments = campaign_to_try()
     monkeypatch.setattr(sys, "argv", [script, str(tmp_path / folder)])
     exec(compile(Path(script).read_text(), script, "exec"), {"__name__": "__main__"})
-    _, *arguments = shlex.split(look)
     monkeypatch.chdir(tmp_path)
     assert cli.main(arguments) == 0
     printed = capsys.readouterr().out
