@@ -19,7 +19,7 @@ from pymoo_hdte.laws.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.motion import motion_of
 
-STEP, DURATION, CUTOFF = 2e-3, 12.0, 25.0
+STEP, DURATION, CUTOFF = 2e-3, 6.0, 25.0
 TIME = np.arange(0.0, DURATION, STEP)
 INERTIA, VISCOUS = 0.05, 0.4
 
