@@ -3,10 +3,10 @@
 import json
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from places import DOCS
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
@@ -39,7 +39,7 @@ from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "examples"))
+sys.path.insert(0, str(DOCS / "examples"))
 
 from eyring_drag import EYRING_DRAG, EyringDrag
 
