@@ -10,7 +10,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import Command, Outcome, Say
 from pymoo_hdte.reports.folder import PAGE_FILE
 
-Believed = tuple[Path | None, Path | None]
+ModelFiles = tuple[Path | None, Path | None]
 """Files of a model and its data sheet."""
 
 _DETAILS = """example:
@@ -49,7 +49,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
 
 
 def _analysed(
-    folder: Path, out: Path, data: Path | None, believed: Believed, say: Say
+    folder: Path, out: Path, data: Path | None, believed: ModelFiles, say: Say
 ) -> dict[str, Any]:
     """Analyse a campaign or a rig and write its report; return the verdict's document."""
     from pymoo_hdte.discrepancy import analyse, check_report_folder
