@@ -150,6 +150,7 @@ def port_sizes(
             # What is missing lies between what the base leaves of it, which takes up the rest, and
             # the whole torque: of values on a logarithmic scale, in the middle.
             force=(left[port] * largest[port]) ** 0.5,
+            left=left[port],
             largest=largest[port],
             speed=shared.speed / slower[port],
             slower=slower[port],
