@@ -21,6 +21,9 @@ class Sizes:
     ----------
     force : float
         Typical size of a force that may be missing there.
+    left : float
+        What the base leaves of the balance there. Of a line nothing in the base takes up a part, so
+        that this is its size, while ``force`` is larger where the base takes up most of a force.
     largest : float
         The largest that may be missing.
     speed : float
@@ -33,9 +36,6 @@ class Sizes:
         Whether records move it in both directions.
     loaded : bool
         Whether records hold it under steady loads, so that corners of its spring show.
-    left : float
-        What the base leaves of the balance there. Of a line nothing in the base takes up a part, so
-        that this is its size, while ``force`` is larger where the base takes up most of a force.
     read : bool
         Whether it is the reading of a force sensor.
     slower : float
@@ -51,12 +51,12 @@ class Sizes:
     """
 
     force: float
+    left: float
     largest: float
     speed: float
     travel: float
     stiffness: float = 0.0
     damping: float = 0.0
-    left: float = 0.0
     both_ways: bool = True
     loaded: bool = False
     read: bool = False

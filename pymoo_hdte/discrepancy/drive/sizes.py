@@ -128,6 +128,7 @@ def port_sizes(
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
     shared = DriveSizes(
         force=0.0,
+        left=0.0,
         largest=0.0,
         speed=scales.speed,
         travel=scales.torque / believed.stiffness,
