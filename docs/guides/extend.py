@@ -2,14 +2,13 @@
 Extend the package
 ==================
 
-Five things that people add: a law, an effect of a drive, a port, a part of an algorithm and an
-experiment. Each is a small class or function of your own that the package accepts; none needs a
-change in it. What does need one is said where it stands.
+Four things that people add: an effect, a port, a part of an algorithm and an experiment. Each is a
+small class or function of your own that the package accepts; none needs a change in it.
 """
 
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -20,8 +19,12 @@ from pymoo.optimize import minimize
 from pymoo_hdte.algorithms import ElitistSwarm, EntropyWeight, Flat, LinearDecrease, ParticleSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange
-from pymoo_hdte.drive import harmonic_balance, preset, simulate_drive
-from pymoo_hdte.laws.law import Aperiodic, Response
+from pymoo_hdte.discrepancy.drive.analysis import analyse
+from pymoo_hdte.discrepancy.drive.revision import revised_model
+from pymoo_hdte.discrepancy.mechanism import investigate
+from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
+from pymoo_hdte.drive.toml_text import model_toml
+from pymoo_hdte.laws import register
 from pymoo_hdte.mechanism import (
     BelievedValue,
     Input,
@@ -31,37 +34,41 @@ from pymoo_hdte.mechanism import (
     Record,
     simulate_mechanism,
 )
+from pymoo_hdte.mechanism.simulation import simulate as simulate_mechanism
 from pymoo_hdte.problems import RobustDTE
+from pymoo_hdte.virtual.own_effects import with_effects
+from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 
 # %%
-# A law
-# -----
+# An effect
+# ---------
 #
-# A *law* says with which torque (or force) a place answers to the motion there. It is any object
-# with ``orders`` and ``respond``: the protocol ``pymoo_hdte.laws.law.Law``. ``respond`` gets the
-# motion at the port as a ``PortState``, arrays of one shape, and returns torque and both
+# An *effect* is a law with everything that the package should know about it, in one file. The
+# lubricant whose molecules jump over energy barriers (Eyring, Journal of Chemical Physics 4, 1936)
+# has a drag that is proportional to the speed when slow, to its logarithm when fast. This is all of
+# it, ``docs/examples/eyring_drag.py``:
+#
+# .. literalinclude:: ../examples/eyring_drag.py
+#    :language: python
+#
+# The *law* says with which torque (or force) a place answers to the motion there. ``respond`` gets
+# the motion at the port as a ``PortState``, arrays of one shape, and returns torque and both
 # derivatives, which Newton's method needs. Laws that depend on no angle inherit ``Aperiodic``;
 # those that vary with one inherit ``Periodic`` and name their order, so that solvers keep its
-# harmonics.
+# harmonics. What else solvers ask of a law (inner states, clearance, breakaway) has a default in
+# ``pymoo_hdte.laws.law.Behaviour``.
 #
-# Here is the drag of a lubricant whose molecules jump over energy barriers (Eyring, Journal of
-# Chemical Physics 4, 1936): proportional to the speed when slow, to its logarithm when fast.
+# The ``Effect`` names the ports of a drive where the law makes sense, its numbers with their units,
+# its sentence in a report, what it holds as a special case, and a *guess*: from the sizes of a port
+# to the unknowns of a fit, with their bounds and starts. ``register`` makes it known.
 
+HERE = Path(sys.argv[0]).resolve().parent  # in a notebook: the folder docs/guides
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
-@dataclass(frozen=True)
-class EyringDrag(Aperiodic):
-    """T = level asinh(speed / knee); N.m and rad/s, or N and m/s."""
+import virtual_campaign
+from eyring_drag import EYRING_DRAG, EyringDrag
 
-    level: float
-    knee: float
-
-    def respond(self, state):
-        """Return torque and tangents."""
-        share = state.speed / self.knee
-        return Response(
-            self.level * np.arcsinh(share), damping=self.level / self.knee / np.hypot(1.0, share)
-        )
-
+register(EYRING_DRAG)
 
 # %%
 # At a port of a mechanism
@@ -95,34 +102,31 @@ ax.legend()
 plt.show()
 
 # %%
-# An effect of a drive
-# --------------------
+# Measured records name it too. A motor drives the wheel to and fro; from its torque and the angle,
+# both with noise, the workflow finds what a frictionless wheel lacks.
+
+wheel = Mechanism(flywheel.inertias, flywheel.ports, [Input("torque", {"angle": 1.0})])
+time = np.arange(0.0, 20.0, 0.004)
+generator = np.random.default_rng(1)
+phases = generator.uniform(0.0, 2.0 * np.pi, 38)
+torque = 0.03 * np.cos(2.0 * np.pi * np.outer(time, np.arange(2, 40) / 20.0) + phases).sum(axis=1)
+plan = Record("to and fro", "train", time, {"torque": torque})
+course = simulate_mechanism(wheel, plan, [LawAt("eyring_drag", "bearing", drag)])
+angle = course.position["angle"] + 1e-5 * generator.standard_normal(len(time))
+finding = investigate(wheel, [replace(plan, channels={"torque": torque, "angle": angle})])
+for effect in finding.accepted.effects:
+    print(f"{finding.verdict.status}: {effect.name}, {effect.law}")
+
+# %%
+# In a drive
+# ----------
 #
-# A drive model is a data sheet with *effects*. An effect changes the coefficients of the equations
-# of motion, and every solver follows. It has a ``name``, ``apply`` and ``to_dict`` (the protocol
-# ``Effect``). This one puts the law at the input of the drive; ports of a drive are ``input``,
-# ``mesh`` and ``output``. ``LawAtPort`` does the same for the laws that the package lists.
-
-
-@dataclass(frozen=True)
-class LubricantDrag:
-    """Eyring's drag in the bearings of the input."""
-
-    law: EyringDrag
-    name = "lubricant_drag"
-    port = "input"
-
-    def apply(self, coefficients):
-        """Return the coefficients with the law at its port."""
-        return replace(coefficients, laws=(*coefficients.laws, (self.port, self.law)))
-
-    def to_dict(self):
-        """Return what makes the effect, as a record beside results."""
-        return {"name": self.name, "port": self.port, **vars(self.law)}
-
+# A drive model is a data sheet with effects; ``LawAtPort`` puts a law at one of its ports,
+# ``input``, ``mesh`` or ``output``.
 
 calm = preset("published")
-draggy = replace(calm, name="draggy", effects=(LubricantDrag(EyringDrag(0.05, 20.0)),))
+lubricant = LawAtPort("eyring_drag", "input", EyringDrag(0.05, 20.0))
+draggy = replace(calm, name="draggy", effects=(lubricant,))
 design = calm.nominal
 
 motor = []
@@ -134,22 +138,32 @@ print(f"mean motor torque {motor[0]:.4f} N.m, with the drag {motor[1]:.4f} N.m")
 print(f"difference {motor[1] - motor[0]:.4f} N.m, in closed form {expected:.4f} N.m")
 
 # %%
-# The integrator knows it too, and so does the robust problem: the drag is now part of the drive.
+# The integrator knows it, the robust problem, and model files.
 
 steady = draggy.dte_arcsec(design[np.newaxis])[0]
 integrated = simulate_drive(draggy, design, ramp=0.2, settle=0.3).dte_arcsec()
 print(f"DTE: steady state {steady:.3f}, integrated {integrated:.3f} arcsec")
-scenario = replace(preset("calibrated"), name="calibrated_draggy")
-scenario = replace(scenario, effects=(*scenario.effects, *draggy.effects))
+scenario = preset("calibrated")
+scenario = replace(scenario, name="calibrated_draggy", effects=(*scenario.effects, lubricant))
 mean, std = RobustDTE(scenario, order=1).evaluate(scenario.nominal[np.newaxis, 1:])[0]
 print(f"robust problem on it: mean {mean:.1f}, std {std:.1f} arcsec")
+print(model_toml(scenario)[-170:])
 
 # %%
-# Two things need a change in the package. Model files name only the effects of
-# ``pymoo_hdte.drive.effects.EFFECT_NAMES``: for yours in a TOML file, add the law to
-# ``port_effects.LAWS``. And a verdict of ``pymoo-hdte discrepancy`` names only what it has a
-# candidate for: add one to ``pymoo_hdte/discrepancy/drive/friction_candidates.py`` for drives, to
-# ``pymoo_hdte/discrepancy/mechanism/candidates.py`` for other machines.
+# And a campaign on a rig that has it gets it named, with its values, and as a model to go on with.
+# Here the rig is virtual.
+
+generator = np.random.default_rng(3)
+rig = draw_rig(virtual_campaign.BELIEVED, (), generator)
+campaign = run_campaign(rig, virtual_campaign.BELIEVED, virtual_campaign.RIG, generator)
+analysis = analyse(with_effects(campaign, rig, [lubricant]))
+revised = revised_model(analysis)
+print(f"{analysis.verdict.status}: {revised.effects[-1]}")
+
+# %%
+# What is no law at a port, such as an inertia or an error of a sensor, is a subclass of
+# ``pymoo_hdte.drive.DriveEffect``, registered as the ``change`` of an ``Effect``: see the files in
+# ``pymoo_hdte/drive/effects``.
 #
 # A port
 # ------
@@ -277,9 +291,6 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 #
 # To try it without the line in the registry, all it takes is a folder and a campaign in this
 # process:
-
-HERE = Path(sys.argv[0]).resolve().parent  # in a notebook: the folder docs/guides
-sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
 from stiffer import run
 

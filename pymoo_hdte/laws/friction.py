@@ -178,7 +178,7 @@ def _varying(sizes: Sizes) -> list[Guess]:
     found = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
-        unknowns = (*family.waves("level", sizes.largest, sizes.force), mean)
+        unknowns = (*family.waves("level", sizes.largest, sizes.left), mean)
 
         def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
             lines = family.lines(values[:-1])
@@ -226,7 +226,7 @@ class PeriodicTorque(Periodic):
 def _ripple(sizes: Sizes) -> list[Guess]:
     found = []
     for family in sizes.lines:
-        unknowns = family.waves("amplitude", sizes.largest, sizes.force)
+        unknowns = family.waves("amplitude", sizes.largest, sizes.left)
 
         def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
             lines = family.lines(values)

@@ -14,8 +14,6 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import next_experiment
-from pymoo_hdte.discrepancy.drive.parameters import base_parameters
-from pymoo_hdte.discrepancy.drive.prediction import Conditions, predict
 from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import revised_model
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
@@ -36,6 +34,7 @@ from pymoo_hdte.laws import effects, register, registered
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.simulation import simulate_mechanism
 from pymoo_hdte.problems import RobustDTE
+from pymoo_hdte.virtual.own_effects import with_effects
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
 
@@ -72,37 +71,8 @@ def analysis():
     rng = np.random.default_rng(3)
     rig = draw_rig(BELIEVED, (), rng)
     campaign = run_campaign(rig, BELIEVED, RIG, rng, (*CONDITIONS, *SLOW))
-    return examine_drive(replace(campaign, running=with_drag(rig, campaign.running)))
-
-
-def with_drag(rig, records):
-    """Add to records what the drag changes in the steady state of the rig, by harmonic balance."""
-    speed, load = np.array([(one.input_speed, one.load_torque) for one in records]).T
-    base = base_parameters(rig.drive, RIG, rig.error_phases, 0.0)
-    values = {one.name: np.array([one.start]) for one in base}
-    count = len(records)
-    when = Conditions(speed, load, np.zeros(count), np.zeros((count, 3, 2), dtype=complex))
-    calm, draggy = (
-        predict(rig.drive, RIG, when, [1.0], values, effects).balance
-        for effects in ((), (LawAtPort("eyring_drag", "input", PLANTED),))
-    )
-    changed = []
-    for row, record in enumerate(records):
-        waves = np.exp(1j * np.outer(record.input_angle, calm.torus.orders))
-        error, motor, coupling, lead = (
-            (waves @ (getattr(draggy, name)[row] - getattr(calm, name)[row])).real
-            for name in ("transmission_error", "motor_torque", "coupling_torque", "lead")
-        )
-        changed.append(
-            replace(
-                record,
-                input_angle=record.input_angle + lead,
-                output_angle=record.output_angle + lead / BELIEVED.ratio - error,
-                input_torque=record.input_torque + motor,
-                output_torque=record.output_torque + coupling,
-            )
-        )
-    return tuple(changed)
+    drag = LawAtPort("eyring_drag", "input", PLANTED)
+    return examine_drive(with_effects(campaign, rig, [drag]))
 
 
 @pytest.fixture(scope="module")

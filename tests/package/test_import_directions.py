@@ -104,3 +104,9 @@ def test_the_workflow_knows_nothing_of_optimisation(rooms_of_it):
     found = dict(rooms(ROOT, LOWEST_FIRST))[rooms_of_it]
     names = set().union(*(imported(path, "pymoo_hdte", ROOT) for path in found))
     assert not names & {"surrogate", "problems", "algorithms", "decision", "pymoo"}
+
+
+def test_the_engine_knows_no_machine():
+    found = dict(rooms(ROOT, LOWEST_FIRST))["discrepancy.engine"]
+    names = set().union(*(imported(path, "pymoo_hdte", ROOT) for path in found))
+    assert not {name for name in names if name.startswith(("drive", "mechanism"))}

@@ -128,6 +128,7 @@ def port_sizes(
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
     shared = DriveSizes(
         force=0.0,
+        left=0.0,
         largest=0.0,
         speed=scales.speed,
         travel=scales.torque / believed.stiffness,
@@ -150,6 +151,7 @@ def port_sizes(
             # What is missing lies between what the base leaves of it, which takes up the rest, and
             # the whole torque: of values on a logarithmic scale, in the middle.
             force=(left[port] * largest[port]) ** 0.5,
+            left=left[port],
             largest=largest[port],
             speed=shared.speed / slower[port],
             slower=slower[port],
