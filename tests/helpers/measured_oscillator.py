@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from pymoo_hdte.mechanism import Record
 
 MASS, STIFFNESS, DAMPING = 1.0, 4000.0, 4.0
-RATE, DURATION, HIGHEST = 250.0, 20.0, 12.0
+RATE, DURATION, HIGHEST = 250.0, 12.0, 12.0
 POSITION_NOISE, FORCE_NOISE = 1e-5, 0.02
 
 
