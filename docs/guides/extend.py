@@ -19,9 +19,7 @@ from pymoo.optimize import minimize
 from pymoo_hdte.algorithms import ElitistSwarm, EntropyWeight, Flat, LinearDecrease, ParticleSwarm
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange
-from pymoo_hdte.discrepancy.drive.analysis import analyse
-from pymoo_hdte.discrepancy.drive.revision import revised_model
-from pymoo_hdte.discrepancy.mechanism import investigate
+from pymoo_hdte.discrepancy import MeasuredMechanism, analyse
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
 from pymoo_hdte.drive.toml_text import model_toml
 from pymoo_hdte.laws import register
@@ -34,7 +32,6 @@ from pymoo_hdte.mechanism import (
     Record,
     simulate_mechanism,
 )
-from pymoo_hdte.mechanism.simulation import simulate as simulate_mechanism
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.virtual.own_effects import with_effects
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
@@ -113,9 +110,10 @@ torque = 0.03 * np.cos(2.0 * np.pi * np.outer(time, np.arange(2, 40) / 20.0) + p
 plan = Record("to and fro", "train", time, {"torque": torque})
 course = simulate_mechanism(wheel, plan, [LawAt("eyring_drag", "bearing", drag)])
 angle = course.position["angle"] + 1e-5 * generator.standard_normal(len(time))
-finding = investigate(wheel, [replace(plan, channels={"torque": torque, "angle": angle})])
-for effect in finding.accepted.effects:
-    print(f"{finding.verdict.status}: {effect.name}, {effect.law}")
+record = replace(plan, channels={"torque": torque, "angle": angle})
+verdict = analyse(MeasuredMechanism(wheel, [record])).verdict
+for effect in verdict.accepted.effects:
+    print(f"{verdict.status}: {effect.name}, {effect.law}")
 
 # %%
 # In a drive
@@ -157,8 +155,7 @@ generator = np.random.default_rng(3)
 rig = draw_rig(virtual_campaign.BELIEVED, (), generator)
 campaign = run_campaign(rig, virtual_campaign.BELIEVED, virtual_campaign.RIG, generator)
 analysis = analyse(with_effects(campaign, rig, [lubricant]))
-revised = revised_model(analysis)
-print(f"{analysis.verdict.status}: {revised.effects[-1]}")
+print(f"{analysis.verdict.status}: {analysis.revised_model().effects[-1]}")
 
 # %%
 # What is no law at a port, such as an inertia or an error of a sensor, is a subclass of

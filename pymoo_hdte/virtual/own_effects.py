@@ -11,7 +11,7 @@ from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.prediction import Conditions, predict
-from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.drive import DriveEffect, SteadyMotion
 from pymoo_hdte.virtual.rig import TrueRig
 
 _CHANNELS = ("transmission_error", "motor_torque", "coupling_torque", "lead")
@@ -52,7 +52,7 @@ def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect
 
 
 def _changed(
-    record: RunningRecord, row: int, calm: Balance, changed: Balance, ratio: float
+    record: RunningRecord, row: int, calm: SteadyMotion, changed: SteadyMotion, ratio: float
 ) -> RunningRecord:
     waves = np.exp(1j * np.outer(record.input_angle, calm.torus.orders))
     error, motor, coupling, lead = (

@@ -4,12 +4,12 @@ from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
-import pymoo_hdte.drive.solve.harmonic_balance as solver
 import pytest
 from planted_features import analysed, known_data, library, measured
 from scipy.stats import chi2
 from virtual_rig_cases import BELIEVED
 
+import pymoo_hdte.drive.solve.free_angle as solver
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.plausibility import check_believed
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
