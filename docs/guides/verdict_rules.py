@@ -47,10 +47,13 @@ from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 # and no known effect would reduce :math:`\chi^2` by a given gain; a single line may be lost among a
 # thousand features.
 
-for freedom in (100, 1400):
-    limit = adequate(freedom, RULES)
-    chance = chi2.sf(limit * freedom, freedom)
-    print(f"nu = {freedom:4}: limit {limit:.3f}, passed by noise with probability {chance:.0e}")
+for degrees_of_freedom in (100, 1400):
+    limit = adequate(degrees_of_freedom, RULES)
+    chance = chi2.sf(limit * degrees_of_freedom, degrees_of_freedom)
+    print(
+        f"nu = {degrees_of_freedom:4}: limit {limit:.3f}, "
+        f"passed by noise with probability {chance:.0e}"
+    )
 print(f"gain that speaks against an adequate model: {RULES.single_effect_gain:g}")
 
 # %%
@@ -58,17 +61,25 @@ print(f"gain that speaks against an adequate model: {RULES.single_effect_gain:g}
 # times signal to noise, squared) makes :math:`\chi^2` non-central. From the sizes at which it
 # passes the limit one sees what a campaign can detect at all:
 
-freedom = 400
-limit = adequate(freedom, RULES)
+degrees_of_freedom = 400
+limit = adequate(degrees_of_freedom, RULES)
 size = np.linspace(0.0, 250.0, 200)
 x = np.linspace(0.6, 2.0, 400)
 fig, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.5), layout="constrained")
-left.plot(x, chi2.pdf(x * freedom, freedom) * freedom, label="nothing missing")
-left.plot(x, ncx2.pdf(x * freedom, freedom, 200.0) * freedom, label="$\\lambda = 200$")
+left.plot(
+    x,
+    chi2.pdf(x * degrees_of_freedom, degrees_of_freedom) * degrees_of_freedom,
+    label="nothing missing",
+)
+left.plot(
+    x,
+    ncx2.pdf(x * degrees_of_freedom, degrees_of_freedom, 200.0) * degrees_of_freedom,
+    label="$\\lambda = 200$",
+)
 left.axvline(limit, color="k", ls="--", lw=1, label="limit")
 left.set(xlabel="$\\chi^2 / \\nu$", ylabel="density", title="400 degrees of freedom")
 left.legend()
-right.plot(size, ncx2.sf(limit * freedom, freedom, np.maximum(size, 1e-9)))
+right.plot(size, ncx2.sf(limit * degrees_of_freedom, degrees_of_freedom, np.maximum(size, 1e-9)))
 right.set(xlabel="$\\lambda$", ylabel="probability to be noticed", title="by the total alone")
 plt.show()
 
@@ -144,7 +155,7 @@ print(f"  in each part of the data                 {RULES.explained_part_share:g
 print(f"  by effects of an exact form              {RULES.exact_share:.6f}")
 print(f"chi-square / nu that does for exact forms  {RULES.exact_chi_square:g}")
 print(f"a second effect removes of what is left    {RULES.second_share:g}")
-print(f"rivals are alike within an evidence of     {RULES.evidence_distance:g}")
+print(f"hypotheses are alike within an evidence of     {RULES.evidence_distance:g}")
 print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as much")
 
 # %%
@@ -217,8 +228,8 @@ joint = Mechanism(
 )
 for friction in (0.0, 0.3):
     verdict = analyse(MeasuredMechanism(joint, [record_of(friction)])).verdict
-    freedom = verdict.degrees_of_freedom
-    ratio = verdict.base.chi_square / freedom
+    degrees_of_freedom = verdict.degrees_of_freedom
+    ratio = verdict.base.chi_square / degrees_of_freedom
     print(f"friction {friction:g} N.m: chi-square / nu of the base {ratio:.3g}, {verdict.status}")
 
 # %%
@@ -230,14 +241,14 @@ print(f"{'set':58}{'gain':>10}{'share':>9}{'evidence':>12}")
 for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.bic)[:6]:
     mark = "*" if one is verdict.chosen else " "
     gain = base_bic - one.bic
-    print(f"{mark} {one.label:56}{gain:10.0f}{one.share:9.4f}{one.fit.evidence:12.0f}")
+    print(f"{mark} {one.label:56}{gain:10.0f}{one.explained:9.4f}{one.fit.evidence:12.0f}")
 
 # %%
 # Of another machine than a drive, no model meets the noise of its sensors. There all of this
 # is measured in units of the *rest*, which is what the two best effects leave, and three rules
 # are added (``pymoo_hdte.discrepancy.mechanism.analysis``): a named effect removes at least half
 # of the power of the misfit beyond the noise of the sensors; of models that leave about as much,
-# the one with the fewest unknowns is named; and a rival that merely contains the named law is no
+# the one with the fewest unknowns is named; and a law that merely contains the named one is no
 # other explanation.
 
 # %%

@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy.drive.features import Features, measure
 from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.misfit.map import Flags
 from pymoo_hdte.discrepancy.drive.next_test import next_experiment
-from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, degrees_of_freedom
+from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, cell_degrees_of_freedom
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.drive.proof import Proof, prove
 from pymoo_hdte.discrepancy.engine.candidate import Layout
@@ -89,7 +89,7 @@ class BlindJob:
 
         Seconds are those of the processor, so that other work on the machine does not count.
         """
-        tools = rivals()
+        tools = hypotheses()
         try:
             scores, parts = score(self.case, tools)
         except Exception:
@@ -99,7 +99,7 @@ class BlindJob:
         return Run(COLUMNS, np.array([row]), sum(parts), parts)
 
 
-def rivals() -> dict[str, Tool]:
+def hypotheses() -> dict[str, Tool]:
     """Return the simpler tools by name.
 
     They are imported here only, so that a report of stored outcomes does not need their packages.
@@ -142,7 +142,9 @@ def verdict_scores(case: Case, verdict: Verdict) -> Scores:
         scores[f"{place}_port"] = code(candidate.port, PORTS)
         scores[f"{place}_order"] = np.nan if candidate.order is None else candidate.order
     truth = {"parameter"} if case.kind == "parameter" else set(case.names)
-    alike = [{candidate.name for candidate in rival.candidates} for rival in verdict.equivalent]
+    alike = [
+        {candidate.name for candidate in hypothesis.candidates} for hypothesis in verdict.equivalent
+    ]
     scores["equivalents"] = code_of_set(set().union(*alike))
     scores["truth_in_class"] = float(any(truth <= names for names in alike))
     return scores
@@ -158,7 +160,7 @@ def truly_moved(analysis: DriveFinding, twin: Campaign) -> Flags:
     moved: NDArray[np.float64] = cell_chi_square(
         analysis.data, kept.values - _features(twin, kept).values
     )
-    return moved > degrees_of_freedom(analysis.data)
+    return moved > cell_degrees_of_freedom(analysis.data)
 
 
 def location_scores(moved: Flags, flagged: Flags) -> Scores:

@@ -23,7 +23,11 @@ from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.objective import LOST
-from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
+from pymoo_hdte.discrepancy.drive.observations import (
+    as_lines,
+    cell_chi_square,
+    cell_degrees_of_freedom,
+)
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.laws.unknowns import Parameter
@@ -55,18 +59,20 @@ def largest_residual_rule(analysis: DriveFinding) -> str:
     data, values = analysis.data, _base_values(analysis)
     difference = data.features.values - data.predict(values[None], ())[0]
     by_record = cell_chi_square(data, difference)
-    freedom = np.where(np.isnan(by_record), np.nan, degrees_of_freedom(data)).sum(axis=0)
+    degrees_of_freedom = np.where(np.isnan(by_record), np.nan, cell_degrees_of_freedom(data)).sum(
+        axis=0
+    )
     sweep = np.nan_to_num(data.torsion_residuals(values[None], ())[0], nan=LOST)
     place = Layout(data.base).index("input_torque_zero")
     zero = (values[place] - data.base[place].start) / data.base[place].prior
     total = np.append(by_record.sum(axis=0), [sweep @ sweep, zero**2])
-    freedom = np.append(freedom, [sweep.size, 1.0])
-    known = np.isfinite(total) & (freedom > 0.0)
-    significant = known & (chi2.sf(total, freedom) < FALSE_ALARMS / known.sum())
+    degrees_of_freedom = np.append(degrees_of_freedom, [sweep.size, 1.0])
+    known = np.isfinite(total) & (degrees_of_freedom > 0.0)
+    significant = known & (chi2.sf(total, degrees_of_freedom) < FALSE_ALARMS / known.sum())
     if not significant.any():
         return "adequate"
     size = np.full(total.shape, -np.inf)
-    expected = freedom[significant]
+    expected = degrees_of_freedom[significant]
     size[significant] = (total[significant] - expected) / np.sqrt(2.0 * expected)
     worst = int(np.argmax(size))
     if worst == len(size) - 1:
@@ -169,12 +175,12 @@ def sparse_regression(analysis: DriveFinding) -> str:
     test = regression(replace(held_out, torsion=data.torsion), values, library)
     support = chosen_support(train, test)
     target, laws = free_of_base(train)
-    freedom = len(train.target) - len(values)
+    degrees_of_freedom = len(train.target) - len(values)
     if not support.any():
         # Before the base parameters are let out of their bounds.
-        clean = chi2.sf(train.target @ train.target, freedom) > FALSE_ALARMS
+        clean = chi2.sf(train.target @ train.target, degrees_of_freedom) > FALSE_ALARMS
         return "adequate" if clean else "unlisted"
-    excess = float(target @ target) - freedom
+    excess = float(target @ target) - degrees_of_freedom
     positive = np.array([term.positive for term in library])
     if explained(laws[:, support], target, positive[support]) < LEAST_SHARE * excess:
         return "unlisted"

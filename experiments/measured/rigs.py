@@ -155,13 +155,15 @@ def gaps_table(one: Study) -> Table:
 def evidence_table(one: Study) -> Table:
     """Return the explanations that were tried, the best first."""
     verdict = one.finding.verdict
-    rivals = [verdict.chosen, *verdict.alternatives]
-    found = [rival for rival in rivals if rival is not None]
+    hypotheses = [verdict.chosen, *verdict.alternatives]
+    found = [hypothesis for hypothesis in hypotheses if hypothesis is not None]
     return Table(
         "evidence",
         "Explanations that were tried",
         (Column("effects"), Column("share of the misfit removed", "%", 4), Column("BIC", "", 5)),
-        tuple((rival.label, 100.0 * rival.share, rival.bic) for rival in found),
+        tuple(
+            (hypothesis.label, 100.0 * hypothesis.explained, hypothesis.bic) for hypothesis in found
+        ),
         folded=True,
     )
 

@@ -178,7 +178,7 @@ def _varying(sizes: Sizes) -> list[Guess]:
     found = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
-        unknowns = (*family.waves("level", sizes.largest, sizes.left), mean)
+        unknowns = (*family.waves("level", sizes.largest, sizes.residual), mean)
 
         def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
             lines = family.lines(values[:-1])
@@ -226,7 +226,7 @@ class PeriodicTorque(Periodic):
 def _ripple(sizes: Sizes) -> list[Guess]:
     found = []
     for family in sizes.lines:
-        unknowns = family.waves("amplitude", sizes.largest, sizes.left)
+        unknowns = family.waves("amplitude", sizes.largest, sizes.residual)
 
         def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
             lines = family.lines(values)

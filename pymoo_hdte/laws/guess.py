@@ -21,7 +21,7 @@ class Sizes:
     ----------
     force : float
         Typical size of a force that may be missing there.
-    left : float
+    residual : float
         What the base leaves of the balance there. Of a line nothing in the base takes up a part, so
         that this is its size, while ``force`` is larger where the base takes up most of a force.
     largest : float
@@ -51,7 +51,7 @@ class Sizes:
     """
 
     force: float
-    left: float
+    residual: float
     largest: float
     speed: float
     travel: float

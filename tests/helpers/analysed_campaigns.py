@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.virtual.rig import run_campaign
 from pymoo_hdte.virtual.runs import Condition
@@ -42,9 +42,11 @@ def analysed(campaign, label=None, status="named"):
     if label is not None:
         (candidate,) = (one for one in LISTED if one.label == label)
         start = np.concatenate([base.values, candidate.starts[0]])
-        chosen = Rival(fit(data, (candidate,), start), 0.0, 1.0)
-    freedom = len(base.residuals) - len(base.values)
-    return DriveFinding(campaign, data, Verdict(status, base, chosen, (), (), freedom), ())
+        chosen = Hypothesis(fit(data, (candidate,), start), 0.0, 1.0)
+    degrees_of_freedom = len(base.residuals) - len(base.values)
+    return DriveFinding(
+        campaign, data, Verdict(status, base, chosen, (), (), degrees_of_freedom), ()
+    )
 
 
 @cache

@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.drive.sizes import Scales, port_sizes
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -111,6 +111,6 @@ def analysed(data, status="unlisted", candidate=None, start=()):
     base = fit(data)
     chosen = None
     if candidate is not None:
-        chosen = Rival(fit(data, (candidate,), np.concatenate([base.values, start])), 0.0, 1.0)
+        chosen = Hypothesis(fit(data, (candidate,), np.concatenate([base.values, start])), 0.0, 1.0)
     verdict = Verdict(status, base, chosen, (), (), len(base.residuals) - len(base.values))
     return DriveFinding(data.campaign, data, verdict, ())

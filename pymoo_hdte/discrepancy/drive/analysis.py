@@ -148,7 +148,7 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
     The repeatability is a motion, which all channels show by way of the model's own response.
     """
     rules = data.rules
-    if verdict.chosen is None or verdict.chosen.share < rules.explained_share:
+    if verdict.chosen is None or verdict.chosen.explained < rules.explained_share:
         return data, verdict
     fitted = verdict.chosen.fit
     values = fitted.values[: len(data.base)]
@@ -269,11 +269,11 @@ def _strong_lines(features: Features, base: Fit, rules: Rules) -> list[float]:
     strong = total > _threshold(8 * len(speed), rules.order_line_chance)
     if len(groups) > 1:
         fewest = min(np.sum(speed == one) for one in np.unique(speed))
-        freedom = 8 * (len(speed) - fewest)
-        strong &= total - strongest > _threshold(freedom, rules.second_speed_chance)
+        degrees_of_freedom = 8 * (len(speed) - fewest)
+        strong &= total - strongest > _threshold(degrees_of_freedom, rules.second_speed_chance)
     ranked = [k for k in np.argsort(-total) if strong[k]]
     return [float(features.orders[k]) for k in ranked[: rules.most_order_lines]]
 
 
-def _threshold(freedom: int, chance: float) -> float:
-    return float(chi2.isf(chance, freedom))
+def _threshold(degrees_of_freedom: int, chance: float) -> float:
+    return float(chi2.isf(chance, degrees_of_freedom))

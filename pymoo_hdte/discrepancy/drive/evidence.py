@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.drive.observations import (
     Observations,
     cell_chi_square,
-    degrees_of_freedom,
+    cell_degrees_of_freedom,
 )
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
@@ -99,12 +99,14 @@ class Data(Observations):
         whitened = fitted.residuals[:n_running].reshape(n_records, n_features)
         cells = cell_chi_square(self, np.einsum("rij,rj->ri", self.whiteners, whitened))
         known = np.isfinite(cells)
-        chi_square, freedom = np.zeros((2, n_records + 1, cells.shape[1] + 1))
-        freedom[:-1, :-1] = np.where(known, degrees_of_freedom(self), 0.0).sum(axis=2)
+        chi_square, degrees_of_freedom = np.zeros((2, n_records + 1, cells.shape[1] + 1))
+        degrees_of_freedom[:-1, :-1] = np.where(known, cell_degrees_of_freedom(self), 0.0).sum(
+            axis=2
+        )
         chi_square[:-1, :-1] = np.where(known, cells, 0.0).sum(axis=2)
         sweeps = fitted.residuals[n_running : n_running + n_sweeps]
-        chi_square[-1, -1], freedom[-1, -1] = sweeps @ sweeps, n_sweeps
-        return Excess(chi_square - freedom, freedom)
+        chi_square[-1, -1], degrees_of_freedom[-1, -1] = sweeps @ sweeps, n_sweeps
+        return Excess(chi_square - degrees_of_freedom, degrees_of_freedom)
 
     def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
         """Return a candidate for each base parameter that a fit left at a bound."""

@@ -1,4 +1,4 @@
-"""The next experiment: the test that best tells the named effect from its nearest rivals.
+"""The next experiment: the test that best tells the named effect from what else the data allow.
 
 Two models that fit all that was measured are held against each other in tests within the range of
 conditions measured, new ones and repeats: a further record of a known condition still averages its
@@ -77,13 +77,13 @@ def next_experiment(finding: DriveFinding) -> Proposal:
     if twin is not None and verdict.status != "unlisted":
         return twin
     model = grid.model(chosen)
-    rivals = [grid.model(fitted) for fitted in nearest_rivals(verdict)]
-    if not rivals:
+    hypotheses = [grid.model(fitted) for fitted in nearest_rivals(verdict)]
+    if not hypotheses:
         return _most_uncertain(grid, model)
-    separations = np.array([separation(model, rival) for rival in rivals])
+    separations = np.array([separation(model, hypothesis) for hypothesis in hypotheses])
     test = int(np.argmax(separations.min(axis=0)))
     closest = int(np.argmin(separations[:, test]))
-    labels = model.label, rivals[closest].label
+    labels = model.label, hypotheses[closest].label
     return _proposal(grid, test, labels, float(separations[closest, test]), verdict)
 
 
@@ -92,13 +92,16 @@ def nearest_rivals(verdict: Verdict) -> list[Fit]:
     if verdict.chosen is None:
         return []
     names = {candidate.name for candidate in verdict.chosen.candidates}
-    others = [*verdict.equivalent, *sorted(verdict.alternatives, key=lambda rival: rival.bic)]
+    others = [
+        *verdict.equivalent,
+        *sorted(verdict.alternatives, key=lambda hypothesis: hypothesis.bic),
+    ]
     found: dict[frozenset[str], Fit] = {}
-    for rival in others:
-        theirs = frozenset(candidate.name for candidate in rival.candidates)
-        # One effect more is no rival: it explains at least as much wherever one looks.
+    for hypothesis in others:
+        theirs = frozenset(candidate.name for candidate in hypothesis.candidates)
+        # A set with one effect more explains at least as much in every test.
         if not names <= theirs:
-            found.setdefault(theirs, rival.fit)
+            found.setdefault(theirs, hypothesis.fit)
     return list(found.values())[:_RIVALS]
 
 

@@ -137,17 +137,17 @@ class Observations:
         return white.reshape(*differences.shape[:-2], -1)
 
 
-def degrees_of_freedom(data: Observations) -> Values:
+def cell_degrees_of_freedom(data: Observations) -> Values:
     """Return those of each cell, shape (4, 1 + m)."""
-    freedom = np.full((len(CHANNELS), 1 + len(data.features.orders)), 2.0)
-    freedom[:, 0] = 1.0
-    return freedom
+    degrees_of_freedom = np.full((len(CHANNELS), 1 + len(data.features.orders)), 2.0)
+    degrees_of_freedom[:, 0] = 1.0
+    return degrees_of_freedom
 
 
 def cell_chi_square(data: Observations, difference: Values) -> Values:
     """Return the chi-square of each cell for differences of features (r, f); (r, 4, 1 + m)."""
     covariance = data.covariance
-    found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan)
+    found = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan)
     for channel in range(len(CHANNELS)):
         if channel in MEANS:
             found[:, channel, 0] = difference[:, channel] ** 2 / covariance[:, channel, channel]
@@ -161,7 +161,7 @@ def cell_chi_square(data: Observations, difference: Values) -> Values:
 
 def as_lines(data: Observations, difference: Values) -> NDArray[np.complex128]:
     """Return differences of features (r, f) as phasors of cells (r, 4, 1 + m)."""
-    found = np.full((len(difference), *degrees_of_freedom(data).shape), np.nan, dtype=complex)
+    found = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan, dtype=complex)
     for channel in range(len(CHANNELS)):
         if channel in MEANS:
             found[:, channel, 0] = difference[:, channel]

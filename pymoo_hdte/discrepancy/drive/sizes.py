@@ -58,10 +58,11 @@ def scales_of(data: Observations, base: Fit) -> Scales:
     features = data.features
     n_running = features.values.size
     whitened = base.residuals[:n_running].reshape(features.values.shape)
-    left = np.einsum("rij,rj->ri", data.whiteners, whitened)
+    residual = np.einsum("rij,rj->ri", data.whiteners, whitened)
     noise = np.sqrt(np.diagonal(features.covariance, axis1=1, axis2=2))
     error, input_torque, output_torque = (
-        max(_size(features, left, channel), _size(features, noise, channel)) for channel in range(3)
+        max(_size(features, residual, channel), _size(features, noise, channel))
+        for channel in range(3)
     )
     swept = base.residuals[n_running : n_running + sum(len(one.angle) - 1 for one in data.torsion)]
     if len(swept):
@@ -110,7 +111,7 @@ def port_sizes(
     scales : Scales
     """
     at_output = max(scales.output_torque, believed.ratio * scales.input_torque)
-    left = {
+    residual = {
         "input": scales.input_torque,
         # What brakes the output is missing at the input, N times as small.
         "output": at_output,
@@ -128,7 +129,7 @@ def port_sizes(
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
     shared = DriveSizes(
         force=0.0,
-        left=0.0,
+        residual=0.0,
         largest=0.0,
         speed=scales.speed,
         travel=scales.torque / believed.stiffness,
@@ -150,8 +151,8 @@ def port_sizes(
             shared,
             # What is missing lies between what the base leaves of it, which takes up the rest, and
             # the whole torque: of values on a logarithmic scale, in the middle.
-            force=(left[port] * largest[port]) ** 0.5,
-            left=left[port],
+            force=(residual[port] * largest[port]) ** 0.5,
+            residual=residual[port],
             largest=largest[port],
             speed=shared.speed / slower[port],
             slower=slower[port],

@@ -28,7 +28,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
     moved = np.vstack([base + steps[0] * stiffness, base + steps[1] * offset])
     imitated = (data.torsion_residuals(moved, fitted.effects) - before).T
     orthonormal, _ = np.linalg.qr(imitated)
-    left = before - orthonormal @ (orthonormal.T @ before)
+    residual = before - orthonormal @ (orthonormal.T @ before)
     least, found = data.rules.sweep_gain, list[tuple[float, str]]()
     for candidate in candidates:
         for start in candidate.starts:
@@ -36,7 +36,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
             change = np.nan_to_num(data.torsion_residuals(base, effects)[0] - before)
             change -= orthonormal @ (orthonormal.T @ change)
             size = float(change @ change)
-            along = float(-change @ left)
+            along = float(-change @ residual)
             if size > least and along > 0.0:
                 found.append((along**2 / size, candidate.name))
     reduction, name = max(found, default=(0.0, ""))

@@ -28,7 +28,7 @@ class Excess:
     """
 
     chi_square: NDArray[np.float64]
-    freedom: NDArray[np.float64]
+    degrees_of_freedom: NDArray[np.float64]
 
     @property
     def of_parts(self) -> NDArray[np.float64]:
@@ -37,18 +37,18 @@ class Excess:
 
     def significant(self, rules: Rules) -> NDArray[np.bool_]:
         """Return whether it is more than noise, of each part, shape (parts,)."""
-        noise = np.sqrt(2.0 * self.freedom.sum(axis=0))
+        noise = np.sqrt(2.0 * self.degrees_of_freedom.sum(axis=0))
         return np.asarray(self.of_parts > rules.false_alarm_deviations * noise)
 
     @property
     def worst(self) -> NDArray[np.int_]:
         """Row of each part with most of it, shape (parts,); -1 where a part has but one row."""
-        several = np.count_nonzero(self.freedom, axis=0) > 1
+        several = np.count_nonzero(self.degrees_of_freedom, axis=0) > 1
         return np.where(several, np.argmax(self.chi_square, axis=0), -1)
 
     def without(self, rows: NDArray[np.int_]) -> Excess:
         """Return it with one row left out of each part; -1 leaves a part as it is."""
-        chi_square, freedom = self.chi_square.copy(), self.freedom.copy()
+        chi_square, degrees_of_freedom = self.chi_square.copy(), self.degrees_of_freedom.copy()
         parts = np.flatnonzero(rows >= 0)
-        chi_square[rows[parts], parts] = freedom[rows[parts], parts] = 0.0
-        return Excess(chi_square, freedom)
+        chi_square[rows[parts], parts] = degrees_of_freedom[rows[parts], parts] = 0.0
+        return Excess(chi_square, degrees_of_freedom)

@@ -93,8 +93,8 @@ class Fit:
         of a uniform distribution between them: what no record determines is as uncertain as they
         are wide.
         """
-        freedom = max(len(self.residuals) - len(self.values), 1)
-        curvature = self.jacobian.T @ self.jacobian / max(self.chi_square / freedom, 1.0)
+        degrees_of_freedom = max(len(self.residuals) - len(self.values), 1)
+        curvature = self.jacobian.T @ self.jacobian / max(self.chi_square / degrees_of_freedom, 1.0)
         scale = Layout(self.parameters).array("scale")
         within = np.diag(12.0 / self._widths**2)
         return np.linalg.inv(curvature + within) * np.outer(scale, scale)

@@ -21,7 +21,7 @@ from pymoo_hdte.laws.effect import is_contained
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class Hypothesis:
     """A set of effects fitted jointly with the base, with its evidence.
 
     Attributes
@@ -29,13 +29,13 @@ class Rival:
     fit : Fit
     bic : float
         Chi-square + parameters x ln(residuals).
-    share : float
-        Of the base's excess chi-square that it removes; 1 leaves nothing but noise.
+    explained : float
+        Share of the base's excess chi-square that it removes; 1 leaves nothing but noise.
     """
 
     fit: Fit
     bic: float
-    share: float
+    explained: float
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -63,24 +63,24 @@ class Rival:
         return frozenset((candidate.name, candidate.port) for candidate in self.candidates)
 
 
-def rival(fitted: Fit, of_base: float) -> Rival:
+def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
     """Return a fit with its evidence, the base's excess chi-square being given."""
     n_base = len(fitted.values) - count(fitted.candidates)
     unknowns = n_base + sum(candidate.unknowns for candidate in fitted.candidates)
     bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
     gain = of_base + (len(fitted.residuals) - n_base) - fitted.chi_square
     share = gain / max(of_base, gain) if gain > 0.0 else 0.0
-    return Rival(fitted, float(bic), float(share))
+    return Hypothesis(fitted, float(bic), float(share))
 
 
-def adequate(freedom: int, rules: Rules) -> float:
+def adequate(degrees_of_freedom: int, rules: Rules) -> float:
     """Return chi-square per degree of freedom up to which a model is adequate; 1.15 for 1400."""
-    return float(1.0 + rules.false_alarm_deviations * np.sqrt(2.0 / freedom))
+    return float(1.0 + rules.false_alarm_deviations * np.sqrt(2.0 / degrees_of_freedom))
 
 
-def down_to_noise(fitted: Fit, freedom: int, rules: Rules) -> bool:
+def down_to_noise(fitted: Fit, degrees_of_freedom: int, rules: Rules) -> bool:
     """Tell whether a fit is `adequate`."""
-    return fitted.chi_square <= adequate(freedom, rules) * freedom
+    return fitted.chi_square <= adequate(degrees_of_freedom, rules) * degrees_of_freedom
 
 
 def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
@@ -93,42 +93,44 @@ def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     worst = after.worst
     before, after = before.without(worst), after.without(worst)
     contradicting = rules.contradicting_chi_square - 1.0
-    plain = after.of_parts > contradicting * after.freedom.sum(axis=0)
-    left = after.of_parts > (1.0 - rules.explained_part_share) * before.of_parts
-    return np.asarray(before.significant(rules) & plain & left)
+    plain = after.of_parts > contradicting * after.degrees_of_freedom.sum(axis=0)
+    residual = after.of_parts > (1.0 - rules.explained_part_share) * before.of_parts
+    return np.asarray(before.significant(rules) & plain & residual)
 
 
-def explains(data: Evidence, one: Rival, base: Fit, freedom: int) -> bool:
+def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
     """Tell whether a set of effects removes what is wrong with the base, and wherever it is."""
-    rules, limit = data.rules, adequate(freedom, data.rules)
+    rules, limit = data.rules, adequate(degrees_of_freedom, data.rules)
     gain = base.chi_square - one.fit.chi_square
     unknowns = sum(candidate.unknowns for candidate in one.candidates)
     share = rules.exact_share if one.exact else rules.explained_share
     limit = max(limit, rules.exact_chi_square) if one.exact else limit
     if gain - unknowns * np.log(len(base.residuals)) < rules.bic_gain:
         return False
-    if one.fit.chi_square <= limit * freedom:
+    if one.fit.chi_square <= limit * degrees_of_freedom:
         return True
-    return one.share >= share and not unexplained(data, base, one.fit).any()
+    return one.explained >= share and not unexplained(data, base, one.fit).any()
 
 
-def alike(one: Rival, chosen: Rival, freedom: int, rules: Rules, margin: float = 1.0) -> bool:
-    """Tell whether the data cannot separate a rival with other effects from the chosen one.
+def alike(
+    one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules, margin: float = 1.0
+) -> bool:
+    """Tell whether the data cannot separate a set of other effects from the chosen one.
 
     Where even the chosen form leaves more than noise, that remainder is the scale on which chi-
     squares differ: hidden and listed forms of one effect differ in kind.
     """
     if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
         return False
-    misfit = max(chosen.fit.chi_square / freedom, 1.0)
+    misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
     near = one.fit.evidence - chosen.fit.evidence < margin * rules.evidence_distance * misfit
-    if near or misfit <= adequate(freedom, rules) or (one.exact and chosen.exact):
+    if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
         return near
-    left = chosen.fit.chi_square - freedom
-    return one.fit.chi_square - freedom < margin * rules.form_ratio * left
+    residual = chosen.fit.chi_square - degrees_of_freedom
+    return one.fit.chi_square - degrees_of_freedom < margin * rules.form_ratio * residual
 
 
-def contains(one: Rival, other: Rival) -> bool:
+def contains(one: Hypothesis, other: Hypothesis) -> bool:
     """Tell whether a set differs from another only by laws that hold the other's as special cases.
 
     Stribeck's friction without its excess is Coulomb's: it always explains as much.
@@ -145,13 +147,15 @@ def contains(one: Rival, other: Rival) -> bool:
     )
 
 
-def refined(data: Evidence, one: Rival, excess: float) -> Rival:
-    """Fit a rival further from where it ended, with slopes of its own."""
+def refined(data: Evidence, one: Hypothesis, excess: float) -> Hypothesis:
+    """Fit a hypothesis further from where it ended, with slopes of its own."""
     evaluations = data.rules.refinement_evaluations
-    return rival(fit(data, one.candidates, one.fit.values, evaluations), excess)
+    return hypothesis_of(fit(data, one.candidates, one.fit.values, evaluations), excess)
 
 
-def fit_all(data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float) -> list[Rival]:
+def fit_all(
+    data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float
+) -> list[Hypothesis]:
     """Fit candidates, each jointly with what stands; by rising BIC."""
     rules, found = data.rules, []
     for one in chosen:
@@ -159,7 +163,7 @@ def fit_all(data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float
         effects = (*base.candidates, one.candidate)
         evaluations = rules.pair_evaluations if base.candidates else rules.fit_evaluations
         fitted = fit(data, effects, start, evaluations, base.slopes)
-        found.append(rival(fitted, excess))
+        found.append(hypothesis_of(fitted, excess))
     return sorted(found, key=lambda one: one.bic)
 
 

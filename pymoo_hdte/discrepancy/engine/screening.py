@@ -51,12 +51,12 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
     """
     # A parameter at its bound cannot give way any further.
     orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
-    left = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
+    residual = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
     response, parts = data.response(fitted), data.rows_of_parts()
     found = []
     for candidate in candidates:
         if candidate.frees is not None:
-            found.append(_freed(candidate, fitted, orthonormal, left))
+            found.append(_freed(candidate, fitted, orthonormal, residual))
             continue
         signatures = []
         for start in candidate.starts:
@@ -64,9 +64,9 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
             signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
         every = np.array(signatures)
         by_part = tuple(
-            _best_start(candidate, every[:, rows], left[rows]).reduction for rows in parts
+            _best_start(candidate, every[:, rows], residual[rows]).reduction for rows in parts
         )
-        found.append(replace(_best_start(candidate, every, left), by_part=by_part))
+        found.append(replace(_best_start(candidate, every, residual), by_part=by_part))
     return sorted(found, key=lambda one: -one.reduction)
 
 
@@ -74,34 +74,34 @@ def _freed(
     candidate: Candidate,
     fitted: Fit,
     orthonormal: NDArray[np.float64],
-    left: NDArray[np.float64],
+    residual: NDArray[np.float64],
 ) -> Screened:
     """Return what a parameter at its bound could remove if it went beyond."""
     place = [parameter.name for parameter in fitted.parameters].index(str(candidate.frees))
     signature = fitted.jacobian[:, place] * fitted.bound_sides[place]
     signature = signature - orthonormal @ (orthonormal.T @ signature)
-    along, size = float(-signature @ left), float(signature @ signature)
+    along, size = float(-signature @ residual), float(signature @ signature)
     return Screened(candidate, along**2 / size if along > 0.0 and size > 0.0 else 0.0, ())
 
 
 def _best_start(
-    candidate: Candidate, signatures: NDArray[np.float64], left: NDArray[np.float64]
+    candidate: Candidate, signatures: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> Screened:
     """Return what the candidate could remove, and its strengths that would do so."""
     starts = np.array(candidate.starts)
     lower = np.array([parameter.lower for parameter in candidate.parameters])
     upper = np.array([parameter.upper for parameter in candidate.parameters])
     if candidate.linear:
-        best, reduction = _least_squares(signatures, starts, left)
+        best, reduction = _least_squares(signatures, starts, residual)
         harmonic = [one.name.startswith(HARMONIC_NAMES[1:]) for one in candidate.parameters]
         lines = np.hypot(*best[harmonic].reshape(-1, 2).T)
         if lines.size and lines.max() > np.hypot(*best[:2]):
             # A line that is weaker than its harmonic is not what the harmonic belongs to.
             kept = np.flatnonzero(~np.array(harmonic))
-            best, reduction = _least_squares(signatures[kept], starts[kept], left)
+            best, reduction = _least_squares(signatures[kept], starts[kept], residual)
     else:
         sizes = np.einsum("ij,ij->i", signatures, signatures)
-        along = -signatures @ left
+        along = -signatures @ residual
         strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
         gains = np.where((strengths > 0.0) | (lower[0] < 0.0), along * strengths, 0.0)
         place = int(np.argmax(gains))
@@ -112,9 +112,9 @@ def _best_start(
 
 
 def _least_squares(
-    signatures: NDArray[np.float64], starts: NDArray[np.float64], left: NDArray[np.float64]
+    signatures: NDArray[np.float64], starts: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
     """Return the values along the starts that remove most, and what they remove."""
-    solution, *_ = np.linalg.lstsq(signatures.T, -left, rcond=1e-10)
-    rest = left + signatures.T @ solution
-    return solution @ starts, float(left @ left - rest @ rest)
+    solution, *_ = np.linalg.lstsq(signatures.T, -residual, rcond=1e-10)
+    rest = residual + signatures.T @ solution
+    return solution @ starts, float(residual @ residual - rest @ rest)

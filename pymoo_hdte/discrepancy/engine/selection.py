@@ -14,13 +14,13 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
-    Rival,
+    Hypothesis,
     alike,
     down_to_noise,
     explains,
     fit_all,
+    hypothesis_of,
     refined,
-    rival,
     varied,
 )
 from pymoo_hdte.discrepancy.engine.rules import Rules
@@ -28,13 +28,13 @@ from pymoo_hdte.discrepancy.engine.screening import Screened, screen
 
 
 def with_second(
-    data: Evidence, base: Fit, singles: list[Rival], candidates: Sequence[Candidate]
-) -> tuple[Rival, list[Rival]]:
+    data: Evidence, base: Fit, singles: list[Hypothesis], candidates: Sequence[Candidate]
+) -> tuple[Hypothesis, list[Hypothesis]]:
     """Return the set to be named, and all that were fitted: a second effect has to be earned."""
-    freedom = len(base.residuals) - len(base.values)
-    excess = base.chi_square - freedom
+    degrees_of_freedom = len(base.residuals) - len(base.values)
+    excess = base.chi_square - degrees_of_freedom
     best = singles[0]
-    if not _second_could_count(data, best, freedom):
+    if not _second_could_count(data, best, degrees_of_freedom):
         return best, singles
     # Slopes with the first effect in place, which those of pairs are close to.
     best = refined(data, best, excess)
@@ -43,39 +43,41 @@ def with_second(
     for place, pair in enumerate(pairs):
         if pair.bic >= best.bic:
             break
-        if _promising(data, pair, best, freedom):
+        if _promising(data, pair, best, degrees_of_freedom):
             pairs[place] = pair = refined(data, pair, excess)
-        if not _second_earned(data, pair, singles, base, freedom):
+        if not _second_earned(data, pair, singles, base, degrees_of_freedom):
             continue
         singles = _with_second_alone(data, base, pair, singles, excess)
-        if _second_earned(data, pair, singles, base, freedom):
-            found = [pair, *_exchanged(data, pair, singles, freedom, excess)]
-            rivals = sorted([*singles, *pairs, *found[1:]], key=lambda one: one.bic)
-            return min(found, key=lambda one: one.bic), rivals
-    rivals = sorted([*singles, *pairs], key=lambda one: one.bic)
-    if explains(data, singles[0], base, freedom):
-        return singles[0], rivals
-    does = [pair for pair in pairs if explains(data, pair, base, freedom)]
-    return (does[0] if does else singles[0]), rivals
+        if _second_earned(data, pair, singles, base, degrees_of_freedom):
+            found = [pair, *_exchanged(data, pair, singles, degrees_of_freedom, excess)]
+            hypotheses = sorted([*singles, *pairs, *found[1:]], key=lambda one: one.bic)
+            return min(found, key=lambda one: one.bic), hypotheses
+    hypotheses = sorted([*singles, *pairs], key=lambda one: one.bic)
+    if explains(data, singles[0], base, degrees_of_freedom):
+        return singles[0], hypotheses
+    does = [pair for pair in pairs if explains(data, pair, base, degrees_of_freedom)]
+    return (does[0] if does else singles[0]), hypotheses
 
 
-def _second_could_count(data: Evidence, single: Rival, freedom: int) -> bool:
+def _second_could_count(data: Evidence, single: Hypothesis, degrees_of_freedom: int) -> bool:
     """Tell whether a second effect beside this one could be earned at all."""
-    if down_to_noise(single.fit, freedom, data.rules):
+    if down_to_noise(single.fit, degrees_of_freedom, data.rules):
         return False
     return single.exact or bool(data.excess(single.fit).significant(data.rules).any())
 
 
-def _promising(data: Evidence, pair: Rival, single: Rival, freedom: int) -> bool:
+def _promising(
+    data: Evidence, pair: Hypothesis, single: Hypothesis, degrees_of_freedom: int
+) -> bool:
     """Tell whether a second effect removes so much that its fit is worth being finished."""
-    left = single.fit.chi_square - freedom
+    residual = single.fit.chi_square - degrees_of_freedom
     removed = single.fit.chi_square - pair.fit.chi_square
-    return removed >= data.rules.explained_part_share * left
+    return removed >= data.rules.explained_part_share * residual
 
 
 def _with_second_alone(
-    data: Evidence, base: Fit, pair: Rival, singles: list[Rival], excess: float
-) -> list[Rival]:
+    data: Evidence, base: Fit, pair: Hypothesis, singles: list[Hypothesis], excess: float
+) -> list[Hypothesis]:
     """Return single effects with the second of a pair among them: it may do alone.
 
     What the screening puts first is not always what fits best.
@@ -85,13 +87,17 @@ def _with_second_alone(
         return singles
     start = np.concatenate([base.values, pair.fit.values[-len(second.parameters) :]])
     fitted = fit(data, (second,), start, data.rules.fit_evaluations, base.slopes)
-    alone = rival(fitted, excess)
+    alone = hypothesis_of(fitted, excess)
     return sorted([*singles, alone], key=lambda one: one.bic)
 
 
 def _exchanged(
-    data: Evidence, pair: Rival, singles: Sequence[Rival], freedom: int, excess: float
-) -> list[Rival]:
+    data: Evidence,
+    pair: Hypothesis,
+    singles: Sequence[Hypothesis],
+    degrees_of_freedom: int,
+    excess: float,
+) -> list[Hypothesis]:
     """Return the pair with its first effect exchanged for those that do as well alone."""
     first, second = pair.candidates
     (best,) = (one for one in singles if one.candidates == (first,))
@@ -99,17 +105,17 @@ def _exchanged(
     for other in singles:
         (candidate,) = other.candidates
         fits = candidate.frees is None and candidate.goes_with(second)
-        if fits and alike(other, best, freedom, rules):
+        if fits and alike(other, best, degrees_of_freedom, rules):
             start = np.append(other.fit.values, pair.fit.values[-len(second.parameters) :])
             effects = (candidate, second)
             fitted = fit(data, effects, start, rules.pair_evaluations, other.fit.slopes)
-            found.append(rival(fitted, excess))
+            found.append(hypothesis_of(fitted, excess))
     return found
 
 
 def _pairs(
-    data: Evidence, base: Fit, single: Rival, candidates: Sequence[Candidate], excess: float
-) -> list[Rival]:
+    data: Evidence, base: Fit, single: Hypothesis, candidates: Sequence[Candidate], excess: float
+) -> list[Hypothesis]:
     """Return the best pairs that contain the best single effect.
 
     Seconds are taken from what would remove most of all that is left, and most of what is left of
@@ -124,8 +130,8 @@ def _pairs(
         shares = [rest.sum() / whole.sum(), *rest[ill] / whole[ill]]
         others = [one for one in others if max(shares) >= _least(data, first, one)]
     screened = screen(data, single.fit, others)
-    left = single.fit.chi_square - (base.chi_square - excess)
-    chosen = _hopeful(screened, [one.reduction for one in screened], left, data.rules)
+    residual = single.fit.chi_square - (base.chi_square - excess)
+    chosen = _hopeful(screened, [one.reduction for one in screened], residual, data.rules)
     for part in ill:
         reductions = [one.by_part[part] for one in screened]
         of_part = _hopeful(screened, reductions, float(rest[part]), data.rules)
@@ -139,11 +145,11 @@ def _least(data: Evidence, first: Candidate, second: Candidate) -> float:
 
 
 def _hopeful(
-    screened: Sequence[Screened], reductions: Sequence[float], left: float, rules: Rules
+    screened: Sequence[Screened], reductions: Sequence[float], residual: float, rules: Rules
 ) -> list[Screened]:
     """Return the best candidates, to first order, if they remove enough of what is left."""
     order = np.argsort([-reduction for reduction in reductions], kind="stable")
-    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
+    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * residual]
     return varied(enough, 1)[: rules.most_seconds]
 
 
@@ -153,13 +159,17 @@ def _ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
     The worst, and what else the fit explains no better than by half.
     """
     wrong = np.flatnonzero(before.significant(rules) & after.significant(rules))
-    left = after.of_parts[wrong] / before.of_parts[wrong]
-    ranked = wrong[np.argsort(-left)].tolist()
-    return ranked[: max(1, int(np.sum(left > 1.0 - rules.explained_part_share)))]
+    residual = after.of_parts[wrong] / before.of_parts[wrong]
+    ranked = wrong[np.argsort(-residual)].tolist()
+    return ranked[: max(1, int(np.sum(residual > 1.0 - rules.explained_part_share)))]
 
 
 def _second_earned(
-    data: Evidence, pair: Rival, singles: Sequence[Rival], base: Fit, freedom: int
+    data: Evidence,
+    pair: Hypothesis,
+    singles: Sequence[Hypothesis],
+    base: Fit,
+    degrees_of_freedom: int,
 ) -> bool:
     """Tell whether the second effect removes most of what the better of the two leaves alone.
 
@@ -172,16 +182,16 @@ def _second_earned(
         key=lambda single: single.fit.chi_square,
     )
     if first.exact:
-        left = first.fit.chi_square - freedom
+        residual = first.fit.chi_square - degrees_of_freedom
         removed = first.fit.chi_square - pair.fit.chi_square
-        return left > 0.0 and removed >= rules.explained_share * left
+        return residual > 0.0 and removed >= rules.explained_share * residual
     before, alone, both = (data.excess(one) for one in (base, first.fit, pair.fit))
     parts = _ill_explained(before, alone, rules)
     if not parts:
         return False
     least = _least(data, *pair.candidates)
     for part in (slice(None), parts[0]):
-        whole, left, rest = (np.sum(one.of_parts[part]) for one in (before, alone, both))
-        if left - rest >= max(rules.second_share * left, least * whole):
+        whole, residual, rest = (np.sum(one.of_parts[part]) for one in (before, alone, both))
+        if residual - rest >= max(rules.second_share * residual, least * whole):
             return True
     return False

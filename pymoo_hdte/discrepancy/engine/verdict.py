@@ -17,14 +17,14 @@ import numpy as np
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
-    Rival,
+    Hypothesis,
     alike,
     contains,
     down_to_noise,
     explains,
     fit_all,
+    hypothesis_of,
     refined,
-    rival,
     varied,
 )
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
@@ -46,10 +46,10 @@ class Verdict:
         One of `STATUSES`.
     base : Fit
         Without any effect.
-    chosen : Rival or None
-    alternatives : tuple of Rival
+    chosen : Hypothesis or None
+    alternatives : tuple of Hypothesis
         Other sets that were fitted.
-    equivalent : tuple of Rival
+    equivalent : tuple of Hypothesis
         Those of them that explain the data too and that these cannot tell from the chosen one.
     degrees_of_freedom : int
     rules : Rules
@@ -58,9 +58,9 @@ class Verdict:
 
     status: str
     base: Fit
-    chosen: Rival | None
-    alternatives: tuple[Rival, ...]
-    equivalent: tuple[Rival, ...]
+    chosen: Hypothesis | None
+    alternatives: tuple[Hypothesis, ...]
+    equivalent: tuple[Hypothesis, ...]
     degrees_of_freedom: int
     rules: Rules = RULES
 
@@ -74,50 +74,56 @@ class Verdict:
     def leaves_more_than_noise(self) -> bool:
         """Whether the chosen effects do not explain the data down to the noise."""
         chosen = self.chosen
-        freedom, rules = self.degrees_of_freedom, self.rules
-        return chosen is not None and not down_to_noise(chosen.fit, freedom, rules)
+        degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
+        return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
 
 
 def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
     """Return the verdict on a fitted base, by the rules of its data."""
     rules = data.rules
-    freedom = len(base.residuals) - len(base.values)
+    degrees_of_freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     screened = screen(data, base, candidates)
-    excess = base.chi_square - freedom
+    excess = base.chi_square - degrees_of_freedom
     gain = screened[0].reduction
-    if down_to_noise(base, freedom, rules) and gain < rules.single_effect_gain:
-        return Verdict("adequate", base, None, (), (), freedom, rules)
+    if down_to_noise(base, degrees_of_freedom, rules) and gain < rules.single_effect_gain:
+        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules)
     singles = _fit_best(data, base, screened, excess)
-    if not explains(data, singles[0], base, freedom):
+    if not explains(data, singles[0], base, degrees_of_freedom):
         singles[0] = _searched(data, base, singles[0], excess)
-    chosen, rivals = with_second(data, base, singles, candidates)
-    others = [rival for rival in rivals if rival is not chosen]
+    chosen, hypotheses = with_second(data, base, singles, candidates)
+    others = [hypothesis for hypothesis in hypotheses if hypothesis is not chosen]
     chosen, others = _least_special(data, refined(data, chosen, excess), others, excess)
-    if not explains(data, chosen, base, freedom):
-        return Verdict("unlisted", base, chosen, tuple(others), (), freedom, rules)
-    near = [alike(rival, chosen, freedom, rules, rules.refit_margin) for rival in others]
+    if not explains(data, chosen, base, degrees_of_freedom):
+        return Verdict("unlisted", base, chosen, tuple(others), (), degrees_of_freedom, rules)
+    near = [
+        alike(hypothesis, chosen, degrees_of_freedom, rules, rules.refit_margin)
+        for hypothesis in others
+    ]
     others = [
-        refined(data, rival, excess) if flag else rival
-        for rival, flag in zip(others, near, strict=True)
+        refined(data, hypothesis, excess) if flag else hypothesis
+        for hypothesis, flag in zip(others, near, strict=True)
     ]
     equivalent = tuple(
-        rival
-        for rival in others
-        if alike(rival, chosen, freedom, rules) and explains(data, rival, base, freedom)
+        hypothesis
+        for hypothesis in others
+        if alike(hypothesis, chosen, degrees_of_freedom, rules)
+        and explains(data, hypothesis, base, degrees_of_freedom)
     )
-    listed = [rival for rival in equivalent if rival.listed]
+    listed = [hypothesis for hypothesis in equivalent if hypothesis.listed]
     if not chosen.listed and listed:
-        others = [chosen if rival is listed[0] else rival for rival in others]
-        equivalent = tuple(chosen if rival is listed[0] else rival for rival in equivalent)
+        others = [chosen if hypothesis is listed[0] else hypothesis for hypothesis in others]
+        equivalent = tuple(
+            chosen if hypothesis is listed[0] else hypothesis for hypothesis in equivalent
+        )
         chosen = listed[0]
     status = _status(chosen, equivalent)
-    return Verdict(status, base, chosen, tuple(others), equivalent, freedom, rules)
+    return Verdict(status, base, chosen, tuple(others), equivalent, degrees_of_freedom, rules)
 
 
 def _least_special(
-    data: Evidence, chosen: Rival, others: list[Rival], excess: float
-) -> tuple[Rival, list[Rival]]:
+    data: Evidence, chosen: Hypothesis, others: list[Hypothesis], excess: float
+) -> tuple[Hypothesis, list[Hypothesis]]:
     """Return the chosen set, or a special case of it that is no worse fitted to the end; others.
 
     Fits of few steps stall now and then, and of two that do the one with more unknowns may lead.
@@ -130,7 +136,7 @@ def _least_special(
     return best, [one for one in (chosen, *fitted) if one is not best]
 
 
-def _status(chosen: Rival, equivalent: Sequence[Rival]) -> str:
+def _status(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> str:
     """Return the status of a set that explains what is wrong."""
     if not chosen.listed:
         return "unlisted"
@@ -140,7 +146,7 @@ def _status(chosen: Rival, equivalent: Sequence[Rival]) -> str:
     return "parameter" if out else "named"
 
 
-def _searched(data: Evidence, base: Fit, single: Rival, excess: float) -> Rival:
+def _searched(data: Evidence, base: Fit, single: Hypothesis, excess: float) -> Hypothesis:
     """Return the best of fits from all starts of a single effect, with slopes of their own.
 
     An inertia that is half as large again moves a resonance past lines: the way there is not
@@ -151,13 +157,13 @@ def _searched(data: Evidence, base: Fit, single: Rival, excess: float) -> Rival:
     if len(candidate.starts) > 1 and not candidate.linear:
         begins = [np.concatenate([base.values, start]) for start in candidate.starts]
         fits = [fit(data, single.candidates, begin) for begin in begins]
-        found += [rival(fitted, excess) for fitted in fits]
+        found += [hypothesis_of(fitted, excess) for fitted in fits]
     return min(found, key=lambda one: one.bic)
 
 
 def _fit_best(
     data: Evidence, base: Fit, screened: Sequence[Screened], excess: float
-) -> list[Rival]:
+) -> list[Hypothesis]:
     """Fit the most promising candidates jointly with what stands; by rising BIC."""
     rules = data.rules
     least = rules.promising_share * screened[0].reduction

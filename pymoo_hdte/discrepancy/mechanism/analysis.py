@@ -18,11 +18,11 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
-    Rival,
+    Hypothesis,
     contains,
     down_to_noise,
     fit_all,
-    rival,
+    hypothesis_of,
     varied,
 )
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
@@ -158,11 +158,11 @@ def examine_mechanism(
 
 
 def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
-    left = dict(zip(data.names, root_mean_square(data, base.residuals), strict=True))
+    residual = dict(zip(data.names, root_mean_square(data, base.residuals), strict=True))
     forces = {
-        port.name: left[port.name]
+        port.name: residual[port.name]
         if port.read
-        else max(left[name] / abs(share) for name, share in port.motion.items() if share)
+        else max(residual[name] / abs(share) for name, share in port.motion.items() if share)
         for port in data.mechanism.ports
     }
     return mechanism_candidates(data, forces, position_orders(data, base))
@@ -173,8 +173,8 @@ def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]
 
     Which these are depends on the noise; after a few rounds it no longer does.
     """
-    rules, freedom = sensors.rules, len(base.residuals) - len(base.values)
-    if down_to_noise(base, freedom, rules):
+    rules, degrees_of_freedom = sensors.rules, len(base.residuals) - len(base.values)
+    if down_to_noise(base, degrees_of_freedom, rules):
         return sensors
     data = sensors.with_rest(base.residuals)
     for _ in range(rules.rest_rounds):
@@ -183,13 +183,13 @@ def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]
     return data
 
 
-def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Rival:
+def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis:
     """Return the best model with up to two effects, by BIC."""
     base, rules = fit(data), data.rules
     excess = base.chi_square - (len(base.residuals) - len(base.values))
     promising = varied(screen(data, base, candidates), rules.most_of_one_name)
     singles = fit_all(data, base, promising[: rules.most_fitted], excess)
-    found = [rival(base, excess), *singles]
+    found = [hypothesis_of(base, excess), *singles]
     for single in singles[: rules.rest_seconds]:
         (first,) = single.candidates
         others = [one for one in candidates if first.goes_with(one)]
@@ -263,7 +263,7 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
 
 
 def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
-    """Return the verdict without rivals that leave more of some balance, or are the same and more.
+    """Return the verdict without hypotheses that leave more of a balance, or contain the chosen.
 
     A law that contains the chosen one and does no better is no other explanation.
     """
@@ -280,11 +280,11 @@ def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
     return replace(verdict, status=status, equivalent=equivalent)
 
 
-def _unknowns(one: Rival) -> int:
+def _unknowns(one: Hypothesis) -> int:
     return sum(candidate.unknowns for candidate in one.candidates)
 
 
-def _as_unlisted(verdict: Verdict, nearest: Rival | None) -> Verdict:
+def _as_unlisted(verdict: Verdict, nearest: Hypothesis | None) -> Verdict:
     return replace(verdict, status="unlisted", chosen=nearest, equivalent=())
 
 

@@ -82,7 +82,7 @@ def port_sizes(data: MeasuredData, port: Port, force: float, seen: Sequence[floa
         raise InvalidInput(f"motion of port {port.name}", 0.0, "one that changes in some record")
     return Sizes(
         force=force,
-        left=force,
+        residual=force,
         largest=LARGEST * force,
         speed=max(float(np.abs(one.speed).max()) for one in here),
         travel=travel,

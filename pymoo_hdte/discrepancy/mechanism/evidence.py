@@ -138,8 +138,8 @@ class MeasuredData:
 
     def excess(self, fitted: Fit) -> Excess:
         """Return the excess chi-square of a fit by record and part, shape (r, n_parts)."""
-        chi_square, freedom = self._chi_square(fitted.residuals), self._coefficients
-        return Excess(chi_square - freedom, freedom)
+        chi_square, degrees_of_freedom = self._chi_square(fitted.residuals), self._coefficients
+        return Excess(chi_square - degrees_of_freedom, degrees_of_freedom)
 
     def known_over_noise(self) -> float:
         """Return by how much what is known exactly stands out of the noise.
@@ -169,8 +169,8 @@ class MeasuredData:
         wrong at low frequencies would be fitted to the others.
         """
         found = []
-        for left, one in zip(self.coefficients(residuals), self.spectra, strict=True):
-            beyond = np.sum(left**2 - one.noise**2 * one.kept, axis=1, keepdims=True)
+        for residual, one in zip(self.coefficients(residuals), self.spectra, strict=True):
+            beyond = np.sum(residual**2 - one.noise**2 * one.kept, axis=1, keepdims=True)
             level = np.maximum(beyond, 0.0) / one.kept.sum(axis=1, keepdims=True)
             found.append(np.sqrt(one.noise**2 + level))
         return replace(self, deviation=tuple(found))

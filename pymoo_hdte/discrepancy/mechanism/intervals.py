@@ -58,12 +58,12 @@ class Spread:
         influence = inverse @ fitted.jacobian.T
         free = 1.0 - np.einsum("np,pn->n", fitted.jacobian, influence)
         band = _bands(data)
-        freedom = np.maximum(np.bincount(band, free), 1.0)
-        power = np.bincount(band, fitted.residuals**2) / freedom
+        degrees_of_freedom = np.maximum(np.bincount(band, free), 1.0)
+        power = np.bincount(band, fitted.residuals**2) / degrees_of_freedom
         spread = (influence * power[band]) @ influence.T + inverse @ bounds @ inverse
         self.covariance = spread * np.outer(scale, scale)
         shares = np.array([np.bincount(band, row**2) * power for row in influence])
-        uncertain = np.sum(shares**2 / freedom, axis=1)
+        uncertain = np.sum(shares**2 / degrees_of_freedom, axis=1)
         # What only the bounds determine is as sure of its variance as can be: infinite freedom.
         with np.errstate(divide="ignore"):
             self.reach = np.asarray(t.ppf(_CENTRAL, np.diag(spread) ** 2 / uncertain))

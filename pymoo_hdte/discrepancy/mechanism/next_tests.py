@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import in_words
-from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
@@ -82,8 +82,8 @@ def next_test(finding: MechanismFinding) -> NextTest:
             f"Run the same speeds in the reverse direction: the {one_way[0]} moves one way only, "
             "in which dry friction cannot be told from a constant force.",
         )
-    rival = _nearest(finding)
-    if chosen is None or rival is None:
+    hypothesis = _nearest(finding)
+    if chosen is None or hypothesis is None:
         why = {
             "adequate": "an effect too small to be seen may grow with the motion",
             "unlisted": "how what is left grows with the motion says what it may be",
@@ -93,10 +93,10 @@ def next_test(finding: MechanismFinding) -> NextTest:
         )
         text = f"Repeat {first} at three times its size: {why}."
         return NextTest(first, 3.0, 1.0, (), 0.0, text)
-    return _best_repetition(finding, chosen, rival)
+    return _best_repetition(finding, chosen, hypothesis)
 
 
-def _nearest(finding: MechanismFinding) -> Rival | None:
+def _nearest(finding: MechanismFinding) -> Hypothesis | None:
     """Return the explanation that comes closest to the chosen one and differs from it."""
     chosen, near_by = finding.verdict.chosen, finding.data.rules.nearest_rival_ratio
     others = [
@@ -113,11 +113,13 @@ def _nearest(finding: MechanismFinding) -> Rival | None:
     return min(equivalent or near, key=lambda one: one.bic, default=None)
 
 
-def _best_repetition(finding: MechanismFinding, chosen: Rival, rival: Rival) -> NextTest:
+def _best_repetition(
+    finding: MechanismFinding, chosen: Hypothesis, hypothesis: Hypothesis
+) -> NextTest:
     best: tuple[float, int, float, float] = (-1.0, 0, 1.0, 1.0)
     for place, size, rate in product(range(len(finding.data.spectra)), SIZES, RATES):
         best = max(
-            best, (_separation(finding, chosen, rival, place, size, rate), place, size, rate)
+            best, (_separation(finding, chosen, hypothesis, place, size, rate), place, size, rate)
         )
     separation, place, size, rate = best
     name = finding.data.spectra[place].record.name
@@ -129,7 +131,7 @@ def _best_repetition(finding: MechanismFinding, chosen: Rival, rival: Rival) -> 
         )
         if factor != 1.0
     )
-    told = f"{in_words(chosen.label)} and {in_words(rival.label)}"
+    told = f"{in_words(chosen.label)} and {in_words(hypothesis.label)}"
     if separation < 1.0:
         description = (
             "No repetition of these records at another size or speed separates "
@@ -140,11 +142,16 @@ def _best_repetition(finding: MechanismFinding, chosen: Rival, rival: Rival) -> 
             f"Repeat {name} at {how or 'the same size, for longer'}: there {told} differ by "
             f"{separation:.2g} times what the model leaves now."
         )
-    return NextTest(name, size, rate, (chosen.label, rival.label), separation, description)
+    return NextTest(name, size, rate, (chosen.label, hypothesis.label), separation, description)
 
 
 def _separation(
-    finding: MechanismFinding, chosen: Rival, rival: Rival, place: int, size: float, rate: float
+    finding: MechanismFinding,
+    chosen: Hypothesis,
+    hypothesis: Hypothesis,
+    place: int,
+    size: float,
+    rate: float,
 ) -> float:
     """Return how far two explanations lie apart when a record is repeated, beyond the base."""
     balance = finding.data.spectra[place]
@@ -158,13 +165,13 @@ def _separation(
                 motion = balance.ports[port.name]
                 position, speed = size * motion.position, size * rate * motion.speed
                 imitated += [position, speed, np.gradient(speed)]
-                for sign, one in ((1.0, chosen), (-1.0, rival)):
+                for sign, one in ((1.0, chosen), (-1.0, hypothesis)):
                     for effect in one.fit.effects:
                         if effect.port == port.name:
                             scaled = PortMotion(position, speed)
                             force = law_force(effect.law, scaled, port.stiffness.value)
                             difference += sign * share * force
         base = np.column_stack(imitated)
-        left = difference - base @ np.linalg.lstsq(base, difference, rcond=None)[0]
-        power += float(np.mean(left**2)) / max(float(rest[row]) ** 2, 1e-300)
+        residual = difference - base @ np.linalg.lstsq(base, difference, rcond=None)[0]
+        power += float(np.mean(residual**2)) / max(float(rest[row]) ** 2, 1e-300)
     return float(np.sqrt(power))

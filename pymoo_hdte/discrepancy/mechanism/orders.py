@@ -45,8 +45,10 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
         for left_by_row, balance in zip(coefficients, data.spectra, strict=True):
             # As a force at the port would stand in all of them.
             rows = [data.names.index(name) for name in shares]
-            left = np.array(list(shares.values())) @ left_by_row[rows]
-            signals.append((balance.ports[port.name].position, _detrended(balance.in_time(left))))
+            residual = np.array(list(shares.values())) @ left_by_row[rows]
+            signals.append(
+                (balance.ports[port.name].position, _detrended(balance.in_time(residual)))
+            )
         found[port.name] = _strongest(signals, data.rules)
     return found
 

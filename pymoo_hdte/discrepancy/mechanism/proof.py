@@ -165,23 +165,23 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
     data = measured_data(finding.mechanism, [record], finding.cutoff, finding.data.known)
     n_base = len(data.base)
     (balance,) = data.spectra
-    left = []
+    residual = []
     for one in (finding.verdict.base, finding.accepted):
         whitened = data.residuals(one.values[:n_base], laws_of(one.effects))
-        left.append((root_mean_square(data, whitened), data.coefficients(whitened)[0]))
+        residual.append((root_mean_square(data, whitened), data.coefficients(whitened)[0]))
     floor = root_mean_square(data, np.ones(len(data.frequency)))
     return [
         MeasuredGap(
             record.name,
             name,
             "balance",
-            float(left[0][0][place]),
-            float(left[1][0][place]),
+            float(residual[0][0][place]),
+            float(residual[1][0][place]),
             float(floor[place]),
             balance.time,
             np.zeros(len(balance.time)),
-            -balance.in_time(left[0][1][place]),
-            -balance.in_time(left[1][1][place]),
+            -balance.in_time(residual[0][1][place]),
+            -balance.in_time(residual[1][1][place]),
             finding.data.rules.least_gap_share,
         )
         for place, name in enumerate(data.names)

@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.laws.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
@@ -105,7 +105,7 @@ def sentence(verdict: Verdict) -> str:
             f"{in_words(chosen.label)}."
         )
     if verdict.status == "class":
-        others = "; or ".join(in_words(rival.label) for rival in verdict.equivalent)
+        others = "; or ".join(in_words(hypothesis.label) for hypothesis in verdict.equivalent)
         return f"{what} Or, which these data cannot tell from it: {others}."
     return what
 
@@ -126,7 +126,7 @@ def _effects(verdict: Verdict) -> list[dict[str, Any]]:
                 "sentence": candidate.sentence,
                 "parameters": _parameters(candidate, fitted, rows),
                 "at_bound": bounded,
-                "share": verdict.chosen.share if verdict.chosen else None,
+                "explained": verdict.chosen.explained if verdict.chosen else None,
             }
         )
     return found
@@ -202,17 +202,20 @@ def _alternatives(verdict: Verdict) -> list[dict[str, Any]]:
     """Return the other sets of effects with their evidence, by rising BIC."""
     chosen = verdict.chosen
 
-    def evidence(rival: Rival) -> dict[str, Any]:
+    def evidence(hypothesis: Hypothesis) -> dict[str, Any]:
         return {
             "effects": [
-                {"name": one.name, "port": one.port, "order": one.order} for one in rival.candidates
+                {"name": one.name, "port": one.port, "order": one.order}
+                for one in hypothesis.candidates
             ],
-            "bic": rival.bic,
-            "bic_gap": rival.bic - chosen.bic if chosen else None,
-            "chi_square": rival.fit.chi_square,
-            "share": rival.share,
-            "at_bound": list(rival.fit.at_bounds),
-            "equivalent": rival in verdict.equivalent,
+            "bic": hypothesis.bic,
+            "bic_gap": hypothesis.bic - chosen.bic if chosen else None,
+            "chi_square": hypothesis.fit.chi_square,
+            "explained": hypothesis.explained,
+            "at_bound": list(hypothesis.fit.at_bounds),
+            "equivalent": hypothesis in verdict.equivalent,
         }
 
-    return [evidence(rival) for rival in sorted(verdict.alternatives, key=lambda one: one.bic)]
+    return [
+        evidence(hypothesis) for hypothesis in sorted(verdict.alternatives, key=lambda one: one.bic)
+    ]

@@ -85,14 +85,14 @@ def gap_by_channel(proof: Proof) -> Figure:
 def gap_by_order(proof: Proof) -> Figure:
     """Draw the gap of each order line of the transmission error, and the peak-to-peak values."""
     figure = Figure(figsize=(11.0, 3.8), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    _dumbbells(left, proof.by_order, [_order_word(order) for order in proof.orders])
+    residual, right = figure.subplots(1, 2)
+    _dumbbells(residual, proof.by_order, [_order_word(order) for order in proof.orders])
     floors = [gap.noise_floor for gap in proof.by_order]
-    left.plot(floors, range(len(floors)), "|", color=GREY, markersize=9, label="noise floor")
-    left.set_xscale("log")
-    left.set_xlabel("gap of the transmission error [arcsec]")
-    left.set_ylabel("order of the input")
-    left.legend(fontsize=8, frameon=False)
+    residual.plot(floors, range(len(floors)), "|", color=GREY, markersize=9, label="noise floor")
+    residual.set_xscale("log")
+    residual.set_xlabel("gap of the transmission error [arcsec]")
+    residual.set_ylabel("order of the input")
+    residual.legend(fontsize=8, frameon=False)
     measured, before, after = proof.dte
     ends = [proof.dte.min(), proof.dte.max()]
     right.plot(ends, ends, color=GREY, linewidth=1)
@@ -162,8 +162,8 @@ def _dumbbells(
 
 def _deviations(location: Location) -> NDArray[np.float64]:
     """Return the root mean square misfit of each cell in standard deviations."""
-    freedom = np.where(location.orders == 0.0, 1.0, 2.0)
-    return np.sqrt(location.chi_square / freedom)
+    degrees_of_freedom = np.where(location.orders == 0.0, 1.0, 2.0)
+    return np.sqrt(location.chi_square / degrees_of_freedom)
 
 
 def _heat(figure: Figure, axis: Axes, size: NDArray[np.float64], labelled: bool = True) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
@@ -139,10 +139,10 @@ def remainder(finding: MechanismFinding) -> dict[str, Any]:
     removed = finding.share_removed if named else 0.0
     words = f"The model leaves {size}."
     if named:
-        left = "What is left is" if np.all(after <= noise) else "What nobody explains is"
+        residual = "What is left is" if np.all(after <= noise) else "What nobody explains is"
         words = (
             f"It removes {100.0 * removed:.3g} % of the power of the misfit beyond the sensors' "
-            f"noise. {left} {size}."
+            f"noise. {residual} {size}."
         )
     return {
         "sentence": words,
@@ -174,23 +174,23 @@ def limits(finding: MechanismFinding) -> list[str]:
     return found
 
 
-def _by_bic(one: Rival) -> float:
+def _by_bic(one: Hypothesis) -> float:
     return one.bic
 
 
-def _evidence(finding: MechanismFinding, one: Rival) -> dict[str, Any]:
+def _evidence(finding: MechanismFinding, one: Hypothesis) -> dict[str, Any]:
     chosen = finding.verdict.chosen
     return {
         "effects": [{"name": c.name, "port": c.port} for c in one.candidates],
         "label": in_words(one.label),
         "bic_gap": one.bic - chosen.bic if chosen else None,
-        "share": one.share,
+        "explained": one.explained,
         "equivalent": one in finding.verdict.equivalent,
         "role": _role(finding, one),
     }
 
 
-def _role(finding: MechanismFinding, one: Rival) -> str:
+def _role(finding: MechanismFinding, one: Hypothesis) -> str:
     chosen = finding.verdict.chosen
     if one in finding.verdict.equivalent:
         return "as good"

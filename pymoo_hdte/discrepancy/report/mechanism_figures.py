@@ -37,9 +37,9 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
             if named:
                 shown.append((after[record][row], AFTER, "x", "after"))
             for column, over in enumerate((motion.speed, motion.position)):
-                for left, colour, marker, label in shown:
+                for residual, colour, marker, label in shown:
                     axes[row, column].plot(
-                        over[stride], balance.in_time(left)[stride], marker, ms=3, color=colour,
+                        over[stride], balance.in_time(residual)[stride], marker, ms=3, color=colour,
                         alpha=0.6, label=label if record == 0 else None,
                     )  # fmt: skip
         axes[row, 0].set_ylabel(f"left of {name} [SI]")

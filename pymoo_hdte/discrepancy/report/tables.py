@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
 from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
 from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.discrepancy.engine.hypothesis import (
-    Rival,
+    Hypothesis,
     adequate,
     unexplained,
 )
@@ -71,13 +71,13 @@ class EffectRow:
 
 
 @dataclass(frozen=True)
-class RivalRow:
-    """Evidence for a set of effects; ``bic`` above that of the best, share in words."""
+class HypothesisRow:
+    """Evidence for a set of effects; ``bic`` above that of the best, what is explained in words."""
 
     label: str
     role: str
     chi_square: float
-    share: str
+    explained: str
     bic: float
     at_bounds: str
 
@@ -86,14 +86,14 @@ def certainty(finding: DriveFinding) -> str:
     """Return how sure the verdict is, in words."""
     verdict = finding.verdict
     limit = adequate(verdict.degrees_of_freedom, verdict.rules)
-    left = verdict.base.chi_square / verdict.degrees_of_freedom
+    residual = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate" or verdict.chosen is None:
         return (
-            f"The misfit of the believed drive, fitted within its tolerances, has {left:.2f} times "
-            f"the variance of the noise; up to {limit:.2f} counts as noise. An effect too small "
-            "for these records may still be there."
+            "The misfit of the believed drive, fitted within its tolerances, has "
+            f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. An "
+            "effect too small for these records may still be there."
         )
-    share = _percent(verdict.chosen.share)
+    share = _percent(verdict.chosen.explained)
     if not verdict.chosen.listed:
         return (
             f"No effect of the list is as likely: this explains {share} of the misfit. An error of "
@@ -107,18 +107,20 @@ def certainty(finding: DriveFinding) -> str:
     return " ".join(_evidence(verdict, verdict.chosen, share))
 
 
-def _too_little(finding: DriveFinding, nearest: Rival) -> str:
+def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
     """Return why an effect is not named though it is the nearest."""
-    left = unexplained(finding.data, finding.verdict.base, nearest.fit)
-    if left.any():
-        parts = [part.replace("_", " ") for part, missed in zip(PARTS, left, strict=True) if missed]
+    residual = unexplained(finding.data, finding.verdict.base, nearest.fit)
+    if residual.any():
+        parts = [
+            part.replace("_", " ") for part, missed in zip(PARTS, residual, strict=True) if missed
+        ]
         return f"but not what shows in {' and '.join(f'the {part}' for part in parts)}"
     rules = finding.verdict.rules
     share = rules.exact_share if nearest.exact else rules.explained_share
     return f"where a name takes {100.0 * share:g} %, or what is left to be noise"
 
 
-def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
+def _evidence(verdict: Verdict, chosen: Hypothesis, share: str) -> list[str]:
     after = chosen.fit.chi_square / verdict.degrees_of_freedom
     words = [
         f"It explains {share} of the misfit that is not noise; what is left has {after:.3g} times "
@@ -129,17 +131,18 @@ def _evidence(verdict: Verdict, chosen: Rival, share: str) -> list[str]:
             "That is more than noise: its form is not quite right or more is missing, and values "
             "may be off by more than their intervals say."
         )
-    rivals = [
-        rival
-        for rival in verdict.alternatives
-        if _names(rival) != _names(chosen) and len(rival.candidates) == len(chosen.candidates)
+    hypotheses = [
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if _names(hypothesis) != _names(chosen)
+        and len(hypothesis.candidates) == len(chosen.candidates)
     ]
     if verdict.equivalent:
-        shares = ", ".join(_percent(rival.share) for rival in verdict.equivalent)
+        shares = ", ".join(_percent(hypothesis.explained) for hypothesis in verdict.equivalent)
         words.append(f"What these data cannot tell from it explains {shares}.")
-    elif rivals:
-        best = min(rivals, key=lambda rival: rival.bic)
-        words.append(f"The next best, {in_words(best.label)}, explains {_percent(best.share)}.")
+    elif hypotheses:
+        best = min(hypotheses, key=lambda hypothesis: hypothesis.bic)
+        words.append(f"The next best, {in_words(best.label)}, explains {_percent(best.explained)}.")
     if chosen.fit.at_bounds:
         names = ", ".join(name.replace("_", " ") for name in chosen.fit.at_bounds)
         words.append(f"At the edge of what was allowed, so judge with care: {names}.")
@@ -184,23 +187,25 @@ def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
     return rows
 
 
-def rival_rows(verdict: Verdict) -> list[RivalRow]:
+def hypothesis_rows(verdict: Verdict) -> list[HypothesisRow]:
     """Return the evidence of all that was fitted, the chosen first."""
-    rivals = [] if verdict.chosen is None else [verdict.chosen]
-    rivals += [rival for rival in verdict.alternatives if rival is not verdict.chosen]
-    if not rivals:
+    hypotheses = [] if verdict.chosen is None else [verdict.chosen]
+    hypotheses += [
+        hypothesis for hypothesis in verdict.alternatives if hypothesis is not verdict.chosen
+    ]
+    if not hypotheses:
         return []
-    best = min(rival.bic for rival in rivals)
+    best = min(hypothesis.bic for hypothesis in hypotheses)
     return [
-        RivalRow(
-            in_words(rival.label),
-            _role(verdict, rival),
-            rival.fit.chi_square,
-            _percent(rival.share),
-            rival.bic - best,
-            ", ".join(name.replace("_", " ") for name in rival.fit.at_bounds) or "none",
+        HypothesisRow(
+            in_words(hypothesis.label),
+            _role(verdict, hypothesis),
+            hypothesis.fit.chi_square,
+            _percent(hypothesis.explained),
+            hypothesis.bic - best,
+            ", ".join(name.replace("_", " ") for name in hypothesis.fit.at_bounds) or "none",
         )
-        for rival in rivals
+        for hypothesis in hypotheses
     ]
 
 
@@ -285,14 +290,14 @@ def _shown(unit: str) -> str:
     return unit.replace(".", " ").replace("2", "²").replace("3", "³")
 
 
-def _role(verdict: Verdict, rival: Rival) -> str:
-    if rival is verdict.chosen:
+def _role(verdict: Verdict, hypothesis: Hypothesis) -> str:
+    if hypothesis is verdict.chosen:
         return "best known, but not enough" if verdict.status == "unlisted" else "chosen"
-    return "cannot be told apart" if rival in verdict.equivalent else "rejected"
+    return "cannot be told apart" if hypothesis in verdict.equivalent else "rejected"
 
 
-def _names(rival: Rival) -> set[str]:
-    return {candidate.name for candidate in rival.candidates}
+def _names(hypothesis: Hypothesis) -> set[str]:
+    return {candidate.name for candidate in hypothesis.candidates}
 
 
 def _percent(share: float) -> str:

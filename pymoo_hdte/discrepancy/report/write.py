@@ -34,10 +34,10 @@ from pymoo_hdte.discrepancy.report.tables import (
     certainty,
     effect_rows,
     gap_sentence,
+    hypothesis_rows,
     metric_rows,
     parameter_rows,
     record_rows,
-    rival_rows,
 )
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
@@ -165,7 +165,7 @@ def _page(
         gap=gap_sentence(finding, proof),
         next_test=in_words(document["next_experiment"]["description"]),
         pictures=pictures,
-        rivals=rival_rows(finding.verdict),
+        hypotheses=hypothesis_rows(finding.verdict),
         parameters=parameter_rows(finding),
         metrics=metric_rows(proof),
         records=record_rows(finding.campaign, proof),

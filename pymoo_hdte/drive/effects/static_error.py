@@ -84,7 +84,7 @@ def _of_drive(sizes: DriveSizes) -> list[Guess]:
 def _of_reading(sizes: Sizes) -> list[Guess]:
     found = []
     for family in sizes.lines:
-        unknowns = family.waves("amplitude", sizes.largest, sizes.left)
+        unknowns = family.waves("amplitude", sizes.largest, sizes.residual)
 
         def build(values: Sequence[float], family: Family = family) -> tuple[PeriodicTorque, ...]:
             lines = family.lines(values)

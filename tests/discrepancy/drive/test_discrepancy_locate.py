@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.drive.misfit.location import locate, refit_clean
 from pymoo_hdte.discrepancy.drive.misfit.map import benjamini_hochberg
-from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, degrees_of_freedom
+from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, cell_degrees_of_freedom
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.units import ARCSEC
@@ -54,7 +54,7 @@ def test_cells_of_noise_follow_their_chi_square():
     for _ in range(20):
         noise = rng.standard_normal(data.features.values.shape)
         found = cell_chi_square(data, np.einsum("rij,rj->ri", data.whiteners, noise))
-        p_values.append(chi2.sf(found, degrees_of_freedom(data)))
+        p_values.append(chi2.sf(found, cell_degrees_of_freedom(data)))
     known = np.array(p_values)
     known = known[np.isfinite(known)]
     assert known.mean() == pytest.approx(0.5, abs=0.02)
@@ -82,13 +82,15 @@ def test_a_local_misfit_does_not_bias_the_refitted_base():
     assert biased > 0.02
     assert abs(clean[row] / truth[row] - 1.0) < 0.1 * biased
     left = data.features.values - data.predict(clean[None], ())[0]
-    p_value = chi2.sf(cell_chi_square(data, left), degrees_of_freedom(data))
+    p_value = chi2.sf(cell_chi_square(data, left), cell_degrees_of_freedom(data))
     flagged = np.argwhere(benjamini_hochberg(p_value, 0.01))
     assert flagged.tolist() == [[record, 0, 0] for record in np.flatnonzero(loaded)]
     # What is not left out keeps its weight: it is fitted down to its noise and no further.
     clean = refit_clean(data, base)
-    freedom = data.features.values.size - loaded.sum()
-    assert clean.chi_square == pytest.approx(freedom, abs=4.0 * np.sqrt(2.0 * freedom))
+    degrees_of_freedom = data.features.values.size - loaded.sum()
+    assert clean.chi_square == pytest.approx(
+        degrees_of_freedom, abs=4.0 * np.sqrt(2.0 * degrees_of_freedom)
+    )
 
 
 def test_a_named_line_flags_the_cells_that_it_moves():
@@ -98,7 +100,7 @@ def test_a_named_line_flags_the_cells_that_it_moves():
     data, truth = measured((effect,), np.random.default_rng(5), stiffness=1.03)
     found = locate(analysed(data, "named", candidate, candidate.starts[0]))
     moved = (data.predict(truth[None], (effect,)) - data.predict(truth[None], ()))[0]
-    truly = cell_chi_square(data, moved) > degrees_of_freedom(data)
+    truly = cell_chi_square(data, moved) > cell_degrees_of_freedom(data)
     both = np.sum(truly & found.flagged)
     assert 2.0 * both / (truly.sum() + found.flagged.sum()) > 0.95
     assert "order 3" in found.sentence

@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy.drive.misfit.location import locate
 from pymoo_hdte.discrepancy.drive.next_test import nearest_rivals, next_experiment
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.report.document import verdict_document
 from pymoo_hdte.units import ARCSEC
@@ -24,9 +24,9 @@ def judged(data, chosen, *others, equivalent=()):
     return DriveFinding(data.campaign, data, verdict, ())
 
 
-def rival(data, candidate, start, bic=0.0):
+def hypothesis_of(data, candidate, start, bic=0.0):
     values = np.concatenate([[parameter.start for parameter in data.base], start])
-    return Rival(fit(data, (candidate,), values), bic, 1.0)
+    return Hypothesis(fit(data, (candidate,), values), bic, 1.0)
 
 
 def test_separation_in_closed_form():
@@ -40,7 +40,7 @@ def test_an_eccentric_encoder_is_to_be_clocked_anew():
     data = known_data()
     candidate = listed(data, "eccentricity")
     data, _ = measured(candidate.build((3.0 * ARCSEC, 1.0 * ARCSEC)))
-    chosen = rival(data, candidate, candidate.starts[0])
+    chosen = hypothesis_of(data, candidate, candidate.starts[0])
     proposal = next_experiment(judged(data, chosen))
     assert proposal.test == "reclocked_encoder"
     assert proposal.separates == ("eccentricity:sensor@0.009901", "kinematic_error:mesh@0.009901")
@@ -56,7 +56,7 @@ def test_dry_friction_at_the_input_asks_for_the_other_direction():
     candidate = listed(data, "coulomb_friction")
     assert candidate.port == "input"
     data, _ = measured(candidate.build((0.02,)))
-    chosen = rival(data, candidate, (0.02,))
+    chosen = hypothesis_of(data, candidate, (0.02,))
     proposal = next_experiment(judged(data, chosen))
     assert proposal.speed_rpm < 0.0
     assert "tare" in proposal.description
@@ -70,7 +70,10 @@ def test_a_rival_is_told_apart_by_a_record_that_the_two_predict_apart():
     data = known_data()
     ripple, line = listed(data, "torque_ripple", [6.0]), listed(data, "kinematic_error", [6.0])
     data, _ = measured(ripple.build((0.005, 0.0)), np.random.default_rng(7))
-    chosen, other = rival(data, ripple, ripple.starts[0]), rival(data, line, line.starts[0], 50.0)
+    chosen, other = (
+        hypothesis_of(data, ripple, ripple.starts[0]),
+        hypothesis_of(data, line, line.starts[0], 50.0),
+    )
     proposal = next_experiment(judged(data, chosen, other))
     assert proposal.separates == (chosen.label, other.label)
     assert proposal.expected_separation > 9.0
@@ -83,7 +86,7 @@ def test_the_test_to_make_tells_the_chosen_effect_from_its_nearest_rival(monkeyp
     ripple, line = listed(data, "torque_ripple", [6.0]), listed(data, "kinematic_error", [6.0])
     drag = listed(data, "nonlinear_drag")
     data, _ = measured(ripple.build((0.005, 0.0)), np.random.default_rng(7))
-    chosen, *others = (rival(data, one, one.starts[0]) for one in (ripple, line, drag))
+    chosen, *others = (hypothesis_of(data, one, one.starts[0]) for one in (ripple, line, drag))
     separations = iter([np.array([1.0, 9.0, 4.0]), np.array([8.0, 0.5, 3.0])])
     monkeypatch.setitem(next_experiment.__globals__, "separation", lambda *_: next(separations))
     proposal = next_experiment(judged(data, chosen, *others))

@@ -75,9 +75,11 @@ def test_numbers_of_things_are_whole():
 
 
 def test_the_level_of_a_false_alarm_is_the_one_stated():
-    for freedom, chance in ((100, 3e-4), (1400, 6.5e-5)):
-        limit = freedom + RULES.false_alarm_deviations * np.sqrt(2.0 * freedom)
-        assert chi2.sf(limit, freedom) == pytest.approx(chance, rel=0.15)
+    for degrees_of_freedom, chance in ((100, 3e-4), (1400, 6.5e-5)):
+        limit = degrees_of_freedom + RULES.false_alarm_deviations * np.sqrt(
+            2.0 * degrees_of_freedom
+        )
+        assert chi2.sf(limit, degrees_of_freedom) == pytest.approx(chance, rel=0.15)
 
 
 def errors_of_the_model(data):
@@ -122,8 +124,8 @@ def test_a_lower_level_raises_an_alarm_where_nothing_is_missing():
     data = replace(data, features=features)
     found = verdict_on(data, RIPPLE, LINE)
     assert found.status == "adequate"
-    freedom = found.degrees_of_freedom
-    deviations = (found.base.chi_square - freedom) / np.sqrt(2.0 * freedom)
+    degrees_of_freedom = found.degrees_of_freedom
+    deviations = (found.base.chi_square - degrees_of_freedom) / np.sqrt(2.0 * degrees_of_freedom)
     assert 0.0 < deviations < RULES.false_alarm_deviations
     alarmed = verdict_on(data, RIPPLE, LINE, false_alarm_deviations=0.9 * deviations)
     assert alarmed.status == "unlisted"

@@ -207,14 +207,14 @@ def test_the_path_passes_the_same_points_however_finely_it_is_cut(corners, laws)
 
 @every_law
 def test_residuals_of_the_true_model_are_white_at_the_stated_covariance(laws, rng):
-    total, freedom = 0.0, 0
+    total, degrees_of_freedom = 0.0, 0
     for _ in range(30):
         points = torsion_points(swept(laws, rng), RIG)
         left = points.whitening @ (points.angle - predicted(points, laws))
-        total, freedom = total + left @ left, freedom + len(left)
+        total, degrees_of_freedom = total + left @ left, degrees_of_freedom + len(left)
     # The clearance jumps between two rows, at the same ones in every sweep: a bias of half a row.
     slack = 1.4 if any(isinstance(law, DeadZone) for _, law in laws) else 1.0
-    assert chi2.ppf(0.001, freedom) < total < slack * chi2.ppf(0.999, freedom)
+    assert chi2.ppf(0.001, degrees_of_freedom) < total < slack * chi2.ppf(0.999, degrees_of_freedom)
 
 
 def test_the_torque_noise_is_kept_out(rng):
@@ -235,12 +235,12 @@ def test_a_constant_does_not_count(rng):
 
 
 def test_an_unsteady_sweep_is_followed(rng):
-    total, freedom = 0.0, 0
+    total, degrees_of_freedom = 0.0, 0
     for _ in range(20):
         points = torsion_points(swept((), rng, BOWED), RIG)
         left = points.whitening @ (points.angle - predicted(points, ()))
-        total, freedom = total + left @ left, freedom + len(left)
-    assert total / freedom < 1.3
+        total, degrees_of_freedom = total + left @ left, degrees_of_freedom + len(left)
+    assert total / degrees_of_freedom < 1.3
 
 
 def test_turning_points_are_found_to_a_fraction_of_a_row(rng):

@@ -8,7 +8,7 @@ from quick_campaigns import quick_campaign
 
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.engine import hypothesis as rival
+from pymoo_hdte.discrepancy.engine import hypothesis
 from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.fitting import fit
@@ -27,7 +27,7 @@ def unsearched(monkeypatch):
     def as_screened(data, candidates, start, _=0, slopes=None):
         return fit(data, candidates, start, 1, slopes)
 
-    for module in (naming, rival, second_effect):
+    for module in (naming, hypothesis, second_effect):
         monkeypatch.setattr(module, "fit", as_screened)
     return replace(RULES, most_fitted=1)
 

@@ -144,10 +144,10 @@ def test_a_planted_base_comes_back_with_the_scatter_that_the_fit_states(repeated
 def test_chi_square_of_the_truth_is_its_degrees_of_freedom(repeated):
     _, first = repeated[0]
     # A parameter that ended at a bound was as good as known.
-    freedom = [
+    degrees_of_freedom = [
         len(first.residuals) - np.count_nonzero(one.bound_sides == 0.0) for _, one in repeated
     ]
-    p_values = chi2.sf([one.chi_square for _, one in repeated], freedom)
+    p_values = chi2.sf([one.chi_square for _, one in repeated], degrees_of_freedom)
     assert kstest(p_values, "uniform").pvalue > 0.01
 
 

@@ -9,7 +9,7 @@ from planted_features import CONDITIONS, known_data, library, measured, with_swe
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.drive.objective import Objective
-from pymoo_hdte.discrepancy.engine import hypothesis as rival
+from pymoo_hdte.discrepancy.engine import hypothesis
 from pymoo_hdte.discrepancy.engine import selection as second_effect
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.candidate import Layout
@@ -63,8 +63,8 @@ def disturbed(data, chi_square, record=3):
 def verdict_on(data, labels=None, seen=SEEN, **changed):
     """The verdict by the rules of the data, or by those that are changed."""
     data = replace(data, rules=replace(data.rules, **changed))
-    rivals = library(data, seen) if labels is None else of_labels(labels, seen)
-    return judge(data, fit(data), rivals)
+    hypotheses = library(data, seen) if labels is None else of_labels(labels, seen)
+    return judge(data, fit(data), hypotheses)
 
 
 def labels_of(verdict):
@@ -81,8 +81,11 @@ def test_adequacy_in_closed_form():
     assert adequate(1400, RULES) == pytest.approx(1.0 + 4.0 * np.sqrt(2.0 / 1400.0))
     assert adequate(1400, RULES) == pytest.approx(1.15, abs=0.005)
     # Chi-square has the variance 2 f: four standard deviations, of a normal one in 30000.
-    for freedom in (100, 1000, 10000):
-        assert chi2.sf(freedom * adequate(freedom, RULES), freedom) < 3e-4
+    for degrees_of_freedom in (100, 1000, 10000):
+        assert (
+            chi2.sf(degrees_of_freedom * adequate(degrees_of_freedom, RULES), degrees_of_freedom)
+            < 3e-4
+        )
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -114,8 +117,8 @@ def test_a_planted_effect_is_named_with_its_values(label, values):
     objective = Objective(data, fitted.candidates)
     truth = objective.residuals(np.append(objective.start[: len(data.base)], values))
     assert truth @ truth - fitted.chi_square < chi2.isf(1e-4, len(fitted.values))
-    freedom = verdict.degrees_of_freedom
-    assert fitted.chi_square < adequate(freedom, RULES) * freedom
+    degrees_of_freedom = verdict.degrees_of_freedom
+    assert fitted.chi_square < adequate(degrees_of_freedom, RULES) * degrees_of_freedom
 
 
 def test_evidence_in_closed_form(ripple):
@@ -126,11 +129,11 @@ def test_evidence_in_closed_form(ripple):
     assert verdict.degrees_of_freedom == len(base.residuals) - len(data.base)
     penalty = len(chosen.fit.values) * np.log(len(base.residuals))
     assert chosen.bic == pytest.approx(chosen.fit.chi_square + penalty)
-    assert chosen.share == 1.0
+    assert chosen.explained == 1.0
     for other in verdict.alternatives:
         removed = base.chi_square - other.fit.chi_square
         excess = base.chi_square - verdict.degrees_of_freedom
-        assert other.share == pytest.approx(min(removed / excess, 1.0))
+        assert other.explained == pytest.approx(min(removed / excess, 1.0))
         assert other.bic > chosen.bic
 
 
@@ -175,7 +178,9 @@ def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
     verdict = verdict_on(planted({label: (2.0 * ARCSEC, 0.5 * ARCSEC)}, seen=seen), seen=seen)
     assert verdict.status == "class"
     names = {
-        one.name for rival in (verdict.chosen, *verdict.equivalent) for one in rival.candidates
+        one.name
+        for hypothesis in (verdict.chosen, *verdict.equivalent)
+        for one in hypothesis.candidates
     }
     assert names == {"eccentricity", "kinematic_error"}
 
@@ -210,14 +215,14 @@ def test_a_listed_effect_is_named_before_one_in_no_list_that_does_as_well():
 def test_what_one_record_alone_shows_is_unlisted():
     verdict = verdict_on(disturbed(planted({}), 1000.0), FEW)
     assert verdict.status == "unlisted"
-    assert verdict.chosen.share < 0.5
+    assert verdict.chosen.explained < 0.5
 
 
 def test_a_line_too_small_for_the_whole_chi_square_is_found_by_its_gain():
     data = planted({RIPPLE: (3e-5, 0.0)})
     verdict = verdict_on(data, [RIPPLE, LINE])
-    freedom = verdict.degrees_of_freedom
-    assert verdict.base.chi_square < adequate(freedom, RULES) * freedom
+    degrees_of_freedom = verdict.degrees_of_freedom
+    assert verdict.base.chi_square < adequate(degrees_of_freedom, RULES) * degrees_of_freedom
     assert (verdict.status, labels_of(verdict)) == ("named", {RIPPLE})
     insensitive = verdict_on(data, [RIPPLE, LINE], single_effect_gain=1e9)
     assert insensitive.status == "adequate"
@@ -228,7 +233,7 @@ def test_a_line_must_explain_down_to_the_noise():
     data = disturbed(planted({RIPPLE: (5e-4, 0.0)}), 1000.0)
     verdict = verdict_on(data, [RIPPLE, LINE])
     assert verdict.status == "unlisted"
-    assert RULES.explained_share < verdict.chosen.share < RULES.exact_share
+    assert RULES.explained_share < verdict.chosen.explained < RULES.exact_share
     found = verdict_on(data, [RIPPLE, LINE], exact_chi_square=10.0)
     assert (found.status, labels_of(found)) == ("named", {RIPPLE})
 
@@ -236,8 +241,8 @@ def test_a_line_must_explain_down_to_the_noise():
 def test_a_curve_need_explain_its_share_only():
     data = disturbed(planted({CUBIC: (2e9,)}), 500.0)
     verdict = verdict_on(data, [CUBIC, RIPPLE])
-    freedom = verdict.degrees_of_freedom
-    assert verdict.chosen.fit.chi_square > RULES.exact_chi_square * freedom
+    degrees_of_freedom = verdict.degrees_of_freedom
+    assert verdict.chosen.fit.chi_square > RULES.exact_chi_square * degrees_of_freedom
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC})
 
 
@@ -247,8 +252,8 @@ def test_what_explains_one_channel_is_not_the_cause_of_what_another_shows():
         data = disturbed(data, 1500.0, record)
     verdict = verdict_on(data, [CUBIC, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
-    assert verdict.chosen.share > RULES.explained_share
-    left = rival.unexplained(data, verdict.base, verdict.chosen.fit)
+    assert verdict.chosen.explained > RULES.explained_share
+    left = hypothesis.unexplained(data, verdict.base, verdict.chosen.fit)
     assert left.tolist() == [False, True, False, False, False]
     assert verdict_on(data, [CUBIC, RIPPLE], explained_part_share=0.0).status == "named"
 
@@ -258,10 +263,10 @@ def test_what_one_record_alone_shows_does_not_speak_against_a_curve():
     data = disturbed(planted({CUBIC: (6e9,)}), 3000.0)
     verdict = verdict_on(data, [CUBIC, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC})
-    assert not rival.unexplained(data, verdict.base, verdict.chosen.fit).any()
+    assert not hypothesis.unexplained(data, verdict.base, verdict.chosen.fit).any()
     excess = data.excess(verdict.chosen.fit)
     contradicting = RULES.contradicting_chi_square - 1.0
-    assert excess.of_parts[1] > contradicting * excess.freedom.sum(axis=0)[1]
+    assert excess.of_parts[1] > contradicting * excess.degrees_of_freedom.sum(axis=0)[1]
 
 
 @pytest.mark.parametrize(
@@ -275,11 +280,11 @@ def test_the_record_left_out_is_the_one_that_a_fit_misses_most(left, missed):
         Excess(np.array([rows]).T, np.full((4, 1), 10.0))
         for rows in ([900.0, 300.0, 100.0, 100.0], left)
     )
-    assert rival.unexplained(data, before, after).tolist() == [missed]
+    assert hypothesis.unexplained(data, before, after).tolist() == [missed]
 
 
 def test_an_effect_must_pay_for_its_unknowns():
-    freedom, price = 1000, 2.0 * np.log(1002)
+    degrees_of_freedom, price = 1000, 2.0 * np.log(1002)
     base = SimpleNamespace(chi_square=1040.0, residuals=np.zeros(1002))
     for gain, named in ((price + 5.9, False), (price + 6.1, True)):
         found = SimpleNamespace(chi_square=base.chi_square - gain)
@@ -287,7 +292,7 @@ def test_an_effect_must_pay_for_its_unknowns():
             fit=found, candidates=[SimpleNamespace(unknowns=2)], exact=True, share=1.0
         )
         data = SimpleNamespace(rules=RULES)
-        assert rival.explains(data, one, base, freedom) == named
+        assert hypothesis.explains(data, one, base, degrees_of_freedom) == named
 
 
 def test_rivals_are_compared_by_their_evidence():
@@ -299,7 +304,7 @@ def test_rivals_are_compared_by_their_evidence():
     # Both leave the same; what counts is how much of its bounds each had to give up.
     for more, equal in ((9.9, True), (10.1, False)):
         other = alternative("other", 1050.0 + more)
-        assert rival.alike(other, chosen, 1000, RULES) == equal
+        assert hypothesis.alike(other, chosen, 1000, RULES) == equal
 
 
 def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent():
@@ -313,7 +318,7 @@ def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent(
         np.array([getattr(one, name) for one in found.parameters]) for name in ("start", "prior")
     )
     priors = np.sum(((found.values - start) / prior) ** 2)
-    total = excess.of_parts.sum() + excess.freedom.sum()
+    total = excess.of_parts.sum() + excess.degrees_of_freedom.sum()
     assert total == pytest.approx(found.chi_square - priors)
 
 
@@ -332,8 +337,8 @@ def test_a_second_effect_is_looked_for_where_the_first_explains_least():
     verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC, DRAG})
     alone = next(one for one in verdict.alternatives if one.label == CUBIC)
-    assert alone.share > RULES.explained_share
-    left = rival.unexplained(data, verdict.base, alone.fit)
+    assert alone.explained > RULES.explained_share
+    left = hypothesis.unexplained(data, verdict.base, alone.fit)
     assert left.tolist() == [False, True, False, False, False]
     verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE], second_hope_share=1e9)
     assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
@@ -350,7 +355,7 @@ def test_a_second_effect_is_looked_for_in_the_sweep_alone(monkeypatch):
     verdict = judge(data, fit(data), [drag, friction])
     assert labels_of(verdict) == {DRAG, OUTPUT_FRICTION}
     excess = data.excess(verdict.base)
-    assert excess.freedom[-1].tolist() == [0.0] * 4 + [len(data.torsion[0].angle) - 1]
+    assert excess.degrees_of_freedom[-1].tolist() == [0.0] * 4 + [len(data.torsion[0].angle) - 1]
     monkeypatch.setattr(second_effect, "_ill_explained", lambda *_: [])
     assert labels_of(judge(data, fit(data), [drag, friction])) == {DRAG}
 

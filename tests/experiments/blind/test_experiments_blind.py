@@ -35,7 +35,7 @@ from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Rival
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.virtual.hidden_forms import LISTED_FORMS, UNLISTED_FORMS
 from pymoo_hdte.virtual.rig import TrueRig
 
@@ -185,8 +185,10 @@ def test_a_verdict_survives_the_way_through_numbers():
     data = known_data()
     line, friction = listed(data, "kinematic_error", [3.0]), listed(data, "coulomb_friction")
     base = fit(data)
-    chosen = Rival(replace(base, candidates=(line, friction)), 0.0, 1.0)
-    alike = Rival(replace(base, candidates=(friction, listed(data, "thermal_drift"))), 0.0, 1.0)
+    chosen = Hypothesis(replace(base, candidates=(line, friction)), 0.0, 1.0)
+    alike = Hypothesis(
+        replace(base, candidates=(friction, listed(data, "thermal_drift"))), 0.0, 1.0
+    )
     verdict = replace(analysed(data).verdict, status="class", chosen=chosen, equivalent=(alike,))
     case = Case("pair", ("thermal_drift", "coulomb_friction"), 1.0, 0, ROOT)
     found = as_outcome(case, verdict_scores(case, verdict))

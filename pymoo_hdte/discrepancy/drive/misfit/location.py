@@ -26,7 +26,11 @@ from pymoo_hdte.discrepancy.drive.misfit.map import (
 )
 from pymoo_hdte.discrepancy.drive.misfit.words import sentences
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
-from pymoo_hdte.discrepancy.drive.observations import as_lines, cell_chi_square, degrees_of_freedom
+from pymoo_hdte.discrepancy.drive.observations import (
+    as_lines,
+    cell_chi_square,
+    cell_degrees_of_freedom,
+)
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.drive import DriveEffect
@@ -60,10 +64,10 @@ def locate(finding: DriveFinding) -> Location:
     clean = refit_clean(data, finding.verdict.accepted)
     base = clean.values[None, : len(data.base)]
     without, complete = data.predict(base, ())[0], data.predict(base, clean.effects)[0]
-    freedom = degrees_of_freedom(data)
+    degrees_of_freedom = cell_degrees_of_freedom(data)
     chi_square = cell_chi_square(data, data.features.values - without)
     moved = cell_chi_square(data, complete - without)
-    left = cell_chi_square(data, data.features.values - complete)
+    residual = cell_chi_square(data, data.features.values - complete)
     sweep = _sweep_p_value(data, clean.values, ())
     conditions = data.features.conditions
     found = Location(
@@ -73,9 +77,10 @@ def locate(finding: DriveFinding) -> Location:
         orders=np.concatenate([[0.0], data.features.orders]),
         misfit=as_lines(data, data.features.values - without),
         chi_square=chi_square,
-        p_value=chi2.sf(chi_square, freedom),
+        p_value=chi2.sf(chi_square, degrees_of_freedom),
         moved=moved,
-        flagged=(moved > freedom) | _significant(left, freedom, data.rules),
+        flagged=(moved > degrees_of_freedom)
+        | _significant(residual, degrees_of_freedom, data.rules),
         sweep_p_value=sweep,
         sweep_flagged=_wrong(sweep, data.rules),
         named=bool(clean.candidates),
@@ -98,16 +103,16 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
     fitted : Fit
         Its effects are kept; returned as it is where it contradicts nothing.
     """
-    freedom, rules = degrees_of_freedom(data), data.rules
+    degrees_of_freedom, rules = cell_degrees_of_freedom(data), data.rules
     chi_square, sweep = _misfit(data, fitted)
-    if not (_significant(chi_square, freedom, rules).any() or _wrong(sweep, rules)):
+    if not (_significant(chi_square, degrees_of_freedom, rules).any() or _wrong(sweep, rules)):
         return fitted
     values = fitted.values
     for _ in range(_LINEARISATIONS):
         values = _robust_step(data, replace(fitted, values=values))
     fitted = replace(fitted, values=values)
     chi_square, sweep = _misfit(data, fitted)
-    factor = np.where(_significant(chi_square, freedom, rules), _LEFT_OUT, 1.0)
+    factor = np.where(_significant(chi_square, degrees_of_freedom, rules), _LEFT_OUT, 1.0)
     weakened = _weakened(data, factor, _wrong(sweep, rules))
     return fit(weakened, fitted.candidates, values, _EVALUATIONS, fitted.slopes)
 
@@ -117,7 +122,7 @@ def _robust_step(data: Data, fitted: Fit) -> Values:
 
     Weights are renewed after every solution of the bounded linear problem until they settle.
     """
-    freedom = degrees_of_freedom(data)
+    degrees_of_freedom = cell_degrees_of_freedom(data)
     _, sweep = _misfit(data, fitted)
     kept = replace(data, torsion=()) if _wrong(sweep, data.rules) else data
     objective = Objective(kept, fitted.candidates, fitted.slopes)
@@ -125,10 +130,16 @@ def _robust_step(data: Data, fitted: Fit) -> Values:
     slopes, others_slopes = objective.derivatives(fitted.values)
     lower = (objective.lower - fitted.values) / objective.scale
     upper = (objective.upper - fitted.values) / objective.scale
-    step, factor = np.zeros(len(lower)), np.full((len(difference), *freedom.shape), np.inf)
+    step, factor = (
+        np.zeros(len(lower)),
+        np.full((len(difference), *degrees_of_freedom.shape), np.inf),
+    )
     for _ in range(_ROUNDS):
         missed = difference + np.tensordot(step, slopes, 1)
-        before, factor = factor, 1.0 + cell_chi_square(data, missed) / (_CAUCHY * freedom)
+        before, factor = (
+            factor,
+            1.0 + cell_chi_square(data, missed) / (_CAUCHY * degrees_of_freedom),
+        )
         if np.allclose(before, factor, rtol=_SETTLED, atol=0.0, equal_nan=True):
             break
         weakened = _weakened(data, factor, False)
@@ -146,8 +157,8 @@ def _misfit(data: Data, fitted: Fit) -> tuple[Values, float | None]:
     return chi_square, _sweep_p_value(data, fitted.values, fitted.effects)
 
 
-def _significant(chi_square: Values, freedom: Values, rules: Rules) -> Flags:
-    return benjamini_hochberg(chi2.sf(chi_square, freedom), rules.false_discovery_rate)
+def _significant(chi_square: Values, degrees_of_freedom: Values, rules: Rules) -> Flags:
+    return benjamini_hochberg(chi2.sf(chi_square, degrees_of_freedom), rules.false_discovery_rate)
 
 
 def _wrong(sweep: float | None, rules: Rules) -> bool:

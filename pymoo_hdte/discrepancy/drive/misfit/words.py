@@ -128,10 +128,10 @@ def _growth(location: Location, broad: bool) -> str:
     if size[:3].any():
         size = size[:3]
     channel, order = np.unravel_index(int(np.argmax(size)), size.shape)
-    freedom = 1.0 if order == 0 else 2.0
+    degrees_of_freedom = 1.0 if order == 0 else 2.0
     chi_square = location.chi_square[:, channel]
     # What noise adds to the square of an amplitude, on average, is taken off.
-    real = np.clip(1.0 - freedom / np.maximum(chi_square, 1e-12), 0.0, 1.0)
+    real = np.clip(1.0 - degrees_of_freedom / np.maximum(chi_square, 1e-12), 0.0, 1.0)
     power = np.abs(location.misfit[:, channel]) ** 2 * real
     chosen = np.nansum(power[:, 1:], axis=1) if broad else power[:, order]
     found = [
