@@ -90,8 +90,8 @@ def certainty(finding: DriveFinding) -> str:
     if verdict.status == "adequate" or verdict.chosen is None:
         return (
             "The misfit of the believed drive, fitted within its tolerances, has "
-            f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. An "
-            "effect too small for these records may still be there."
+            f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. "
+            "An effect too small for these records may still be there."
         )
     share = _percent(verdict.chosen.explained)
     if not verdict.chosen.listed:
