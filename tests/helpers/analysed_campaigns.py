@@ -7,7 +7,7 @@ from planted_features import SCALES
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
-from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
@@ -30,7 +30,7 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
-LISTED = candidates(port_sizes(BELIEVED, [6.0], [6.0], SCALES))
+LISTED = drive_candidates(port_sizes(BELIEVED, [6.0], [6.0], SCALES))
 
 
 def analysed(campaign, label=None, status="named"):

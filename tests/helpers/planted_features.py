@@ -8,7 +8,7 @@ import numpy as np
 from virtual_rig_cases import BELIEVED, PHASES, RIG
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
-from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
@@ -100,7 +100,7 @@ def with_sweep(data, effects=(), rng=None, **changes):
 def library(data, seen=()):
     """All candidates; lines of unexpected order at those that were seen."""
     orders = data.features.orders.tolist()
-    return candidates(port_sizes(data.campaign.believed, orders, seen, SCALES))
+    return drive_candidates(port_sizes(data.campaign.believed, orders, seen, SCALES))
 
 
 def listed(data, name, seen=()):

@@ -10,9 +10,8 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset
+from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
 from pymoo_hdte.drive.effects import KinematicReaction
-from pymoo_hdte.drive.solve import time_domain
 from pymoo_hdte.laws import friction
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
@@ -255,7 +254,7 @@ def test_the_drive_is_an_instance(effects):
     sheet = replace(model.sheet, flexspline_teeth=20, circular_spline_teeth=22)
     model = replace(model, sheet=sheet, effects=effects)
     design = model.nominal * [1.0, 1.0, 1.0, 1.0, 4e3]
-    run = time_domain.simulate(model, design, ramp=0.1, settle=0.2)
+    run = simulate_drive(model, design, ramp=0.1, settle=0.2)
     torque = harmonic_balance(model.coefficients(design[None])).motor_torque[0, 0].real
     mechanism, laws = drive_mechanism(model, design)
     error = CubicSpline(run.time, run.transmission_error)

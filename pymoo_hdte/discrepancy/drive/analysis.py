@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
-from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
 from pymoo_hdte.discrepancy.drive.prediction import moves_steadily
@@ -166,7 +166,9 @@ def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
     seen = _strong_lines(features, base, data.rules)
     believed, orders = data.campaign.believed, features.orders.tolist()
-    return candidates(port_sizes(believed, orders, seen, scales_of(data, base)), believed.effects)
+    return drive_candidates(
+        port_sizes(believed, orders, seen, scales_of(data, base)), believed.effects
+    )
 
 
 def _loaded(data: Data) -> Data:

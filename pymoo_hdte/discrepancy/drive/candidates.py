@@ -16,7 +16,7 @@ _OF_THEIR_OWN = ("load_inertia", "damping")
 """Base parameters for which an effect of another name stands in the library."""
 
 
-def candidates(
+def drive_candidates(
     sizes: Mapping[str, DriveSizes], believed: Sequence[DriveEffect] = ()
 ) -> list[Candidate]:
     """Return all candidates for a drive, for the sizes of each of its ports.

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pymoo_hdte.discrepancy.engine.rule import BY_HAND, rule
+from pymoo_hdte.discrepancy.engine.rule_fields import BY_HAND, rule
 from pymoo_hdte.discrepancy.engine.rules_of_records import RecordRules
 from pymoo_hdte.discrepancy.engine.rules_of_report import ReportRules
 

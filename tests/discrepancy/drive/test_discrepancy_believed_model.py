@@ -22,7 +22,7 @@ from pymoo_hdte.discrepancy import (
     write_campaign,
 )
 from pymoo_hdte.discrepancy.campaign.believed_model import believed_of_model
-from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import training_data
 from pymoo_hdte.discrepancy.drive.features import measure
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
@@ -151,9 +151,9 @@ def test_a_believed_effect_predicts_as_an_added_one(campaign):
 def test_no_candidate_stands_where_an_effect_is_believed():
     orders, seen = [1.0, 2.0, 2.02, 3.0, 3.7, 6.0], [3.0, 3.7]
     sizes = port_sizes(BELIEVED, orders, seen, SCALES)
-    plain = candidates(sizes)
+    plain = drive_candidates(sizes)
     holding = replace(BELIEVED, effects=(FRICTION, RIPPLE, LINE))
-    left = candidates(sizes, holding.effects)
+    left = drive_candidates(sizes, holding.effects)
     places = {place_of(one) for one in holding.effects}
     assert all(any(one.places & {place} for one in plain) for place in places)
     assert not any(one.places & places for one in left)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from planted_features import ORDERS, SCALES, known_data, library, listed
 from virtual_rig_cases import BELIEVED
 
-from pymoo_hdte.discrepancy.drive.candidates import candidates, out_of_tolerance
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates, out_of_tolerance
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
@@ -30,7 +30,7 @@ NAMES = {
 }  # fmt: skip
 """Of design section 7, "Words"."""
 SEEN = [3.0, 6.0, 46.0 / BELIEVED.ratio]
-LISTED = candidates(
+LISTED = drive_candidates(
     port_sizes(BELIEVED, [*ORDERS, *SEEN, 2.0 * 46.0 / BELIEVED.ratio], SEEN, SCALES)
 )
 parts = st.floats(-1e3, 1e3)
@@ -156,7 +156,7 @@ def test_cosine_and_sine_are_real_and_imaginary_part_of_the_static_error():
 @pytest.mark.parametrize("seen", [[3.0], [1.0, 6.0], [1.01], [46.0 / 101.0, 0.5], [2.0, 4.0]])
 def test_lines_have_harmonics_only_where_the_features_look(seen):
     orders = sorted({*ORDERS.tolist(), *seen})
-    for candidate in candidates(port_sizes(BELIEVED, orders, seen, SCALES)):
+    for candidate in drive_candidates(port_sizes(BELIEVED, orders, seen, SCALES)):
         if candidate.name not in ("kinematic_error", "torque_ripple", "encoder_line"):
             continue
         first, *further = orders_of(candidate)
@@ -171,7 +171,7 @@ def test_lines_have_harmonics_only_where_the_features_look(seen):
 def test_a_believed_order_of_the_error_is_no_further_line_of_it():
     names = [
         (one.name, one.order)
-        for one in candidates(port_sizes(BELIEVED, ORDERS.tolist(), [1.0, 3.0], SCALES))
+        for one in drive_candidates(port_sizes(BELIEVED, ORDERS.tolist(), [1.0, 3.0], SCALES))
     ]
     assert ("kinematic_error", 1.0) not in names
     assert ("kinematic_error", 3.0) in names
@@ -181,7 +181,7 @@ def test_a_believed_order_of_the_error_is_no_further_line_of_it():
 def test_an_order_that_is_no_whole_number_of_output_turns_is_not_the_encoder_s():
     names = [
         one.label
-        for one in candidates(port_sizes(BELIEVED, [*ORDERS, 0.4567], [0.4567, 3.0], SCALES))
+        for one in drive_candidates(port_sizes(BELIEVED, [*ORDERS, 0.4567], [0.4567, 3.0], SCALES))
     ]
     assert "encoder_line:sensor@3" in names
     assert "kinematic_error:mesh@0.4567" in names

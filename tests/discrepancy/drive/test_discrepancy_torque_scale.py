@@ -12,7 +12,7 @@ from virtual_rig_cases import BELIEVED, effect
 
 from pymoo_hdte.discrepancy.campaign.campaign import RATED_TORQUE, torque_scale
 from pymoo_hdte.discrepancy.drive.analysis import _flanks_held, examine_drive
-from pymoo_hdte.discrepancy.drive.candidates import candidates
+from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.engine.rules import RULES
 
@@ -80,8 +80,8 @@ def test_a_verdict_does_not_depend_on_the_size_of_the_drive(rubbing, verdict, fa
 
 @pytest.mark.parametrize("factor", EXACT_FACTORS)
 def test_every_candidate_is_the_same_on_a_drive_of_another_size(factor):
-    usual = candidates(port_sizes(BELIEVED, ORDERS, SEEN, SCALES))
-    large = candidates(
+    usual = drive_candidates(port_sizes(BELIEVED, ORDERS, SEEN, SCALES))
+    large = drive_candidates(
         port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, scales(factor))
     )
     for one, other in zip(usual, large, strict=True):
@@ -99,7 +99,9 @@ def test_every_candidate_is_the_same_on_a_drive_of_another_size(factor):
 
 def test_an_angle_stays_and_a_torque_grows():
     usual, large = (
-        candidates(port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, scales(factor)))
+        drive_candidates(
+            port_sizes(scaled(BELIEVED, "believed", factor), ORDERS, SEEN, scales(factor))
+        )
         for factor in (1.0, 32.0)
     )
     grown = {
