@@ -9,6 +9,7 @@ import sys
 
 import pytest
 from kept_results import kept
+from PIL import Image
 from places import DOCS, ROOT
 
 from pymoo_hdte.discrepancy.engine.rules import RULES
@@ -206,3 +207,13 @@ def test_gate_builds_the_site_as_its_front_page_says():
     front, gate = (path.read_text() for path in (DOCS / "index.md", ROOT / ".ci" / "run"))
     for command in re.findall(r"^(?:pip|python) .*", front, flags=re.M):
         assert f".venv/bin/{command}\n" in gate
+
+
+def test_picture_of_the_rooms_is_that_of_the_imports(tmp_path):
+    """Every arrow of the picture on the architecture page is an import, and none is missing."""
+    script = DOCS / "rooms_picture.py"
+    scope = {"__file__": str(script), "__name__": "picture"}
+    exec(compile(script.read_text(encoding="utf-8"), str(script), "exec"), scope)
+    scope["draw"](tmp_path / "drawn.png")
+    drawn, stored = (Image.open(path) for path in (tmp_path / "drawn.png", scope["PICTURE"]))
+    assert drawn.text["Description"] == stored.text["Description"]
