@@ -1,7 +1,6 @@
 """Mechanisms in time against closed forms, other integrators, and what must be conserved."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from scipy.linalg import expm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
 from pymoo_hdte.drive.effects import KinematicReaction
-from pymoo_hdte.laws import friction
+from pymoo_hdte.laws import Aperiodic, friction
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
 from pymoo_hdte.laws.law import PortState, Response, periodic_phase
@@ -308,9 +307,15 @@ def test_wrong_arguments_are_named(mechanism, channels, arguments, named):
 def test_what_cannot_be_followed_ends_in_an_error(of_speed, gain, message, monkeypatch):
     monkeypatch.setattr(exponential_steps, "_STEPS_ANYWAY", 500)
     mechanism = block(loops=[replace(LOOP, position_gain=gain, speed_gain=0.0)])
-    law = SimpleNamespace(orders=(), respond=lambda state: Response(of_speed(state.speed)))
+
+    class OfSpeed(Aperiodic):
+        def respond(self, state):
+            return Response(of_speed(state.speed))
+
     with pytest.raises(ArithmeticError, match=message):
-        simulate_mechanism(mechanism, record(TIME, wanted=1.0), [at(law)], start={"q": (0.1, 0.5)})
+        simulate_mechanism(
+            mechanism, record(TIME, wanted=1.0), [at(OfSpeed())], start={"q": (0.1, 0.5)}
+        )
 
 
 def test_drives_are_refused_that_no_mechanism_can_be():

@@ -275,7 +275,7 @@ def test_what_one_record_alone_shows_does_not_speak_against_a_curve():
 )
 def test_the_record_left_out_is_the_one_that_a_fit_misses_most(left, missed):
     """Not the one that the base misses most, which the fit may explain."""
-    data = SimpleNamespace(excess=lambda one: one)
+    data = SimpleNamespace(excess=lambda one: one, rules=RULES)
     before, after = (
         Excess(np.array([rows]).T, np.full((4, 1), 10.0))
         for rows in ([900.0, 300.0, 100.0, 100.0], left)
@@ -289,7 +289,7 @@ def test_an_effect_must_pay_for_its_unknowns():
     for gain, named in ((price + 5.9, False), (price + 6.1, True)):
         found = SimpleNamespace(chi_square=base.chi_square - gain)
         one = SimpleNamespace(
-            fit=found, candidates=[SimpleNamespace(unknowns=2)], exact=True, share=1.0
+            fit=found, candidates=[SimpleNamespace(unknowns=2)], exact=True, explained=1.0
         )
         data = SimpleNamespace(rules=RULES)
         assert hypothesis.explains(data, one, base, degrees_of_freedom) == named

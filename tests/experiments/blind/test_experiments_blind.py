@@ -349,7 +349,7 @@ def made_up_score(case, tools):
 def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
     tmp_path, monkeypatch, capsys
 ):
-    monkeypatch.setattr(blind, "cases", lambda: MADE_UP)
+    monkeypatch.setattr(blind, "all_cases", lambda: MADE_UP)
     monkeypatch.setattr(blind_scoring, "score", made_up_score)
     monkeypatch.setattr(blind_scoring, "rivals", dict)
     # No rival is asked, so none need be installed.

@@ -156,7 +156,7 @@ def test_the_report_is_made_from_the_committed_ladder(tmp_path):
 def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
     budget = Budget(population=6, generations=1, starts=1, local_evaluations=2)
     rung = Candidate(("load_inertia",), "semi_amplitude", NARROW)
-    monkeypatch.setattr(calibration, "ladder", lambda: [rung])
+    monkeypatch.setattr(calibration, "ladder_rungs", lambda: [rung])
     monkeypatch.setattr(calibration, "REPLICATES", 2)
     monkeypatch.setattr(calibration, "SEEDS", {"table8": (1,), "table5": (1,)})
     monkeypatch.setattr(calibration, "BUDGETS", dict.fromkeys(FITS, budget))
