@@ -1,4 +1,4 @@
-"""What a rule of the verdict is: a number with its meaning, its unit and where it comes from."""
+"""A rule of the verdict: a number with its meaning, its unit and its derivation."""
 
 from __future__ import annotations
 
