@@ -95,7 +95,7 @@ def analyse(
 class DriveAnalysis:
     """The analysis of a campaign of a harmonic drive; made by `analyse`.
 
-    Each answer is worked out when it is first asked for.
+    Each result is computed when it is first used.
 
     Attributes
     ----------
@@ -186,7 +186,7 @@ class DriveAnalysis:
 class MechanismAnalysis:
     """The analysis of the records of a mechanism; made by `analyse`.
 
-    Each answer is worked out when it is first asked for.
+    Each result is computed when it is first used.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""A candidate: one effect that the workflow can name, with its unknowns, their ranges, its words.
+"""A candidate: one effect that a verdict can name, with its unknowns, ranges and sentence.
 
 A candidate turns a vector of values into effects of a model of the machine. It is made from a guess
 of its effect: see `pymoo_hdte.laws.guess`.
@@ -72,7 +72,7 @@ class Candidate:
 
     @property
     def places(self) -> frozenset[Place]:
-        """Where its effects stand in a drive model, which takes one of a name at each place."""
+        """Places of its effects in a drive model, which takes one of a name at each place."""
         return frozenset(place_of(effect) for effect in self.build(self.starts[0]))
 
     def goes_with(self, other: Candidate) -> bool:
@@ -138,7 +138,7 @@ def candidate_of(
 
 
 def out_of_tolerance(name: str, words: str) -> Candidate:
-    """Return the candidate that lifts the tolerance of a base parameter, which is ``words``."""
+    """Return the candidate that frees a base parameter, called ``words``, of its tolerance."""
     return Candidate(
         "parameter",
         name,

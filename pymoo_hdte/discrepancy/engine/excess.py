@@ -43,7 +43,7 @@ class Excess:
 
     @property
     def worst(self) -> NDArray[np.int_]:
-        """Row of each part with most of it, shape (parts,); -1 where a part has but one row."""
+        """Row of each part's largest excess, shape (parts,); -1 where a part has only one row."""
         several = np.count_nonzero(self.degrees_of_freedom, axis=0) > 1
         return np.where(several, np.argmax(self.chi_square, axis=0), -1)
 

@@ -10,7 +10,7 @@ from typing import Any
 from pymoo_hdte.checks import real_number, whole_number
 
 BY_HAND = "Set by hand on 2026-11-21"
-"""Date of the hand-set values, all of which were chosen on campaigns made for that purpose."""
+"""Derivation of hand-set values, all of which were chosen on campaigns made for that purpose."""
 
 
 @dataclass(frozen=True)

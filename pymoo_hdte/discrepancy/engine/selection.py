@@ -30,7 +30,7 @@ from pymoo_hdte.discrepancy.engine.screening import Screened, screen
 def with_second(
     data: Evidence, base: Fit, singles: list[Hypothesis], candidates: Sequence[Candidate]
 ) -> tuple[Hypothesis, list[Hypothesis]]:
-    """Return the set to be named, and all that were fitted: a second effect has to be earned."""
+    """Return the set to be named, with a second effect only if justified, and all fitted sets."""
     degrees_of_freedom = len(base.residuals) - len(base.values)
     excess = base.chi_square - degrees_of_freedom
     best = singles[0]
