@@ -15,5 +15,5 @@ def si_unit(quantity: str) -> str:
 
 
 def with_unit(value: float, quantity: str) -> object:
-    """Return a value in SI with its unit, as model files have it."""
+    """Return a value in SI with its unit, as in model files."""
     return {"value": value, "unit": si_unit(quantity)} if quantity else value

@@ -199,7 +199,7 @@ def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis
 
 
 def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
-    """Return the verdict in units of the rest, if it stands before what the sensors would show."""
+    """Return the verdict in units of the residual, if it also holds against the sensors' noise."""
     base, rules = fit(data), data.rules
     verdict = _with_true_rivals(data, _simplest(data, judge(data, base, candidates)))
     before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))

@@ -102,7 +102,7 @@ class MeasuredData:
         return np.concatenate(constants), np.concatenate(slopes)
 
     def whitened_forces(self, base: Vector, effects: Sequence[LawAt]) -> Vector:
-        """Return what effects take from whitened residuals, (n,), at base parameters (n_base,)."""
+        """Return how effects reduce whitened residuals, (n,), at base parameters (n_base,)."""
         prefix = "stiffness of "
         stiffness = {
             one.name.removeprefix(prefix): float(value)
@@ -124,7 +124,7 @@ class MeasuredData:
     def objective(
         self, candidates: Sequence[Candidate], slopes: Values | None = None
     ) -> BalanceObjective:
-        """Return whitened residuals with candidates; slopes are known, they need not be given."""
+        """Return whitened residuals with candidates; slopes are known and need not be given."""
         return BalanceObjective(self, candidates)
 
     def response(self, fitted: Fit) -> Response:

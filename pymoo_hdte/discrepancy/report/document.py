@@ -191,7 +191,7 @@ def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
 
 
 def _within_bounds(parameter: Parameter, interval: list[float], rules: Rules) -> list[float]:
-    """Return an interval cut at the bounds; all between them where the records say little."""
+    """Return an interval clipped to the bounds; all between them if it is nearly as wide."""
     lower, upper = parameter.lower, parameter.upper
     if interval[1] - interval[0] > rules.undetermined_share * (upper - lower):
         return [lower, upper]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SAME_MOMENTS = 2e-3
-"""Relative difference up to which two designs are as good: some neighbours on a front of 100."""
+"""Relative difference at which two designs are equally good: a few neighbours in a front of 100."""
 
 Values = NDArray[np.float64]
 
