@@ -67,7 +67,7 @@ class Sizes:
     together: bool = False
 
     def family(self, order: float, most: int = 2) -> Family:
-        """Return an order of the port with those of its first ``most`` harmonics that show."""
+        """Return an order of the port with those of its first ``most`` harmonics in ``shown``."""
         count = harmonics_among(self.shown, order / self.slower, most)
         return Family(tuple(multiple * order for multiple in range(1, count + 1)))
 

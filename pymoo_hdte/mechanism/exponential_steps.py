@@ -118,7 +118,7 @@ class ExponentialIntegrator:
         return forces, slopes, rates
 
     def longest(self, state: Values) -> float:
-        """Return the step in which nothing swings or turns by more than 1 rad unseen."""
+        """Return the step in which no vibration or periodic law advances by more than 1 rad."""
         if not self.curved:
             return math.inf
         return 1.0 / max([self.swing, *(abs(float(row @ state[1])) for row in self.turning)])
@@ -238,7 +238,7 @@ def _product(first: Values, second: Values) -> Values:
 def _judge(
     after: Values, error: Values, origin: Values, watched: Values, reach: Values, rtol: float
 ) -> tuple[Values, float]:
-    """Return how far and fast all has ever been, (2, rows), and the error over the allowed one."""
+    """Return the largest positions and speeds so far, (2, rows), and the relative error."""
     farthest, missed, size = reach.copy(), np.zeros(reach.shape), 0.0
     for kind in range(2):
         largest = np.max(np.abs(after[kind]))

@@ -156,7 +156,7 @@ def _unit(candidate: Candidate, name: str) -> str:
 
 
 def _line(name: str, candidate: Candidate, fitted: Fit, row: int) -> dict[str, Any]:
-    """Return amplitude and phase, with intervals, of the cosine part at a row and the sine next."""
+    """Return amplitude and phase, with intervals, of a line whose cosine part is at a row."""
     rows = np.array([row, row + 1])
     covariance = fitted.covariance[np.ix_(rows, rows)]
     cosine, sine = fitted.values[rows]
