@@ -116,7 +116,7 @@ def _proposal(
     elif verdict.equivalent:
         said = f"The data cannot tell {one} from {other}; what can is"
     else:
-        said = f"The data tell {one} from its rivals; the best further proof against {other} is"
+        said = f"The data separate {one} from others; the best further test against {other} is"
     return Proposal(f"{said} {what}.", kind, speed, load, labels, expected)
 
 
@@ -153,8 +153,8 @@ def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
         text = (
             f"{candidate.label} and {twin} predict nearly the same in every record: turn the disc "
             f"of the output encoder by {180.0 / turns:.3g} degrees on its shaft and repeat a "
-            f"record at {speed:.4g} r/min with {load:.3g} N.m. The line turns with the encoder, or "
-            "it stays."
+            f"record at {speed:.4g} r/min with {load:.3g} N.m. A line of the encoder turns "
+            "with it; one of the drive stays."
         )
         labels = (candidate.label, twin)
         return Proposal(text, "reclocked_encoder", speed, load, labels, float(expected[test]))

@@ -53,7 +53,7 @@ class Verdict:
         Those of them that also explain the data and cannot be separated from the chosen one.
     degrees_of_freedom : int
     rules : Rules
-        By which it was judged.
+        Thresholds of the verdict.
     """
 
     status: str

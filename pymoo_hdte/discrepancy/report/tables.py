@@ -145,7 +145,7 @@ def _evidence(verdict: Verdict, chosen: Hypothesis, share: str) -> list[str]:
         words.append(f"The next best, {in_words(best.label)}, explains {_percent(best.explained)}.")
     if chosen.fit.at_bounds:
         names = ", ".join(name.replace("_", " ") for name in chosen.fit.at_bounds)
-        words.append(f"At the edge of what was allowed, so judge with care: {names}.")
+        words.append(f"At the bound of its range, and therefore uncertain: {names}.")
     return words
 
 
