@@ -1,4 +1,4 @@
-"""Where model and measurement disagree: what is missing, proved on records that were not fitted.
+"""Discrepancies of model and measurement: missing effects, validated on records not fitted.
 
 >>> from pymoo_hdte.discrepancy import analyse, read_campaign
 >>> analysis = analyse(read_campaign("campaign"))

@@ -1,4 +1,4 @@
-"""One call from measurements to a verdict, and from it to place, proof, next test and report."""
+"""One call from measurements to a verdict, with location, validation, next test and report."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.laws.effect import Effect, register
 
 ONE_THREAD = threadpool_limits.wrap(limits=1)
-"""The matrices are small: threads that wait for each other cost a multiple."""
+"""One thread: the matrices are small, so that several threads would be much slower."""
 
 
 @overload
@@ -44,7 +44,7 @@ def analyse(
 def analyse(
     measured: Campaign | MeasuredMechanism, effects: Sequence[Effect] = (), rules: Rules = RULES
 ) -> DriveAnalysis | MechanismAnalysis:
-    """Return what the believed model lacks beside measurements.
+    """Return which effects the believed model lacks, by comparison with measurements.
 
     The believed model is fitted within its tolerances; if that is not enough, candidate effects are
     compared by the Bayesian information criterion (Schwarz, Annals of Statistics 6, 1978). A
@@ -69,9 +69,9 @@ def analyse(
     Raises
     ------
     InvalidInput
-        If too few records are to be fitted, or they cannot show what is believed: of a drive, a
-        line of its static error; of a mechanism, a channel, motion, or what sets the scale. For
-        an effect whose name another one has.
+        If there are too few records to fit, or they cannot determine the believed model: for a
+        drive, a line of its static error; for a mechanism, a channel, motion, or the scale. For an
+        effect with the name of another one.
 
     Examples
     --------
@@ -93,9 +93,9 @@ def analyse(
 
 
 class DriveAnalysis:
-    """What the workflow finds in a campaign of a harmonic drive; made by `analyse`.
+    """The analysis of a campaign of a harmonic drive; made by `analyse`.
 
-    Each answer is worked out when it is first asked for.
+    Each result is computed when it is first used.
 
     Attributes
     ----------
@@ -108,7 +108,7 @@ class DriveAnalysis:
 
     @property
     def campaign(self) -> Campaign:
-        """The campaign with what is believed."""
+        """The campaign with the believed model."""
         return self.finding.campaign
 
     @property
@@ -125,7 +125,7 @@ class DriveAnalysis:
         return self._proof
 
     def next_experiment(self) -> Proposal:
-        """Return the test that says most about what is still in doubt."""
+        """Return the test that best resolves what is still uncertain."""
         return self._proposal
 
     def revised_model(self) -> DriveModel:
@@ -159,7 +159,7 @@ class DriveAnalysis:
         OSError
             If it cannot be written.
         """
-        # Pictures and optimisation take long to import, and nothing else here needs them.
+        # Plotting and optimisation are slow to import, and only a report needs them.
         from pymoo_hdte.discrepancy.report.write import write_report
         from pymoo_hdte.discrepancy.robust_optimum import optimum_shift
 
@@ -184,16 +184,16 @@ class DriveAnalysis:
 
 
 class MechanismAnalysis:
-    """What the workflow finds in the records of a mechanism; made by `analyse`.
+    """The analysis of the records of a mechanism; made by `analyse`.
 
-    Each answer is worked out when it is first asked for.
+    Each result is computed when it is first used.
 
     Attributes
     ----------
     measured : MeasuredMechanism
         The mechanism as it is believed, and its records.
     finding : MechanismFinding
-        Force balances of the records, verdict, and what it leaves.
+        Force balances of the records, verdict, and unexplained residual.
     """
 
     def __init__(self, measured: MeasuredMechanism, finding: MechanismFinding) -> None:
@@ -213,7 +213,7 @@ class MechanismAnalysis:
         return self._gaps
 
     def next_experiment(self) -> NextTest:
-        """Return the repetition of a record that says most about what is still in doubt."""
+        """Return the repetition of a record that best resolves what is still uncertain."""
         return self._test
 
     def revised_model(self) -> MechanismModel:
@@ -241,7 +241,7 @@ class MechanismAnalysis:
         OSError
             If it cannot be written.
         """
-        # Pictures take long to import, and nothing else here needs them.
+        # Plotting is slow to import, and only a report needs it.
         from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
 
         check_report_folder(out)
@@ -260,7 +260,7 @@ class MechanismAnalysis:
 
 
 def check_report_folder(out: str | Path) -> None:
-    """Refuse a folder that could not take a report, before anybody waits for one.
+    """Refuse a folder that cannot take a report, before the analysis is run.
 
     Parameters
     ----------

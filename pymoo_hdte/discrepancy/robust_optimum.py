@@ -1,9 +1,9 @@
-"""What a correction does to the robust optimum: the old choice judged by the new model.
+"""Effect of a correction on the robust optimum: the old choice evaluated by the new model.
 
 Both models go through the same surrogate, swarm and preferences. A design is a set of factors on
-the parameters of the drive as it stands, which is what a designer can order without knowing their
-true values. The choice made with the old model is then evaluated with the new one: what was
-promised, and what one would really get.
+the parameters of the existing drive, which a designer can specify without knowing their true
+values. The choice made with the old model is then evaluated with the new one, to compare predicted
+and actual performance.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.problems import RobustDTE
 
 SURROGATE_ORDER = 3
-"""That of the paper; with laws at ports it costs a harmonic balance in each of 4^5 runs."""
+"""Order of the paper; with laws at ports it costs a harmonic balance in each of 4^5 runs."""
 EVALUATIONS = 5_000
 POPULATION = 100
 

@@ -14,10 +14,10 @@ from pymoo_hdte.drive.model import DriveModel
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 _PROMINENCE = 0.02
-"""A peak over speed stands out by at least this share of its height."""
+"""Least prominence of a peak over speed, as a share of its height."""
 
 _NEIGHBOURS = 0.05
-"""Share of the speed within which resonances stand together."""
+"""Relative distance in speed within which resonances are listed together."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def critical_speeds(model: DriveModel) -> list[tuple[float, float]]:
 def neighbouring_resonances(model: DriveModel, fastest: float) -> list[tuple[str, float]]:
     """Return the orders, as a text, and the speed (r/min) of resonances up to ``fastest`` r/min.
 
-    Orders whose speeds lie within 5 % of the highest stand together.
+    Orders whose speeds lie within 5 % of the highest are listed together.
     """
     within = [(order, speed) for order, speed in critical_speeds(model) if speed <= fastest]
     found = []
@@ -130,6 +130,6 @@ def speed_load_map(
         try:
             dte[row, column] = there.dte_arcsec(model.nominal[None])[0]
         except ArithmeticError:
-            # Left NaN: motion that grows, or is not found, has no peak-to-peak.
+            # Left NaN: a motion that grows, or is not found, has no peak-to-peak.
             continue
     return SpeedLoadMap(model, speeds, loads, dte)

@@ -75,10 +75,10 @@ def simulate_drive(
     """Integrate Eq. (9) for one design from rest to steady state and through one output turn.
 
     Torque-driven as in Section 2.2, from the rest of Eq. (11). The input torque rises smoothly from
-    zero to the level that holds the rated speed, with what it takes to accelerate the inertias in
-    between; load and static error follow the same envelope. The drive starts at the negative input
-    angle from which it reaches 0 after ``ramp + settle``, so that the output turn is the one the
-    steady state is evaluated on.
+    zero to the level that holds the rated speed, plus the torque that accelerates the inertias
+    meanwhile; load and static error follow the same envelope. The drive starts at the negative
+    input angle from which it reaches 0 after ``ramp + settle``, so that the output turn is the one
+    the steady state is evaluated on.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""One file for what shall be loaded years later: npz with a JSON header, versioned, no pickle.
+"""Files for long-term storage: npz with a JSON header, versioned, no pickle.
 
-``docs/file_format.md`` describes the files. They are read as if an enemy had written them: sizes
-are compared with what is really there, nothing is unpacked, and nothing is ever executed.
+``docs/file_format.md`` describes the files. Files are treated as untrusted: stated sizes are
+compared with actual ones, nothing is decompressed, and nothing is ever executed.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ LARGEST_HEADER = 2**18
 """Characters."""
 
 DEEPEST_HEADER = 50
-"""Lists and tables within each other."""
+"""Largest depth of nested lists and tables."""
 
 MOST_AXES = 32
-"""Of an array; numpy 1 knows no more."""
+"""Largest number of dimensions of an array; the limit of numpy 1."""
 
 _END_OF_DIRECTORY = struct.Struct("<4s4H2LH")
 _MARK_OF_ZIP64 = slice(-_END_OF_DIRECTORY.size - 20, -_END_OF_DIRECTORY.size - 16)
@@ -44,12 +44,12 @@ _LARGEST_DIRECTORY = 2**12
 
 @dataclass(frozen=True)
 class FileFormat:
-    """A kind of file: what its header and its arrays are called.
+    """A kind of file: the names of its header fields and arrays.
 
     Attributes
     ----------
     name : str
-        Stands in the file, so that no other kind is taken for this one.
+        Written into the file, to distinguish it from other kinds.
     version : int
         Written into files. Those of a later version are refused.
     fields, arrays : tuple of str
@@ -112,7 +112,7 @@ class FileFormat:
             arrays = {name: _array(member) for name, member in members.items()}
         except InvalidInput:
             raise
-        # Whatever the libraries stumble over, it is the file that is wrong: all is in memory here.
+        # All is in memory here, so that any error of the libraries is caused by the file.
         except Exception as error:
             reason = str(error) or type(error).__name__
             allowed = f"an undamaged file of format {self.name!r} ({reason})"
@@ -150,7 +150,7 @@ def _members(contents: bytes) -> dict[str, bytes]:
         raise ValueError(f"its size is {len(contents)}, allowed: at most {LARGEST_FILE} bytes")
     end = contents[-_END_OF_DIRECTORY.size :]
     mark, *_, directory_size, _, _ = _END_OF_DIRECTORY.unpack(end)
-    # zipfile believes this size, and builds an object for every entry it finds.
+    # zipfile trusts this size, and builds an object for every entry it finds.
     if mark != b"PK\5\6" or contents[_MARK_OF_ZIP64] == b"PK\6\7":
         raise ValueError("it does not end as a plain zip file")
     if directory_size > _LARGEST_DIRECTORY:

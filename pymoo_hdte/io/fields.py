@@ -11,7 +11,7 @@ from pymoo_hdte.units import UNITS
 
 
 class Fields:
-    """One TOML table that is emptied field by field, so that what is left over is an error.
+    """One TOML table whose fields are removed when read, so that any remaining field is an error.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Fields:
         )
 
     def names(self) -> tuple[str, ...]:
-        """Return the names of the fields that are left."""
+        """Return the names of the remaining fields."""
         return tuple(self._left)
 
     def has(self, field: str) -> bool:

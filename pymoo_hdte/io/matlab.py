@@ -27,7 +27,7 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
     Raises
     ------
     InvalidInput
-        If the file is damaged or of another version, or a name stands for nothing of the kind.
+        If the file is damaged or of another version, or a name is not that of such a vector.
     OSError
         If it cannot be read.
     """
@@ -60,7 +60,7 @@ def read_vectors(path: Path, names: Sequence[str]) -> dict[str, NDArray[np.float
 
 def _element(data: bytes, at: int, order: str) -> tuple[int, bytes, int]:
     kind, size = struct.unpack_from(f"{order}II", data, at)
-    # Up to four bytes stand in the tag itself, their number in its upper half.
+    # Up to four bytes are in the tag itself, their number in its upper half.
     if kind >> 16:
         return kind & 0xFFFF, data[at + 4 : at + 4 + (kind >> 16)], at + 8
     after = at + 8 + size

@@ -108,7 +108,7 @@ def _channel(table: Fields, form: str, units: Collection[str]) -> Channel:
 
 
 def read_table(path: Path, layout: TableLayout) -> Table:
-    """Read the mapped columns; a constant one is allowed, the caller knows which must move.
+    """Read the mapped columns; a constant one is allowed, since the caller knows which must vary.
 
     Raises `OSError` if the file cannot be read and `InvalidInput`, with file and line (MATLAB:
     row), if it is damaged, a column is missing, ragged or holds text or a huge number, too few
@@ -181,7 +181,7 @@ def _si(channel: Channel, kept: Mapping[str | int, NDArray[np.float64]]) -> NDAr
     raw = kept[channel.column]
     at = np.flatnonzero(np.isfinite(raw))
     values = raw[at] * CHANNEL_UNITS[channel.unit]
-    # Unwrapped before anything is interpolated: halfway across a jump there is no angle.
+    # Unwrapped before interpolation, which is invalid across a jump of the angle.
     values = (np.unwrap(values) if channel.unwrap else values) * channel.scale
     return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
 

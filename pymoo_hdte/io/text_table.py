@@ -38,7 +38,7 @@ def line_of_row(row: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """A text file cut into rows; what is asked for is converted, the rest is ignored.
+    """A text file split into rows; only requested columns are converted.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class TextTable:
         if not self.rows:
             field = f"{self.file}, line {self.title_line}: rows below the header"
             raise InvalidInput(field, 0, "at least 1")
-        # All at once is fast; cell by cell finds what is wrong, or passes by a column of text.
+        # All at once is fast; cell by cell locates errors, or skips a column of text.
         found = self._all_at_once(names)
         if found is None or not (gaps or np.all(np.isfinite(found))):
             found = self._cell_by_cell(names, gaps)
@@ -157,7 +157,7 @@ class TextTable:
 
 
 def column_label(name: Any) -> str:
-    """Return how an error calls a column: by its title, or by its number from 0."""
+    """Return the name of a column in errors: its title, or its number from 0."""
     return name if isinstance(name, str) else f"column {name}"
 
 
@@ -257,7 +257,7 @@ def _text(path: Path, kind: str) -> str:
         text = data.decode("utf-8", "replace")
         bad = len(data[: error.start].decode("utf-8"))
     if bad >= 0:
-        # What is no text in its first line is no text at all.
+        # A file whose first line is no text is refused as a whole.
         line = len(re.findall("\r\n?|\n", text[:bad]))
         field = f"{path.name}, line {line + 1}" if line else path.name
         shown = re.split("\r\n?|\n", text)[line]

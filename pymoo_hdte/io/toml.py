@@ -46,7 +46,7 @@ def toml_text(table: Mapping[str, Any]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value without numpy's scalars, of which TOML writers know nothing."""
+    """Return a value without numpy's scalars, which TOML writers do not support."""
     if isinstance(value, Mapping):
         return {name: _plain(one) for name, one in value.items()}
     if isinstance(value, list | tuple):
@@ -95,7 +95,7 @@ def _parsed(path: Path, named: str) -> tuple[str, dict[str, Any]]:
         text = path.read_text(encoding="utf-8")
         return text, tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        # Beside what is no TOML: too many digits for Python, and brackets nested too deeply.
+        # Besides invalid TOML: too many digits for Python, and brackets nested too deeply.
         raise InvalidInput(named, str(error), "valid TOML in UTF-8") from None
 
 

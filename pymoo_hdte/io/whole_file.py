@@ -19,5 +19,5 @@ def write_whole(path: Path, content: bytes) -> None:
         temporary.write_bytes(content)
         os.replace(temporary, path)
     finally:
-        # A full disk leaves a part behind, which would keep it full.
+        # On a full disk a partial file remains, which would keep the disk full.
         temporary.unlink(missing_ok=True)

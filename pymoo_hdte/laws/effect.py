@@ -1,10 +1,10 @@
-"""What an effect is, and the register of all that are known.
+"""Effects, and the register of all known ones.
 
-An effect says everything about itself in one place: its law or what else it changes in a drive, the
-ports where it makes sense, its quantities with their units, its sentence, what it is a special case
-of, and a guess of its values from the sizes of a machine. How it behaves (memory, clearance, what
-a sensor shows of it) its law says: see `Behaviour`. What is registered is known to model files, to
-the solvers of drives and mechanisms, to verdicts and to reports.
+An effect is defined in one place: its law or other change of a drive, the ports where it makes
+sense, its quantities with their units, its sentence, the effects of which it is a special case, and
+a guess of its values from the sizes of a machine. Its behaviour (memory, clearance, readings of
+sensors) is defined by its law: see `Behaviour`. Registered effects are known to model files, to the
+solvers of drives and mechanisms, to verdicts and to reports.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from pymoo_hdte.laws.quantities import si_unit, with_unit
 Place = tuple[str, str, float | None]
 """Name, port and order of an effect."""
 DRIVE_PORTS = (*PORTS, "sensor")
-"""Ports of a drive: where laws stand, and the reading of its output angle."""
+"""Ports of a drive: places of laws, and the reading of its output angle."""
 
 
 class Standing(Protocol):
-    """An effect as it stands in a model: what model, port and values it has is its own."""
+    """An effect in a model, with its own port and values."""
 
     @property
     def name(self) -> str:
@@ -37,7 +37,7 @@ class Standing(Protocol):
 
 
 def place_of(standing: Standing) -> Place:
-    """Return where an effect stands in a model, which takes one at each place."""
+    """Return the place of an effect in a model, which takes one at each place."""
     law = getattr(standing, "law", standing)
     return standing.name, str(getattr(standing, "port", "")), getattr(law, "order", None)
 
@@ -51,35 +51,34 @@ class Effect:
     name : str
         In model files and verdicts: lower case with underscores, e.g. ``"coulomb_friction"``.
     law : type or None
-        Dataclass of the law, whose fields are numbers in SI; None for what is no law at a port.
+        Dataclass of the law, whose fields are numbers in SI; None if it is no law at a port.
     ports : tuple of str
-        Ports of a drive where it may stand, of ``"input"``, ``"output"``, ``"mesh"`` and
-        ``"sensor"``; empty for an effect of other mechanisms only. A law may stand at any port of
-        a mechanism.
+        Ports of a drive where it may be, of ``"input"``, ``"output"``, ``"mesh"`` and ``"sensor"``;
+        empty for an effect of other mechanisms only. A law may be at any port of a mechanism.
     quantities : mapping of str to str
         For each number its quantity, of `fields.UNITS`, or a unit of SI; empty for a dimensionless
-        one. Fields of the law that are not here stand in no file.
+        one. Fields of the law that are not listed here are in no file.
     sentence : str
-        What it says in a report. ``{port}``, ``{order}`` and ``{force}`` (``"torque"`` in a drive)
-        may stand in it.
+        Its description in a report, which may contain ``{port}``, ``{order}`` and ``{force}``
+        (``"torque"`` in a drive).
     guess : callable or None
-        From `Sizes` of a port to `Guess` es, empty where it cannot be there; None for an effect
-        that is never looked for.
+        From `Sizes` of a port to a list of `Guess`, empty where the effect is impossible; None for
+        an effect that is never searched for.
     sought : tuple of str or None
-        Ports of a drive where a campaign looks for it; by default all of ``ports``.
+        Ports of a drive where it is searched for; by default all of ``ports``.
     change : type or None
-        What it is in a drive, where that is no law at a port.
+        Its type in a drive, where that is no law at a port.
     of_fit : mapping of str to str
         Quantities of unknowns of its guesses that are no numbers of the law.
     special_case_of, contains : tuple of str
         Effects of which this one is a special case, and effects that are special cases of this one:
-        Coulomb friction is Stribeck friction without the excess. One that contains another and
-        does no better says no more.
+        Coulomb friction is Stribeck friction without the excess. One that contains another and fits
+        no better is not a different explanation.
     exact : bool
-        Whether its form leaves nothing open, so that it must explain records down to the noise; the
-        curve of a friction is only ever approximately that of a real one.
+        Whether its form is known exactly, so that it must explain records down to the noise; the
+        curve of a friction law is only an approximation of a real one.
     of_reading : bool
-        Whether, in a mechanism, nothing but the reading of a force sensor shows it.
+        Whether, in a mechanism, only the reading of a force sensor shows it.
 
     Raises
     ------
@@ -126,14 +125,14 @@ class Effect:
 
     @property
     def kind(self) -> type[Any]:
-        """What the effect is in a drive, or else its law."""
+        """Type of the effect in a drive, or else of its law."""
         kind = self.change or self.law
         assert kind is not None
         return kind
 
     @property
     def sought_at(self) -> tuple[str, ...]:
-        """Ports of a drive where a campaign looks for it."""
+        """Ports of a drive where it is searched for."""
         return self.ports if self.sought is None else self.sought
 
     @property
@@ -143,22 +142,22 @@ class Effect:
 
     @property
     def drives(self) -> bool:
-        """Whether it is a force of the drive's own: see `Behaviour.driving`."""
+        """Whether it is a driving force: see `Behaviour.driving`."""
         return bool(getattr(self.law, "drives", False))
 
     def guesses(self, sizes: Sizes) -> Sequence[Guess]:
-        """Return the forms in which it may be there, for the sizes of a port."""
+        """Return the forms that it may have, for the sizes of a port."""
         return [] if self.guess is None else self.guess(sizes)
 
     def parts(self, guess: Guess, values: Sequence[float]) -> tuple[tuple[str, Any], ...]:
-        """Return laws (or what else it is) for the values of a guess, each with its name."""
+        """Return laws (or other changes) for the values of a guess, each with its name."""
         if guess.build is None:
             names = [one.name for one in guess.unknowns]
             return ((self.name, self.kind(**dict(zip(names, values, strict=True)))),)
         return tuple((self._name_of(part), part) for part in guess.build(values))
 
     def _name_of(self, part: Any) -> str:
-        """Return the name of a part: an effect may bring another's law along."""
+        """Return the name of a part: an effect may include the law of another."""
         if type(part) in (self.law, self.change):
             return self.name
         return next(one.name for one in _EFFECTS.values() if one.law is type(part))
@@ -184,7 +183,7 @@ class Effect:
         return self._made(self.law, values)
 
     def numbers_of(self, law: Any) -> dict[str, float]:
-        """Return the numbers of a law in SI, of which `law_of` makes an equal one.
+        """Return the numbers of a law in SI, from which `law_of` makes an equal law.
 
         Raises
         ------
@@ -197,7 +196,7 @@ class Effect:
         return {one: float(getattr(law, one)) for one in self.quantities}
 
     def from_fields(self, table: Fields) -> Any:
-        """Return the law, or what else it is in a drive, from a table of a model file.
+        """Return the law, or other change of a drive, from a table of a model file.
 
         Raises
         ------
@@ -212,7 +211,7 @@ class Effect:
         return self.kind(**values)
 
     def to_fields(self, numbers: Any) -> dict[str, object]:
-        """Return the numbers with their units, as `from_fields` reads them, but for defaults."""
+        """Return the numbers with their units, as `from_fields` reads them, without defaults."""
         values = {number: getattr(numbers, number) for number in self.quantities}
         return {
             number: with_unit(value, self.quantities[number])
@@ -235,7 +234,7 @@ class Effect:
         try:
             return kind(**numbers)
         except InvalidInput as error:
-            # Laws name themselves by another effect that they are too, or not at all.
+            # A law may have the name of another effect that shares it, or none.
             number = error.field.rpartition(".")[2]
             raise InvalidInput(f"{self.name}.{number}", error.value, error.allowed) from None
 
@@ -246,7 +245,7 @@ _EFFECTS: dict[str, Effect] = {}
 def register(effect: Effect) -> Effect:
     """Make an effect known to model files, simulation, verdicts and reports, and return it.
 
-    An effect that is registered already stays as it is.
+    An effect that is already registered is unchanged.
 
     Raises
     ------
@@ -284,7 +283,7 @@ def effect_named(name: str) -> Effect:
 
 
 def is_contained(one: str, other: str) -> bool:
-    """Tell whether an effect is a special case of another, both by name, known or not."""
+    """Tell whether an effect is a special case of another, both by name, registered or not."""
     this, that = _EFFECTS.get(one), _EFFECTS.get(other)
     return (this is not None and other in this.special_case_of) or (
         that is not None and one in that.contains

@@ -1,7 +1,7 @@
-"""What an effect could be, guessed from the sizes of a port before anything is fitted there.
+"""Possible forms and values of an effect, guessed from the sizes of a port before a fit.
 
-An effect answers with guesses, which are what candidates of the discrepancy workflow are made of.
-One guess serves every machine: it knows a machine by its `Sizes` only.
+Candidates of a discrepancy analysis are made from the guesses of effects. A guess serves every
+machine, which it knows by its `Sizes` only.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from pymoo_hdte.laws.unknowns import Family, Parameter, Values, harmonics_among
 
 @dataclass(frozen=True)
 class Sizes:
-    """What is known of a port before anything is fitted there; SI, N or N.m as the port has it.
+    """Known sizes of a port before a fit; SI, N or N.m depending on the port.
 
     Attributes
     ----------
     force : float
         Typical size of a force that may be missing there.
     residual : float
-        What the base leaves of the balance there. Of a line nothing in the base takes up a part, so
-        that this is its size, while ``force`` is larger where the base takes up most of a force.
+        Residual of the base in the balance there. The base absorbs no part of a line, so that this
+        is the size of a line, while ``force`` is larger where the base absorbs most of a force.
     largest : float
         The largest that may be missing.
     speed : float
@@ -31,7 +31,7 @@ class Sizes:
     travel : float
         Largest deflection from the middle of its motion.
     stiffness, damping : float
-        Of the spring and the damper that are believed to stand there; 0 without.
+        Of the believed spring and damper there; 0 without.
     both_ways : bool
         Whether records move it in both directions.
     loaded : bool
@@ -41,13 +41,13 @@ class Sizes:
     slower : float
         Turns of the machine's reference shaft per turn of the port, 1 where there is no such shaft.
     expected : tuple of float
-        Orders of the port's own angle at which its parts vary by their making.
+        Orders of the port's own angle at which its parts vary by design or manufacture.
     seen : tuple of float
-        Orders at which records show something; per turn of the reference shaft.
+        Orders with significant lines in the records; per turn of the reference shaft.
     shown : tuple of float
-        All orders at which records could: further harmonics would be guesses.
+        All orders at which records could show lines; further harmonics could not be determined.
     together : bool
-        Whether what varies at all orders that are seen is looked for as one effect.
+        Whether the variation at all seen orders is searched for as one effect.
     """
 
     force: float
@@ -67,20 +67,20 @@ class Sizes:
     together: bool = False
 
     def family(self, order: float, most: int = 2) -> Family:
-        """Return an order of the port with those of its first ``most`` harmonics that show."""
+        """Return an order of the port with those of its first ``most`` harmonics in ``shown``."""
         count = harmonics_among(self.shown, order / self.slower, most)
         return Family(tuple(multiple * order for multiple in range(1, count + 1)))
 
     @property
     def varying(self) -> list[Family]:
-        """Orders at which the making of the port may let it vary, or else all that are seen."""
+        """Orders at which the port is expected to vary, or else all that are seen."""
         if self.together:
             return self.lines
         return [self.family(order) for order in self.expected]
 
     @property
     def lines(self) -> list[Family]:
-        """Orders that are seen, each with its harmonics, or all in one."""
+        """Orders that are seen, each with its harmonics, or all in one family."""
         if self.together:
             return [Family(self.seen, harmonic=False)] if self.seen else []
         return [self.family(order * self.slower) for order in self.seen]
@@ -88,26 +88,26 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Guess:
-    """One form in which an effect may be there.
+    """One form that an effect may have.
 
     Attributes
     ----------
     unknowns : tuple of Parameter
         The first is the strength, the others are shapes, unless all of them are linear.
     starts : sequence of sequence of float
-        Values from which fits begin; the typical ones where there are none.
+        Values from which fits start; by default the typical ones.
     build : callable, optional
-        From values to laws (or what else the effect is in a drive), (n,) to a tuple. By default
-        the one law whose numbers the unknowns are, by name.
+        From values to laws (or other changes of a drive), (n,) to a tuple. By default the one law
+        whose numbers are the unknowns, by name.
     family : Family, optional
         Orders at which it varies.
     form : str
-        In a word, where there are several forms.
+        Word for the form, where there are several.
     sentence : str
-        Instead of that of the effect.
+        Replaces that of the effect.
     name : str
-        Under which it stands in place of the effect, and no verdict names it: what a campaign
-        cannot tell from the machine.
+        Replaces that of the effect, and no verdict names it: for what a campaign cannot separate
+        from the machine.
     """
 
     unknowns: tuple[Parameter, ...]
@@ -120,6 +120,6 @@ class Guess:
 
     @property
     def begins(self) -> tuple[tuple[float, ...], ...]:
-        """Where fits begin."""
+        """Values from which fits start."""
         given = tuple(tuple(start) for start in self.starts)
         return given or (tuple(one.start for one in self.unknowns),)

@@ -20,7 +20,7 @@ SPRINGS = 4
 
 @dataclass(frozen=True)
 class MaxwellSlip(Aperiodic):
-    """Hysteresis of four springs in parallel, each of which slips at a force of its own.
+    """Hysteresis of four springs in parallel, each of which has its own slip force.
 
     Their slip torsions are ``torsion`` (rad) times 1, 2, 3 and 4 quarters to the power ``spread``,
     their slip forces equal and in sum ``force`` (N.m): from rest the torque rises ever more slowly
@@ -55,10 +55,10 @@ class MaxwellSlip(Aperiodic):
         return Response(state.back(torque), state.back(slope))
 
     def recall(self, path: Values) -> tuple[Values, NDArray[np.int_]]:
-        """Return how torques hang on where springs last slipped: weights and steps of ``path``.
+        """Return how torques depend on where springs last slipped: weights and steps of ``path``.
 
-        Both have shape (springs, n, steps). A spring that sticks answers to the way since then, so
-        the torque changes by minus weight times the change of the position at that step.
+        Both have shape (springs, n, steps). A sticking spring is stretched by the way since then,
+        so the torque changes by minus weight times the change of the position at that step.
         """
         _, sticking = slip_along(path, self._slips)
         slipped = np.where(sticking == 0.0, np.arange(path.shape[1]), -1)
@@ -76,11 +76,11 @@ class MaxwellSlip(Aperiodic):
         return float(self._stiffnesses @ np.clip(kept, -self._slips, self._slips))
 
     def moved(self, kept: Values, way: float) -> Values:
-        """Return how far springs (4,) are stretched after a way (rad) without a turn."""
+        """Return the stretch of springs (4,) after a way (rad) without reversal."""
         return np.clip(kept + way, -self._slips, self._slips)
 
     def tangent(self, kept: Values, direction: float) -> float:
-        """Return the slope of the torque in a direction: at the slip, that of the way it moves."""
+        """Return the slope of the torque in a direction, which matters at the limit of slip."""
         return float(self._stiffnesses @ np.abs(self.rates(direction, kept)))
 
     @property
@@ -90,7 +90,7 @@ class MaxwellSlip(Aperiodic):
 
 
 def _slipping(sizes: Sizes) -> list[Guess]:
-    """Guess springs that slip; in a motion without a reversal they would be dry friction."""
+    """Guess springs that slip; in a motion without reversal they would act as dry friction."""
     if not sizes.both_ways:
         return []
     travel, force = sizes.travel, sizes.force
@@ -115,7 +115,7 @@ register(
 
 
 def slip_along(path: Values, slips: Values) -> tuple[Values, Values]:
-    """Return stretch, and whether it sticks, of springs that slip at ``slips`` along paths.
+    """Return stretch and state of sticking of springs that slip at ``slips`` along paths.
 
     ``path`` has shape (n, steps) and starts from rest; results have shape (springs, n, steps).
     """

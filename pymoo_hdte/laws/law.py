@@ -1,10 +1,10 @@
-"""What a law at a port is: the motion it sees and the torque it answers with.
+"""A law at a port: the motion on which it depends and the torque that it returns.
 
-A port is a place where two parts move against each other: ``input`` (wave generator against the
-housing), ``output`` (circular spline against the housing), ``mesh`` (the torsion d). A law answers
-with the torque that opposes the motion; which port it stands at decides which effect it is. The
-laws themselves are in `friction`, `stiffness`, `hysteresis` and `linear`, each beside the `Effect`
-that says everything else about it.
+A port is a place where two parts move relative to each other: ``input`` (wave generator against the
+housing), ``output`` (circular spline against the housing), ``mesh`` (the torsion d). A law returns
+the torque that opposes the motion; its effect depends on its port. The laws themselves are in
+`friction`, `stiffness`, `hysteresis` and `linear`, each beside the `Effect` that defines everything
+else about it.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ class PortState:
         Gives ``order`` times the angle on which periodic laws depend, rad: of the input at the
         input and at the mesh, of the output at the output.
     stiffness : ndarray
-        Mean mesh stiffness K, N.m/rad, which a clearance takes away.
+        Mean mesh stiffness K, N.m/rad, which a clearance removes.
     path, back : callable
-        ``path`` lays values of the shape of ``position`` out in the order in which the port passes
-        them, shape (n, steps), running in included; ``back`` undoes that.
+        ``path`` arranges values of the shape of ``position`` in the order in which the port passes
+        them, shape (n, steps), including a running-in; ``back`` undoes that.
     """
 
     position: Values
@@ -63,7 +63,7 @@ class Response:
 
 
 class Law(Protocol):
-    """What stands at a port."""
+    """A law at a port."""
 
     @property
     def orders(self) -> tuple[float, ...]:
@@ -115,14 +115,14 @@ class Law(Protocol):
 
 
 class Memory(Law, Protocol):
-    """A law whose force hangs on the way so far, by inner states that solvers keep.
+    """A law whose force depends on the previous motion, by inner states that solvers keep.
 
     Attributes
     ----------
     states : int
-        Number of inner states, above 0; all are 0 at rest, and of the unit of the motion.
+        Number of inner states, above 0; all are 0 at rest and have the unit of the motion.
     shortest : float
-        The least way in which a state changes its course, m or rad: what integrators resolve.
+        The shortest distance over which a state changes, m or rad, which integrators must resolve.
     """
 
     shortest: float
@@ -132,7 +132,7 @@ class Memory(Law, Protocol):
         ...
 
     def moved(self, kept: Values, way: float) -> Values:
-        """Return the states after a way without a turn."""
+        """Return the states after a way without reversal."""
         ...
 
     def torque(self, kept: Values) -> float:
@@ -144,7 +144,7 @@ class Memory(Law, Protocol):
         ...
 
     def recall(self, path: Values) -> tuple[Values, NDArray[np.int_]]:
-        """Return how forces along paths (n, steps) hang on earlier steps: weights and steps.
+        """Return how forces along paths (n, steps) depend on earlier steps: weights and steps.
 
         Both of shape (k, n, steps): the force changes by minus weight times the change of the
         position at that step, beside what ``respond`` gives as its slope.
@@ -153,14 +153,14 @@ class Memory(Law, Protocol):
 
 
 class Behaviour:
-    """What solvers and sensors ask of a law beyond its force; a law overrides what is its own."""
+    """Properties of a law beyond its force, for solvers and sensors; a law overrides its own."""
 
     states: ClassVar[int] = 0
     """Number of inner states; above 0 the law is a `Memory`."""
     rattles: ClassVar[bool] = False
-    """Whether the law takes the spring of its port away, so that parts may lose contact."""
+    """Whether the law removes the spring of its port, so that parts may lose contact."""
     drives: ClassVar[bool] = False
-    """Whether the force is the drive's own and acts on the motion, whatever its direction."""
+    """Whether the force is a driving force, whatever the direction of motion."""
     varies_stiffness: ClassVar[bool] = False
     """Whether it is K depth cos(order angle + phase) times the position, with these three numbers:
     then Hill's method and the stability of the drive know it too."""
@@ -172,18 +172,18 @@ class Behaviour:
 
     @property
     def constant(self) -> float:
-        """Size of the force, where it is one constant against the motion at any speed, or 0."""
+        """Size of the force if it is constant against the motion at any speed, else 0."""
         return 0.0
 
     @property
     def driving(self) -> complex:
-        """Phasor of the force of a law that drives, which a sensor of that force sees; 0 else."""
+        """Phasor of a driving force, which a sensor of that force reads; 0 otherwise."""
         return 0.0
 
 
 @dataclass(frozen=True)
 class Aperiodic(Behaviour):
-    """Base of laws that depend on no angle."""
+    """Base of laws that do not depend on an angle."""
 
     @property
     def orders(self) -> tuple[float, ...]:
@@ -191,7 +191,7 @@ class Aperiodic(Behaviour):
         return ()
 
     def with_input_locked(self) -> Law | None:
-        """Return what the law is at the mesh while the input is locked: itself."""
+        """Return the law at the mesh while the input is locked: itself."""
         return cast(Law, self)
 
 
@@ -212,9 +212,9 @@ class Periodic(Behaviour):
         return (self.order,)
 
     def with_input_locked(self) -> Law | None:
-        """Return what the law is at the mesh while the input is locked at an unknown angle.
+        """Return the law at the mesh while the input is locked at an unknown angle.
 
-        On average over all angles, where a cosine is nothing.
+        Its mean over all angles, which is zero for a cosine.
         """
         return None
 

@@ -1,4 +1,4 @@
-"""Laws that a drive has no name for but other mechanisms need."""
+"""Laws for mechanisms other than a drive."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ConstantForce(Aperiodic):
 
 
 def _offset(sizes: Sizes) -> list[Guess]:
-    """Guess a constant force, which only two directions tell from dry friction."""
+    """Guess a constant force, which only motion in both directions separates from dry friction."""
     most = sizes.largest
     return [Guess((unknown("force", -most, most, sizes.force),))] if sizes.both_ways else []
 
@@ -50,8 +50,8 @@ register(
 class DirectionalFriction(Aperiodic):
     """T = level + viscous ``|speed|`` while it moves: half the difference of the two directions.
 
-    ``level`` in N or N.m, ``viscous`` in force per speed. What the directions have in common is
-    Coulomb's friction and the port's damping.
+    ``level`` in N or N.m, ``viscous`` in force per speed. The common part of the directions is
+    Coulomb friction and the port's damping.
     """
 
     level: float
@@ -71,7 +71,7 @@ class DirectionalFriction(Aperiodic):
 
 
 def _one_sided(sizes: Sizes) -> list[Guess]:
-    """Guess what two directions tell from friction that is the same in both."""
+    """Guess friction that differs between the directions, if the port moves in both."""
     if not sizes.both_ways:
         return []
     force, slope = sizes.force, sizes.force / sizes.speed

@@ -6,7 +6,7 @@ from pymoo_hdte.io.fields import UNITS
 
 
 def si_unit(quantity: str) -> str:
-    """Return the SI unit of a quantity of `fields.UNITS`, or of one that is its unit; 1 for none.
+    """Return the SI unit of a quantity of `fields.UNITS`, or the quantity if it is a unit; or 1.
 
     >>> si_unit("torque"), si_unit("N.m.s3/rad3"), si_unit("")
     ('N.m', 'N.m.s3/rad3', '1')
@@ -15,5 +15,5 @@ def si_unit(quantity: str) -> str:
 
 
 def with_unit(value: float, quantity: str) -> object:
-    """Return a value in SI with its unit, as model files have it."""
+    """Return a value in SI with its unit, as in model files."""
     return {"value": value, "unit": si_unit(quantity)} if quantity else value

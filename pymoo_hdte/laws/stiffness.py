@@ -22,8 +22,8 @@ class HardeningStiffness(Aperiodic):
 
     Gradually, by the cubic (N.m/rad3), or beyond a corner: K is higher by the share ``stiffening``
     beyond the ``torsion``, rad. g is that of `SoftWindup`; a corner differs from that law by a
-    multiple of K d, so that only the tolerance of K tells a drive that is stiff under load from one
-    that is soft near zero.
+    multiple of K d, so that only the tolerance of K separates a drive that is stiff under load from
+    one that is soft near zero.
     """
 
     coefficient: float = 0.0
@@ -137,7 +137,7 @@ register(
 def _wound(position: Values, torsion: float, sharpness: float) -> tuple[Values, Values]:
     """Return torsion x g(position / torsion), which ends at the torsion, and its slope."""
     share = position / torsion
-    # (1 + |x|^p)^(1/p) by logarithms: the power itself overflows far from zero.
+    # (1 + |x|^p)^(1/p) by logarithms, because the power overflows far from zero.
     root = np.logaddexp(0.0, sharpness * np.log(np.maximum(np.abs(share), 1e-30))) / sharpness
     return position * np.exp(-root), np.exp(-(1.0 + sharpness) * root)
 
@@ -165,7 +165,7 @@ differs by less than this share of the half-width, times ln 2, and only at the c
 
 
 def _dead_zone(state: PortState, half_width: Values | float) -> Response:
-    """Return what a clearance takes from K d: everything within, a constant beyond."""
+    """Return the reduction of K d by a clearance: everything within, a constant beyond."""
     rounding = ROUNDING * np.maximum(half_width, 1e-12)
     left, right = state.position + half_width, state.position - half_width
     lost = rounding * (_soft_plus(left / rounding) - _soft_plus(right / rounding)) - half_width
@@ -222,8 +222,8 @@ class PeriodicClearance(Periodic):
     half_width, variation : float
         rad.
     locked : float or None
-        Half-width at the angle at which the input was locked for a torsion sweep, rad, where it
-        is known: of a rig, not of a drive.
+        Half-width at the angle at which the input was locked for a torsion sweep, rad, where it is
+        known; a property of a rig, not of a drive.
     """
 
     rattles: ClassVar[bool] = True
@@ -254,10 +254,10 @@ class PeriodicClearance(Periodic):
 
 
 def _uneven(sizes: Sizes) -> list[Guess]:
-    """Guess a play that varies with the shaft, by half of what it is and more.
+    """Guess a play that varies with the shaft, by half of its mean and more.
 
-    Its least width is an unknown of its own: a play that would fall below nothing stays there, and
-    no search finds its way out of that.
+    Its least width is an unknown of its own: a play with negative width would be clipped to zero,
+    where a search has no gradient.
     """
     if sizes.stiffness == 0.0:
         return []

@@ -1,7 +1,7 @@
-"""Unknowns of an effect: their bounds and sizes, and the lines that two of them make.
+"""Unknowns of an effect: their bounds and sizes, and lines, each described by two of them.
 
 Amplitude and phase of a line are searched as its cosine and sine parts, in which a prediction is
-close to linear. A periodic effect brings its harmonics along: a ripple of order 6 with a little of
+close to linear. A periodic effect includes its harmonics: a ripple of order 6 with a little of
 order 12 is one effect and not two.
 """
 
@@ -103,7 +103,7 @@ class Family:
     orders : tuple of float
         Cycles per turn of the angle of a port, or per unit of its position.
     harmonic : bool
-        Whether all are multiples of the first, which then stands for all of them.
+        Whether all are multiples of the first, which then represents all of them.
     """
 
     orders: tuple[float, ...]
@@ -111,17 +111,17 @@ class Family:
 
     @property
     def order(self) -> float | None:
-        """The order that stands for all of them."""
+        """The order that represents all of them, if any."""
         return self.orders[0] if self.harmonic else None
 
     @property
     def form(self) -> str:
-        """All orders in a word, where none stands for them."""
+        """All orders in a word, if none represents them."""
         return "" if self.harmonic else "+".join(f"{order:g}" for order in self.orders)
 
     @property
     def words(self) -> str:
-        """What a sentence says of the orders."""
+        """The orders in the words of a sentence."""
         return ", ".join(f"{order:g}" for order in self.orders[: 1 if self.harmonic else None])
 
     def waves(self, name: str, largest: float, typical: float) -> tuple[Parameter, ...]:
@@ -155,8 +155,8 @@ def line_with_variance(
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return amplitude and phase of a line, each with its variance.
 
-    ``covariance`` is that of its cosine and sine part, shape (2, 2). A phase is never less certain
-    than one of which nothing is known.
+    ``covariance`` is that of its cosine and sine part, shape (2, 2). The variance of a phase is at
+    most that of an unknown phase.
     """
     amplitude, phase = polar(cosine, sine)
     along = np.array([np.cos(phase), np.sin(phase)])

@@ -1,4 +1,4 @@
-"""Lumped mechanisms of any kind: what they are, how they move, and what force balances miss."""
+"""Lumped mechanisms of any kind: their models, simulation and force balances."""
 
 from pymoo_hdte.lazy import lazy_names
 

@@ -1,4 +1,4 @@
-"""What acts in a mechanism while it is simulated: the forces of ports, and what loops command."""
+"""Forces in a simulated mechanism: those at ports, and the commands of loops."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TURN = 1e-7
 
 
 class PortForce:
-    """What acts at a port. States are positions and speeds, shape (2, coordinates)."""
+    """The force at a port. States are positions and speeds, shape (2, coordinates)."""
 
     def __init__(
         self, port: Port, laws: Sequence[Law], mechanism: Mechanism, begin: Values
@@ -67,7 +67,7 @@ class PortForce:
             stiffness += np.asarray(found.slope).item()
             damping += np.asarray(found.damping).item()
             if law.orders:
-                # A law's slope holds the phase, which turns with the position here.
+                # A law's slope is at constant phase, which varies with the position here.
                 turned = law.respond(replace(here, phase=periodic_phase(d + _TURN)))
                 stiffness += np.asarray(turned.torque - found.torque).item() / _TURN
         for law, kept in zip(self.memories, self.kept, strict=True):
@@ -80,7 +80,7 @@ class PortForce:
         return force, 0.0
 
     def turns(self, before: Values, after: Values, step: float, rtol: float) -> float:
-        """Return the share of a step after which laws with memory turn back, 1 for none."""
+        """Return the share of a step after which laws with memory reverse, 1 for none."""
         first, last = self.motion(before)[1], self.motion(after)[1]
         missed = min(abs(first), abs(last)) * step
         if first * last >= 0.0 or missed <= rtol * min(law.shortest for law in self.memories):
@@ -88,7 +88,7 @@ class PortForce:
         return float(min(max(first / (first - last), 0.01), 0.99))
 
     def settle(self, state: Values) -> None:
-        """Keep the inner states of laws, which up to a turn only the way decides."""
+        """Keep the inner states of laws, which up to a reversal depend on the way only."""
         d = self.motion(state)[0]
         for law, kept in zip(self.memories, self.kept, strict=True):
             kept[:] = law.moved(kept, d - self.since)
@@ -105,7 +105,7 @@ class PortForce:
 
 
 class Command:
-    """What a loop commands."""
+    """The command of a loop."""
 
     linear = False
     memories: tuple[Memory, ...] = ()

@@ -1,8 +1,8 @@
-"""Inverse dynamics: what is left of the force balances when a record's motion is put into them.
+"""Inverse dynamics: the residuals of the force balances for the motion of a record.
 
 For every coordinate the forces of inputs, inertia, springs, dampers and laws, and for every force
 sensor its reading less what acts at its port, as coefficients of an orthonormal cosine transform up
-to the cutoff: stationary noise makes them independent, so that its colour is a weight of each.
+to the cutoff: for stationary noise they are independent, so that its spectrum is a weight of each.
 Linear in the quantities of the mechanism (Gautier, Robotics and Autonomous Systems 1997).
 """
 
@@ -46,7 +46,7 @@ class ForceBalance:
     mechanism : Mechanism
     record : Record
     cutoff : float
-        Hz, up to which the motion is known. Force sensors are held against the motion up to ten
+        Hz, up to which the motion is known. Force sensors are compared with the motion up to ten
         samples in a period.
 
     Attributes
@@ -54,9 +54,10 @@ class ForceBalance:
     frequency : ndarray, shape (n_bins,)
         Of the coefficients, Hz.
     kept : bool ndarray, shape (n_balances, n_bins)
-        Coefficients of frequencies up to which a balance is known.
+        Whether a coefficient is within the frequencies up to which a balance is known.
     terms : ndarray, shape (n_balances, n_quantities, n_bins)
-        Coefficients of what each of `quantity_names` adds to each of `balance_names` per unit.
+        Coefficients of the contribution of each of `quantity_names` to each of `balance_names` per
+        unit.
     constant : ndarray, shape (n_balances, n_bins)
         Of the readings of force sensors.
     noise : ndarray, shape (n_balances, n_bins)
@@ -115,13 +116,13 @@ class ForceBalance:
     def forces(
         self, effects: Sequence[LawAt], stiffness: Mapping[str, float] | None = None
     ) -> Values:
-        """Return the coefficients of what laws take from the balances, (n_balances, n_bins).
+        """Return the coefficients of the forces of laws in the balances, (n_balances, n_bins).
 
         Parameters
         ----------
         effects : sequence of LawAt
         stiffness : mapping of str to float, optional
-            Of ports, N/m or N.m/rad, which play and curved springs take from; otherwise believed.
+            Of ports, N/m or N.m/rad, for play and curved springs; by default the believed one.
         """
         names = balance_names(self.mechanism)
         found = np.zeros((len(names), self._bins))
@@ -136,14 +137,14 @@ class ForceBalance:
     def _law_coefficients(self, effect: LawAt, stiffness: float) -> Values:
         """Return the coefficients of the force of one effect, (n_bins,).
 
-        The last ones are kept: of a difference quotient all laws but one stay as they are.
+        The last results are cached: in a difference quotient all laws but one are unchanged.
         """
         key = effect, stiffness
         if key not in self._known:
             while len(self._known) >= _KEPT:
                 self._known.pop(next(iter(self._known)))
             force = law_force(effect.law, self._fine[effect.port], stiffness)
-            # The finer samples lie around the others, so that their cosines are the same.
+            # The finer samples are centred on the others, so that their cosines are the same.
             self._known[key] = self._transform(force) / np.sqrt(self._finer)
         return self._known[key]
 
@@ -179,7 +180,7 @@ class ForceBalance:
         return np.asarray(dct(signal, type=2, norm="ortho")[: self._bins])
 
     def _rows_of(self, port: Port) -> dict[str, float]:
-        """Return with which share what acts at a port stands in which balance."""
+        """Return the share of a force at a port in each balance."""
         return {port.name: 1.0} if port.read else dict(port.motion)
 
     def _terms(self) -> Values:
@@ -205,10 +206,11 @@ class ForceBalance:
         return found
 
     def _noise(self, stride: int) -> Values:
-        """Return the sensors' noise as the believed mechanism carries it into the balances.
+        """Return the sensors' noise in the balances, by the believed mechanism.
 
-        Beside each frequency's own noise the transform shows that of speed and position at the ends
-        of the record, because a derivative is no series of cosines: sum x'' cos = [x' cos] - ...
+        Beside each frequency's own noise the transform contains that of speed and position at the
+        ends of the record, because a derivative is no series of cosines: sum x'' cos = [x' cos] -
+        ...
         """
         mechanism, names, record = self.mechanism, balance_names(self.mechanism), self.record
         omega = 2.0 * np.pi * self.frequency

@@ -26,7 +26,7 @@ def drive_mechanism(
     Parameters
     ----------
     model : DriveModel
-        Its speed and load are left to records.
+        Its speed and load are not used: records have their own.
     parameters : array, shape (5,)
         `PARAMETERS` in SI units.
 
@@ -41,7 +41,7 @@ def drive_mechanism(
     coefficients = model.coefficients(values[None])
     _refuse(coefficients)
     mesh = {"input_angle": 1.0 / coefficients.ratio, "output_angle": -1.0}
-    # The static error is taken off: -Re(p exp(i x)) = |p| sin(x + arg p - pi / 2).
+    # The static error is subtracted: -Re(p exp(i x)) = |p| sin(x + arg p - pi / 2).
     error = tuple(
         ErrorLine("input_angle", float(order), abs(phasor), cmath.phase(phasor) - math.pi / 2.0)
         for order, phasor in zip(
@@ -74,7 +74,7 @@ def _refuse(coefficients: Coefficients) -> None:
     if coefficients.reaction != 0.0:
         allowed = "0: errors of a port do not act back on the coordinate that makes them"
         raise InvalidInput("reaction of the static error", coefficients.reaction, allowed)
-    # Periodic laws of a mechanism turn with the motion of their port, which here is the torsion.
+    # Periodic laws of a mechanism vary with the motion of their port, which here is the torsion.
     allowed = "no effect that varies with the input angle"
     if coefficients.stiffness_depth != 0.0:
         raise InvalidInput("effects at the mesh", "mesh_stiffness_variation", allowed)

@@ -1,6 +1,6 @@
 """Effects that ports of a mechanism may have: every registered one that is a law."""
 
-# The effects of a drive register themselves; some of them are laws, or readings, elsewhere too.
+# The import registers the effects of a drive; some of them are laws, or readings, elsewhere too.
 from pymoo_hdte.drive import effects as _of_drives  # noqa: F401
 from pymoo_hdte.laws.effect import Effect, effects
 

@@ -1,7 +1,8 @@
-"""Steps of an exponential integrator for mechanisms: exact for what is linear, however stiff.
+"""Steps of an exponential integrator for mechanisms: exact for linear parts, however stiff.
 
 Steps are those of exprb32 (Hochbruck, Ostermann, Schweitzer, SIAM J. Numer. Anal. 47, 2009): of
-third order in how laws depart from their tangents. What the second order misses is their error.
+third order in the deviation of laws from their tangents. The difference to the second order is the
+estimate of their error.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ Triple = tuple[Values, Values, Values]
 
 _STEPS_ANYWAY, _STEPS_PER_SAMPLE = 20_000, 50
 _SHORTEST = 1e-9
-"""Share of the way to the next sample below which a step is taken whatever its error."""
+"""Share of the time to the next sample below which a step is accepted whatever its error."""
 _ROUNDING = 1e-14
 
 
 class ExponentialIntegrator:
-    """Steps of a mechanism, with what those behind say about the next."""
+    """Steps of a mechanism, with the size of the next predicted from previous ones."""
 
     def __init__(
         self, inertias: Values, forces: Sequence[PortForce | Command], rows: Values, rtol: float
@@ -49,14 +50,14 @@ class ExponentialIntegrator:
     def follow(self, time: Values, pushes: Values, begin: Values, bound: float) -> Values:
         """Return the states at times (n,), shape (n, 2, coordinates).
 
-        ``pushes`` are the accelerations by inputs, shape (n, coordinates), and ``bound`` is how
-        far positions may go.
+        ``pushes`` are the accelerations by inputs, shape (n, coordinates), and ``bound`` limits the
+        positions.
         """
         path = np.empty((len(time), *begin.shape))
         path[0] = state = begin
         self.origin = begin * [[1.0], [0.0]]
         self.reach = np.abs((begin - self.origin) @ self.plant[2].T)
-        # A scheme whose error goes with the third power of the step takes so many more.
+        # Number of steps of a scheme whose error is proportional to the third power of the step.
         finer = max(1.0, 1e-6 / self.rtol) ** (1.0 / 3.0)
         samples = len(time) + self.swing * (time[-1] - time[0])
         self.steps_left = int(finer * (_STEPS_ANYWAY + _STEPS_PER_SAMPLE * samples))
@@ -88,7 +89,7 @@ class ExponentialIntegrator:
             step = left if step > 0.999 * left else step
             moves, exponential = _predict(step, state, push, drift, self.plant, tangent)
             missed = []
-            # At the end alone, a motion that turns back within the step would look like none.
+            # Checked at the end alone, a motion that reverses within the step would look like rest.
             for share, move in zip((0.5, 1.0), moves, strict=True):
                 there = self.tangent(state + move, time + share * step)[0]
                 missed.append(_correct(step, share, move, exponential, there, self.plant, tangent))
@@ -110,20 +111,20 @@ class ExponentialIntegrator:
         return after, step
 
     def tangent(self, state: Values, time: float) -> Triple:
-        """Return what is not linear: forces (r,), slopes by state (r, 2, coordinates), by time."""
+        """Return the nonlinear parts: forces (r,), slopes by state (r, 2, coordinates), by time."""
         slopes = np.empty((len(self.curved), *state.shape))
         found = [one.at(state, time, slopes[place]) for place, one in enumerate(self.curved)]
         forces, rates = np.reshape(found, (-1, 2)).T.copy()
         return forces, slopes, rates
 
     def longest(self, state: Values) -> float:
-        """Return the step in which nothing swings or turns by more than 1 rad unseen."""
+        """Return the step in which no vibration or periodic law advances by more than 1 rad."""
         if not self.curved:
             return math.inf
         return 1.0 / max([self.swing, *(abs(float(row @ state[1])) for row in self.turning)])
 
     def turn(self, before: Values, after: Values, step: float) -> float:
-        """Return the share of a step after which the first slipping springs turn back."""
+        """Return the share of a step after which the first slipping springs reverse."""
         shares = (one.turns(before, after, step, self.rtol) for one in self.memories)
         return min(shares, default=1.0)
 
@@ -138,7 +139,7 @@ def _predict(
     """
     (linear, columns, _), (forces, slopes, rates) = plant, tangent
     n, r = columns.shape
-    # The exponential of this block matrix holds phi_1, phi_2 and phi_3 beside that of the first;
+    # The exponential of this block matrix contains phi_1, phi_2 and phi_3 beside that of the first;
     # speeds are in ways per step.
     block, sources = np.zeros((5 * n, 5 * n)), np.zeros((5 * n, 1))
     for i in range(4 * n):
@@ -185,9 +186,9 @@ def _correct(
     plant: Triple,
     tangent: Triple,
 ) -> Values:
-    """Return what the tangents miss in a step, by the forces after a move of a share of it.
+    """Return the error of the tangents in a step, from the forces after a share of the step.
 
-    Forces are taken to depart with the square of time, as they do at first.
+    The deviation of forces is assumed to grow with the square of time, as it does initially.
     """
     (_, columns, _), (forces, slopes, rates) = plant, tangent
     n, r = columns.shape
@@ -237,7 +238,7 @@ def _product(first: Values, second: Values) -> Values:
 def _judge(
     after: Values, error: Values, origin: Values, watched: Values, reach: Values, rtol: float
 ) -> tuple[Values, float]:
-    """Return how far and fast all has ever been, (2, rows), and the error over the allowed one."""
+    """Return the largest positions and speeds so far, (2, rows), and the relative error."""
     farthest, missed, size = reach.copy(), np.zeros(reach.shape), 0.0
     for kind in range(2):
         largest = np.max(np.abs(after[kind]))

@@ -1,8 +1,8 @@
 """A lumped mechanism: inertias, and ports with springs, dampers and laws between them.
 
 M q'' = sum over inputs of B gain u - sum over ports of A (stiffness d + damping d' + laws(d, d')),
-where the motion at a port is d = A^T q, plus what its kinematic error adds. The laws are those of
-`pymoo_hdte.drive`; units are SI throughout, N and m or N.m and rad as the coordinate has it.
+where the motion at a port is d = A^T q plus its kinematic error. The laws are those of
+`pymoo_hdte.laws`; units are SI throughout, N and m or N.m and rad depending on the coordinate.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class BelievedValue:
     value : float
         SI; at least 0.
     tolerance : float
-        Relative, 0 for a value that is known; 1 allows everything from nothing to twice the value.
+        Relative, 0 for a value that is known; 1 allows everything from zero to twice the value.
 
     Raises
     ------
@@ -45,7 +45,7 @@ NOTHING = BelievedValue(0.0)
 
 @dataclass(frozen=True)
 class ErrorLine:
-    """What a port moves beside its motion: amplitude sin(order q + phase) of a coordinate q.
+    """Kinematic error of a port: amplitude sin(order q + phase) of a coordinate q.
 
     The form of Eq. (1) of the paper.
 
@@ -78,7 +78,7 @@ class ErrorLine:
 
 @dataclass(frozen=True)
 class Port:
-    """A place where parts move against each other.
+    """A place where parts move relative to each other.
 
     Attributes
     ----------
@@ -86,10 +86,10 @@ class Port:
     motion : mapping of str to float
         Share of each coordinate in the motion d of the port, by name.
     stiffness, damping : BelievedValue
-        Of the linear spring and damper that stand there, N/m and N.s/m or N.m/rad and N.m.s/rad.
+        Of the linear spring and damper at the port, N/m and N.s/m or N.m/rad and N.m.s/rad.
     read : bool
-        True for a force sensor: what acts at the port is measured, as the channel of this name,
-        and does not act on the coordinates.
+        True for a force sensor: the force at the port is measured, as the channel of this name, and
+        does not act on the coordinates.
     error : tuple of ErrorLine
         Kinematic error, added to d. It does not act back on the coordinate that makes it, as in
         Eq. (9) of the paper.
@@ -137,7 +137,7 @@ class Loop:
     position_gain, speed_gain : float
         Units of the input per m or rad, and per m/s or rad/s.
     limit : float
-        Of the size of the command, in units of the input; infinite without saturation.
+        Largest size of the command, in units of the input; infinite without saturation.
     """
 
     input: str
@@ -152,8 +152,8 @@ class Loop:
 class Mechanism:
     """Coordinates, ports and inputs of a lumped mechanism; SI units throughout.
 
-    M q'' is what the inputs put on the coordinates q, less what springs, dampers and laws at the
-    ports answer with: Lagrange's equations, as in Eqs. (3) to (9) of the paper.
+    M q'' is the force of the inputs on the coordinates q, less that of springs, dampers and laws at
+    the ports: Lagrange's equations, as in Eqs. (3) to (9) of the paper.
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class Mechanism:
     Raises
     ------
     InvalidInput
-        For a name that is used twice or stands for nothing, an inertia that is not positive, or a
+        For a name that is used twice or refers to nothing, an inertia that is not positive, or a
         port or input that touches no coordinate.
     """
 
@@ -225,7 +225,7 @@ class Mechanism:
 
     @property
     def quantities(self) -> dict[str, BelievedValue]:
-        """What is believed, SI, by the name under which a fit knows it; what is 0 is left out."""
+        """Believed values, SI, by the names that fits use; those that are 0 are left out."""
         found = {f"inertia of {name}": one for name, one in self.inertias.items()}
         for port in self.ports:
             found[f"stiffness of {port.name}"] = port.stiffness
@@ -240,7 +240,7 @@ class Mechanism:
         Parameters
         ----------
         values : mapping of str to float
-            SI, by name as in `quantities`; what is not there stays as it is.
+            SI, by name as in `quantities`; all others are unchanged.
         exactly : bool
             Whether they are known exactly; otherwise each keeps its relative tolerance.
 
@@ -290,7 +290,7 @@ class LawAt:
     Attributes
     ----------
     name : str
-        Of the effect, as verdicts have it.
+        Of the effect, as in verdicts.
     port : str
         Name of the port.
     law : Law

@@ -1,7 +1,7 @@
 """Motion from measured positions: smoothed without delay, and differentiated, up to a frequency.
 
-Beyond the frequency at which a position no longer stands out of its sensor's noise its derivatives
-are noise, and force balances are held against records below it only.
+Above the frequency at which a position falls below its sensor's noise its derivatives are noise, so
+that force balances are compared with records below it only.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pymoo_hdte.checks import InvalidInput
 Values = NDArray[np.float64]
 
 _STANDS_OUT = 4.0
-"""Ratio of powers by which a position stands out of its noise."""
+"""Least ratio of the power of a position to that of its noise."""
 _FEWEST = 4
 _HIGHEST_SHARE = 0.1
 """Largest cutoff as a share of the sampling rate: ten samples in a period."""
@@ -28,13 +28,13 @@ _CLEAR = 4.0
 """Standard deviations of a difference beyond which a rise between two samples is a jump."""
 _NEIGHBOURS = 5
 _LAW_SAMPLES = 40
-"""To a period of the cutoff: the jumps of dry friction lie between two of them."""
+"""Samples per period of the cutoff; the jumps of dry friction occur between two of them."""
 _SEGMENT = 1024
 _ORDER = 8
 _PASS = 2.0
 """Corner of the smoothing over the cutoff, up to which it passes all but 2e-5."""
 _SETTLES = 4.0
-"""Periods of the cutoff that are left out at either end, where smoothing knows but one side."""
+"""Periods of the cutoff that are left out at either end, where smoothing has one side only."""
 _STENCIL = 7
 """Samples of a derivative: exact for polynomials of degree six."""
 
@@ -63,9 +63,10 @@ def noise_of(signal: Values, jumps: bool = False) -> float:
 def timing_noise(signal: Values) -> float:
     """Return the standard deviation of white noise as strong as the timing of a signal's jumps.
 
-    When a force jumped is known to within a sample: a uniform error of one sample by the jump over
-    the square root of 12, white over the frequencies. A jump is what a rise has beyond those around
-    it, where it stands out of the noise: a smooth signal, of shape (n,), has none.
+    The time of a jump of a force is known to within one sample: a uniform error, with a standard
+    deviation of the jump over the square root of 12, white over the frequencies. A jump is the
+    excess of a rise over its neighbours, where it exceeds the noise: a smooth signal, of shape
+    (n,), has none.
     """
     rises = np.diff(signal)
     beyond = rises - median_filter(rises, _NEIGHBOURS, mode="nearest")
@@ -74,7 +75,7 @@ def timing_noise(signal: Values) -> float:
 
 
 def highest_frequency(position: Values, step: float, deviation: float) -> float:
-    """Return the frequency in Hz up to which a position stands out of its noise.
+    """Return the frequency in Hz up to which a position exceeds its noise.
 
     Parameters
     ----------
@@ -87,7 +88,7 @@ def highest_frequency(position: Values, step: float, deviation: float) -> float:
     Raises
     ------
     InvalidInput
-        If it does so nowhere.
+        If it does so at no frequency.
     """
     # Second differences, because the spectrum of a position falls too steeply for a window.
     difference = np.diff(position, 2)
@@ -96,7 +97,7 @@ def highest_frequency(position: Values, step: float, deviation: float) -> float:
     )
     noise = 2.0 * step * deviation**2 * (2.0 * np.sin(np.pi * frequency * step)) ** 4
     stands_out = power[1:] > _STANDS_OUT * noise[1:]
-    # In the lowest ones of white noise, too, there is what the window lets through.
+    # The lowest frequencies contain the leakage of the window even for white noise.
     if not np.all(stands_out[:_FEWEST]):
         ratio = float(np.min(power[1:] / np.maximum(noise[1:], 1e-300)))
         raise InvalidInput(
@@ -115,12 +116,12 @@ def highest_share(step: float) -> float:
 
 
 def stride_of(cutoff: float, step: float) -> int:
-    """Return how many samples make a step of `_LAW_SAMPLES` to a period of the cutoff."""
+    """Return the stride in samples that gives `_LAW_SAMPLES` per period of the cutoff."""
     return max(1, int(1.0 / (_LAW_SAMPLES * step * cutoff)))
 
 
 def finer_than(cutoff: float, step: float) -> int:
-    """Return how many samples for each make `_LAW_SAMPLES` to a period of the cutoff."""
+    """Return the factor of refinement that gives `_LAW_SAMPLES` per period of the cutoff."""
     return max(1, int(np.ceil(_LAW_SAMPLES * cutoff * step - 1e-9)))
 
 
@@ -134,7 +135,7 @@ def smooth(signal: Values, step: float, cutoff: float) -> Values:
     corner = _PASS * cutoff
     if corner * step >= 0.45:
         return signal
-    # From the mean, so that a large constant does not ring at the ends.
+    # Relative to the mean, so that a large constant does not cause ringing at the ends.
     middle = float(np.mean(signal))
     filtered = sosfiltfilt(butter(_ORDER, corner, fs=1.0 / step, output="sos"), signal - middle)
     return np.asarray(filtered + middle)

@@ -1,4 +1,4 @@
-"""The motion at a port in time, and what a law answers to it."""
+"""The motion at a port in time, and the force of a law for it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PortMotion:
 
 
 def motion_at_port(port: Port, position: dict[str, Values], speed: dict[str, Values]) -> PortMotion:
-    """Return the motion at a port, with its kinematic error, of coordinates of shape (n,)."""
+    """Return the motion at a port, with its kinematic error, for coordinates of shape (n,)."""
     here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
     rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
     for line in port.error:
@@ -38,7 +38,7 @@ def law_force(law: Law, motion: PortMotion | SmoothedMotion, stiffness: float) -
 
     ``stiffness`` is that of its port, N/m or N.m/rad.
     """
-    # Laws with memory start from rest, wherever the position has its zero.
+    # Laws with memory start from rest, whatever the zero of the position.
     rests = law.states > 0
     state = PortState(
         motion.position - rests * motion.position[0],

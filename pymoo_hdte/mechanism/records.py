@@ -16,7 +16,7 @@ from pymoo_hdte.mechanism.motion import noise_of, timing_noise
 ROLES = ("train", "held_out")
 FEWEST_SAMPLES = 16
 FINER = 4
-"""Samples for each of a record in a simulation."""
+"""Samples of a simulation per sample of a record."""
 _JITTER = 0.01
 """Largest deviation of a step from the mean one, relative."""
 
@@ -40,7 +40,7 @@ class Record:
         is estimated, see `noise_of`.
     dropped : int
         Rows of its file that had values that are not finite: left out at the ends, interpolated
-        inside. A report tells their number.
+        inside. A report states their number.
 
     Raises
     ------
@@ -132,11 +132,11 @@ class Record:
         return math.hypot(own, timing_noise(signal)) if jumps else own
 
     def finer(self, factor: int) -> Record:
-        """Return the record with ``factor`` samples for each, on a smooth curve through them.
+        """Return the record with ``factor`` times as many samples, on a smooth curve through them.
 
-        The curve is a cubic spline; n samples become factor (n - 1) + 1. What takes signals for
-        straight between samples is wrong by three per cent where there are ten of them to a period,
-        and by more at a resonance.
+        The curve is a cubic spline; n samples become factor (n - 1) + 1. Linear interpolation
+        between samples has an error of three per cent at ten samples per period, and more at a
+        resonance.
         """
         n = len(self.time)
         places, between = np.arange(n), np.arange(factor * (n - 1) + 1) / factor

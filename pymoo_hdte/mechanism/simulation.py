@@ -1,7 +1,7 @@
 """A mechanism in time, under the inputs of a record or in its closed loops.
 
-Inputs and references are straight lines between samples: right for analogue signals; what a
-controller holds acts half a sample later. The steps, which end at samples, are in
+Inputs and references are straight lines between samples: right for analogue signals; signals held
+by a controller act half a sample later. The steps, which end at samples, are in
 `exponential_steps`.
 """
 
@@ -36,7 +36,7 @@ class SimulatedCourse:
     position, speed : dict of str to ndarray, shape (n,)
         By coordinate, m and m/s or rad and rad/s.
     inputs : dict of str to ndarray, shape (n,)
-        As they acted: of the record, or commanded by a loop; in its unit.
+        As applied: of the record, or commanded by a loop; in its unit.
     forces : dict of str to ndarray, shape (n,)
         By port that is ``read``, N or N.m.
     """

@@ -1,4 +1,4 @@
-"""The rate at which a record's force balances are formed, and what a record must have for it."""
+"""The rate at which a record's force balances are formed, and its requirements on a record."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FEWEST_BINS = 8
 
 
 def working_rows(mechanism: Mechanism, record: Record, cutoff: float) -> slice:
-    """Return the rows of a record at the working rate, without what smoothing spoils at the ends.
+    """Return the rows of a record at the working rate, without the ends that smoothing distorts.
 
     Parameters
     ----------

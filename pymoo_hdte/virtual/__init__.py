@@ -1,4 +1,4 @@
-"""Virtual rigs that hide effects, to try the discrepancy workflow on."""
+"""Virtual rigs with hidden effects, to test the discrepancy analysis."""
 
 from pymoo_hdte.lazy import lazy_names
 

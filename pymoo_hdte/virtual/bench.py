@@ -1,7 +1,7 @@
 """A virtual test bench: records with known truth, for tests and for trying the procedures.
 
 Sensors add zero error and noise; the drive adds Coulomb friction and hysteresis. Every size is our
-own choice within what such benches show; the paper prints none.
+own choice within the usual range of such benches; the paper prints none.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What blind campaigns hide: the effects by name, each with plausible parameters to draw."""
+"""Hidden effects of blind campaigns, by name, each with plausible random parameters."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _BISECTIONS = 60
 
 
 class Course(NamedTuple):
-    """One running record: what the speed loop and the load ask for.
+    """One running record: set values of speed loop and load.
 
     Attributes
     ----------
@@ -203,8 +203,8 @@ def quasi_static_torsion(
 ) -> NDArray[np.float64]:
     """Return the torsion of a drive with locked input under slowly changing load, rad.
 
-    Dry friction ``breakaway`` of the output holds the mesh torque until the load has left it by
-    that much, whichever way.
+    Dry friction ``breakaway`` of the output holds the mesh torque until the load differs from it by
+    that much, in either direction.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Laws of the virtual rig, compiled; in kind other than the laws of the library they must test.
+"""Laws of the virtual rig, compiled; their forms differ from those of the library under test.
 
 Where the library is sharp these are rounded, where it is Gaussian these are exponential, and so on:
-a workflow that only recognised its own formulas would fail on them.
+an analysis that only recognised its own formulas would fail on them.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Hidden effects that the library holds too, under the same name and in another form.
+"""Hidden effects that the library also has, under the same name and in another form.
 
-Sizes are our own choice within what strain wave gears of this size and their rigs show; ``size``
-scales the strength of an effect, 1 being typical. Each function returns the port and the values of
-its fields (`laws.Side`, `laws.Mesh` or `sensors.OutputEncoder`), SI.
+Sizes are our own choice within the usual range of strain wave gears of this size and their rigs;
+``size`` scales the strength of an effect, 1 being typical. Each function returns the port and the
+values of its fields (`laws.Side`, `laws.Mesh` or `sensors.OutputEncoder`), SI.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def position_dependent_friction(
 ) -> Drawn:
     """Draw friction that varies once or twice in an input turn, or once in an output turn.
 
-    Its mean keeps it from turning negative: friction that drives would shake the rig by itself.
+    Its mean keeps it positive: a negative friction would excite the rig by itself.
     """
     port, order, low, high = [
         ("input", 1.0, 0.005, 0.02),

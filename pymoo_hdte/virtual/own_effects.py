@@ -1,4 +1,4 @@
-"""Campaigns on a drive with effects of one's own, which the integrator of the rig does not know."""
+"""Campaigns on a drive with user-defined effects, which the integrator of the rig does not have."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _CHANNELS = ("transmission_error", "motor_torque", "coupling_torque", "lead")
 
 
 def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect]) -> Campaign:
-    """Return a campaign with what effects change in the steady state of the rig, its noise kept.
+    """Return a campaign with the change of the rig's steady state by effects added, with its noise.
 
     By harmonic balance of the true drive with and without them; torsion sweeps stay as they are.
 
@@ -27,7 +27,7 @@ def with_effects(campaign: Campaign, rig: TrueRig, effects: Sequence[DriveEffect
     campaign : Campaign
         Of `rig.run_campaign`.
     rig : TrueRig
-        What it was made of.
+        The rig of the campaign.
     effects : sequence of DriveEffect
         Laws of friction or drag.
 

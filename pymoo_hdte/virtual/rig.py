@@ -1,4 +1,4 @@
-"""A virtual rig that hides an effect: truth for blind campaigns, apart from the library's laws.
+"""A virtual rig with hidden effects: truth for blind campaigns, independent of the library's laws.
 
 Every record moves the static error a little: the sine and the cosine part of each of m lines and
 the constant get normal errors of repeatability / sqrt(m), so that the varying part has the
@@ -27,7 +27,7 @@ from pymoo_hdte.virtual.runs import Condition, simulate_run
 from pymoo_hdte.virtual.sensors import OutputEncoder, TorqueErrors, draw_torque_errors, measure
 
 LOAD_SETTING = 0.25
-"""Standard deviation with which the brake meets a load other than zero, N.m."""
+"""Standard deviation of the brake's load from a set value other than zero, N.m."""
 PAUSE = 20.0
 """Time between two records of a session, s."""
 SWEEP = (0.0, 40.0, -40.0, 40.0)
@@ -64,12 +64,12 @@ _Part = TypeVar("_Part", Side, Mesh)
 
 @dataclass(frozen=True)
 class TrueRig:
-    """What the drive on the rig really is.
+    """The true drive on the rig.
 
     Attributes
     ----------
     drive : BelievedDrive
-        True values in the place of the believed ones.
+        True values of the believed parameters.
     error_phases : tuple of float
         phi of a sin(o theta_in + phi), one for each error order, rad.
     effects : tuple of HiddenEffect
@@ -176,7 +176,7 @@ def run_campaign(
     ----------
     true_rig : TrueRig
     believed : BelievedDrive
-        What the campaign says about the drive.
+        Believed drive of the campaign.
     rig : Rig
         Its speed loop needs an integral part, or the mean speed would be free.
     rng : numpy.random.Generator

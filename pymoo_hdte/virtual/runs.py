@@ -1,4 +1,4 @@
-"""One running record of the virtual rig: its condition, its steps, its settling."""
+"""One running record of the virtual rig: its condition, step size and settling."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pymoo_hdte.virtual.laws import friction, static_error
 SETTLING = 18.0
 """Time constants of the slowest mode before the first sample; leaves 2e-8 of the start."""
 SETTLING_TURNS = 2.0
-"""Input turns before the first sample: what remembers the path, not the time, settles on them."""
+"""Input turns before the first sample, in which laws with memory of the path settle."""
 STABLE_STEP = 1.0
 """Largest product of a step and the fastest eigenvalue; the method is stable up to 2.7."""
 ACCURATE_STEP = 2.5e-4
@@ -34,7 +34,7 @@ SLOW = 0.25
 
 @dataclass(frozen=True)
 class Condition:
-    """What one running record is to be.
+    """The condition of one running record.
 
     Attributes
     ----------

@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy.campaign.believed import Rig
 
 @dataclass(frozen=True)
 class OutputEncoder:
-    """What the output encoder adds to the angle; nothing by default.
+    """Errors that the output encoder adds to the angle; none by default.
 
     Attributes
     ----------

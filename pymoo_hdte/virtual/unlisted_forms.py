@@ -1,6 +1,6 @@
-"""Hidden effects that the library does not hold: a workflow must say that something is missing.
+"""Hidden effects that the library does not have: an analysis must report a missing effect.
 
-Sizes and what the functions return are as in `listed_forms`.
+Sizes and return values are as in `listed_forms`.
 """
 
 from __future__ import annotations

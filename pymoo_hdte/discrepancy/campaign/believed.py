@@ -44,16 +44,16 @@ class BelievedDrive:
     error_tolerance : float
         Relative half-width of the amplitudes.
     effects : tuple of Effect
-        What the drive is believed to have beside Eq. (9), as it stands. The inertia of the load and
-        the damping of the torsion are values.
+        Effects that the drive is believed to have beside Eq. (9), with fixed values. The inertia of
+        the load and the damping of the torsion are given as values instead.
     tolerances : dict of str to float
-        Relative half-widths of single values of `MECHANICAL`, in the place of ``tolerance``.
+        Relative half-widths of single values of `MECHANICAL`, which replace ``tolerance``.
 
     Raises
     ------
     InvalidInput
         For a value that is not finite or out of range, orders that do not match, or an effect that
-        stands twice at one place or is a value.
+        is given twice at one place or is a value.
     """
 
     ratio: float
@@ -171,7 +171,7 @@ class Rig:
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
-            # Without noise no misfit has a size, so that nothing can be weighted or tested.
+            # Residuals are weighted by the noise, so that it must not be zero.
             if one.name.endswith("_noise"):
                 real_number(one.name, value, above=0.0)
             else:

@@ -1,8 +1,8 @@
-"""A drive model as what is believed: its values become the base of a fit, its effects stand in it.
+"""A drive model as the believed model: its values are fitted within tolerances, its effects kept.
 
 The inertia of the load and the damping of the torsion are values of their own, which a fit may
-change within their tolerances; all other effects of the model are believed as they stand. The
-phases of the static error are fitted anew, because they hang on where an encoder has its zero.
+change within their tolerances; all other effects of the model keep their values. The phases of the
+static error are fitted anew, because they depend on where an encoder has its zero.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from pymoo_hdte.drive import (
 from pymoo_hdte.io.fields import Fields
 
 LEAST = 1e-12
-"""What a data sheet, which refuses zero, gets in the place of zero, SI."""
+"""Value that replaces zero in a data sheet, which refuses zero, SI."""
 _ROUNDED = 1.0 + 1e-9
-"""Of a value that was multiplied and divided on its way."""
+"""Factor that allows for the rounding of a value by multiplication and division."""
 OF_VALUES = (LoadInertia.name, DampingReference.name)
 """Effects that are values of `BelievedDrive`."""
 SHEET_SUFFIX = "_sheet"
-"""Of the name of a model's data sheet, where no other is given."""
+"""Ending of the name of a model's data sheet, where no other is given."""
 
 
 def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> DriveModel:
@@ -72,13 +72,13 @@ def believed_of_model(
     error_tolerance: float = 0.3,
     tolerances: Mapping[str, float] | None = None,
 ) -> BelievedDrive:
-    """Return what a drive model says as what is believed.
+    """Return a drive model as a believed drive.
 
     Parameters
     ----------
     model : DriveModel
     tolerance, error_tolerance, tolerances
-        Relative half-widths, as of `BelievedDrive`; a model has none.
+        Relative half-widths, as in `BelievedDrive`; a model itself has none.
 
     Raises
     ------

@@ -32,7 +32,7 @@ class Campaign:
     title, drive : str
         One line of printable text each.
     believed : BelievedDrive
-        Drive and load, as they are thought to be.
+        Drive and load, as believed before the analysis.
     rig : Rig
         Speed loop and sensors.
     running : tuple of RunningRecord
@@ -40,7 +40,7 @@ class Campaign:
     torsion : tuple of TorsionRecord
         May be empty.
     rules : Rules
-        Thresholds of what is refused. They are used to check and not kept: give them to
+        Thresholds for refusing records. They are used for the checks and not kept: pass them to
         ``dataclasses.replace`` again.
 
     Raises
@@ -78,9 +78,9 @@ class Campaign:
         check_noise(self.running, self.torsion, self.believed, self.rig, rules)
 
     def believing(self, model: DriveModel) -> Campaign:
-        """Return the same records with a drive model as what is believed.
+        """Return the same records with a drive model as the believed model.
 
-        Its values keep the tolerances of this campaign; its effects are believed as they stand.
+        Its values keep the tolerances of this campaign; its effects keep their values.
 
         Parameters
         ----------
@@ -109,12 +109,12 @@ class Campaign:
 
     @property
     def held_out(self) -> tuple[RunningRecord, ...]:
-        """Running records to judge by; empty where nothing can be said about new conditions."""
+        """Running records to validate the result; empty where new conditions cannot be judged."""
         return tuple(record for record in self.running if record.role == "held_out")
 
     @property
     def torque_scale(self) -> float:
-        """Torques beside those that the library of effects is sized for, dimensionless.
+        """Torques relative to those that the library of effects is sized for, dimensionless.
 
         See `campaign.torque_scale`.
         """
@@ -128,7 +128,7 @@ class Campaign:
             if record.name in names:
                 raise InvalidInput("name of a record", record.name, "each name once")
             names.add(record.name)
-            # A copy among the held-out records would prove whatever was fitted to its twin.
+            # A copy of a training record among the held-out ones would confirm any fit to it.
             twin = measurements.setdefault(record.output_angle.tobytes(), record.name)
             if twin != record.name:
                 allowed = f"each measurement once; it repeats {twin}"
@@ -144,19 +144,20 @@ def _named(name: str) -> Iterator[None]:
 
 
 RATED_TORQUE = 40.0
-"""N.m at the output of the drive that the effects are sized for."""
+"""Output torque of the drive that the effects are sized for, N.m."""
 
 
 RATED_STIFFNESS = 2.583e4
-"""N.m/rad of its mesh."""
+"""Mesh stiffness of that drive, N.m/rad."""
 
 
 def torque_scale(loads: Sequence[float], believed: BelievedDrive) -> float:
     """Return the size of a drive in torque: 1 for rigs near `RATED_TORQUE`, a power of two.
 
-    The larger of what was loaded and what the stiffness lets expect, since the friction of a drive
-    that was tested with light loads, or with none, is still that of its size. In steps of two,
-    because only the size counts; and multiplying by a power of two does not round.
+    The larger of the applied load and the load expected from the stiffness, since the friction of a
+    drive that was tested with light loads, or with none, still belongs to its size. In steps of
+    two, because only the order of magnitude counts; and multiplying by a power of two does not
+    round.
 
     Parameters
     ----------

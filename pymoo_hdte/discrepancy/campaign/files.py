@@ -80,14 +80,14 @@ def read_campaign(folder: str | Path, rules: Rules = RULES) -> Campaign:
 
 
 def write_campaign(campaign: Campaign, folder: str | Path) -> None:
-    """Write a campaign to a new or empty folder: all of it or nothing, always the same bytes.
+    """Write a campaign to a new or empty folder, completely or not at all, always with equal bytes.
 
     Parameters
     ----------
     campaign : Campaign
-        SI units; the files have those in their names.
+        In SI units; the files use the units in the names of their fields.
     folder : str or Path
-        That `read_campaign` will read.
+        Where `read_campaign` can read it.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def _table(campaign: Campaign) -> dict[str, Any]:
 
 
 def _believed_table(believed: BelievedDrive) -> dict[str, Any]:
-    """Return what is believed, with tolerances of single values and effects where there are any."""
+    """Return the believed drive as a table, with any tolerances of single values and effects."""
     effects = [effect.to_dict() for effect in believed.effects]
     further = {"tolerances": dict(believed.tolerances), "effect": effects}
     return _in_units(believed, BELIEVED) | {name: one for name, one in further.items() if one}
@@ -146,7 +146,7 @@ def _in_units(values: Any, names: Names) -> dict[str, Any]:
     def rounded(value: Any, factor: float) -> Any:
         if isinstance(value, tuple):
             return [rounded(item, factor) for item in value]
-        # Twelve digits hide the rounding of the conversion and keep more than anybody knows.
+        # Twelve digits hide the rounding of the conversion and exceed the accuracy of any value.
         digits = f"{value / factor:.12g}"
         return int(digits) if digits.lstrip("-").isdigit() else float(digits)
 

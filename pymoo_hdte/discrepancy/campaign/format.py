@@ -1,4 +1,4 @@
-"""Names of the campaign format: ``campaign.toml`` and a ``.csv.gz`` or ``.csv`` file each record.
+"""Names of the campaign format: ``campaign.toml`` and one ``.csv.gz`` or ``.csv`` file per record.
 
 =========================  ===================================================================
 table                      fields; those with ``=`` may be left out
@@ -32,14 +32,14 @@ top, instead of it         ``model``, a drive model such as ``revised_model.toml
 Columns of a running record: ``time_s, input_angle_rad, output_angle_rad, input_torque_Nm,
 output_torque_Nm``; of a torsion record: ``time_s, output_angle_rad, output_torque_Nm``.
 
-What is believed is a model: values, each with the relative tolerance that a fit keeps, and effects
-that are taken as they stand. The inertia of the load and the damping of the torsion are values,
+The believed drive is a model: values, each with the relative tolerance that a fit keeps, and
+effects whose values are kept. The inertia of the load and the damping of the torsion are values,
 also where a model file has them as effects. The phases of the static error are fitted anew; those
-of effects are believed, so that the input encoder must have the zero that it had for the model.
+of effects are kept, so that the input encoder must have the same zero as for the model.
 
 The ``role`` of a running record is ``"train"``, to be fitted, or ``"held_out"``, to judge the
-result; a torsion record is always ``"train"``. ``time_s`` counts from any origin, be it that of the
-record, of the session or of the world: ``elapsed_s`` says when in the session a record began.
+result; a torsion record is always ``"train"``. ``time_s`` may have any origin: ``elapsed_s`` says
+when in the session a record began.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ from pymoo_hdte.units import factor_of_name
 CAMPAIGN_FILE = "campaign.toml"
 
 ENDING = ".csv.gz"
-"""Of the file of a record that is written; what stands before it is the name of the record."""
+"""Ending of the file of a written record, after the name of the record."""
 PLAIN_ENDING = ".csv"
-"""Of one that is read as well."""
+"""Alternative ending, which can be read only."""
 
 Names = Mapping[str, tuple[str, float]]
 """For each attribute its name in the file and the factor to SI units."""
@@ -104,7 +104,7 @@ RUNNING = _named(
 
 TORSION = _named(sample_rate="sample_rate_Hz")
 
-# Decimals far below the noise of any sensor.
+# Numbers of decimals, chosen far below the noise of any sensor.
 COLUMNS = {
     "time": ("time_s", 6),
     "input_angle": ("input_angle_rad", 9),
@@ -116,4 +116,4 @@ COLUMNS = {
 CONTROL = re.compile(
     r"\bT\s*=\s*(\S+?)\s*\*\s*\(w_set - w\)\s*\+\s*(\S+?)\s*\*\s*integral\(w_set - w\)"
 )
-"""The sentence that may stand for the two numbers of the speed loop."""
+"""The sentence that may replace the two numbers of the speed loop."""

@@ -5,8 +5,8 @@ A channel is fitted by a straight line in time and by lines at the given orders:
     value(t) = mean + slope (t - t_mid) + Re sum_j phasor_j exp(i order_j theta_in)
 
 so that lines that do not close over the record (order 2.02) do not leak into each other. theta_in
-is the measured, absolute input angle; its noise counts as noise of all channels: of the two that
-hold it, and of each by the slope of its lines, order x |phasor| x N x angle_noise.
+is the measured, absolute input angle; its noise enters all channels: directly the two that contain
+it, and each one through the slope of its lines, as order x |phasor| x N x angle_noise.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from pymoo_hdte.discrepancy.engine.rules import RULES
 
 CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
 
-# Conditions of a linear fit, which keep its digits; what is named does not depend on them.
+# Numerical limits of a linear fit; the verdict does not depend on them.
 LARGEST_CONDITION = 1e3
-"""Of the matrix of the fit; beyond it the noise of the lines has grown a thousandfold."""
+"""Largest condition number of the fit; beyond it the noise of the lines grows a thousandfold."""
 
 LEAST_SEPARATION = 0.1
-"""Share of a line's power that the fitted lines must leave to it."""
+"""Least share of a line's power that is independent of the fitted lines."""
 
 BLOCK = 64
 """Lines of the residual spectrum worked on at once, to bound the memory."""
@@ -53,19 +53,19 @@ class OrderLines:
     slope : ndarray, shape (4,)
         Of the straight line, rad/s or N.m/s; that of the input angle is the mean input speed.
     phasors : ndarray of complex, shape (4, m)
-        With the loss by averaging undone, rad or N.m.
+        Corrected for the loss by averaging, rad or N.m.
     covariance : ndarray, shape (4, 1 + 2 m, 1 + 2 m)
         Of (mean, Re phasors, Im phasors) of each channel, from sensor noise and quantisation, in
         the square of its unit.
     row_covariance : ndarray, shape (4, 4)
-        Of the noise of one row between channels, in the product of their units. The covariance of
-        channel a with channel b is ``covariance[a] * row_covariance[a, b] / row_covariance[a, a]``:
-        the input encoder stands in the transmission error, in the input angle, and in the slopes of
-        all lines.
+        Covariance of the noise of one row between channels, in the product of their units. The
+        covariance of channel a with channel b is ``covariance[a] * row_covariance[a, b] /
+        row_covariance[a, a]``: the noise of the input encoder enters the transmission error, the
+        input angle, and all lines by their slopes.
     bends : ndarray of complex, shape (3, 1 + m)
-        Mean and phasors, in s^k, that signals (t - t_mid)^k / k!, k = 2, 3, 4, leave: a drift is no
-        straight line in a record of ten minutes, and an order that turns once in it takes what is
-        bent.
+        Mean and phasors, in s^k, that a fit assigns to the signals (t - t_mid)^k / k!, k = 2, 3, 4:
+        a drift is curved in a record of ten minutes, and an order with one cycle per record absorbs
+        the curvature.
     """
 
     orders: NDArray[np.float64]
@@ -82,9 +82,9 @@ def order_lines(
 ) -> OrderLines:
     """Fit order lines to every channel of a record by least squares.
 
-    Sinusoids at known frequencies that need not be periodic in the record, with a straight line:
-    the model of a least-squares spectrum (Lomb, Astrophysics and Space Science 39, 1976), all lines
-    at once.
+    The model is that of a least-squares spectrum (Lomb, Astrophysics and Space Science 39, 1976)
+    with all lines at once: sinusoids at known frequencies that need not be periodic in the record,
+    and a straight line.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def order_lines(
     unit = (inverse @ inverse.T)[np.ix_(kept, kept)] * np.outer(scales, scales)
     phasors = np.asarray((real + 1j * imaginary) / gains, dtype=complex)
     noise = row_covariance(rig, ratio, record.samples_averaged)
-    # The angle's noise stands in the exponent too, where a line is steep; it is as good as white.
+    # The noise of the angle also enters the exponent, where a line is steep; it is nearly white.
     steepness = fit.orders * phasors
     noise = noise + 0.5 * (steepness @ steepness.conj().T).real * noise[3, 3]
     bends = inverse @ (fit.basis.T @ _bent(record))
@@ -133,7 +133,7 @@ def order_lines(
 
 
 def averaging_gain(orders: ArrayLike, record: RunningRecord) -> NDArray[np.float64]:
-    """Return by how much the averaging of raw samples shrinks lines, shape (m,).
+    """Return the factor by which averaging of raw samples reduces each line, shape (m,).
 
     The mean of n samples, Delta apart, of exp(i w t) is exp(i w t_mid) times
     ``sin(n w Delta / 2) / (n sin(w Delta / 2))``, with w = order x mean input speed.
@@ -147,7 +147,7 @@ def row_covariance(rig: Rig, ratio: float, samples_averaged: int) -> NDArray[np.
     """Return the covariance of the noise of one row between `CHANNELS`, shape (4, 4).
 
     An encoder has the variance ``angle_noise**2 + angle_quantisation**2 / 12``, referred to the
-    output; the transmission error carries that of both.
+    output; the transmission error has the variance of both encoders.
     """
     encoder = rig.angle_noise**2 + rig.angle_quantisation**2 / 12.0
     covariance = np.diag(
@@ -164,14 +164,14 @@ def residual_spectrum(
     orders: ArrayLike | Sequence[float],
     highest_order: float = RULES.highest_order,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what the order lines leave, at multiples of 1/N and of 1, in units of the noise.
+    """Return the residual of the order lines, at multiples of 1/N and of 1, in units of the noise.
 
-    What turns with the output repeats in an output turn and what turns with the input in an input
-    turn; with a ratio that is no whole number, these are not the same orders.
+    Errors of the output repeat every output turn and errors of the input every input turn; unless
+    the ratio is a whole number, their orders differ.
 
-    Each line is fitted to the residual after it, too, was cleared of the fitted lines, so that
-    these do not leak into it. Orders too close to a fitted line are left out. Under noise
-    alone the power is exponential (Scargle, Astrophysical Journal 263, 1982).
+    Each line is made orthogonal to the fitted lines before it is fitted to the residual, so that
+    these do not leak into it. Orders too close to a fitted line are left out. Under noise alone the
+    power is exponential (Scargle, Astrophysical Journal 263, 1982).
 
     Parameters
     ----------
@@ -185,9 +185,9 @@ def residual_spectrum(
     orders : ndarray, shape (k,)
         Cycles per input turn, up to ``highest_order`` or the Nyquist order.
     amplitudes : ndarray, shape (4, k)
-        Dimensionless, by channel as in `OrderLines`: over their root mean square under noise alone.
-        The square is then exponential with mean 1: a line exceeds x by chance with probability
-        exp(-x**2).
+        Dimensionless, by channel as in `OrderLines`: divided by their root mean square under noise
+        alone. The square is then exponential with mean 1: a line exceeds x by chance with
+        probability exp(-x**2).
 
     Raises
     ------
@@ -230,7 +230,7 @@ def _amplitudes(
     shared: NDArray[np.complex128],
     products: NDArray[np.complex128],
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Fit cosine and sine of each wave, cleared of the basis, to residuals of unit variance.
+    """Fit cosine and sine of each wave, orthogonal to the basis, to residuals of unit variance.
 
     ``waves`` has shape (n, k), ``shared``, their part in the basis, (p, k), and ``products`` with
     the residuals (4, k).

@@ -1,7 +1,7 @@
-"""Can these numbers come from this drive? Finds swapped channels and wrong units.
+"""Plausibility checks of a campaign: they find swapped channels and wrong units.
 
-The limits are wide: they must pass every effect that a campaign may hide and still tell degrees
-from radians, N.mm from N.m, and one channel from another.
+The limits are wide: they must accept every effect that a campaign may contain and still distinguish
+degrees from radians, N.mm from N.m, and one channel from another.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from pymoo_hdte.units import ARCSEC
 
 
 def check_believed(believed: BelievedDrive, rules: Rules) -> None:
-    """Refuse beliefs that no drive can have.
+    """Refuse believed values that no drive can have.
 
     Raises
     ------
     InvalidInput
-        If an inertia would swing on the mesh below `Rules.least_natural_frequency`, the static
-        error has no line or one beyond what drives have, or a tolerance is below
+        If an inertia has a natural frequency on the mesh below `Rules.least_natural_frequency`, the
+        static error has no line or an implausibly large one, or a tolerance is below
         `Rules.least_tolerance`.
     """
     for name in ("tolerance", "error_tolerance"):
@@ -67,7 +67,7 @@ def check_noise(
     rig: Rig,
     rules: Rules,
 ) -> None:
-    """Refuse a stated noise so large that no record shows it: it would hide every misfit.
+    """Refuse a stated noise far above the scatter of all records: it would hide every misfit.
 
     A record may scatter more than stated, because an effect moves it from row to row.
 
@@ -79,7 +79,7 @@ def check_noise(
     averaged = np.sqrt([record.samples_averaged for record in running])
     errors = [record.transmission_error(believed.ratio) for record in running]
     shown = {
-        # Both encoders stand in a transmission error.
+        # The noise of both encoders enters a transmission error.
         "angle_noise": _scatters(errors) * averaged / math.sqrt(2.0),
         "input_torque_noise": _scatters([record.input_torque for record in running]) * averaged,
         "output_torque_noise": _scatters([record.output_torque for record in running]) * averaged,
@@ -97,7 +97,7 @@ def check_noise(
 
 
 def _scatters(channels: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Return the standard deviation of the noise of each channel's rows, or more."""
+    """Return the standard deviation of the noise of each channel's rows, or an upper bound."""
     # Third differences of white noise have 1 + 9 + 9 + 1 times its variance.
     with np.errstate(over="ignore"):
         return np.array([np.sqrt(np.mean(np.diff(rows, 3) ** 2) / 20.0) for rows in channels])
@@ -114,15 +114,15 @@ def check_running(
     believed : BelievedDrive
     rig : Rig
     largest_load : float
-        Of the campaign, N.m: the scale of torques where a record has no load.
+        Largest load of the campaign, N.m: the scale of torques where a record has no load.
     rules : Rules
 
     Raises
     ------
     InvalidInput
         If the speed is off by more than `Rules.speed_mismatch`, the record is shorter than one
-        output turn, the transmission error is not small, or a torque is far from what the load asks
-        for.
+        output turn, the transmission error is not small, or a torque is far from the one that the
+        load requires.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         _check_travel(record, believed.ratio, rules)
@@ -138,12 +138,12 @@ def check_running(
 
 
 def check_torsion(record: TorsionRecord, believed: BelievedDrive, rules: Rules) -> None:
-    """Refuse a torsion record whose slope is not that of the drive within a factor.
+    """Refuse a torsion record whose slope differs from that of the drive by more than a factor.
 
     Raises
     ------
     InvalidInput
-        If the stiffness is of another sign or size.
+        If the stiffness has the wrong sign or order of magnitude.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         torque = record.output_torque - np.mean(record.output_torque)
@@ -180,7 +180,7 @@ def _check_torques(
 ) -> None:
     load, multiple = record.load_torque, rules.torque_mismatch
     measured = float(np.mean(record.output_torque))
-    # A single wild sample moves the mean, but not the middle 95 %.
+    # A single outlier moves the mean, but not the middle 95 %.
     spread = float(np.ptp(np.quantile(record.output_torque, (0.025, 0.975))))
     slack = multiple * rig.output_torque_zero + spread
     if not abs(measured - load) <= rules.load_mismatch * abs(load) + slack:
@@ -189,13 +189,14 @@ def _check_torques(
     slack = multiple * rig.input_torque_zero
     if load == 0.0:
         most = multiple * largest_load / ratio + slack if largest_load else math.inf
-        # Only the motor drives, against friction.
+        # Without load the motor only has to overcome friction.
         if not -slack <= math.copysign(1.0, record.input_speed) * motor <= most:
             allowed = "a torque that overcomes friction, small beside that under load"
             raise InvalidInput("mean of input_torque", motor, allowed)
         return
     share = abs(load) / ratio
-    # Friction adds to the load when the motor drives it and may reverse the torque when not.
+    # Friction adds to the load when the motor drives it; when the load drives, it may reverse the
+    # torque.
     least = rules.load_mismatch * share - slack if load * record.input_speed > 0.0 else -math.inf
     if not (least <= math.copysign(1.0, load) * motor and abs(motor) <= multiple * share + slack):
         allowed = f"near load / ratio = {load / ratio:.3g} N.m"

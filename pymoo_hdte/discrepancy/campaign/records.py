@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number, whole_number
 
 ROLES = ("train", "held_out")
-"""``train`` records are fitted; ``held_out`` records, which must run, only judge the result."""
+"""``train`` records are fitted; ``held_out`` ones, running records only, validate the result."""
 
 FEWEST_SAMPLES = 8
-"""Below this nothing can be said about a record."""
+"""Least number of rows of a record."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +35,12 @@ class RunningRecord:
     sample_rate : float
         Of the rows, after averaging, Hz.
     samples_averaged : int
-        Raw samples in the mean that is one row.
+        Number of raw samples averaged into one row.
     elapsed : float
         Time from the start of the session to the start of this record, s.
     time : ndarray, shape (n,)
-        Middle of the raw samples of each row, s, increasing; on any clock, since only ``elapsed``
-        says when the record began.
+        Middle of the raw samples of each row, s, increasing; the origin is arbitrary, since only
+        ``elapsed`` says when the record began.
     input_angle, output_angle : ndarray, shape (n,)
         rad, absolute and unwrapped, with one common zero over a campaign.
     input_torque, output_torque : ndarray, shape (n,)
@@ -84,14 +84,14 @@ class RunningRecord:
 
 @dataclass(frozen=True, eq=False)
 class TorsionRecord:
-    """Input locked, output torque swept slowly enough that only stiffness and friction answer.
+    """Input locked, output torque swept so slowly that only stiffness and friction matter.
 
     Attributes
     ----------
     name : str
         As in `RunningRecord`.
     role : {"train"}
-        A sweep is fitted: what is proven is how a drive runs.
+        A sweep is always fitted: only running records are used for validation.
     sample_rate : float
         Hz.
     time : ndarray, shape (n,)
@@ -145,7 +145,7 @@ def _check_time(time: NDArray[np.float64], sample_rate: float) -> None:
         if falls.size:
             row = int(falls[0]) + 1
             raise InvalidInput(f"time[{row}]", float(time[row]), f"above {time[row - 1]:g}, rising")
-        # The median, because a few lost rows do no harm.
+        # The median, because a few lost rows are harmless.
         step = float(np.median(steps))
         if not abs(step * sample_rate - 1.0) < 0.05:
             allowed = f"{1.0 / sample_rate:g} s within 5 %, as the sample rate says"

@@ -1,9 +1,10 @@
 """The torque of a torsion sweep as a curve over time from each turning point to the next.
 
 The noise of the torque sensor, turned into torsion by the compliance, is eight times that of the
-encoder. A sweep is steady, so the torque of a leg is a straight line, fitted to hundreds of rows: a
-hundredth of a newton metre is left. A leg that is not steady gets a polynomial with a coefficient
-for every other point; it costs information, and unsteadiness below the torque noise is not noticed.
+encoder. A sweep is steady, so the torque of a leg is a straight line, fitted to hundreds of rows,
+which reduces its noise to a hundredth of a newton metre. A leg that is not steady gets a polynomial
+with one coefficient per two points; this costs information, and unsteadiness below the torque noise
+is not detected.
 """
 
 from __future__ import annotations
@@ -22,20 +23,20 @@ from pymoo_hdte.discrepancy.campaign.records import TorsionRecord
 
 Values = NDArray[np.float64]
 
-# How rows become points with their covariance, which is told on: no rule of the verdict.
+# Reduction of rows to points with a covariance that is passed on; these are no rules of a verdict.
 ROWS_A_POINT = 24
-"""Rows of which a point is the mean, or some more."""
+"""Number of rows averaged into a point, or slightly more."""
 FEWEST_ROWS = 2 * ROWS_A_POINT
-"""Rows that a leg needs."""
+"""Least number of rows of a leg."""
 _REVERSAL = 8.0
-"""Standard deviations of the torque noise that tell a turning point from noise."""
+"""Least reversal at a turning point, in standard deviations of the torque noise."""
 _REVERSAL_SHARE = 0.05
 """The same as a share of the swept range, for a sensor noisier than believed."""
 _REFINEMENTS = 3
 _FEW_ROWS = 8
-"""By which a refinement may move a turning point."""
+"""Rows by which a refinement may move a turning point."""
 _RARE = 1e-3
-"""Chance with which a steady leg gets more than a straight line."""
+"""Probability that a steady leg is given more than a straight line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ class TorsionLeg:
 
 
 def torsion_legs(record: TorsionRecord, rig: Rig) -> list[TorsionLeg]:
-    """Return the legs of a sweep, cut where their curves meet: at an angle, not smoothly.
+    """Return the legs of a sweep, separated where their curves intersect.
 
     Raises
     ------
@@ -148,7 +149,7 @@ def _between(record: TorsionRecord, rig: Rig, corners: Values) -> list[TorsionLe
 
 
 def _fitted(record: TorsionRecord, rows: NDArray[np.bool_], end: float, noise: float) -> TorsionLeg:
-    """Fit a straight line, or more where it leaves what noise does not explain."""
+    """Fit a straight line, or a polynomial where the residual exceeds the noise."""
     time, torque = record.time[rows], record.output_torque[rows]
     flexible = max(len(time) // ROWS_A_POINT // 2, 2)
     curve = chebyshev.chebfit(_share(time, time), torque, flexible)
@@ -162,7 +163,7 @@ def _fitted(record: TorsionRecord, rows: NDArray[np.bool_], end: float, noise: f
 
 
 def _meeting(one: TorsionLeg, other: TorsionLeg) -> float:
-    """Return the time at which two curves meet, within a few rows of the turn so far."""
+    """Return the time at which two curves meet, within a few rows of the present turning point."""
     closing = one.slope(one.end) - other.slope(one.end)
     if closing == 0.0:
         return one.end

@@ -1,1 +1,1 @@
-"""A campaign of a harmonic drive held against its model, from evidence to the proof."""
+"""Comparison of a harmonic drive's campaign with its model, from evidence to validation."""

@@ -1,4 +1,4 @@
-"""The workflow from a campaign to a verdict: measure, fit the base, locate lines, judge."""
+"""From a campaign to a verdict: extract features, fit the base, find order lines, judge."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from pymoo_hdte.laws.effect import effect_named
 
 @dataclass(frozen=True, eq=False)
 class DriveFinding:
-    """A campaign and what the workflow finds in it.
+    """A campaign and the result of its analysis.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class DriveFinding:
         Features of the training records.
     verdict : Verdict
     unexpected : tuple of float
-        Orders beyond the expected ones at which records show more than noise.
+        Orders beyond the expected ones with significant lines.
     """
 
     campaign: Campaign
@@ -47,9 +47,9 @@ class DriveFinding:
 
     @cached_property
     def held_out(self) -> Data | None:
-        """Features of the held-out records, or None where there are none.
+        """Features of the held-out records, or None without such records.
 
-        Where records that rattle were left out of the fit, they are here too.
+        If records with rattling were left out of the fit, they are left out here, too.
         """
         records = self.campaign.held_out
         if not records:
@@ -64,12 +64,12 @@ class DriveFinding:
 
 
 def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
-    """Return the orders that are always looked at: of the error, their sums, of the output turn.
+    """Return the orders that are always analysed: of the error, their sums, of the output turn.
 
     Raises
     ------
     InvalidInput
-        For a line of the believed static error that some record does not show or tell apart.
+        For a line of the believed static error that some record cannot resolve.
     """
     believed = campaign.believed
     lines = believed.error_orders
@@ -83,7 +83,7 @@ def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
 def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     """Return the verdict on a campaign.
 
-    In one thread: the matrices are small, and threads that wait for each other cost a multiple.
+    In one thread: the matrices are small, so that several threads would be much slower.
 
     Parameters
     ----------
@@ -94,9 +94,9 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     Raises
     ------
     InvalidInput
-        If fewer than `Rules.fewest_records` records are there to be fitted, a record cannot show or
-        tell apart the lines of the believed static error, or the believed effects let the drive
-        have no steady motion.
+        If there are fewer than `Rules.fewest_records` records to fit, a record cannot resolve the
+        lines of the believed static error, or the drive has no steady motion with the believed
+        effects.
     """
     if len(campaign.train) < rules.fewest_records:
         allowed = f"at least {rules.fewest_records}, or base and effects cannot be told apart"
@@ -127,7 +127,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
 def _check_steady(data: Data) -> None:
     """Refuse believed effects with which the drive has no steady motion in some record.
 
-    A fit would leave them out there, and judge another drive than the one that is believed.
+    A fit would ignore the effects there, and judge a drive other than the believed one.
     """
     campaign = data.campaign
     believed = campaign.believed
@@ -143,9 +143,9 @@ def _check_steady(data: Data) -> None:
 
 
 def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
-    """Judge again where the named effect changes how the drive answers to what does not repeat.
+    """Judge again if the named effect changes the drive's response to non-repeatable errors.
 
-    The repeatability is a motion, which all channels show by way of the model's own response.
+    The non-repeatable error is a motion, which reaches all channels through the model's response.
     """
     rules = data.rules
     if verdict.chosen is None or verdict.chosen.explained < rules.explained_share:
@@ -174,7 +174,7 @@ def _candidates(data: Data, base: Fit) -> list[Candidate]:
 def _loaded(data: Data) -> Data:
     """Return the data without records whose load does not hold the tooth flanks together.
 
-    With a clearance such a drive rattles and has no steady state to be fitted.
+    With a clearance such a drive rattles and has no steady state that could be fitted.
     """
     held = _flanks_held(data.features, data.campaign.torque_scale, data.rules)
     if np.all(held) or held.sum() < data.rules.fewest_records:
@@ -183,7 +183,7 @@ def _loaded(data: Data) -> Data:
 
 
 def _flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:
-    """Return which records carry a load beyond the swing of their torque, shape (r,)."""
+    """Return which records have a load above the amplitude of their torque, shape (r,)."""
     m = len(features.orders)
     lines = features.values[:, features.places(2)].reshape(len(features.records), m, 2)
     swing = np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)
@@ -192,7 +192,7 @@ def _flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArr
 
 
 def highest_order(campaign: Campaign, rules: Rules) -> float:
-    """Return the order up to which lines of a campaign are looked at, cycles per input turn."""
+    """Return the order up to which lines of a campaign are analysed, cycles per input turn."""
     shown = [_shown_order(record, rules) for record in campaign.running]
     return float(min(rules.highest_order, *shown))
 
@@ -203,11 +203,11 @@ def _shown_order(record: RunningRecord, rules: Rules) -> float:
 
 
 def _error_lines(campaign: Campaign, rules: Rules) -> list[float]:
-    """Return the orders of the believed static error that the records show, if they can.
+    """Return the orders of the believed static error that are analysed; all must be resolved.
 
-    A line that a record folds to another order, or mixes with its neighbour, would be there and
-    not predicted: a drive that hides nothing would miss something. What is believed to be nothing
-    need not be seen, and what lies above `Rules.highest_order` is looked at nowhere.
+    A line that a record aliases to another order, or mixes with its neighbour, would be measured
+    but not predicted: an effect would seem to be missing from a drive without any. Lines of
+    amplitude zero need not be resolved, and lines above `Rules.highest_order` are not analysed.
     """
     believed = campaign.believed
     coarsest = min(campaign.running, key=lambda record: _shown_order(record, rules))
@@ -245,7 +245,7 @@ def _travel(record: RunningRecord) -> float:
 
 
 def _apart(wanted: list[float], campaign: Campaign, kept: list[float], rules: Rules) -> list[float]:
-    """Return orders that every record can tell apart: those kept, then the first ones first."""
+    """Return orders that every record can resolve: those kept, then further ones as they come."""
     least = rules.line_separation / campaign.believed.ratio
     highest = highest_order(campaign, rules)
     kept = list(kept)
@@ -256,9 +256,9 @@ def _apart(wanted: list[float], campaign: Campaign, kept: list[float], rules: Ru
 
 
 def _strong_lines(features: Features, base: Fit, rules: Rules) -> list[float]:
-    """Return the orders at which the base leaves more than noise in any channel.
+    """Return the orders at which the residual of the base exceeds the noise in any channel.
 
-    What is seen at one speed only is no order but a frequency, if there are several speeds.
+    If there are several speeds, a line seen at one speed only is a frequency and no order.
     """
     misfit: NDArray[np.float64] = (base.residuals[: features.values.size] ** 2).reshape(
         features.values.shape

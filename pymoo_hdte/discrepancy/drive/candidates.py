@@ -1,4 +1,4 @@
-"""The library: every registered effect that could be in a drive, as candidates of a campaign."""
+"""The library: every registered effect that a drive may have, as candidates for a campaign."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pymoo_hdte.laws.effect import effect_named, place_of
 from pymoo_hdte.laws.unknowns import Parameter
 
 _OF_THEIR_OWN = ("load_inertia", "damping")
-"""Base parameters for which an effect of another name stands in the library."""
+"""Base parameters that an effect in the library covers under another name."""
 
 
 def drive_candidates(
@@ -21,7 +21,7 @@ def drive_candidates(
 ) -> list[Candidate]:
     """Return all candidates for a drive, for the sizes of each of its ports.
 
-    None of them stands where a believed effect does.
+    None of them is at the place of a believed effect.
     """
     known = {place_of(effect) for effect in believed}
     found = [
@@ -34,14 +34,14 @@ def drive_candidates(
 
 
 def _standing(name: str, port: str, part: Any) -> Any:
-    """Return a law at its port; what is no law stands in a drive as it is."""
+    """Return a law at its port; anything else is already an effect of a drive."""
     return LawAtPort(name, port, part) if effect_named(name).change is None else part
 
 
 def out_of_tolerance(base: Sequence[Parameter], at_bounds: Sequence[str]) -> list[Candidate]:
     """Return a candidate for each base parameter that a fit left at a bound.
 
-    What is believed to be nothing is missing where it is something, and not out of tolerance.
+    A parameter believed to be zero cannot be out of tolerance: if it is not zero, it is missing.
     """
     believed = {parameter.name: parameter.start for parameter in base}
     return [

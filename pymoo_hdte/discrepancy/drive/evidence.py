@@ -1,4 +1,4 @@
-"""What a campaign offers a fit: its observations as evidence, record by record and part by part."""
+"""The observations of a campaign as evidence for a fit, by record and part of the data."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from pymoo_hdte.laws.unknowns import Parameter
 Vector = NDArray[np.float64]
 
 PARTS = (*CHANNELS, "torsion_sweep")
-"""Of the data, as an `Excess` has them: channels of the running records, and the sweeps."""
+"""Parts of the data, as in `Excess`: channels of the running records, and the sweeps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +40,14 @@ class Data(Observations):
     Attributes
     ----------
     rules : Rules
-        By which they are judged.
+        Thresholds of the verdict.
     """
 
     rules: Rules = RULES
 
     @property
     def remainder(self) -> float:
-        """Share of the base's excess up to which what is left is the model's own error."""
+        """Share of the base's excess up to which a residual counts as the model's own error."""
         return self.rules.model_accuracy**2
 
     def objective(
@@ -73,7 +73,7 @@ class Data(Observations):
         return change
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
-        """Return where the residuals of each channel stand, and those of the sweeps."""
+        """Return the indices of the residuals of each channel, and of the sweeps."""
         n_records, n_features = self.features.values.shape
         first = n_features * np.arange(n_records)[:, None]
         found = []

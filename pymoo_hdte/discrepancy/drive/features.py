@@ -1,9 +1,9 @@
-"""What a campaign's running records say, as numbers with a full covariance.
+"""Features of a campaign's running records: numbers with a full covariance.
 
 A record's features are the means of transmission error and input torque, then real and imaginary
 parts of the order lines of every channel. Their covariance is that of the sensors (both encoders
 share the input's noise) plus that of the repeatability: the static error changes a little from one
-record to the next, and the drive's own response carries that to all channels.
+record to the next, which reaches all channels through the response of the drive.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Features:
         return stack(prediction.mean, prediction.phasors)
 
     def places(self, channel: int) -> NDArray[np.int_]:
-        """Return the places (m, 2) of a channel's real and imaginary parts among the features."""
+        """Return the indices (m, 2) of a channel's real and imaginary parts among the features."""
         m = len(self.orders)
         first = len(MEANS) + 2 * m * channel
         return first + np.array([np.arange(m), m + np.arange(m)]).T
@@ -82,7 +82,7 @@ def measure(
     Raises
     ------
     InvalidInput
-        For orders that a record cannot tell apart or that lie beyond its Nyquist order.
+        For orders that a record cannot resolve or that lie beyond its Nyquist order.
     """
     ratio, rig = campaign.believed.ratio, campaign.rig
     lines = [order_lines(record, rig, ratio, orders) for record in records]
@@ -100,8 +100,7 @@ def measure(
 
 def _middle(record: RunningRecord) -> float:
     """Return the time from the start of the session to the middle of a record, s."""
-    # The first row is the mean of samples that end within a row's time: what is later or earlier
-    # is another clock, of the session or of the world.
+    # If the first time is not within one row of zero, the clock has another origin than the record.
     own_clock = abs(record.time[0]) * record.sample_rate <= 1.0
     start = 0.0 if own_clock else record.time[0]
     return float(record.elapsed + (record.time[0] + record.time[-1]) / 2.0 - start)
@@ -112,7 +111,7 @@ def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[
     m = len(line.orders)
     size = len(MEANS) + 2 * m * len(CHANNELS)
     covariance = np.zeros((size, size))
-    # Where the mean (0) and the lines (1 .. 2 m) of each channel stand among the features.
+    # Indices of the mean (0) and the lines (1 .. 2 m) of each channel among the features.
     places = [
         np.concatenate([[channel] if channel in MEANS else [-1], len(MEANS) + 2 * m * channel
                         + np.arange(2 * m)])
@@ -124,6 +123,6 @@ def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[
             block = share * line.covariance[one]
             rows, columns = first >= 0, second >= 0
             covariance[np.ix_(first[rows], second[columns])] += block[np.ix_(rows, columns)]
-    # The load is taken from the output torque: its error winds the drive up.
+    # The load is taken from the measured output torque, whose error changes the predicted torsion.
     covariance[0, 0] += line.covariance[2, 0, 0] / stiffness**2
     return covariance

@@ -1,4 +1,4 @@
-"""What a campaign cannot tell: conditions that no record varies, lines that are not looked at."""
+"""Limits of a campaign: conditions that no record varies, lines that are not analysed."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
 from pymoo_hdte.laws.unknowns import harmonics_among
 
 _SAME_ORDER = 1e-6
-"""Largest distance at which a line is that of an order: one beside it is not predicted for it."""
+"""Largest difference of order at which two lines count as the same."""
 
 
 def campaign_limits(finding: DriveFinding) -> list[str]:
-    """Return a sentence for everything that the records of a campaign cannot tell.
+    """Return a sentence for each question that the records of a campaign cannot answer.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _too_high(finding: DriveFinding) -> list[str]:
     seen = finding.data.features.orders.tolist()
     orders = {one.order for one in verdict.chosen.candidates if one.order is not None}
     values = ", which may shift the values of the effect" if verdict.status in EXPLAINED else ""
-    # A line that nobody expects is searched strictly below the highest order.
+    # Unexpected lines are searched strictly below the highest order.
     return [
         f"Order {2.0 * order:.4g}, the second harmonic of order {order:.4g}, is not looked at: "
         f"lines are searched below order {highest:.3g}. What is left may be that harmonic{values}."

@@ -1,11 +1,10 @@
-"""The next experiment: the test that best tells the named effect from what else the data allow.
+"""The next experiment: the test that best separates the named effect from other hypotheses.
 
-Two models that fit all that was measured are held against each other in tests within the range of
-conditions measured, new ones and repeats: a further record of a known condition still averages its
-noise, and is called a repeat. Their difference is weighed by the noise and by what either model
-leaves uncertain there, after Hunter and Reiner (Technometrics 1965) and Box and Hill (Technometrics
-1967). Where nothing is missing, the most uncertain prediction is what a further record would teach
-most about.
+Two models that fit all measurements are compared in tests within the range of measured conditions,
+both new conditions and repeats of records, which still average the noise. Their difference is
+weighted by the noise and by the uncertainty of both predictions, after Hunter and Reiner
+(Technometrics 1965) and Box and Hill (Technometrics 1967). Where nothing is missing, the record
+with the most uncertain prediction is the most informative one.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ TESTS = ("running", "torsion_sweep", "reclocked_encoder")
 _RIVALS = 2
 OF_ENCODER = ("eccentricity", ENCODER_LINE)
 LARGEST_TURNS = 100
-"""Cycles per output turn; faster lines of the drive betray themselves by its response."""
+"""Cycles per output turn; the response of the drive identifies faster lines as its own."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class Proposal:
     separates : tuple of str, or None
         Labels of the two models; None where the aim is a less uncertain prediction.
     expected_separation : float
-        Chi-square between the two models, or of the uncertain prediction.
+        Expected chi-square between the two models, or of the uncertain prediction.
     """
 
     description: str
@@ -57,7 +56,7 @@ class Proposal:
     expected_separation: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it as plain types."""
+        """Return the proposal as plain types."""
         return asdict(self) | {"separates": list(self.separates) if self.separates else None}
 
 
@@ -88,7 +87,7 @@ def next_experiment(finding: DriveFinding) -> Proposal:
 
 
 def nearest_rivals(verdict: Verdict) -> list[Fit]:
-    """Return the fits of other effects that come nearest to the chosen ones, nearest first."""
+    """Return the fits of the nearest other hypotheses, nearest first."""
     if verdict.chosen is None:
         return []
     names = {candidate.name for candidate in verdict.chosen.candidates}
@@ -99,7 +98,7 @@ def nearest_rivals(verdict: Verdict) -> list[Fit]:
     found: dict[frozenset[str], Fit] = {}
     for hypothesis in others:
         theirs = frozenset(candidate.name for candidate in hypothesis.candidates)
-        # A set with one effect more explains at least as much in every test.
+        # Of nested models the larger one can imitate the chosen one in every test.
         if not names <= theirs:
             found.setdefault(theirs, hypothesis.fit)
     return list(found.values())[:_RIVALS]
@@ -117,12 +116,12 @@ def _proposal(
     elif verdict.equivalent:
         said = f"The data cannot tell {one} from {other}; what can is"
     else:
-        said = f"The data tell {one} from its rivals; the best further proof against {other} is"
+        said = f"The data separate {one} from others; the best further test against {other} is"
     return Proposal(f"{said} {what}.", kind, speed, load, labels, expected)
 
 
 def _most_uncertain(grid: Grid, model: Model) -> Proposal:
-    """Return the running record whose prediction the fit leaves most uncertain."""
+    """Return the running record with the most uncertain prediction of the fit."""
     variance = np.sum(model.influence[: len(grid.speed_rpm)] ** 2, axis=(1, 2))
     test = int(np.argmax(variance))
     what, speed, load, kind = grid.condition(test)
@@ -131,7 +130,7 @@ def _most_uncertain(grid: Grid, model: Model) -> Proposal:
 
 
 def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
-    """Return the test for a line of whole cycles per output turn: of the drive, or the encoder."""
+    """Return the test that separates a line of whole cycles per output turn from the encoder's."""
     ratio = grid.data.campaign.believed.ratio
     for place, candidate in enumerate(chosen.candidates):
         if candidate.order is None or candidate.name not in (*OF_ENCODER, "kinematic_error"):
@@ -146,7 +145,7 @@ def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
         base = chosen.values[: len(grid.data.base)]
         others = [effect for k, part in enumerate(parts) if k != place for effect in part]
         without = grid.predict(base, others)
-        # Half a period reverses the encoder's line and leaves the drive's.
+        # Half a period reverses the encoder's line and leaves that of the drive unchanged.
         change = 2.0 * (grid.predict(base, chosen.effects) - without)[: len(grid.speed_rpm)]
         expected = np.sum(change**2, axis=1)
         test = int(np.argmax(expected))
@@ -154,8 +153,8 @@ def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
         text = (
             f"{candidate.label} and {twin} predict nearly the same in every record: turn the disc "
             f"of the output encoder by {180.0 / turns:.3g} degrees on its shaft and repeat a "
-            f"record at {speed:.4g} r/min with {load:.3g} N.m. The line turns with the encoder, or "
-            "it stays."
+            f"record at {speed:.4g} r/min with {load:.3g} N.m. A line of the encoder turns "
+            "with it; one of the drive stays."
         )
         labels = (candidate.label, twin)
         return Proposal(text, "reclocked_encoder", speed, load, labels, float(expected[test]))
@@ -163,10 +162,10 @@ def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
 
 
 def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit) -> Proposal | None:
-    """Return the test for dry friction at the input: friction, or a zero error of the sensor.
+    """Return the test that separates dry friction at the input from a zero error of the sensor.
 
-    In reverse friction changes its sign and a zero error does not. All else is mirrored, so that
-    the forward record says how well the rest of the mean input torque is known.
+    In reverse friction changes its sign and a zero error does not. Everything else is mirrored, so
+    that the forward record gives the uncertainty of the rest of the mean input torque.
     """
     one_way = len({record.input_speed > 0.0 for record in finding.campaign.train}) == 1
     for candidate, parts in zip(chosen.candidates, chosen.effects_by_candidate, strict=True):

@@ -13,7 +13,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Unknowns, Vector, built
 from pymoo_hdte.drive import DriveEffect, SteadyMotion
 
 LOST = 1e3
-"""Residual of a point at which the model cannot carry the torque."""
+"""Residual of a sweep's point at which the model cannot transmit the torque."""
 
 
 class Objective(Unknowns):
@@ -25,8 +25,8 @@ class Objective(Unknowns):
     candidates : sequence of Candidate
     slopes : ndarray, shape (n_base, r, f), optional
         Derivatives of the features by base parameters, kept where they are given. Those of a model
-        without an effect serve with it: an effect changes features far more than their slopes, and
-        what slopes are wrong by slows a search down but moves its end little.
+        without an effect also serve with it: an effect changes features far more than their slopes,
+        and an error of the slopes slows a search down but hardly moves its optimum.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Objective(Unknowns):
     def _features(
         self, vectors: NDArray[np.float64], effects: tuple[DriveEffect, ...]
     ) -> NDArray[np.float64]:
-        """Return predicted features, the first vector's steady states being kept to begin from."""
+        """Return predicted features; the steady states of the first vector are kept as a start."""
         prediction = self.data.prediction(vectors, effects, self.nearby)
         self.nearby = prediction.balance.rows(slice(len(self.data.features.records)))
         return self.data.features.of_prediction(prediction)

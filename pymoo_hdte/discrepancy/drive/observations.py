@@ -1,8 +1,8 @@
-"""Features of a campaign with their whole covariance, and what a model predicts of them.
+"""Features of a campaign with their full covariance, and their prediction by a model.
 
 Residuals are whitened by that covariance, so that their sum of squares is a chi-square. The small
-changes of the static error from record to record count as noise that the drive's own response
-carries to all channels.
+changes of the static error from record to record count as noise, which reaches all channels through
+the response of the drive.
 """
 
 from __future__ import annotations
@@ -43,9 +43,10 @@ class Observations:
     torsion : tuple of TorsionPoints
         Sweeps with the input locked.
     reference : ndarray, shape (n_base,), optional
-        Base values at which the repeatability is carried to all channels; by default the starts.
+        Base values for the response to the repeatability; by default the starts.
     reference_effects : tuple of DriveEffect
-        Effects that are there then: a resonance that they move magnifies what does not repeat.
+        Effects included in this response: they may move a resonance, which amplifies the
+        repeatability.
     """
 
     campaign: Campaign
@@ -62,13 +63,13 @@ class Observations:
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
-        """Of the features of each record, sensors and repeatability, shape (r, f, f)."""
+        """Covariance of the features of each record, sensors and repeatability, shape (r, f, f)."""
         layout = Layout(self.base)
         start = layout.array("start") if self.reference is None else self.reference
         return self.features.covariance + self._repeatability(layout, start)
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
-        """Return the covariance that small changes of the static error give each record."""
+        """Return the covariance by small changes of the static error for each record."""
         rig, believed = self.campaign.rig, self.campaign.believed
         lines = range(len(believed.error_orders))
         spread = rig.repeatability / max(len(lines), 1) ** 0.5
@@ -96,7 +97,7 @@ class Observations:
     def prediction(
         self, vectors: Vector, effects: Sequence[DriveEffect], start: SteadyMotion | None = None
     ) -> Prediction:
-        """Return what `predict` is made of, steady states included."""
+        """Return the prediction behind `predict`, steady states included."""
         values = self._named(vectors)
         believed, rig = self.campaign.believed, self.campaign.rig
         features = self.features
@@ -118,7 +119,7 @@ class Observations:
         found = [np.empty((len(vectors), 0))]
         for points in self.torsion:
             torsion = np.empty((len(vectors), len(points.angle)))
-            # Vectors that share the sensor's errors share the path of the torque.
+            # Vectors with equal sensor errors have the same path of the torque.
             for gain, zero in np.unique(sensor, axis=0):
                 rows = np.flatnonzero(np.all(sensor == (gain, zero), axis=1))
                 path = (points.path - zero) / (1.0 + gain)
@@ -131,7 +132,7 @@ class Observations:
         white = np.empty_like(differences)
         for record, triangle in enumerate(self.whiteners):
             part = differences[..., record, :].reshape(-1, len(triangle)).T
-            # What is not known is not a number; it is counted as lost afterwards.
+            # Unknown values are NaN here and are counted as lost afterwards.
             solved = solve_triangular(triangle, part, lower=True, check_finite=False)
             white[..., record, :] = solved.T.reshape(differences[..., record, :].shape)
         return white.reshape(*differences.shape[:-2], -1)

@@ -1,7 +1,7 @@
-"""What a fit may change: base parameters within their tolerances, sensor errors, effect parameters.
+"""Unknowns of a fit: base parameters within their tolerances, sensor errors, effect parameters.
 
-Base parameters keep hard bounds: with a Gaussian prior they would run many standard deviations and
-hide an effect. The errors of torque sensors are unknown constants with a prior of their own.
+Base parameters keep hard bounds: with a Gaussian prior they would move by many standard deviations
+and hide an effect. The errors of torque sensors are unknown constants with a prior of their own.
 """
 
 from __future__ import annotations
@@ -64,12 +64,13 @@ def base_parameters(
         phase = phases[line]
         found.append(Parameter(f"error_phase_{line}", phase, phase - 9.0, phase + 9.0, 0.1))
     found.append(Parameter("offset", offset, offset - 1.0, offset + 1.0, 1e-5))
-    # A stiffness that varies with the input angle is not its mean where the input was locked.
+    # Where the input was locked, a varying stiffness differs from its mean.
     locked = _within("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
-    # The prior only keeps it in place where no sweep speaks of it.
+    # The prior only determines it where no sweep does.
     found.append(replace(locked, prior=locked.scale))
     for name in READING[1:]:
-        # What rigs are said to keep is taken for a standard deviation: sensors exceed it.
+        # The stated limit of a sensor error is taken as a standard deviation, since sensors exceed
+        # it.
         size = max(float(getattr(rig, name)), 1e-9)
         found.append(Parameter(name, 0.0, -10.0 * size, 10.0 * size, size, prior=size))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""Tests that could be made, and what fitted models predict for them, with their uncertainty."""
+"""Possible tests, and the predictions of fitted models for them, with their uncertainty."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SWEEP_SHARE = 0.25
 """Range of the sweep through zero, as a share of the largest load."""
 _LEG_POINTS = 16
 _ROWS = 30
-"""Rows of a torsion record in one point of the sweep."""
+"""Rows of a torsion record averaged into one point of the sweep."""
 
 Values = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ Values = NDArray[np.float64]
 class Model:
     """A fitted model and its predictions for every test, in units of the noise.
 
-    ``predicted`` has shape (n_tests, f), ``influence``, of the parameters in units of their own
-    uncertainty, shape (n_tests, f, p).
+    ``predicted`` has shape (n_tests, f); ``influence``, shape (n_tests, f, p), is that of the
+    parameters in units of their own uncertainty.
     """
 
     label: str
@@ -46,7 +46,7 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Tests that could be made: running records, then a sweep through zero torque.
+    """Possible tests: running records, then a sweep through zero torque.
 
     ``repeats`` tells which of the running records the campaign has already, shape (n_running,).
     """
@@ -85,7 +85,7 @@ class Grid:
         )
         sweep = _sweep(_SWEEP_SHARE * largest, finding.campaign.rig.torsion_angle_noise)
         data = replace(finding.data, features=planned, torsion=(sweep,) if largest else ())
-        # Those without effects serve for all models: how uncertain a test is needs no more.
+        # Slopes without effects serve for all models: they suffice for the uncertainty of a test.
         slopes = Objective(data, ()).slopes_at(finding.verdict.base.values)
         made = [(one.input_speed, one.load_torque) for one in finding.campaign.running]
         repeats = np.isclose(grid[:, None], made).all(axis=2).any(axis=1)
@@ -152,7 +152,7 @@ def _sweep(reach: float, noise: float) -> TorsionPoints:
         )
     ]
     path = np.concatenate(legs)
-    # The turning points stand twice; from one to the same nothing is measured.
+    # Turning points are listed twice; nothing is measured between the two.
     intervals = np.flatnonzero(np.diff(path))
     return TorsionPoints(
         torque=(path[intervals] + path[intervals + 1]) / 2.0,

@@ -1,7 +1,7 @@
-"""From parameters to what the rig's sensors would show: order lines and means of every channel.
+"""Predicted readings of the rig's sensors: order lines and means of every channel.
 
-One call of the harmonic balance serves all records of a campaign and all vectors of parameters
-that share their effects. Loads are not those of the plan but those that the sensor measured.
+One call of the harmonic balance serves all records of a campaign and all vectors of parameters that
+share their effects. Loads are the measured ones, not the planned ones.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from pymoo_hdte.drive.solve.steady_motion import BY_CASE
 from pymoo_hdte.drive.solve.torus import Torus
 
 TOLERANCE = 1e-7
-"""Of the harmonic balance: far below the noise, and twice as fast as full precision."""
+"""Tolerance of the harmonic balance: far below the noise, and twice as fast as full precision."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Conditions:
     elapsed : ndarray
         Middle of the record within the session, s.
     bends : complex ndarray, shape (r, 3, 1 + m)
-        What a drift that bends within a record leaves in it: see `OrderLines`.
+        Contribution of a drift that is curved within a record: see `OrderLines`.
     """
 
     input_speed: NDArray[np.float64]
@@ -79,18 +79,18 @@ def predict(
     effects: Sequence[DriveEffect] = (),
     start: SteadyMotion | None = None,
 ) -> Prediction:
-    """Return what the sensors would show.
+    """Return the predicted readings of the sensors.
 
     Parameters
     ----------
     believed, rig
     conditions : Conditions
     orders : sequence of float, length m
-        Lines asked for, in cycles per input turn.
+        Orders of the predicted lines, in cycles per input turn.
     values : dict of ndarray, shape (v,)
         Parameters by name, those of `parameters.base_parameters`.
     effects : sequence of DriveEffect
-        Beside the believed ones; shared by all vectors.
+        In addition to the believed ones; shared by all vectors.
     start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
     """
@@ -125,9 +125,9 @@ def steady_motions(
 ) -> SteadyMotion:
     """Return the steady state of all rows.
 
-    Where a clearance would open because the load does not hold the flanks together, there is none:
-    the drive rattles. Such a record, or one for which none is found, cannot speak for or against
-    the laws and is predicted without them.
+    Where a clearance would open because the load does not hold the flanks together, the drive
+    rattles and has no steady state. Such a record, or one for which none is found, is no evidence
+    for or against the laws and is predicted without them.
     """
     motor = SpeedLoop(rig.proportional, rig.integral)
 
@@ -170,7 +170,7 @@ def moves_steadily(
     ----------
     believed, rig, conditions
     values : dict of ndarray, shape (1,)
-        As of `predict`.
+        As in `predict`.
     """
     coefficients = coefficients_of(believed, values, (), len(conditions))
     motion = harmonic_balance(
@@ -185,7 +185,7 @@ def moves_steadily(
 
 
 def _merged(held: SteadyMotion, plain: SteadyMotion, places: NDArray[np.bool_]) -> SteadyMotion:
-    """Put rows together again: ``held`` where ``places``, ``plain`` elsewhere."""
+    """Merge rows: those of ``held`` at ``places``, those of ``plain`` elsewhere."""
     order = np.argsort(np.concatenate([np.flatnonzero(places), np.flatnonzero(~places)]))
     joined = [
         np.concatenate([getattr(held, name), getattr(plain, name)])[order] for name in BY_CASE
@@ -229,7 +229,7 @@ def coefficients_of(
 def _line(
     balance: SteadyMotion, phasors: NDArray[np.complex128], order: float
 ) -> NDArray[np.complex128]:
-    """Return the phasors of one order, (n,); zero where the balance has no such order."""
+    """Return the phasors of one order, (n,); zero if the balance has no such order."""
     place = balance.torus.find(order)
     if place is None:
         return np.zeros(len(phasors), dtype=complex)
@@ -238,7 +238,7 @@ def _line(
 
 
 def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:
-    """Return the harmonics of a motor's ripple, which its torque sensor sees; (1, n_harmonics)."""
+    """Return the harmonics of a motor's ripple, as its torque sensor reads it; (1, n_harmonics)."""
     total = np.zeros((1, len(balance.torus.orders)), dtype=complex)
     for port, law in coefficients.laws:
         for order in law.orders if port == "input" and law.drives else ():
@@ -256,7 +256,7 @@ def _read(
     mean: NDArray[np.float64],
     phasors: NDArray[np.complex128],
 ) -> None:
-    """Add in place what the sensors add: offset, drift, eccentricity, gains and zeros."""
+    """Add the errors of the sensors in place: offset, drift, eccentricity, gains and zeros."""
     mean[..., 0] += values["offset"][:, None]
     session = Session(orders, believed.ratio, conditions.elapsed, conditions.bends)
     for effect in effects:

@@ -1,4 +1,4 @@
-"""The proof on records that were not fitted: how far the model was off before and after.
+"""Validation on records that were not fitted: the error of the model before and after.
 
 Differences are taken between means and order lines, measured and predicted at the loads measured;
 their squares add up to a `Gap`.
@@ -65,7 +65,7 @@ class Proof:
     channels : dict of Gap
         By name of the channel, over all records.
     overall : Gap
-        Over all features, whitened by their full covariance: a perfect model leaves 1.
+        Over all features, whitened by their full covariance: 1 for a perfect model.
     by_record : tuple of Gap, length r
         Of the transmission error.
     orders : ndarray, shape (1 + m,)
@@ -73,14 +73,14 @@ class Proof:
     by_order : tuple of Gap, length 1 + m
         Of the transmission error.
     dte : ndarray, shape (3, r)
-        Peak-to-peak over one output turn, arcsec, of the transmission error that the order lines
-        make up: measured, before, after.
+        Peak-to-peak over one output turn, arcsec, of the sum of the order lines of the transmission
+        error: measured, before, after.
     metrics : tuple of ValidationMetrics, or None
         Of ``dte`` before and after; None for fewer than two records.
     leading : str
-        Channel in which the base stands out of the noise most.
+        Channel in which the error of the base is largest in units of the noise.
     worst : str
-        Record that the base misses most in that channel, in multiples of the noise floor.
+        Record with the largest error of the base in that channel, in multiples of the noise floor.
     overlays : tuple of Overlay
         Transmission error and one torque of that record.
     """
@@ -98,7 +98,7 @@ class Proof:
     overlays: tuple[Overlay, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what goes into the verdict as plain values; the transmission error leads."""
+        """Return the entry in the verdict as plain values, the transmission error first."""
         metrics = None
         if self.metrics is not None:
             metrics = {
@@ -137,7 +137,7 @@ def prove(finding: DriveFinding) -> Proof | None:
     difference = predicted - data.features.values
     white = data.whiten(difference).reshape(len(fits), len(data.features.records), -1)
     overall = np.sqrt(np.mean(white**2, axis=(1, 2)))
-    # Squares (2, r, channel, 1 + m) that each mean and line adds, and the same of the noise.
+    # Contributions of each mean and line to the squares (2, r, channel, 1 + m), and of the noise.
     squares = np.stack([_squares(data, difference**2, channel) for channel in range(3)], axis=2)
     noise = np.diagonal(data.covariance, axis1=1, axis2=2)
     floor = np.stack([_squares(data, noise, channel) for channel in range(3)], axis=1)
@@ -210,7 +210,7 @@ def _phasors(data: Data, features: Values, channel: int) -> NDArray[np.complex12
 
 
 def _dte(data: Data, features: Values) -> Values:
-    """Return the peak-to-peak over one output turn that the lines of features (r, f) make up."""
+    """Return the peak-to-peak over one output turn of the sum of the lines of features (r, f)."""
     spectrum = OrderSpectrum(data.features.orders, _phasors(data, features, 0))
     return spectrum.peak_to_peak(data.campaign.believed.ratio) / ARCSEC
 
@@ -277,11 +277,11 @@ class Gap:
     Attributes
     ----------
     before, after : float
-        Of the fitted base, and of the model with what was named.
+        Of the fitted base, and of the model with the named effects.
     noise_floor : float
     unit : str
     least_share : float
-        Of the noise floor, by which a gap exceeds it that can be said to shrink.
+        Least excess of a gap over the noise floor, as a share of it, for a shrinkage to be stated.
     """
 
     before: float
@@ -304,6 +304,6 @@ class Gap:
         return 1.0 - (self.after - self.noise_floor) / excess
 
     def as_dict(self) -> dict[str, Any]:
-        """Return all of it as plain values."""
+        """Return the gap as plain values."""
         sizes = {name: getattr(self, name) for name in ("before", "after", "noise_floor", "unit")}
         return sizes | {"shrinkage": self.shrinkage, "reduction": self.reduction}

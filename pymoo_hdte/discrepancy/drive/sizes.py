@@ -1,7 +1,7 @@
 """Sizes of the ports of a drive, from which effects are guessed: see `pymoo_hdte.laws.guess`.
 
-All of them come from the records and the believed drive: how fast and how heavily loaded it ran,
-and what the base leaves in each channel.
+All of them come from the records and the believed drive: its speeds and loads, and the residual of
+the base in each channel.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive.effects import DriveSizes
 
 LARGEST = 5.0
-"""Largest line of the transmission error that is missing, in units of what the base leaves of it:
-nothing in the base takes up a line, but at a resonance it may be some times as small in one record
-as in another."""
+"""Largest missing line of the transmission error, in units of the residual of the base: the base
+absorbs no line, but because of a resonance a line may be several times smaller in one record than
+in another."""
 _SHAFTS = {"input": (1.0, 2.0), "output": (1.0,), "mesh": (1.0, 2.0), "sensor": (1.0,)}
-"""Orders at which a shaft is uneven by its making: once a turn, and twice where it is the wave
+"""Orders at which a shaft varies by design or manufacture: once a turn, and twice for the wave
 generator, which has two lobes."""
 
 
 @dataclass(frozen=True)
 class Scales:
-    """How the records of a campaign were taken, and what the base leaves of them; SI.
+    """Sizes of the conditions of a campaign, and of the residual of the base; SI.
 
     Attributes
     ----------
@@ -40,8 +40,8 @@ class Scales:
     duration : float
         From the first record of the session to the last, s.
     error, input_torque, output_torque : float
-        What the base leaves of the transmission error, rad, and of the two torques, N.m: root of
-        the mean square over a record, means and lines together.
+        Residual of the base in the transmission error, rad, and in the two torques, N.m: root mean
+        square over a record, means and lines together.
     """
 
     speed: float
@@ -105,21 +105,21 @@ def port_sizes(
     ----------
     believed : BelievedDrive
     orders : sequence of float
-        All orders of the features: harmonics beyond them would be guesses.
+        All orders of the features: harmonics beyond them could not be determined.
     seen : sequence of float
-        Orders at which something was seen.
+        Orders with significant lines.
     scales : Scales
     """
     at_output = max(scales.output_torque, believed.ratio * scales.input_torque)
     residual = {
         "input": scales.input_torque,
-        # What brakes the output is missing at the input, N times as small.
+        # A braking torque at the output shows at the input, reduced by the factor N.
         "output": at_output,
-        # A torsion that is missing is a torque by the stiffness.
+        # A missing torsion is converted into a torque by the stiffness.
         "mesh": max(at_output, believed.stiffness * scales.error),
         "sensor": 0.0,
     }
-    # No friction is larger than all the torque, whatever part of it the base takes up.
+    # Friction cannot exceed the whole torque, whatever part of it the base absorbs.
     largest = {
         "input": scales.motor_torque,
         "output": believed.ratio * scales.motor_torque,
@@ -139,7 +139,7 @@ def port_sizes(
         shown=tuple(orders),
         error=scales.error,
         largest_error=LARGEST * scales.error,
-        # A line believed to be nothing is missing where it is something.
+        # A line believed to have amplitude zero may be missing.
         believed_orders=tuple(order for order, amplitude in lines if amplitude > 0.0),
         ratio=believed.ratio,
         inertia=max(believed.load_inertia, 10.0 * believed.output_inertia),
@@ -149,8 +149,8 @@ def port_sizes(
     return {
         port: replace(
             shared,
-            # What is missing lies between what the base leaves of it, which takes up the rest, and
-            # the whole torque: of values on a logarithmic scale, in the middle.
+            # The missing torque lies between the residual, since the base absorbs a part of it, and
+            # the whole torque: the middle on a logarithmic scale.
             force=(residual[port] * largest[port]) ** 0.5,
             residual=residual[port],
             largest=largest[port],

@@ -1,4 +1,4 @@
-"""."""
+"""Early evidence: an effect that only the torsion sweeps show, and unexpected order lines."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
 
 def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> str | None:
-    """Return the name of the effect that the torsion sweeps alone speak for, if they do.
+    """Return the name of the effect that the torsion sweeps alone indicate, if any.
 
-    At rest a clearance is a jump at zero torque that no other law imitates, whereas in a running
-    record it may rattle and look like anything.
+    At rest a clearance is a jump at zero torque that no other law imitates, whereas a running
+    record with rattling has no steady state that would identify it.
     """
     base = fitted.values[None, : len(data.base)]
     before = data.torsion_residuals(base, fitted.effects)[0]
@@ -46,7 +46,7 @@ def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate
 def unexpected_orders(
     features: Features, ratio: float, rig: Rig, rules: Rules = RULES
 ) -> list[float]:
-    """Return orders beyond those of the features at which records show more than noise.
+    """Return orders beyond those of the features at which the residual exceeds the noise.
 
     The strongest first, summed over channels and records; fixed frequencies, whose order differs
     from record to record, do not add up and come last.

@@ -15,16 +15,16 @@ from pymoo_hdte.discrepancy.campaign.torsion_sweep import TorsionLeg, torsion_le
 Values = NDArray[np.float64]
 
 _CLEAR = 4.0
-"""Standard deviations beyond which a step from row to row is a jump, as in a clearance."""
+"""Least step from row to row that counts as a jump, as in a clearance, in standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
 class TorsionPoints:
     """Means of consecutive rows of a torsion sweep, in the order of the path.
 
-    A model of them is `pymoo_hdte.drive.mean_torsion` of ``path`` at ``intervals``.
-    Gain and zero error of the torque sensor are not in the covariance: one value of each moves all
-    points, so that they are parameters; the true path is (path - zero) / (1 + gain).
+    A model of them is `pymoo_hdte.drive.mean_torsion` of ``path`` at ``intervals``. Gain and zero
+    error of the torque sensor are not in the covariance: they are common to all points and
+    therefore parameters; the true path is (path - zero) / (1 + gain).
 
     Attributes
     ----------
@@ -33,8 +33,8 @@ class TorsionPoints:
     angle : ndarray, shape (b,)
         Mean of minus the output angle, rad: the torsion plus an unknown constant.
     covariance : ndarray, shape (b, b)
-        Of ``angle`` over ``torque``, rad2: white noise of the encoder, and what is left of the
-        torque noise, which is common to the points of a leg.
+        Of ``angle`` at given ``torque``, rad2: white noise of the encoder, and the residual torque
+        noise, which is common to the points of a leg.
     path : ndarray, shape (m,)
         Torques at the turning points and at the beginnings and ends of the points, N.m.
     intervals : ndarray of int, shape (b,)
@@ -54,7 +54,7 @@ class TorsionPoints:
 
     @property
     def whitening(self) -> Values:
-        """Matrix (b - 1, b) that frees angles of their constant and gives them unit covariance."""
+        """Matrix (b - 1, b) that removes the angles' constant and gives them unit covariance."""
         white = np.linalg.inv(np.linalg.cholesky(self.covariance))
         constant = white.sum(axis=1, keepdims=True)
         basis = np.linalg.qr(constant, mode="complete")[0]
@@ -94,7 +94,7 @@ def torsion_points(record: TorsionRecord, rig: Rig) -> TorsionPoints:
 
 
 def _means(leg: TorsionLeg) -> Values:
-    """Return the matrix from the coefficients of the leg to the mean torques of the points."""
+    """Return the matrix that maps the coefficients of the leg to the mean torques of the points."""
     return np.array([rows.mean(axis=0) for rows in leg.split(leg.basis(leg.time))])
 
 
@@ -105,7 +105,7 @@ def _covariance(legs: list[TorsionLeg], rig: Rig) -> Values:
     by_leg = [one[:, None] * _means(leg) for one, leg in zip(local, legs, strict=True)]
     influence = block_diag(*by_leg)
     rows, columns = (np.cumsum([0, *(part.shape[i] for part in by_leg)]) for i in (0, 1))
-    # What does not follow the load, as before breakaway, still hangs on the last turning point.
+    # Where the angle does not follow the load, as before breakaway, it depends on the last turn.
     for i in range(1, len(legs)):
         hanging = np.maximum(usual - local[i], 0.0)
         at_turn = np.outer(hanging, _turning_torque(legs[i - 1], legs[i]))
@@ -116,7 +116,7 @@ def _covariance(legs: list[TorsionLeg], rig: Rig) -> Values:
 
 
 def _compliance(leg: TorsionLeg, rig: Rig) -> Values:
-    """Return the slope of angle over torque at each point, rad/(N.m); 0 where the load rests."""
+    """Return the slope of angle over torque at each point, rad/(N.m); 0 at constant load."""
     slopes = []
     for load, angle in zip(leg.split(leg.torque(leg.time)), leg.split(leg.angle), strict=True):
         least = rig.output_torque_noise**2 / len(load)
@@ -127,7 +127,7 @@ def _compliance(leg: TorsionLeg, rig: Rig) -> Values:
 def _turning_torque(one: TorsionLeg, other: TorsionLeg) -> Values:
     """Return the derivatives, by the coefficients of both legs, of the torque where they meet."""
     before, after = one.slope(one.end), other.slope(one.end)
-    # Where two lines cross, the steeper one says less about the torque; both the same at rest.
+    # Where two lines cross, the steeper one determines the torque less; equal weights at rest.
     share = np.clip(before / (before - after), 0.0, 1.0) if before != after else 0.5
     sides = [(1.0 - share) * one.basis(one.end)[0], share * other.basis(one.end)[0]]
     return np.concatenate(sides)

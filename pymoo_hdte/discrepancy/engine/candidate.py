@@ -1,7 +1,7 @@
-"""A candidate: one effect that the workflow can name, with its unknowns, their ranges, its words.
+"""A candidate: one effect that a verdict can name, with its unknowns, ranges and sentence.
 
-A candidate turns a vector of values into what a model of the machine takes as effects. What it is
-made of stands with the effect: see `pymoo_hdte.laws.guess`.
+A candidate turns a vector of values into effects of a model of the machine. It is made from a guess
+of its effect: see `pymoo_hdte.laws.guess`.
 """
 
 from __future__ import annotations
@@ -29,25 +29,25 @@ class Candidate:
     parameters : tuple of Parameter
         Its unknowns; ``start`` is a typical strength.
     starts : tuple of tuple of float
-        Where the joint fit begins, and the directions that the screening tries.
+        Values from which the joint fit starts, and the directions that the screening tries.
     build : callable
-        From values to the effects of the model that make it up.
+        From values to its effects in the model.
     sentence : str
         What it is, for the report.
     order : float or None
         Cycles per input turn, where the candidate has one.
     exact : bool
-        Whether its form leaves nothing open, so that it must explain the misfit down to the noise;
-        the curve of a friction or a stiffness is only ever approximately the library's.
+        Whether its form is known exactly, so that it must explain the misfit down to the noise;
+        real curves of friction or stiffness follow those of the library only approximately.
     listed : bool
-        Whether its name may stand in a verdict; if not, it is there so that what it explains is
-        not laid at another's door.
+        Whether a verdict may name it; if not, it serves to keep the misfit that it explains from
+        being attributed to another effect.
     frees : str or None
-        Base parameter whose tolerance it lifts.
+        Base parameter that it frees of its tolerance.
     form : str
         In a word, where the library holds several forms of one effect.
     unit : callable or None
-        From an unknown, or the line that two of them are parts of, to its SI unit.
+        From an unknown, or the line whose cosine and sine parts two of them are, to its SI unit.
     """
 
     name: str
@@ -72,18 +72,18 @@ class Candidate:
 
     @property
     def places(self) -> frozenset[Place]:
-        """Where its effects stand in a drive model, which takes one of a name at each place."""
+        """Places of its effects in a drive model, which takes one of a name at each place."""
         return frozenset(place_of(effect) for effect in self.build(self.starts[0]))
 
     def goes_with(self, other: Candidate) -> bool:
-        """Tell whether a drive may have both: no two of their effects at one place."""
+        """Tell whether a drive may have both: no two of their effects are at one place."""
         return not self.places & other.places
 
     @property
     def linear(self) -> bool:
         """Whether a prediction is close to linear in all its unknowns: parts of lines, and levels.
 
-        Each of `starts` then goes along one of them.
+        Each of `starts` then changes one of them.
         """
         return all(one.linear for one in self.parameters)
 
@@ -107,14 +107,14 @@ def candidate_of(
     ----------
     effect : Effect
     guess : Guess
-        The form in which it may be there.
+        The form that it may have.
     port : str
     force : str
-        What acts at the port, in a word.
+        Word for what acts at the port.
     standing : callable
-        From the name of an effect, port and law (or what else it is) to what a model takes.
+        From the name of an effect, port and law (or other change) to an effect of a model.
     slower : float
-        Turns of the reference shaft, in whose turns orders are, per turn of the port.
+        Turns of the reference shaft, to which orders refer, per turn of the port.
     """
     family = guess.family
     order = None if family is None or family.order is None else family.order / slower
@@ -138,7 +138,7 @@ def candidate_of(
 
 
 def out_of_tolerance(name: str, words: str) -> Candidate:
-    """Return the candidate that lifts the tolerance of a base parameter, which is ``words``."""
+    """Return the candidate that frees a base parameter, called ``words``, of its tolerance."""
     return Candidate(
         "parameter",
         name,
@@ -153,7 +153,7 @@ def out_of_tolerance(name: str, words: str) -> Candidate:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each parameter stands in a vector of values, shape (..., n_parameters)."""
+    """Index of each parameter in a vector of values, shape (..., n_parameters)."""
 
     parameters: tuple[Parameter, ...]
 
@@ -161,7 +161,7 @@ class Layout:
         return len(self.parameters)
 
     def index(self, name: str) -> int:
-        """Return the place of a parameter."""
+        """Return the index of a parameter."""
         return [parameter.name for parameter in self.parameters].index(name)
 
     def array(self, attribute: str) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
 """Chi-square of a fit beyond its degrees of freedom, by record and part of the data.
 
-The misfit is weighed in each part of the data by itself: a sweep at rest may stand out a thousand
-times further than the transmission error, and an effect that explains only the one must not pass
-for the cause of the other.
+Each part of the data is judged separately: the misfit of a sweep at rest may be a thousand times
+that of the transmission error, and an effect that explains only the one must not count as the cause
+of the other.
 """
 
 from __future__ import annotations
@@ -22,8 +22,9 @@ class Excess:
     Attributes
     ----------
     chi_square : ndarray, shape (rows, parts)
-        Excess by record and part. What is no record counts as a row of its own.
-    freedom : ndarray, shape (rows, parts)
+        Excess by record and part. Data without a running record, such as sweeps, have a row of
+        their own.
+    degrees_of_freedom : ndarray, shape (rows, parts)
         Degrees of freedom.
     """
 
@@ -36,13 +37,13 @@ class Excess:
         return np.asarray(self.chi_square.sum(axis=0))
 
     def significant(self, rules: Rules) -> NDArray[np.bool_]:
-        """Return whether it is more than noise, of each part, shape (parts,)."""
+        """Return for which parts, shape (parts,), the excess is significant."""
         noise = np.sqrt(2.0 * self.degrees_of_freedom.sum(axis=0))
         return np.asarray(self.of_parts > rules.false_alarm_deviations * noise)
 
     @property
     def worst(self) -> NDArray[np.int_]:
-        """Row of each part with most of it, shape (parts,); -1 where a part has but one row."""
+        """Row of each part's largest excess, shape (parts,); -1 where a part has only one row."""
         several = np.count_nonzero(self.degrees_of_freedom, axis=0) > 1
         return np.where(several, np.argmax(self.chi_square, axis=0), -1)
 

@@ -18,12 +18,12 @@ from pymoo_hdte.laws.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 Response = Callable[[Sequence[Any]], Vector]
-"""From effects that are added to a fit to what its whitened residuals change by, shape (n,)."""
-# Of the search; how long it may take is a rule of `Rules`.
+"""From effects that are added to a fit to the change of its whitened residuals, shape (n,)."""
+# Settings of the search; its largest number of steps is in `Rules`.
 _STEP = 1e-3
 """Step of difference quotients, in units of a parameter's scale."""
 _FREED = 10.0
-"""Factor by which a base parameter whose tolerance is lifted may be off."""
+"""Factor by which a base parameter without tolerance may deviate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +86,12 @@ class Fit:
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
-        """Of the values, from the curvature at the optimum and the bounds; shape (n, n).
+        """Covariance of the values, from the curvature at the optimum and the bounds; shape (n, n).
 
-        What the model leaves beyond noise counts as noise (Birge, Physical Review 40, 1932), so
-        that a form that is not quite right is not taken for exact. The bounds count as the variance
-        of a uniform distribution between them: what no record determines is as uncertain as they
-        are wide.
+        A residual beyond the noise counts as noise (Birge, Physical Review 40, 1932), so that an
+        approximate form does not get intervals that are too narrow. The bounds count as the
+        variance of a uniform distribution between them, which is that of a value that no record
+        determines.
         """
         degrees_of_freedom = max(len(self.residuals) - len(self.values), 1)
         curvature = self.jacobian.T @ self.jacobian / max(self.chi_square / degrees_of_freedom, 1.0)
@@ -103,8 +103,8 @@ class Fit:
     def evidence(self) -> float:
         """Minus twice the logarithm of the model's probability, by Laplace's approximation.
 
-        Chi-square and, for each parameter, how much the data narrowed what its bounds allow
-        (MacKay, Neural Computation 4, 1992): what no record determines costs nothing.
+        Chi-square and, for each parameter, a term for how much the data narrowed its range (MacKay,
+        Neural Computation 4, 1992): a value that no record determines costs nothing.
         """
         information = self.jacobian.T @ self.jacobian * np.outer(self._widths, self._widths) / 12.0
         _, narrowed = np.linalg.slogdet(information + np.eye(len(information)))
@@ -172,16 +172,16 @@ class Residuals(Protocol):
 
 
 class Evidence(Protocol):
-    """Measurements that a model of few unknowns and effects can be held against.
+    """Measurements with which a model of few unknowns and effects can be compared.
 
     Attributes
     ----------
     base : tuple of Parameter
         Unknowns of the model without effects.
     rules : Rules
-        By which it is judged.
+        Thresholds of the verdict.
     remainder : float
-        Share of the base's excess that is no effect's, because no model of such data is exact.
+        Share of the base's excess that is attributed to no effect, since no model is exact.
     """
 
     @property
@@ -196,7 +196,7 @@ class Evidence(Protocol):
 
     @property
     def remainder(self) -> float:
-        """Share of the base's excess up to which what is left is nobody's effect."""
+        """Share of the base's excess up to which a residual is attributed to no effect."""
         ...
 
     def objective(
@@ -210,7 +210,7 @@ class Evidence(Protocol):
         ...
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
-        """Return where the residuals of each part of the data stand."""
+        """Return the indices of the residuals of each part of the data."""
         ...
 
     def excess(self, fitted: Fit) -> Excess:
@@ -223,7 +223,7 @@ class Evidence(Protocol):
 
 
 class Unknowns:
-    """What a fit with a set of candidates may change: base parameters first, then theirs.
+    """Unknowns of a fit with a set of candidates: base parameters first, then theirs.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ class Unknowns:
         self.bounded = np.isfinite(self.prior)
 
     def steps(self, values: Vector) -> Vector:
-        """Return steps of quotients; an effect's strength cannot fall below zero."""
+        """Return steps of difference quotients; an effect's strength cannot fall below zero."""
         return np.where(values + _STEP * self.scale > self.upper, -_STEP, _STEP)
 
     def priors(self, values: Vector) -> Vector:

@@ -1,6 +1,6 @@
-"""Sets of effects fitted jointly with the base: how much of the misfit each explains, and where.
+"""Hypotheses: sets of effects fitted jointly with the base, and the misfit that each explains.
 
-An effect that explains one part of the data only must not pass for the cause of the others: see
+An effect that explains only one part of the data must not count as the cause of the others: see
 `excess`.
 """
 
@@ -49,7 +49,7 @@ class Hypothesis:
 
     @property
     def exact(self) -> bool:
-        """Whether the forms of all of them leave nothing open."""
+        """Whether the forms of all of them are known exactly."""
         return all(candidate.exact for candidate in self.candidates)
 
     @property
@@ -64,7 +64,7 @@ class Hypothesis:
 
 
 def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
-    """Return a fit with its evidence, the base's excess chi-square being given."""
+    """Return a fit with its evidence, for a given excess chi-square of the base."""
     n_base = len(fitted.values) - count(fitted.candidates)
     unknowns = n_base + sum(candidate.unknowns for candidate in fitted.candidates)
     bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
@@ -84,10 +84,10 @@ def down_to_noise(fitted: Fit, degrees_of_freedom: int, rules: Rules) -> bool:
 
 
 def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
-    """Tell which parts of the data, of those that contradict the base, a fit plainly misses too.
+    """Tell which parts of the data that contradict the base clearly contradict a fit, too.
 
-    Shape (parts,), as `Excess` has them. Of several records the worst is left out: one condition
-    may lie at a resonance, where no form is exact.
+    Shape (parts,), as `Excess` has them. If there are several records, the worst is left out: it
+    may be at a resonance, where no form is exact.
     """
     before, after, rules = data.excess(base), data.excess(fitted), data.rules
     worst = after.worst
@@ -99,7 +99,7 @@ def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
 
 
 def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
-    """Tell whether a set of effects removes what is wrong with the base, and wherever it is."""
+    """Tell whether a set of effects explains the misfit of the base, in all parts of the data."""
     rules, limit = data.rules, adequate(degrees_of_freedom, data.rules)
     gain = base.chi_square - one.fit.chi_square
     unknowns = sum(candidate.unknowns for candidate in one.candidates)
@@ -115,10 +115,10 @@ def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int
 def alike(
     one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules, margin: float = 1.0
 ) -> bool:
-    """Tell whether the data cannot separate a set of other effects from the chosen one.
+    """Tell whether another hypothesis is indistinguishable from the chosen one with these data.
 
-    Where even the chosen form leaves more than noise, that remainder is the scale on which chi-
-    squares differ: hidden and listed forms of one effect differ in kind.
+    Where even the chosen form leaves more than noise, differences of chi-square are compared with
+    this residual: the true form of an effect may differ from the listed one.
     """
     if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
         return False
@@ -131,7 +131,7 @@ def alike(
 
 
 def contains(one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether a set differs from another only by laws that hold the other's as special cases.
+    """Tell whether a set is nested: it differs from another only by laws that contain the other's.
 
     Stribeck's friction without its excess is Coulomb's: it always explains as much.
     """
@@ -148,7 +148,7 @@ def contains(one: Hypothesis, other: Hypothesis) -> bool:
 
 
 def refined(data: Evidence, one: Hypothesis, excess: float) -> Hypothesis:
-    """Fit a hypothesis further from where it ended, with slopes of its own."""
+    """Continue the fit of a hypothesis from its last values, with slopes of its own."""
     evaluations = data.rules.refinement_evaluations
     return hypothesis_of(fit(data, one.candidates, one.fit.values, evaluations), excess)
 
@@ -156,7 +156,7 @@ def refined(data: Evidence, one: Hypothesis, excess: float) -> Hypothesis:
 def fit_all(
     data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float
 ) -> list[Hypothesis]:
-    """Fit candidates, each jointly with what stands; by rising BIC."""
+    """Fit candidates, each jointly with the given effects; by rising BIC."""
     rules, found = data.rules, []
     for one in chosen:
         start = np.concatenate([base.values, one.start])
@@ -168,6 +168,6 @@ def fit_all(
 
 
 def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
-    """Return the candidates without those behind ``most`` better ones of their name."""
+    """Return at most the ``most`` best candidates of each name."""
     names = [one.candidate.name for one in screened]
     return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < most]

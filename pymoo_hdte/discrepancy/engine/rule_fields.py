@@ -1,4 +1,4 @@
-"""What a rule of the verdict is: a number with its meaning, its unit and where it comes from."""
+"""A rule of the verdict: a number with its meaning, its unit and its derivation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from pymoo_hdte.checks import real_number, whole_number
 
 BY_HAND = "Set by hand on 2026-11-21"
-"""Date of the hand-set values, all of which were chosen on campaigns made for that purpose."""
+"""Derivation of hand-set values, all of which were chosen on campaigns made for that purpose."""
 
 
 @dataclass(frozen=True)

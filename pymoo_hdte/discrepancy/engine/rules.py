@@ -1,12 +1,12 @@
 """All thresholds of the verdict in one place: `Rules`, each with its meaning, unit and derivation.
 
-Here stand the rules for adequacy, false alarms and names. What records must have, and when a line
-counts as seen, stands in `rules_of_records`; what a report flags and shows as certain in
+The rules for adequacy, false alarms and names are here. Requirements on records, and thresholds at
+which a line counts as seen, are in `rules_of_records`; what a report flags and shows as certain in
 `rules_of_report`. `Rules` has them all.
 
-Steps of difference quotients, orders of filters and tolerances of solvers are no rules. They stand
-beside the code that needs them, since a finer one changes the digits of an answer and not what
-counts as an answer.
+Steps of difference quotients, orders of filters and tolerances of solvers are no rules. They are
+kept beside the code that needs them, since finer ones change the digits of a result but not the
+criteria of a verdict.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from pymoo_hdte.discrepancy.engine.rules_of_report import ReportRules
 class Rules(ReportRules, RecordRules):
     """Every threshold that decides what is named, refused, flagged or shown as certain.
 
-    ``analyse(campaign, rules=...)`` and ``investigate(..., rules=...)`` take one; `RULES` is what
-    they take by default. `explained` returns all of them in words.
+    ``analyse(..., rules=...)`` takes one, by default `RULES`. `explained` returns all of them in
+    words.
 
     Raises
     ------
@@ -56,7 +56,7 @@ class Rules(ReportRules, RecordRules):
         "in 100 gave 18.",
     )
 
-    # Which effect, and does it explain the misfit?
+    # Which effect is it, and does it explain the misfit?
     bic_gain: float = rule(
         6.0,
         "twice the logarithm of a probability ratio",
@@ -225,7 +225,7 @@ class Rules(ReportRules, RecordRules):
         f"{BY_HAND} as a budget of time.",
     )
 
-    # Other machines than a drive, no model of which meets the noise of its sensors.
+    # Machines other than a drive, whose models never fit down to the noise of the sensors.
     mechanism_remainder: float = rule(
         0.05,
         "share of the excess chi-square of the base",

@@ -1,4 +1,4 @@
-"""Rules for what beliefs and records must be, and when a line of theirs counts as seen."""
+"""Rules for accepting believed values and records, and for counting a line as seen."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from pymoo_hdte.units import ARCSEC
 
 @dataclass(frozen=True, kw_only=True)
 class RecordRules(RuleSet):
-    """Thresholds by which beliefs and records are refused, left out, or show a line.
+    """Thresholds for refusing believed values and records, leaving records out, and seeing lines.
 
     See `rules.Rules`, which has them all.
     """
 
-    # Can these numbers come from this drive? Wide enough for every effect a campaign may hide.
+    # Plausibility of numbers: wide enough for every effect that a campaign may contain.
     largest_transmission_error: float = rule(
         0.02,
         "rad",
@@ -89,7 +89,7 @@ class RecordRules(RuleSet):
         "parameters.",
     )
 
-    # Which lines of a drive are looked at, and which count as seen?
+    # Which lines of a drive are analysed, and which count as seen?
     highest_order: float = rule(
         14.0,
         "cycles per input turn",
@@ -169,7 +169,7 @@ class RecordRules(RuleSet):
         at_least=1.0,
     )
 
-    # Other machines than a drive.
+    # Machines other than a drive.
     noise_power_ratio: float = rule(
         2.0,
         "ratio of powers",

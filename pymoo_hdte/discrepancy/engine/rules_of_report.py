@@ -1,4 +1,4 @@
-"""Rules for what a report flags, what it says of it, and what it shows as certain."""
+"""Rules for what a report flags, how it describes a misfit, and what it shows as certain."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class ReportRules(RuleSet):
         f"{BY_HAND}: one line that leaks fills two.",
     )
 
-    # What can these records not tell?
+    # Which questions can these records not answer?
     one_speed_ratio: float = rule(
         1.1,
         "ratio",

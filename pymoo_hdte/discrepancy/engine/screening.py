@@ -1,9 +1,10 @@
-"""Which candidates could explain a misfit at all: their signatures held against what is left.
+"""Screening: which candidates could explain a misfit, by comparing their signatures with it.
 
-A candidate of typical strength changes the features by its signature. What the base parameters can
-imitate of it is taken out; the share of the misfit along the rest is what the candidate could
-remove, to first order, were its strength free. Wrong only for strongly curved effects, which is why
-several strengths are tried and the best few candidates are fitted in earnest afterwards.
+The signature of a candidate is the change of the features by a typical strength of it. The part
+that base parameters can imitate is projected out; the share of the misfit along the remainder is
+what the candidate could remove, to first order, with a free strength. This is wrong for strongly
+nonlinear effects only, so that several strengths are tried and the best candidates are then fitted
+without linearisation.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class Screened:
         Of the whole chi-square.
     start : tuple of float
     by_part : tuple of float
-        Of that of each part of the data alone; empty for a parameter out of tolerance.
+        The same for each part of the data alone; empty for a parameter out of tolerance.
     """
 
     candidate: Candidate
@@ -46,10 +47,10 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
     ----------
     data : Evidence
     fitted : Fit
-        What stands so far, perhaps with effects; its misfit is to be explained.
+        The present model, perhaps with effects, whose misfit is to be explained.
     candidates : sequence of Candidate
     """
-    # A parameter at its bound cannot give way any further.
+    # A parameter at its bound cannot move beyond it.
     orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
     residual = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
     response, parts = data.response(fitted), data.rows_of_parts()
@@ -76,7 +77,7 @@ def _freed(
     orthonormal: NDArray[np.float64],
     residual: NDArray[np.float64],
 ) -> Screened:
-    """Return what a parameter at its bound could remove if it went beyond."""
+    """Return the reduction by a parameter at its bound if it could go beyond."""
     place = [parameter.name for parameter in fitted.parameters].index(str(candidate.frees))
     signature = fitted.jacobian[:, place] * fitted.bound_sides[place]
     signature = signature - orthonormal @ (orthonormal.T @ signature)
@@ -87,7 +88,7 @@ def _freed(
 def _best_start(
     candidate: Candidate, signatures: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> Screened:
-    """Return what the candidate could remove, and its strengths that would do so."""
+    """Return the reduction by the candidate, and the strengths that give it."""
     starts = np.array(candidate.starts)
     lower = np.array([parameter.lower for parameter in candidate.parameters])
     upper = np.array([parameter.upper for parameter in candidate.parameters])
@@ -96,7 +97,7 @@ def _best_start(
         harmonic = [one.name.startswith(HARMONIC_NAMES[1:]) for one in candidate.parameters]
         lines = np.hypot(*best[harmonic].reshape(-1, 2).T)
         if lines.size and lines.max() > np.hypot(*best[:2]):
-            # A line that is weaker than its harmonic is not what the harmonic belongs to.
+            # A line that is weaker than its harmonic is not the fundamental of that harmonic.
             kept = np.flatnonzero(~np.array(harmonic))
             best, reduction = _least_squares(signatures[kept], starts[kept], residual)
     else:
@@ -114,7 +115,7 @@ def _best_start(
 def _least_squares(
     signatures: NDArray[np.float64], starts: NDArray[np.float64], residual: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the values along the starts that remove most, and what they remove."""
+    """Return the values along the starts with the largest reduction, and that reduction."""
     solution, *_ = np.linalg.lstsq(signatures.T, -residual, rcond=1e-10)
     rest = residual + signatures.T @ solution
     return solution @ starts, float(residual @ residual - rest @ rest)

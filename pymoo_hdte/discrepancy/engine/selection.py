@@ -1,7 +1,7 @@
-"""A second effect beside the first: looked for where the first leaves most, and to be earned.
+"""A second effect beside the first: searched where the residual is largest, named if it pays off.
 
-What is left of one part of the data may drown in another, and what a law of no exact form leaves
-may be its form.
+The residual of one part of the data may be hidden by that of another, and the residual of a law
+without exact form may be an error of its form.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from pymoo_hdte.discrepancy.engine.screening import Screened, screen
 def with_second(
     data: Evidence, base: Fit, singles: list[Hypothesis], candidates: Sequence[Candidate]
 ) -> tuple[Hypothesis, list[Hypothesis]]:
-    """Return the set to be named, and all that were fitted: a second effect has to be earned."""
+    """Return the set to be named, with a second effect only if justified, and all fitted sets."""
     degrees_of_freedom = len(base.residuals) - len(base.values)
     excess = base.chi_square - degrees_of_freedom
     best = singles[0]
     if not _second_could_count(data, best, degrees_of_freedom):
         return best, singles
-    # Slopes with the first effect in place, which those of pairs are close to.
+    # Slopes with the first effect included, which approximate those of pairs.
     best = refined(data, best, excess)
     singles = [best, *singles[1:]]
     pairs = _pairs(data, base, best, candidates, excess)
@@ -60,7 +60,7 @@ def with_second(
 
 
 def _second_could_count(data: Evidence, single: Hypothesis, degrees_of_freedom: int) -> bool:
-    """Tell whether a second effect beside this one could be earned at all."""
+    """Tell whether a second effect beside this one could be justified at all."""
     if down_to_noise(single.fit, degrees_of_freedom, data.rules):
         return False
     return single.exact or bool(data.excess(single.fit).significant(data.rules).any())
@@ -69,7 +69,7 @@ def _second_could_count(data: Evidence, single: Hypothesis, degrees_of_freedom: 
 def _promising(
     data: Evidence, pair: Hypothesis, single: Hypothesis, degrees_of_freedom: int
 ) -> bool:
-    """Tell whether a second effect removes so much that its fit is worth being finished."""
+    """Tell whether a second effect removes so much that its fit is worth finishing."""
     residual = single.fit.chi_square - degrees_of_freedom
     removed = single.fit.chi_square - pair.fit.chi_square
     return removed >= data.rules.explained_part_share * residual
@@ -78,9 +78,9 @@ def _promising(
 def _with_second_alone(
     data: Evidence, base: Fit, pair: Hypothesis, singles: list[Hypothesis], excess: float
 ) -> list[Hypothesis]:
-    """Return single effects with the second of a pair among them: it may do alone.
+    """Return single effects including the second one of a pair, which may suffice alone.
 
-    What the screening puts first is not always what fits best.
+    The candidate that the screening ranks first does not always fit best.
     """
     second = pair.candidates[1]
     if any(one.candidates == (second,) for one in singles):
@@ -98,7 +98,7 @@ def _exchanged(
     degrees_of_freedom: int,
     excess: float,
 ) -> list[Hypothesis]:
-    """Return the pair with its first effect exchanged for those that do as well alone."""
+    """Return pairs with the first effect replaced by those that fit as well alone."""
     first, second = pair.candidates
     (best,) = (one for one in singles if one.candidates == (first,))
     rules, found = data.rules, []
@@ -118,8 +118,8 @@ def _pairs(
 ) -> list[Hypothesis]:
     """Return the best pairs that contain the best single effect.
 
-    Seconds are taken from what would remove most of all that is left, and most of what is left of
-    the parts of the data that the first explains ill: either may drown in the other.
+    Second effects are those that would remove most of the whole residual, and most of the residual
+    in the parts of the data that the first explains badly: either may hide the other.
     """
     (first,) = single.candidates
     others = [one for one in candidates if one.frees is None and first.goes_with(one)]
@@ -147,7 +147,7 @@ def _least(data: Evidence, first: Candidate, second: Candidate) -> float:
 def _hopeful(
     screened: Sequence[Screened], reductions: Sequence[float], residual: float, rules: Rules
 ) -> list[Screened]:
-    """Return the best candidates, to first order, if they remove enough of what is left."""
+    """Return the best candidates, to first order, if they remove enough of the residual."""
     order = np.argsort([-reduction for reduction in reductions], kind="stable")
     enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * residual]
     return varied(enough, 1)[: rules.most_seconds]
@@ -156,7 +156,7 @@ def _hopeful(
 def _ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
     """Return the parts of the data that contradict both a base and a fit, the worst first.
 
-    The worst, and what else the fit explains no better than by half.
+    The worst one, and all others that the fit explains by no more than half.
     """
     wrong = np.flatnonzero(before.significant(rules) & after.significant(rules))
     residual = after.of_parts[wrong] / before.of_parts[wrong]
@@ -171,10 +171,11 @@ def _second_earned(
     base: Fit,
     degrees_of_freedom: int,
 ) -> bool:
-    """Tell whether the second effect removes most of what the better of the two leaves alone.
+    """Tell whether the second effect removes most of the residual of the better one alone.
 
-    What a law of no exact form leaves may be its form: a second one at its port must also count
-    beside the base's excess, and one at another port beside what is numerical.
+    The residual of a law without exact form may be an error of its form: a second effect at its
+    port must also be large relative to the base's excess, and one at another port relative to the
+    numerical error.
     """
     rules, labels = data.rules, {candidate.label for candidate in pair.candidates}
     first = min(

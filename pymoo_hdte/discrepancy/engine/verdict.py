@@ -1,10 +1,10 @@
-"""The verdict: is anything missing, which effect is it, and how sure is that answer.
+"""The verdict: whether an effect is missing, which one it is, and how certain the answer is.
 
 The base is fitted within its tolerances first. If it is not adequate, candidates are screened, the
 best few are fitted jointly with the base, and the one with the least BIC is named, provided that it
-removes most of the excess, in no part of the data less than half of it. What the data cannot tell
-from it is named beside it. A second effect must remove most of what the first leaves, in all or in
-the part that the first explains worst.
+removes most of the excess, and at least half of it in each part of the data. Hypotheses that the
+data cannot separate from it are named with it. A second effect must remove most of the first one's
+residual, in total or in the part that the first explains worst.
 """
 
 from __future__ import annotations
@@ -50,10 +50,10 @@ class Verdict:
     alternatives : tuple of Hypothesis
         Other sets that were fitted.
     equivalent : tuple of Hypothesis
-        Those of them that explain the data too and that these cannot tell from the chosen one.
+        Those of them that also explain the data and cannot be separated from the chosen one.
     degrees_of_freedom : int
     rules : Rules
-        By which it was judged.
+        Thresholds of the verdict.
     """
 
     status: str
@@ -66,7 +66,7 @@ class Verdict:
 
     @property
     def accepted(self) -> Fit:
-        """The fit that is believed after the verdict: without effects unless some are named."""
+        """The fit accepted by the verdict: without effects unless some are named."""
         chosen = self.chosen
         return chosen.fit if chosen is not None and self.status in EXPLAINED else self.base
 
@@ -124,9 +124,9 @@ def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict
 def _least_special(
     data: Evidence, chosen: Hypothesis, others: list[Hypothesis], excess: float
 ) -> tuple[Hypothesis, list[Hypothesis]]:
-    """Return the chosen set, or a special case of it that is no worse fitted to the end; others.
+    """Return the chosen set, or a special case that fits as well once converged; and the others.
 
-    Fits of few steps stall now and then, and of two that do the one with more unknowns may lead.
+    Fits with few steps sometimes stall, and of two such fits the one with more unknowns may lead.
     """
     fitted = [
         refined(data, one, excess) if one.names != chosen.names and contains(chosen, one) else one
@@ -137,7 +137,7 @@ def _least_special(
 
 
 def _status(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> str:
-    """Return the status of a set that explains what is wrong."""
+    """Return the status of a set that explains the misfit."""
     if not chosen.listed:
         return "unlisted"
     if equivalent:
@@ -149,8 +149,8 @@ def _status(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> str:
 def _searched(data: Evidence, base: Fit, single: Hypothesis, excess: float) -> Hypothesis:
     """Return the best of fits from all starts of a single effect, with slopes of their own.
 
-    An inertia that is half as large again moves a resonance past lines: the way there is not
-    downhill from everywhere.
+    An inertia that is larger by half moves a resonance past lines, so that chi-square does not
+    decrease steadily on the way there.
     """
     found = [refined(data, single, excess)]
     (candidate,) = single.candidates
@@ -164,7 +164,7 @@ def _searched(data: Evidence, base: Fit, single: Hypothesis, excess: float) -> H
 def _fit_best(
     data: Evidence, base: Fit, screened: Sequence[Screened], excess: float
 ) -> list[Hypothesis]:
-    """Fit the most promising candidates jointly with what stands; by rising BIC."""
+    """Fit the most promising candidates jointly with the given effects; by rising BIC."""
     rules = data.rules
     least = rules.promising_share * screened[0].reduction
     promising = [one for one in screened if one.reduction >= least]

@@ -1,1 +1,1 @@
-"""Measured records of any lumped mechanism: what its model lacks, named and proved."""
+"""Measured records of any lumped mechanism: missing effects of its model, named and validated."""

@@ -1,9 +1,9 @@
-"""From records of a mechanism to a verdict: what is missing, and how much nobody explains.
+"""From records of a mechanism to a verdict: missing effects, and the unexplained residual.
 
-The rules are those of `discrepancy.engine.verdict`. Because no model of a real machine meets the
-noise of its sensors, they are held against the rest: what the two best effects leave. A verdict
-therefore names what stands out of everything that is known to be able to explain it, and says what
-is left.
+The rules are those of `discrepancy.engine.verdict`. Because no model of a real machine fits down to
+the noise of its sensors, they are applied relative to the unexplained residual (the rest): the
+residual of the model with the two best effects. A verdict therefore names effects that are
+significant beyond this residual, and states it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 @dataclass(frozen=True, eq=False)
 class MechanismFinding:
-    """What the workflow finds in measured records.
+    """The result of the analysis of measured records.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class MechanismFinding:
     cutoff : float
         Hz, up to which the motion is known.
     data : MeasuredData
-        Training records; their noise is the rest that nobody explains.
+        Training records; their noise is the unexplained residual.
     verdict : Verdict
         What is missing: its ``status`` is ``"adequate"``, ``"named"``, ``"class"``,
         ``"parameter"`` or ``"unlisted"``.
@@ -90,7 +90,7 @@ class MechanismFinding:
 
     @property
     def base_misfit(self) -> NDArray[np.float64]:
-        """Root mean square of what the base leaves of each balance.
+        """Root mean square of the residual of the base in each balance.
 
         Shape (n_balances,), N or N.m.
         """
@@ -98,7 +98,7 @@ class MechanismFinding:
 
     @property
     def remainder(self) -> NDArray[np.float64]:
-        """Root mean square of what the accepted model leaves of each balance.
+        """Root mean square of the residual of the accepted model in each balance.
 
         Shape (n_balances,), N or N.m.
         """
@@ -125,7 +125,7 @@ def examine_mechanism(
     records : sequence of Record
         At least one of them of role ``train``.
     cutoff : float, optional
-        Hz, up to which the motion is known; by default where it ceases to stand out of its noise.
+        Hz, up to which the motion is known; by default where it falls below its noise.
     known : sequence of LawAt
         Effects that the mechanism is known to have.
     rules : Rules
@@ -138,9 +138,9 @@ def examine_mechanism(
     Raises
     ------
     InvalidInput
-        If no record is to be fitted, a record, of either role, lacks a channel, is too short or too
-        slowly sampled or does not move, two have one name, the mechanism has no port, or no
-        quantity sets the scale: none is known, or the input whose gain is known is only noise.
+        If no record is to be fitted, a record, of either role, lacks a channel, is too short, is
+        sampled too slowly or has no motion, two have one name, the mechanism has no port, or no
+        quantity sets the scale: none is known, or the input with the known gain is only noise.
     """
     train = [record for record in records if record.role == "train"]
     if not train:
@@ -169,9 +169,9 @@ def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:
 
 
 def _with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:
-    """Return the data with what the two best effects leave as the noise.
+    """Return the data with the residual of the two best effects as the noise.
 
-    Which these are depends on the noise; after a few rounds it no longer does.
+    The best effects depend on the noise; after a few rounds they no longer change.
     """
     rules, degrees_of_freedom = sensors.rules, len(base.residuals) - len(base.values)
     if down_to_noise(base, degrees_of_freedom, rules):
@@ -199,7 +199,7 @@ def _best_two(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis
 
 
 def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
-    """Return the verdict in units of the rest, if it stands before what the sensors would show."""
+    """Return the verdict in units of the residual, if it also holds against the sensors' noise."""
     base, rules = fit(data), data.rules
     verdict = _with_true_rivals(data, _simplest(data, judge(data, base, candidates)))
     before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
@@ -218,7 +218,7 @@ def _judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Cand
 def share_removed(sensors: MeasuredData, data: MeasuredData, base: Fit, fitted: Fit) -> float:
     """Return the share of the power beyond the sensors' noise that a fit removes, 0 to 1.
 
-    Each balance in units of its rest, so that N and N.m may stand side by side.
+    Each balance is in units of its residual, so that N and N.m can be added.
     """
     noise = float(np.sum((_in_units_of(data, sensors, np.ones_like(base.residuals))) ** 2))
     beyond = base.chi_square - noise
@@ -227,10 +227,10 @@ def share_removed(sensors: MeasuredData, data: MeasuredData, base: Fit, fitted: 
 
 
 def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
-    """Return the verdict with the model of fewest unknowns that leaves hardly more than the best.
+    """Return the verdict with the model of fewest unknowns that fits nearly as well as the best.
 
-    With many samples the evidence prefers a richer law, or a second effect, for a hair's breadth of
-    a rest that is no noise.
+    With many samples the evidence prefers a richer law, or a second effect, for a minimal reduction
+    of a residual that is no noise.
     """
     chosen = verdict.chosen
     if chosen is None or verdict.status not in ("named", "class"):
@@ -263,9 +263,9 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
 
 
 def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
-    """Return the verdict without hypotheses that leave more of a balance, or contain the chosen.
+    """Return the verdict without hypotheses that fit a balance worse, or contain the chosen one.
 
-    A law that contains the chosen one and does no better is no other explanation.
+    A law that contains the chosen one and fits no better is not a different explanation.
     """
     chosen = verdict.chosen
     if chosen is None or verdict.status != "class":
@@ -291,7 +291,7 @@ def _as_unlisted(verdict: Verdict, nearest: Hypothesis | None) -> Verdict:
 def _in_units_of(
     wanted: MeasuredData, given: MeasuredData, residuals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return whitened residuals as whitened by the deviation of other data."""
+    """Return whitened residuals, whitened by the deviation of other data instead."""
     ratio = [
         (one / other)[balance.kept]
         for one, other, balance in zip(

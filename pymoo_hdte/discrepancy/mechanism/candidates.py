@@ -1,4 +1,4 @@
-"""Every effect that can be named at the ports of a mechanism, in sizes that its records suggest."""
+"""Candidates: every effect that a port of a mechanism may have, with sizes from the records."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pymoo_hdte.mechanism import LawAt, Port
 from pymoo_hdte.mechanism.effects import law_effects
 
 LARGEST = 5.0
-"""Largest force of an effect, in units of the largest that the base leaves of a balance."""
+"""Largest force of an effect, in units of the largest residual of the base in a balance."""
 
 
 def mechanism_candidates(
@@ -32,7 +32,7 @@ def mechanism_candidates(
     forces : mapping of str to float
         By port, size of a force that may be missing there, N or N.m.
     orders : mapping of str to sequence of float
-        By port, orders at which something varies with its position, per unit of it.
+        By port, orders at which the residual varies with its position, per unit of position.
     """
     found = [
         candidate_of(effect, guess, port.name, "force", LawAt)
@@ -47,14 +47,14 @@ def mechanism_candidates(
 def _sought(
     data: MeasuredData, port: Port, force: float, orders: Mapping[str, Sequence[float]]
 ) -> Iterator[tuple[Effect, Sizes]]:
-    """Yield the effects that are looked for at a port, each with the sizes of the port."""
+    """Yield the effects that are searched for at a port, each with the sizes of the port."""
     sizes = port_sizes(data, port, force, orders.get(port.name, ()))
     for effect in law_effects():
         if effect.of_reading == port.read:
             yield effect, sizes
         if effect.drives and not port.read:
             for read in data.mechanism.ports:
-                # What a force sensor shows may be a torque that acts on the motion.
+                # The reading of a force sensor may be caused by a torque that acts on the motion.
                 if read.read and dict(read.motion) == dict(port.motion):
                     yield effect, replace(sizes, seen=tuple(orders.get(read.name, ())))
 
@@ -99,5 +99,5 @@ def turns_back(data: MeasuredData, port: str) -> bool:
     """Tell whether a port moves in both directions, in one record or another."""
     speeds = np.concatenate([one.ports[port].speed for one in data.spectra])
     forward, backward = np.sum(np.maximum(speeds, 0.0)), np.sum(np.maximum(-speeds, 0.0))
-    # Noise of a record at rest changes its sign now and then.
+    # At rest, noise sometimes changes the sign of the speed.
     return bool(min(forward, backward) > data.rules.reverse_share * (forward + backward))

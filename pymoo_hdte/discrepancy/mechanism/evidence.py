@@ -1,8 +1,8 @@
-"""Force balances of measured records, whitened, and the rest that counts as their noise.
+"""Force balances of measured records, whitened, and the unexplained residual as their noise.
 
-The noise of the sensors is estimated from the records. No model of a real machine meets it: what
-the best model leaves, the rest, then counts as noise, as Birge's ratio has it (Physical Review 40,
-1932).
+The noise of the sensors is estimated from the records. No model of a real machine fits down to it:
+the residual of the best model (the rest) then counts as noise, as in Birge's ratio (Physical Review
+40, 1932).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class MeasuredData:
-    """Force balances of records as `fitting.Evidence` wants them.
+    """Force balances of records in the form of `fitting.Evidence`.
 
     Attributes
     ----------
@@ -35,11 +35,11 @@ class MeasuredData:
     spectra : tuple of ForceBalance
         Of the records.
     deviation : tuple of ndarray, shape (n_balances, n_bins)
-        Standard deviation that counts as noise, by record.
+        Standard deviation of what counts as noise, by record.
     known : tuple of LawAt
-        Effects that the base has.
+        Effects of the base.
     rules : Rules
-        By which they are judged.
+        Thresholds of the verdict.
     """
 
     mechanism: Mechanism
@@ -61,7 +61,7 @@ class MeasuredData:
 
     @property
     def remainder(self) -> float:
-        """Share of the base's excess up to which what is left is no effect."""
+        """Share of the base's excess up to which a residual is attributed to no effect."""
         return self.rules.mechanism_remainder
 
     @cached_property
@@ -102,7 +102,7 @@ class MeasuredData:
         return np.concatenate(constants), np.concatenate(slopes)
 
     def whitened_forces(self, base: Vector, effects: Sequence[LawAt]) -> Vector:
-        """Return what effects take from whitened residuals, (n,), at base parameters (n_base,)."""
+        """Return how effects reduce whitened residuals, (n,), at base parameters (n_base,)."""
         prefix = "stiffness of "
         stiffness = {
             one.name.removeprefix(prefix): float(value)
@@ -124,7 +124,7 @@ class MeasuredData:
     def objective(
         self, candidates: Sequence[Candidate], slopes: Values | None = None
     ) -> BalanceObjective:
-        """Return whitened residuals with candidates; slopes are known, they need not be given."""
+        """Return whitened residuals with candidates; slopes are known and need not be given."""
         return BalanceObjective(self, candidates)
 
     def response(self, fitted: Fit) -> Response:
@@ -133,7 +133,7 @@ class MeasuredData:
         return lambda added: -self.whitened_forces(base, added)
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
-        """Return where the residuals of each part stand."""
+        """Return the indices of the residuals of each part."""
         return [np.flatnonzero(self._part == part) for part in range(len(self.names))]
 
     def excess(self, fitted: Fit) -> Excess:
@@ -142,11 +142,11 @@ class MeasuredData:
         return Excess(chi_square - degrees_of_freedom, degrees_of_freedom)
 
     def known_over_noise(self) -> float:
-        """Return by how much what is known exactly stands out of the noise.
+        """Return the ratio of exactly known forces to the noise.
 
         The largest ratio of powers in the force balance of a coordinate in a record. Without a
-        force that is known exactly all others may be a multiple of what they are. What is the same
-        in all records at rest may be the zero of a sensor and does not count.
+        force that is known exactly all others are known up to a common factor only. A part that is
+        the same in all records at rest may be the zero of a sensor and does not count.
         """
         believed = np.array([parameter.start for parameter in self.base])
         known = self._linear[0] - self.whitened_forces(believed, self.known)
@@ -163,7 +163,7 @@ class MeasuredData:
         ]
 
     def with_rest(self, residuals: Vector) -> MeasuredData:
-        """Return the data with what whitened residuals (n,) show beyond the sensors as more noise.
+        """Return the data with whitened residuals (n,) beyond the sensors' noise as further noise.
 
         White, one level for each part of a record: with weights by frequency a model that is
         wrong at low frequencies would be fitted to the others.
@@ -239,7 +239,7 @@ class BalanceObjective(Unknowns):
         found[:, :n_base] = self.data._linear[1] * self.scale[:n_base]
         stands = self._forces(values)
         for place, parameter in enumerate(self.parameters):
-            # A law may hang on the stiffness of its port; masses and dampers are no law's.
+            # A law may depend on the stiffness of its port, but not on masses and dampers.
             if place >= n_base or parameter.name.startswith("stiffness of "):
                 moved = values.copy()
                 moved[place] += steps[place] * self.scale[place]
@@ -278,7 +278,7 @@ def measured_data(
     known : sequence of LawAt
         Effects that the mechanism has.
     rules : Rules
-        By which the records are judged.
+        Thresholds by which the records are judged.
 
     Raises
     ------

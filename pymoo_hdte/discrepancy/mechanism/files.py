@@ -1,8 +1,8 @@
 """A rig in a folder: ``rig.toml`` has its mechanism and lists its records, all without code.
 
-What is believed is a model: coordinates, ports, inputs, loops and effects, each value with its
-tolerance. The ``revised_model.toml`` of a report is one. Numbers of the mechanism are in SI; the
-columns of the records have units of their own::
+The believed model has coordinates, ports, inputs, loops and effects, each value with its tolerance.
+The ``revised_model.toml`` of a report is one. Numbers of the mechanism are in SI; the columns of
+the records have units of their own::
 
     title = "An electro-mechanical positioning system"
     cutoff = 40.0                                  # optional, Hz
@@ -28,8 +28,8 @@ columns of the records have units of their own::
     position_gain = 38995.8
     speed_gain = 243.45
     limit = 10.0                                   # optional
-    [[effects]]                                    # optional: laws that are known to be there
-    name = "coulomb_friction"                      # of `EFFECTS`, with all its numbers
+    [[effects]]                                    # optional: known laws
+    name = "coulomb_friction"                      # of a registered effect, with all its numbers
     port = "joint"
     level = 20.4
 
@@ -79,11 +79,11 @@ class MeasuredMechanism:
     mechanism : Mechanism
         Without the effects that are to be found.
     records : sequence of Record
-        At least one of them of role ``train``; others, ``held_out``, to prove what is found.
+        At least one of them of role ``train``; others, ``held_out``, to validate the result.
     cutoff : float, optional
-        Hz, up to which the motion is known; by default where it ceases to stand out of its noise.
+        Hz, up to which the motion is known; by default where it falls below its noise.
     effects : sequence of LawAt
-        Laws that are known to be there.
+        Laws that the mechanism is known to have.
     title : str
     source : str
         Path of the file that it was read from.
@@ -109,11 +109,11 @@ class MeasuredMechanism:
 
     @property
     def model(self) -> MechanismModel:
-        """What is believed, which `model_text` writes to a file."""
+        """The believed model, which `model_text` writes to a file."""
         return MechanismModel(self.title, self.mechanism, tuple(self.effects), self.cutoff)
 
     def believing(self, model: MechanismModel) -> MeasuredMechanism:
-        """Return the same records with another model of what is believed.
+        """Return the same records with another believed model.
 
         Parameters
         ----------
@@ -133,13 +133,13 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> MeasuredMech
     folder : str or Path
         Where `RIG_FILE` is, or the path of a file like it.
     data : str or Path, optional
-        Folder of the files of the records; without it the folder of the rig's file.
+        Folder of the files of the records; by default the folder of the rig's file.
 
     Raises
     ------
     InvalidInput
-        With file and line, for a field that is missing, unknown or impossible, a name that stands
-        for nothing, a record that is missing, named twice or outside the folder, and whatever
+        With file and line, for a field that is missing, unknown or impossible, a name that refers
+        to nothing, a record that is missing, named twice or outside the folder, and whatever
         `read_table`, `check_sha256`, `Record` and `Mechanism` refuse.
     OSError
         If a file cannot be read.
@@ -169,7 +169,7 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> MeasuredMech
 
 
 def _model(top: Fields, path: Path) -> MechanismModel:
-    """Take what is believed out of a rig's file, or out of the file that it names."""
+    """Take the believed model out of a rig's file, or out of the file that it names."""
     if not top.has("model"):
         return model_from_fields(top, path.name)
     model = read_mechanism_model(path.parent / top.text("model"))
@@ -186,7 +186,7 @@ def _record(
     noise: Mapping[str, float],
 ) -> Record:
     file = entry.text("file")
-    # As Windows has paths, because it takes both separators and knows drives.
+    # As a Windows path, which accepts both separators and drive letters.
     parts = PureWindowsPath(file)
     if parts.anchor or ".." in parts.parts or not (folder / file).is_file():
         raise InvalidInput(f"{place}.file", file, f"a file inside {folder}")
@@ -228,5 +228,5 @@ def _check_sha256(path: Path, expected: str, place: str) -> None:
     except InvalidInput as error:
         if error.field.startswith(path.name):
             raise
-        # The digits themselves are wrong, and they stand in the rig's file.
+        # The digits themselves are invalid, and they are in the rig's file.
         raise InvalidInput(f"{place}.sha256", error.value, error.allowed) from None

@@ -1,10 +1,10 @@
-"""How well the parameters of a fit are known when what is left of the records has a colour.
+"""Uncertainty of the parameters of a fit with coloured (correlated) residuals.
 
-The rest of a real record is not white: neighbouring samples err alike, and the curvature at the
-optimum alone would make intervals several times too narrow. The covariance is that of White
-(Econometrica 48, 1980) with the power of the rest by frequency in the place of single squares. A
-fit follows its own noise, so that these powers are less the share that it took (MacKinnon and
-White, Journal of Econometrics 29, 1985), and a few of them leave the deviation uncertain too.
+The residual of a real record is not white: errors of neighbouring samples are correlated, and the
+curvature at the optimum alone would make intervals several times too narrow. The covariance is that
+of White (Econometrica 48, 1980) with the power of the residual by frequency instead of single
+squares. A fit absorbs a share of its noise, for which these powers are corrected (MacKinnon and
+White, Journal of Econometrics 29, 1985), and a few of them leave the deviation uncertain, too.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 Values = NDArray[np.float64]
 
 _FIRST_BAND = 12
-"""Coefficients in the lowest band of frequencies; each further one holds half as many more."""
+"""Coefficients in the lowest band of frequencies; each further band is larger by half."""
 _GROWTH = 1.5
 _CENTRAL = 0.975
 """Quantile at which a central 95 % interval ends."""
@@ -32,7 +32,7 @@ class Spread:
     Parameters
     ----------
     data : MeasuredData
-        Those that were fitted.
+        The fitted data.
     fitted : Fit
 
     Attributes
@@ -51,8 +51,8 @@ class Spread:
         layout = Layout(fitted.parameters)
         scale = layout.array("scale")
         widths = (layout.array("upper") - layout.array("lower")) / scale
-        # The bounds count as the variance of a uniform distribution, as in `Fit.covariance`.
-        # What no record determines is as uncertain as they are wide.
+        # The bounds count as the variance of a uniform distribution, as in `Fit.covariance`. A
+        # value that no record determines gets that variance.
         bounds = np.diag(12.0 / widths**2)
         inverse = np.linalg.inv(fitted.jacobian.T @ fitted.jacobian + bounds)
         influence = inverse @ fitted.jacobian.T
@@ -64,7 +64,7 @@ class Spread:
         self.covariance = spread * np.outer(scale, scale)
         shares = np.array([np.bincount(band, row**2) * power for row in influence])
         uncertain = np.sum(shares**2 / degrees_of_freedom, axis=1)
-        # What only the bounds determine is as sure of its variance as can be: infinite freedom.
+        # A variance that only the bounds determine is exact: infinite degrees of freedom.
         with np.errstate(divide="ignore"):
             self.reach = np.asarray(t.ppf(_CENTRAL, np.diag(spread) ** 2 / uncertain))
 

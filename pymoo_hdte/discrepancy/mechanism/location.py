@@ -16,7 +16,8 @@ class MechanismLocation:
     ----------
     sentence : str
     base_misfit, sensor_noise : dict of str to float
-        Root mean square by balance, N or N.m: what the base leaves, and what sensors would show.
+        Root mean square by balance, N or N.m: of the residual of the base, and of the sensors'
+        noise.
     """
 
     sentence: str
@@ -24,7 +25,7 @@ class MechanismLocation:
     sensor_noise: dict[str, float]
 
     def summary(self) -> dict[str, Any]:
-        """Return what ``verdict.json`` says of it, as plain types."""
+        """Return its entry in ``verdict.json``, as plain types."""
         return asdict(self)
 
 

@@ -1,4 +1,4 @@
-"""A model of a mechanism as a file: its values with tolerances, and the effects it has."""
+"""A model of a mechanism as a file: its values with tolerances, and its effects."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pymoo_hdte.mechanism.mechanism import NOTHING
 
 @dataclass(frozen=True)
 class MechanismModel:
-    """What is believed of a mechanism: the model part of a rig's file.
+    """The believed model of a mechanism: the model part of a rig's file.
 
     Attributes
     ----------
@@ -28,9 +28,9 @@ class MechanismModel:
     mechanism : Mechanism
         Its values with their tolerances.
     effects : tuple of LawAt
-        Laws at its ports that are known to be there.
+        Known laws at its ports.
     cutoff : float or None
-        Hz, up to which the motion is known; None leaves that to the records.
+        Hz, up to which the motion is known; None to determine it from the records.
     """
 
     title: str
@@ -67,8 +67,8 @@ def model_text(model: MechanismModel) -> str:
     Raises
     ------
     InvalidInput
-        For what `read_mechanism_model` would refuse: an effect that is not registered or whose
-        port is not there, an empty title, a limit or cutoff that is not positive.
+        For what `read_mechanism_model` would refuse: an effect that is not registered or whose port
+        does not exist, an empty title, a limit or cutoff that is not positive.
     """
     mechanism = model.mechanism
     top: dict[str, Any] = {"title": model.title}
@@ -92,7 +92,7 @@ def model_text(model: MechanismModel) -> str:
     ]
     # The reader takes no empty array of tables.
     top |= {name: array for name, array in (("loops", loops), ("effects", rows)) if array}
-    # What cannot be read back is better refused now than when the text is needed.
+    # Refuse now a text that could not be read back later.
     model_from_fields(Fields(top, "model"), "model")
     return toml_text(top)
 
@@ -144,7 +144,7 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
 
 
 def _named(top: Fields, field: str, file: str) -> dict[str, Fields]:
-    """Return tables by the names that users gave them; only coordinates have to be there."""
+    """Return tables by the names that users gave them; only coordinates are required."""
     if field != "coordinates" and not top.has(field):
         return {}
     raw = top.take(field, "a table for each name")

@@ -1,8 +1,8 @@
-"""Which test to run next: the repetition of a record that best separates what is still in doubt.
+"""The next test: the repetition of a record that best separates the remaining hypotheses.
 
-Records repeated at another size, speed or direction, with the motion scaled as it is, are compared
-by how far apart the forces of two explanations then lie beyond what the mechanism's own quantities
-could take up (after Hunter and Reiner, Technometrics 7, 1965).
+Records repeated at another size, speed or direction, with a scaled motion, are compared by the
+difference between the forces of two hypotheses that the mechanism's own quantities could not absorb
+(after Hunter and Reiner, Technometrics 7, 1965).
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ RATES = (0.3, 1.0, 3.0)
 
 @dataclass(frozen=True)
 class NextTest:
-    """A test and what it is good for.
+    """A test and its purpose.
 
     Attributes
     ----------
     record : str
         Training record to be repeated.
     size, rate : float
-        Factors of its motion and of its speed; a negative rate is the reverse direction.
+        Factors on its motion and on its speed; a negative rate is the reverse direction.
     separates : tuple of str
-        What it tells apart.
+        Hypotheses that it separates.
     separation : float
-        Root mean square of the difference, in units of what the model leaves; 0 where it is not
-        a matter of degree.
+        Root mean square of the difference, in units of the model's residual; 0 where no size
+        applies.
     description : str
     """
 
@@ -64,7 +64,7 @@ class NextTest:
 
 
 def next_test(finding: MechanismFinding) -> NextTest:
-    """Return the test that says most about what the verdict leaves open."""
+    """Return the test that best resolves what the verdict leaves open."""
     one_way = [
         port.name
         for port in finding.mechanism.ports
@@ -97,7 +97,7 @@ def next_test(finding: MechanismFinding) -> NextTest:
 
 
 def _nearest(finding: MechanismFinding) -> Hypothesis | None:
-    """Return the explanation that comes closest to the chosen one and differs from it."""
+    """Return the hypothesis nearest to the chosen one that differs from it."""
     chosen, near_by = finding.verdict.chosen, finding.data.rules.nearest_rival_ratio
     others = [
         one
@@ -153,7 +153,7 @@ def _separation(
     size: float,
     rate: float,
 ) -> float:
-    """Return how far two explanations lie apart when a record is repeated, beyond the base."""
+    """Return the difference of two hypotheses in a repeated record that the base cannot absorb."""
     balance = finding.data.spectra[place]
     power, rest = 0.0, finding.remainder
     for row, name in enumerate(finding.data.names):

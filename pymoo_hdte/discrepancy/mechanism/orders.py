@@ -1,4 +1,4 @@
-"""At which orders of a port's position something is left that varies with it."""
+"""Orders at which the residual varies with the position of a port."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 
 Values = NDArray[np.float64]
 
-# Grid and smoothing of the search. When an order counts as seen stands in `Rules`.
+# Grid and smoothing of the search. When an order counts as seen is in `Rules`.
 _MOST_TRIED = 2000
 _WHOLE = 2.0
-"""Resolution up to which orders are taken for whole numbers."""
+"""Resolution up to which orders are taken as whole numbers."""
 _SURROUNDINGS = 101
-"""Orders whose median power is what noise shows at the one in their middle."""
+"""Number of orders whose median power estimates the noise at the middle one."""
 _BESIDE = 5.0
-"""Steps up to which an order is what another one leaves, whose size changes along the way."""
+"""Distance in steps within which an order is a side line of another one with changing amplitude."""
 
 
 def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...]]:
     """Return orders by port, the strongest first.
 
-    Cycles per turn of an angle in rad, whole numbers; of a length, radians per m. What is slower in
-    time than the residual's own trend is left to the friction.
+    Cycles per turn of an angle in rad, whole numbers; of a length, radians per m. Variations slower
+    in time than the trend of the residual are attributed to friction.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
         shares = {port.name: 1.0} if port.read else port.motion
         signals = []
         for left_by_row, balance in zip(coefficients, data.spectra, strict=True):
-            # As a force at the port would stand in all of them.
+            # A force at the port would enter all of them with these shares.
             rows = [data.names.index(name) for name in shares]
             residual = np.array(list(shares.values())) @ left_by_row[rows]
             signals.append(
@@ -60,9 +60,9 @@ def _detrended(signal: Values) -> Values:
 
 
 def _strongest(signals: list[tuple[Values, Values]], rules: Rules) -> tuple[float, ...]:
-    """Return orders of which (position, signal) pairs show more than their own surroundings.
+    """Return orders with more power in (position, signal) pairs than neighbouring orders.
 
-    One after the other, what is found being taken out, so that none is found again beside itself.
+    Each order found is removed before the next search, so that none is found twice.
     """
     orders, step = _tried([position for position, _ in signals], rules)
     kept: list[float] = []
@@ -79,9 +79,9 @@ def _strongest(signals: list[tuple[Values, Values]], rules: Rules) -> tuple[floa
 
 
 def _tried(positions: Sequence[Values], rules: Rules) -> tuple[Values, float]:
-    """Return the orders that are looked at, and their step.
+    """Return the orders that are searched, and their step.
 
-    Whole numbers where the travel, as of a shaft, resolves them; otherwise half of what it does.
+    Whole numbers where the travel resolves them, as for a shaft; otherwise half the resolution.
     """
     widest = max(float(np.ptp(position)) for position in positions)
     if widest == 0.0:
@@ -93,12 +93,12 @@ def _tried(positions: Sequence[Values], rules: Rules) -> tuple[Values, float]:
 
 
 def _finest(position: Values) -> float:
-    """Return the order of which a record has, in the mean, eight samples to a period."""
+    """Return the order at which a record has eight samples per period on average."""
     return len(position) * np.pi / (4.0 * max(float(np.sum(np.abs(np.diff(position)))), 1e-300))
 
 
 def _refined(signals: Sequence[tuple[Values, Values]], order: float, step: float) -> float:
-    """Return the order beside one of a coarse grid at which there is most."""
+    """Return the order of largest power near one of a coarse grid."""
     if step == 1.0:
         return order
     near = order + step * np.linspace(-1.0, 1.0, 41)
@@ -109,7 +109,7 @@ def _refined(signals: Sequence[tuple[Values, Values]], order: float, step: float
 
 
 def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rules: Rules) -> Values:
-    """Return the power at each order over what noise shows there by chance, shape (n_orders,)."""
+    """Return the ratio of power to noise at each order, shape (n_orders,)."""
     total, counted = np.zeros((2, len(orders)))
     for position, signal in signals:
         seen = orders * np.ptp(position) >= 2.0 * np.pi * rules.fewest_periods
@@ -125,6 +125,6 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rule
 
 
 def _without(signal: Values, angle: Values) -> Values:
-    """Return a signal without what varies as cosine and sine of an angle, both of shape (n,)."""
+    """Return a signal without its cosine and sine parts of an angle, both of shape (n,)."""
     lines = np.column_stack([np.cos(angle), np.sin(angle)])
     return np.asarray(signal - lines @ np.linalg.lstsq(lines, signal, rcond=None)[0])

@@ -1,4 +1,4 @@
-"""What a mechanism and its records must have before anything can be said of them."""
+"""Requirements on a mechanism and its records for an analysis."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pymoo_hdte.mechanism.working_rate import working_rows
 
 
 def check_signals(mechanism: Mechanism, records: Sequence[Record]) -> None:
-    """Raise `InvalidInput` unless all that a mechanism needs is known and in each record."""
+    """Raise `InvalidInput` unless a mechanism is complete and each record has its channels."""
     if not mechanism.ports:
         raise InvalidInput("mechanism.ports", (), "at least one: effects are looked for there")
     if not _scales(mechanism):
@@ -39,7 +39,7 @@ def check_signals(mechanism: Mechanism, records: Sequence[Record]) -> None:
 
 
 def usual_cutoff(mechanism: Mechanism, records: Sequence[Record]) -> float:
-    """Return the frequency, Hz, up to which every coordinate stands out of its noise.
+    """Return the frequency, Hz, up to which every coordinate exceeds its noise.
 
     Raises
     ------
@@ -59,19 +59,19 @@ def usual_cutoff(mechanism: Mechanism, records: Sequence[Record]) -> float:
 
 
 def check_sampling(mechanism: Mechanism, records: Sequence[Record], cutoff: float) -> None:
-    """Raise `InvalidInput` if a record is too short or too slow for a cutoff in Hz.
+    """Raise `InvalidInput` if a record is too short or sampled too slowly for a cutoff in Hz.
 
-    Held-out ones as well: they are judged at the cutoff of the others, when all else is done.
+    Held-out ones as well: they are judged later at the cutoff of the others.
     """
     for record in records:
         working_rows(mechanism, record, cutoff)
 
 
 def check_scale(data: MeasuredData) -> None:
-    """Raise `InvalidInput` if nothing that is known exactly stands out of the noise of data.
+    """Raise `InvalidInput` if no exactly known force exceeds the noise of data.
 
-    A gain that is known sets the scale only where its input drives the mechanism. Where all is
-    known, nothing is left whose scale could be in question.
+    A gain that is known sets the scale only where its input drives the mechanism. Where all
+    quantities are known, no scale has to be determined.
     """
     if all(one.tolerance == 0.0 for one in data.mechanism.quantities.values()):
         return
@@ -87,6 +87,6 @@ def check_scale(data: MeasuredData) -> None:
 
 
 def _scales(mechanism: Mechanism) -> list[str]:
-    """Return the quantities that are known exactly and of which all others are ratios."""
+    """Return the exactly known quantities, relative to which all others are determined."""
     known = [name for name, one in mechanism.quantities.items() if one.tolerance == 0.0]
     return [name for name in known if name.startswith(("inertia", "stiffness", "gain"))]

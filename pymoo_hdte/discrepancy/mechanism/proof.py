@@ -1,8 +1,8 @@
-"""The gap before and after, on records that were not fitted: of the motion and of the forces.
+"""Validation on records that were not fitted: gaps of motion and forces before and after.
 
-A simulation with the measured inputs, or with the references where a loop is closed, shows what the
-model is good for; the force balances show by how much it errs at each moment, without the drift
-that an open loop piles up.
+A simulation with the measured inputs, or with the references where a loop is closed, shows the
+quality of the model's predictions; the force balances show its error at each moment, without the
+drift that an open loop accumulates.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Values = NDArray[np.float64]
 
 _FEWEST = 5
 _QUARTER = 0.25
-"""Of a period of the cutoff, in which a motion is near a parabola."""
+"""Share of a period of the cutoff in which a motion is nearly a parabola."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +46,11 @@ class MeasuredGap:
     noise_floor : float
         Of the sensors.
     time, measured : ndarray, shape (n,)
-        s and SI; of a balance, zero.
+        s and SI; zero for a balance.
     predicted_before, predicted_after : ndarray, shape (n,)
-        What the models predict; of a balance, minus what they leave.
+        Predictions of the models; minus their residual for a balance.
     least_share : float
-        Of the noise floor, by which a gap exceeds it that can be said to shrink.
+        Least excess of a gap over the noise floor, as a share of it, for a shrinkage to be stated.
     """
 
     record: str
@@ -74,7 +74,7 @@ class MeasuredGap:
         return min(1.0 - (self.after - self.noise_floor) / excess, 1.0)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return its figures as plain values."""
+        """Return its numbers as plain values."""
         return {
             "record": self.record,
             "quantity": self.quantity,
@@ -90,7 +90,7 @@ class MeasuredGap:
 def prove_measured(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
     """Return the gaps on the held-out records; none where none was held out.
 
-    Where nothing is named before and after are the same.
+    Where nothing is named, before and after are equal.
     """
     held_out = [record for record in finding.records if record.role == "held_out"]
     found: list[MeasuredGap] = []
@@ -106,7 +106,7 @@ def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:
 
 
 def fitted_values(mechanism: Mechanism, fitted: Fit) -> dict[str, float]:
-    """Return the values of a fit that are quantities of the mechanism, SI, by name."""
+    """Return the fitted quantities of the mechanism, SI, by name."""
     return {
         parameter.name: float(value)
         for parameter, value in zip(fitted.parameters, fitted.values, strict=True)

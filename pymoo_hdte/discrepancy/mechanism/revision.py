@@ -1,4 +1,4 @@
-"""The revised model of a mechanism: fitted values with the effects that it has."""
+"""The revised model of a mechanism: fitted values with believed and named effects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MODEL_FILE = "revised_model.toml"
 def revised_mechanism(title: str, finding: MechanismFinding) -> MechanismModel:
     """Return the mechanism with fitted values, believed effects, and those that are named.
 
-    Its values keep the relative tolerances that were believed: the same records have the same fit.
+    Its values keep the believed relative tolerances: the same records have the same fit.
 
     Parameters
     ----------

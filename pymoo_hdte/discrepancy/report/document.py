@@ -22,7 +22,7 @@ from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.laws.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
 SCHEMA_VERSION = 1
-"""Of ``verdict.json``: it grows when a field goes, or changes its name, type or meaning."""
+"""Version of ``verdict.json``: raised when a field is removed or changes name, type or meaning."""
 
 _DEVIATIONS = 1.959964
 """Half-width of a central 95 % interval of a normal value, in standard deviations."""
@@ -34,7 +34,7 @@ def verdict_document(
     held_out: Mapping[str, Any] | None,
     proposal: Proposal,
 ) -> dict[str, Any]:
-    """Return the verdict with all that supports it; `json.dumps` takes it as it is.
+    """Return the verdict with its evidence, as types that `json.dumps` accepts.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def verdict_document(
 
 
 def with_believed_effects(effects: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the field ``believed_effects``, of plain types, if something is believed."""
+    """Return the field ``believed_effects``, of plain types, if there are any."""
     return {"believed_effects": [dict(effect) for effect in effects]} if effects else {}
 
 
@@ -156,7 +156,7 @@ def _unit(candidate: Candidate, name: str) -> str:
 
 
 def _line(name: str, candidate: Candidate, fitted: Fit, row: int) -> dict[str, Any]:
-    """Return amplitude and phase, with intervals, of the cosine part at a row and the sine next."""
+    """Return amplitude and phase, with intervals, of a line whose cosine part is at a row."""
     rows = np.array([row, row + 1])
     covariance = fitted.covariance[np.ix_(rows, rows)]
     cosine, sine = fitted.values[rows]
@@ -191,7 +191,7 @@ def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
 
 
 def _within_bounds(parameter: Parameter, interval: list[float], rules: Rules) -> list[float]:
-    """Return an interval cut at the bounds; all between them where the records say little."""
+    """Return an interval clipped to the bounds; all between them if it is nearly as wide."""
     lower, upper = parameter.lower, parameter.upper
     if interval[1] - interval[0] > rules.undetermined_share * (upper - lower):
         return [lower, upper]

@@ -18,7 +18,7 @@ from pymoo_hdte.reports.figures import AFTER, BEFORE, FAINT, GREY
 
 MAP_COLOURS = "cividis"
 LARGEST_SHOWN = 30.0
-"""Misfit, in standard deviations, from which on all cells look the same."""
+"""Misfit, in standard deviations, at which the colour scale ends."""
 
 WORDS = {name: name.replace("_", " ") for name in CHANNELS}
 
@@ -73,7 +73,7 @@ def gap_by_channel(proof: Proof) -> Figure:
     _dumbbells(axis, gaps, labels, relative=True)
     axis.axvline(1.0, color=GREY, linestyle=":", linewidth=1.5)
     axis.set_xscale("log")
-    # Without a gap the axis would otherwise blow differences of a few per cent up.
+    # Without a gap the axis would otherwise magnify differences of a few per cent.
     low, high = axis.get_xlim()
     axis.set_xlim(min(low, 0.5), max(high, 10.0))
     axis.set_xlabel("gap on held-out records / noise floor (dotted: 1)", fontsize=9)
@@ -106,7 +106,7 @@ def gap_by_order(proof: Proof) -> Figure:
 
 
 def overlay(proof: Proof) -> Figure:
-    """Draw measured, before and after of the held-out record that the base misses most."""
+    """Draw measured, before and after of the held-out record with the largest error of the base."""
     figure = Figure(figsize=(11.0, 5.6), layout="constrained")
     panels = figure.subplots(len(proof.overlays), 1, sharex=True, squeeze=False)[:, 0]
     for axis, one in zip(panels, proof.overlays, strict=True):
@@ -117,7 +117,7 @@ def overlay(proof: Proof) -> Figure:
 
 
 def optimum_fronts(shift: OptimumShift) -> Figure:
-    """Draw both fronts, and what becomes of the designs chosen on the first."""
+    """Draw both fronts, and the designs chosen on the first as the new model evaluates them."""
     figure = Figure(figsize=(6.4, 3.4), layout="constrained")
     axis = figure.subplots()
     looks = ((BEFORE, "s", "before"), (AFTER, "o", "after"))

@@ -97,13 +97,13 @@ def _page(finding: MechanismFinding, document: dict[str, Any], gaps: Sequence[Me
 
 
 def _shown(gaps: Sequence[MeasuredGap]) -> MeasuredGap | None:
-    """Return the gap to be drawn over time: a simulation that did not diverge, if there is one."""
+    """Return the gap to be drawn over time: of a simulation that did not diverge, if any."""
     drawn = [gap for gap in gaps if np.isfinite(gap.before) and np.isfinite(gap.after)]
     return max(drawn, key=lambda gap: (gap.kind == "simulation", gap.before), default=None)
 
 
 def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> str:
-    """Return in words what the correction does to records that were not fitted."""
+    """Return in words the effect of the correction on records that were not fitted."""
     if not gaps:
         return "No record was held out, so that nothing can be proved."
     if not finding.accepted.candidates:

@@ -101,7 +101,7 @@ def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
 
 
 def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
-    """Return the rows of a candidate's parameters, or of the quantity that it sets free."""
+    """Return the rows of a candidate's parameters, or of the quantity that it frees."""
     if candidate.frees is None:
         return rows
     place = [one.name for one in fitted.parameters].index(candidate.frees)
@@ -109,9 +109,9 @@ def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
 
 
 def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
-    """Return second effects beside the named one that the data speak for, though not loudly.
+    """Return second effects beside the named one for which the data are weak evidence.
 
-    They make the fit better than chance does, but remove too little to be named.
+    They improve the fit significantly, but remove too little to be named.
     """
     chosen, rules = finding.verdict.chosen, finding.data.rules
     if chosen is None or finding.accepted is not chosen.fit or len(chosen.candidates) > 1:
@@ -128,7 +128,7 @@ def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
 
 
 def remainder(finding: MechanismFinding) -> dict[str, Any]:
-    """Return what the accepted model leaves, and in words how much of the misfit that is."""
+    """Return the residual of the accepted model, and its share of the misfit in words."""
     after, noise = finding.remainder, finding.sensor_noise
     size = ", ".join(
         f"{one:.3g} in the {finding.data.what(name)} ({one / max(floor, 1e-300):.2g} times the "
@@ -152,7 +152,7 @@ def remainder(finding: MechanismFinding) -> dict[str, Any]:
 
 
 def limits(finding: MechanismFinding) -> list[str]:
-    """Return what these records cannot tell, in sentences."""
+    """Return the limits of these records, in sentences."""
     found = [
         f"The {port.name} moves in one direction only: these records cannot separate Coulomb "
         "friction from a constant force or a sensor's offset."
@@ -212,7 +212,7 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
         if name.endswith("_sine"):
             continue
         if not name.endswith("_cosine"):
-            # The fit was not free to leave its bounds.
+            # The fit could not exceed its bounds.
             bounds = parameter.lower, parameter.upper
             found[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
             continue

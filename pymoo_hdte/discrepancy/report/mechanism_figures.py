@@ -21,7 +21,7 @@ _BANDS = 30
 
 
 def misfit_over_motion(finding: MechanismFinding) -> Figure:
-    """Draw what the model leaves of each balance over the speed and the position of a port."""
+    """Draw the residual of each balance over the speed and the position of a port."""
     names = finding.data.names
     figure = Figure(figsize=(8.4, 2.6 * len(names)), layout="constrained")
     axes = figure.subplots(len(names), 2, squeeze=False, sharey="row")
@@ -52,7 +52,7 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
 
 
 def misfit_over_frequency(finding: MechanismFinding) -> Figure:
-    """Draw the amplitude density of what the model leaves, beside that of the sensors' noise."""
+    """Draw the amplitude density of the residual, beside that of the sensors' noise."""
     names = finding.data.names
     figure = Figure(figsize=(4.2 * max(len(names), 1), 2.8), layout="constrained")
     axes = figure.subplots(1, len(names), squeeze=False)[0]
@@ -107,7 +107,7 @@ def overlay(gap: MeasuredGap) -> Figure:
 
 
 def gaps(found: Sequence[MeasuredGap]) -> Figure:
-    """Draw the gaps of held-out records before and after, each in units of the one before."""
+    """Draw the gaps of held-out records before and after, as ratios to the gap before."""
     figure = Figure(figsize=(6.4, 0.7 + 0.42 * len(found)), layout="constrained")
     axis = figure.subplots()
     for row, gap in enumerate(found):
@@ -129,7 +129,7 @@ def gaps(found: Sequence[MeasuredGap]) -> Figure:
 
 
 def _port_of(finding: MechanismFinding, balance: str) -> str:
-    """Return a port whose motion a balance is best drawn over."""
+    """Return the port over whose motion a balance is drawn."""
     if balance in finding.mechanism.port_names:
         return balance
     ports = [port for port in finding.mechanism.ports if not port.read]

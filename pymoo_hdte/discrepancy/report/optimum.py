@@ -1,6 +1,6 @@
-"""What the correction does to the robust optimum, as the report tells it.
+"""Effect of the correction on the robust optimum, for the report.
 
-Who optimises stands above the workflow: `pymoo_hdte.discrepancy.robust_optimum`.
+The optimisation itself is in `pymoo_hdte.discrepancy.robust_optimum`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SAME_MOMENTS = 2e-3
-"""Relative difference up to which two designs are as good: some neighbours on a front of 100."""
+"""Relative difference at which two designs are equally good: a few neighbours in a front of 100."""
 
 Values = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class Choice:
     preference : str
         A key of `pymoo_hdte.decision.PREFERENCES`.
     before, after : ndarray, shape (4,)
-        Factors on K, J_in, B_in, B_fc of the drive as it stands.
+        Factors on K, J_in, B_in, B_fc of the existing drive.
     distance : float
         Relative distance of the two designs, Eq. (42); also along directions that do not matter.
     promised : ndarray, shape (2,)
@@ -63,7 +63,7 @@ class OptimumShift:
         Mean and standard deviation of the DTE, arcsec, of the designs found before and after;
         empty where there are no choices.
     method : str
-        What found them, in words.
+        Method of the optimisation, in words.
     """
 
     choices: tuple[Choice, ...]

@@ -1,4 +1,4 @@
-"""Words and table rows of the report."""
+"""Sentences and table rows of the report."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ STATUSES = {
     "parameter": "believed value wrong",
     "unlisted": "unknown effect",
 }
-"""Those of a verdict, for the reader."""
+"""Words for the status of a verdict."""
 
 _NORMAL_95 = 1.96
 
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """A fitted base parameter; ``None`` where nothing was believed or no bound is meant."""
+    """A fitted base parameter; ``None`` where there is no believed value or no bound."""
 
     name: str
     unit: str
@@ -108,7 +108,7 @@ def certainty(finding: DriveFinding) -> str:
 
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
-    """Return why an effect is not named though it is the nearest."""
+    """Return why the nearest effect is not named."""
     residual = unexplained(finding.data, finding.verdict.base, nearest.fit)
     if residual.any():
         parts = [
@@ -145,7 +145,7 @@ def _evidence(verdict: Verdict, chosen: Hypothesis, share: str) -> list[str]:
         words.append(f"The next best, {in_words(best.label)}, explains {_percent(best.explained)}.")
     if chosen.fit.at_bounds:
         names = ", ".join(name.replace("_", " ") for name in chosen.fit.at_bounds)
-        words.append(f"At the edge of what was allowed, so judge with care: {names}.")
+        words.append(f"At the bound of its range, and therefore uncertain: {names}.")
     return words
 
 
@@ -188,7 +188,7 @@ def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
 
 
 def hypothesis_rows(verdict: Verdict) -> list[HypothesisRow]:
-    """Return the evidence of all that was fitted, the chosen first."""
+    """Return the evidence of all fitted hypotheses, the chosen one first."""
     hypotheses = [] if verdict.chosen is None else [verdict.chosen]
     hypotheses += [
         hypothesis for hypothesis in verdict.alternatives if hypothesis is not verdict.chosen
@@ -212,7 +212,7 @@ def hypothesis_rows(verdict: Verdict) -> list[HypothesisRow]:
 def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     """Return the base parameters of the accepted fit."""
     fitted = finding.verdict.accepted
-    # What no residual depends on has no interval, and variances near zero may round below it.
+    # Without influence on a residual there is no interval; variances may be below zero by rounding.
     known = np.any(fitted.jacobian != 0.0, axis=0)
     variances = np.where(known, np.maximum(np.diag(fitted.covariance), 0.0), np.nan)
     half_widths = _NORMAL_95 * np.sqrt(variances)
@@ -269,7 +269,7 @@ def _parameter_row(
         name = f"{kind} of order {campaign.believed.error_orders[int(line)]:g}"
     elif name == "offset":
         unit, size = "arcsec", ARCSEC
-    # Phases and the constant of the encoders are found, not believed.
+    # Phases and the constant of the encoders have no believed value.
     free = parameter.name == "offset" or parameter.name.startswith("error_phase_")
     return ParameterRow(
         name.replace("_", " "),
@@ -284,7 +284,7 @@ def _parameter_row(
 
 
 def _shown(unit: str) -> str:
-    """Return a unit such as N.m.s2/rad2 as a reader knows it."""
+    """Return a unit such as N.m.s2/rad2 in its usual notation."""
     if unit == "1":
         return ""
     return unit.replace(".", " ").replace("2", "²").replace("3", "³")
@@ -301,5 +301,5 @@ def _names(hypothesis: Hypothesis) -> set[str]:
 
 
 def _percent(share: float) -> str:
-    """Return a share rounded down: 100 % is not said of less."""
+    """Return a share in per cent, rounded down, so that only a full share becomes 100 %."""
     return f"{np.floor(1000.0 * share + 1e-9) / 10.0:g} %"

@@ -46,7 +46,7 @@ from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.html import page
 
 OptimumOf = Callable[[DriveModel, DriveModel], OptimumShift]
-"""Says how the robust optimum moves from one drive model to another."""
+"""Function that returns how the robust optimum moves from one drive model to another."""
 
 
 def write_report(
@@ -67,11 +67,12 @@ def write_report(
         None where no record was held out.
     proposal : Proposal
     optimum_shift : callable
-        Of the fitted base and the revised model; asked only where an effect was added. That of
+        Of the fitted base and the revised model; called only where an effect was added. That of
         `pymoo_hdte.discrepancy.robust_optimum` optimises both.
     out : str or Path
-        New, empty, or an earlier report, which is replaced. Without a revised model, for a drive
-        that a data sheet cannot hold, its two files are missing and the verdict says why.
+        New, empty, or an earlier report, which is replaced. If a data sheet cannot describe the
+        drive, there is no revised model: its two files are missing and the verdict states the
+        reason.
 
     Returns
     -------
@@ -101,7 +102,7 @@ def write_report(
 def _revision(
     finding: DriveFinding, optimum_shift: OptimumOf
 ) -> tuple[dict[str, str], OptimumShift]:
-    """Return the files of the revised model, and what it does to the robust optimum."""
+    """Return the files of the revised model, and its effect on the robust optimum."""
     try:
         model = revised_model(finding)
         before = drive_model(finding.campaign, finding.verdict.base, "before", "the fitted base")

@@ -1,8 +1,8 @@
-"""How an effect stands in a drive model: a law at a port, or another change of Eq. (9).
+"""Effects in a drive model: laws at ports, or other changes of Eq. (9).
 
-An effect changes the coefficients of the equations of motion, or what sensors read of them; every
-solver then follows. What the effect is, `laws.effect.Effect` says; names, quantities and files come
-from there.
+An effect changes the coefficients of the equations of motion, or what sensors read of them; this
+serves every solver. The effect is defined by `laws.effect.Effect`, with its names, quantities and
+form in files.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Lines = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class DriveSizes(Sizes):
-    """Sizes of a port of a drive, with what no law at a port asks for; SI.
+    """Sizes of a port of a drive, including those for effects that are no laws; SI.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class DriveSizes(Sizes):
     ratio : float
         Transmission ratio N.
     inertia : float
-        Of the load, kg.m2: what may be missing of it is of this size.
+        Of the load, kg.m2: the size of an inertia that may be missing.
     duration : float
         Of the session, s.
     """
@@ -52,7 +52,7 @@ class DriveSizes(Sizes):
     duration: float = 0.0
 
     def further(self) -> Self:
-        """Return the sizes with only those orders that no believed line of the error has."""
+        """Return the sizes without the orders of believed lines of the error."""
         return replace(
             self,
             seen=tuple(order for order in self.seen if not self.believes(order)),
@@ -66,7 +66,7 @@ class DriveSizes(Sizes):
 
 @dataclass(frozen=True, eq=False)
 class Session:
-    """When r records were taken, and which m lines of them are looked at.
+    """Times of r records, and the m lines of them that are analysed.
 
     Attributes
     ----------
@@ -77,8 +77,8 @@ class Session:
     elapsed : ndarray, shape (r,)
         Middle of each record within the session, s.
     bends : complex ndarray, shape (r, 3, 1 + m)
-        Mean and lines that the second to fourth power of the time from the middle of a record,
-        over their factorials, leave in it: see `OrderLines`; s^2, s^3 and s^4.
+        Mean and lines that a fit assigns to the second to fourth power of the time from the middle
+        of a record, over their factorials: see `OrderLines`; s^2, s^3 and s^4.
     """
 
     orders: Sequence[float]
@@ -88,7 +88,7 @@ class Session:
 
 
 class DriveEffect:
-    """Something Eq. (9) does not hold: what every effect of a drive model offers.
+    """An effect that Eq. (9) does not contain: base of all effects of a drive model.
 
     A subclass is a frozen dataclass whose fields are the quantities of its effect; it overrides
     what it changes.
@@ -178,14 +178,14 @@ class LawAtPort(DriveEffect):
     name : str
         Of the effect, in model files and verdicts, e.g. ``"coulomb_friction"``.
     port : str
-        ``"input"``, ``"output"`` or ``"mesh"``, where the law may stand.
+        ``"input"``, ``"output"`` or ``"mesh"``, where the law may be.
     law : Law
         Of the type that belongs to the name; its numbers are in SI.
 
     Raises
     ------
     InvalidInput
-        For an unknown name, a port where such a law does not stand, or a law of another type.
+        For an unknown name, a port where such a law is not possible, or a law of another type.
     """
 
     name: str  # type: ignore[misc]

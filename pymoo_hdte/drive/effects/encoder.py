@@ -24,7 +24,8 @@ ENCODER_LINE = "encoder_line"
 class Eccentricity(DriveEffect):
     """The disc of the output encoder is off centre: amplitude cos(theta_out + phase) is added.
 
-    A once-per-turn error of the drive itself reads the same unless the encoder is clocked anew.
+    A once-per-turn error of the drive itself looks the same unless the encoder is turned on its
+    shaft.
 
     Attributes
     ----------
@@ -60,7 +61,7 @@ class Eccentricity(DriveEffect):
         output_angle : ndarray, shape (n,)
             rad.
         elapsed : float or ndarray, shape (n,)
-            Time of the session, s; plays no part.
+            Time of the session, s; not used.
 
         Returns
         -------
@@ -78,14 +79,14 @@ class Eccentricity(DriveEffect):
             Of r records, each with m lines.
         """
         found = np.zeros((len(records.elapsed), len(records.orders)), dtype=complex)
-        # theta_out is theta_in / N but for the transmission error, a part in 10^3.
+        # theta_out is theta_in / N except for the transmission error, a part in 10^3.
         line = np.isclose(records.orders, self.order / records.ratio)
         found[:, line] = self.amplitude * np.exp(1j * self.phase)
         return np.zeros(len(found)), found
 
 
 _CLOSED = 1e-6
-"""Cycles per output turn by which a line of the encoder's scale may miss a whole number."""
+"""Cycles per output turn by which a line of the encoder's scale may differ from a whole number."""
 
 
 def _off_centre(sizes: DriveSizes) -> list[Guess]:
@@ -129,7 +130,7 @@ register(
 
 @dataclass(frozen=True)
 class ThermalDrift(DriveEffect):
-    """The output angle reads what grows while the rig warms up: rate time (1 - exp(-t / time)).
+    """Drift of the output angle's reading as the rig warms up: rate time (1 - exp(-t / time)).
 
     Attributes
     ----------
@@ -187,7 +188,7 @@ class ThermalDrift(DriveEffect):
         Parameters
         ----------
         output_angle : ndarray, shape (n,)
-            rad; plays no part.
+            rad; not used.
         elapsed : float or ndarray, shape (n,)
             Time of the session, s.
 
@@ -212,7 +213,7 @@ class ThermalDrift(DriveEffect):
 
 
 def _drift(sizes: DriveSizes) -> list[Guess]:
-    """Guess a drift that settles early in the session, in it, or hardly.
+    """Guess a drift that settles early in the session, during it, or hardly.
 
     One that settles within a twentieth of the session is over before two records are taken; one
     that takes twenty sessions is a straight line. The fastest has settled in that shortest time.

@@ -15,7 +15,7 @@ from pymoo_hdte.laws.stiffness import PeriodicStiffness
 from pymoo_hdte.laws.unknowns import wave_starts
 
 WAVE_GENERATOR_ORDER = 2.0
-"""Order of what the two lobes of the wave generator do, in cycles per input turn."""
+"""Order of the effects of the wave generator's two lobes, in cycles per input turn."""
 
 
 @dataclass(frozen=True)

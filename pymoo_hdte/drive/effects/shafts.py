@@ -62,7 +62,7 @@ class LoadInertia(DriveEffect):
 def _inertia(sizes: DriveSizes) -> list[Guess]:
     """Guess up to ten times the inertia of the load.
 
-    Half as much again moves a resonance past lines, so that fits begin on both sides of it.
+    An inertia larger by half moves a resonance past lines, so that fits start on both sides of it.
     """
     size = sizes.inertia
     added = unknown("inertia", 0.0, 10.0 * size, 0.3 * size)

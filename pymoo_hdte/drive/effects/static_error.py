@@ -1,4 +1,4 @@
-"""What Eq. (9) leaves out of the static error: further lines, and their reaction on the input."""
+"""Parts of the static error that Eq. (9) omits: further lines, and its reaction on the input."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class KinematicErrorLine(DriveEffect):
 
 
 def _lines(sizes: Any) -> list[Guess]:
-    """Guess lines at orders that are seen: of a drive's static error, or of a sensor's reading."""
+    """Guess lines at seen orders: of a drive's static error, or of a sensor's reading."""
     return _of_reading(sizes) if sizes.read else _of_drive(sizes)
 
 
@@ -125,7 +125,7 @@ class KinematicReaction(DriveEffect):
     name : str
         ``"kinematic_reaction"``, in model files and verdicts.
     share : float
-        Of the reaction that is there, dimensionless: 1 by virtual work.
+        Share of the full reaction, dimensionless: 1 by virtual work.
 
     Raises
     ------
@@ -145,7 +145,7 @@ class KinematicReaction(DriveEffect):
 
 
 def _reaction(sizes: DriveSizes) -> list[Guess]:
-    """Guess the share that virtual work demands, give or take."""
+    """Guess a share near that of virtual work."""
     return [Guess((unknown("share", -3.0, 3.0, 1.0),))]
 
 

@@ -31,7 +31,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TorsionMotion:
-    """A torsion and a speed on the grid of the torus, with what follows; arrays (n, G).
+    """A torsion and a speed on the grid of the torus, with the resulting torques; arrays (n, G).
 
     ``mesh_slope`` and ``mesh_damping`` are the derivatives of ``mesh_torque`` by torsion and by its
     rate, ``output_loss`` that of ``output_friction`` by speed.
@@ -102,7 +102,7 @@ class AngleEquations:
         return np.copysign(size, self.speed)
 
     def motion(self, torsion: Phasors, energy: Phasors) -> TorsionMotion:
-        """Put torsion and E on the grid, with the torques that follow."""
+        """Evaluate torsion and E on the grid, with the resulting torques."""
         torus, coefficients = self.torus, self.coefficients
         angular_speed = self._angular_speed(energy)
         energy_slope = torus.signal(torus.derivative(energy))
@@ -135,7 +135,7 @@ class AngleEquations:
 
     def _laws(self, port: str, position: Values, speed: Values) -> Response:
         """Return the sum of the laws at a port."""
-        # The output's own small fluctuation is left out of the angle its periodic laws follow.
+        # The angle of periodic laws at the output omits the small fluctuation of the output.
         slower = self.coefficients.ratio if port == "output" else 1.0
 
         def phase(order: float) -> Values:
@@ -155,7 +155,7 @@ class AngleEquations:
         return total
 
     def _path(self, values: Values) -> Values:
-        """Return grid values in the order in which a row passes them, twice over."""
+        """Return grid values in the order in which a row passes them, for two passages."""
         along = self.torus.path(values)
         return np.where(self._backward[:, None], along[:, ::-1], along)
 
@@ -166,7 +166,7 @@ class AngleEquations:
         return self.torus.back(np.hstack([second, second]))
 
     def recall_matrix(self, torsion: Phasors) -> Matrices | None:
-        """Return how the mesh torque hangs on the torsion elsewhere, if a law has memory.
+        """Return how the mesh torque depends on the torsion elsewhere, if a law has memory.
 
         Shape (n, 2 H, 2 H), to be added to what ``mesh_slope`` gives.
         """
@@ -186,7 +186,7 @@ class AngleEquations:
         return total
 
     def output_residual(self, motion: TorsionMotion) -> Phasors:
-        """Return what is left of the second equation, N.m."""
+        """Return the residual of the second equation, N.m."""
         return self.torus.phasors(
             self.output_inertia * motion.output_acceleration
             + self.output_damping * motion.output_speed
@@ -196,7 +196,7 @@ class AngleEquations:
         )
 
     def input_residual(self, motion: TorsionMotion) -> Phasors:
-        """Return what is left of the first equation, N.m; its mean is the motor's constant."""
+        """Return the residual of the first equation, N.m; its mean is the motor's constant."""
         coefficients = self.coefficients
         reaction = coefficients.reaction * self._static_slope
         still = np.zeros_like(motion.angular_speed)
@@ -214,7 +214,7 @@ class AngleEquations:
         return -self.torus.integral(self.torus.phasors(self.speed / motion.angular_speed))
 
     def loop_torque(self, motion: TorsionMotion) -> Values:
-        """Return the motor's torque but for its constant."""
+        """Return the motor's torque without its constant."""
         motor = self.motor
         if motor == CONSTANT_TORQUE:
             return np.zeros_like(motion.angular_speed)

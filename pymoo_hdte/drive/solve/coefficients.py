@@ -5,8 +5,8 @@
     d = th_in / N - th_out - th_s(th_in),   k = K (1 + kappa cos(2 th_in + psi))
 
 and laws at ports, which add their torques, and the reaction of theta_s on the input.
-`hill_steady_state`, `harmonic_balance` and `time_domain` all solve these equations, so a term
-stands here once.
+`hill_steady_state`, `harmonic_balance` and `time_domain` all solve these equations, so each term is
+defined here once.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class Coefficients:
 
     @property
     def stiffness_variations(self) -> tuple[PeriodicStiffness, ...]:
-        """All that the stiffness varies by with the input angle: its own order 2, and laws."""
+        """All variations of the stiffness with the input angle: its own order 2, and laws."""
         laws = tuple(cast(PeriodicStiffness, law) for _, law in self.laws if law.varies_stiffness)
         if self.stiffness_depth == 0.0:
             return laws

@@ -2,8 +2,8 @@
 
 The terms of `angle_equations` are evaluated on a grid (`torus`) and brought to zero harmonic by
 harmonic (Newton's method; alternating time and frequency, Cameron and Griffin, J. Applied Mechanics
-56, 1989); what couples speed and torsion is weak and followed by iteration. Hysteresis enters the
-step with its memory: the torque of a spring that sticks hangs on the torsion where it last slipped.
+56, 1989); the coupling of speed and torsion is weak and treated by iteration. Hysteresis enters the
+step with its memory: the torque of a sticking spring depends on the torsion where it last slipped.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
 _STEPS = 50
 _WITHOUT_MEMORY = 10
-"""Steps before those that heed the memory of hysteresis, which cost ten times as much."""
+"""Steps before those that include the memory of hysteresis, which cost ten times as much."""
 _NEARLY_CONSTANT = 0.02
-"""Variation of the mesh stiffness, relative, up to which its mean serves in Newton's step."""
+"""Relative variation of the mesh stiffness up to which Newton's step uses its mean."""
 _SHRINKS = 0.9
-"""A step is followed in full again only where it is shorter than this share of the one before."""
+"""A full step is taken again only where it is shorter than this share of the previous one."""
 _LEAST_PART = 0.1
 _ROWS_AT_ONCE = 64
 
@@ -53,7 +53,7 @@ def torus_of(coefficients: Coefficients) -> Torus:
         excited += [scale * order for order in law.orders]
     fundamentals = fundamental_orders(excited)
     needed = largest_multiples(fundamentals, excited)
-    # A line that the input angle itself shakes has a strong second harmonic over that angle.
+    # A line that modulates the input angle itself has a strong second harmonic over that angle.
     whole = max(HIGHEST, 2 * int(np.ceil(max(excited, default=0.0))) + 1)
     # The first fraction is that of the static error, whose beat the stiffness may modulate.
     fractions = [most + (place == 0) for place, most in enumerate(needed[1:])]
@@ -83,7 +83,7 @@ def harmonic_balance(
         An operating condition for each row, rad/s and N.m, in place of that of ``coefficients``. A
         negative speed is the reverse direction; a load keeps its sense in space.
     motor : SpeedLoop
-        What holds the speed; by default a constant torque.
+        Control of the speed; by default a constant torque.
     torus : Torus, optional
         Harmonics that are kept; by default all excited orders and their combinations.
     tolerance : float
@@ -114,7 +114,7 @@ def harmonic_balance(
         solver = _Solver(equations)
         if start is not None and np.array_equal(start.torus.orders, torus.orders):
             solver.begin(start.rows(rows))
-        # A row that runs away is marked as not converged, and says no more than that.
+        # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
             solver.solve(tolerance)
         parts.append(solver.result())
@@ -141,7 +141,7 @@ class _Solver:
         self.energy = self.equations.at_wanted_speed(np.where(kept, near.energy, self.energy))
 
     def solve(self, tolerance: float) -> None:
-        """Iterate until the torsion stands still; rows that never do are marked."""
+        """Iterate until the torsion converges; rows that do not are marked."""
         equations, left = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
         before, part = np.full_like(size, np.inf), np.ones_like(size)
@@ -160,7 +160,7 @@ class _Solver:
             self.converged[left] = settled
             if np.all(settled):
                 break
-            # A few stubborn rows need not take the others along.
+            # Once half of the rows have converged, only the others are iterated further.
             if 2 * np.sum(settled) >= len(left):
                 left = left[~settled]
                 equations = self.equations.rows(left)
@@ -185,7 +185,7 @@ class _Solver:
 
 
 def _part(part: Values, shrinks: NDArray[np.bool_]) -> Values:
-    """Return the part of a step to take: between kinks, full ones may go round in circles."""
+    """Return the part of a step to take: between kinks, full steps may cycle."""
     longer, shorter = np.minimum(2.0 * part, 1.0), np.maximum(0.5 * part, _LEAST_PART)
     return np.where(shrinks, longer, shorter)
 
@@ -210,7 +210,7 @@ def _newton_step(
     energy_change[:, 0] = 0.0
     right = (equations.output_residual(motion) + coupling * energy_change) / share
     change = _torsion_change(equations, motion, impedance, recall, right)
-    # Where a law takes the stiffness away, a full step may lead far off.
+    # Where a law removes the stiffness, a full step may be far too long.
     longest = np.abs(change).max(axis=1, keepdims=True)
     change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
     energy_change[:, 1:] -= ((right + impedance * change) / operator)[:, 1:]
@@ -228,7 +228,7 @@ def _torsion_change(
     recall: Matrices | None,
     right: Phasors,
 ) -> Phasors:
-    """Return the change of the torsion that the linearised mesh answers ``right`` with."""
+    """Return the change of the torsion by the linearised mesh for the right-hand side ``right``."""
     orders, slope = equations.torus.orders, motion.mesh_slope
     viscous = 1j * orders * equations.speed * mean(motion.mesh_damping) - impedance
     level = mean(slope)

@@ -21,9 +21,9 @@ from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.solve.stability import require_stable
 
 _COUPLINGS = (6, 12, 24, 48, 96, 192)
-"""How many orders beyond the excited ones are kept: the first number that is enough."""
+"""Numbers of orders kept beyond the excited ones; the first sufficient one is used."""
 _TAIL = 1e-9
-"""Enough is where the outermost harmonics are this much smaller than the largest."""
+"""A number suffices if the outermost harmonics are smaller than the largest by this factor."""
 
 
 def transfer_function(
@@ -69,8 +69,8 @@ def hill_steady_state(coefficients: Coefficients) -> OrderSpectrum:
     Raises
     ------
     UnstableDrive
-        If the varying stiffness makes the motion of a design grow, so that there is no steady
-        state for the equations to have.
+        If the varying stiffness makes the motion of a design grow, so that the equations have no
+        steady state.
     ArithmeticError
         If laws at ports are such that the harmonic balance finds no steady state, or the harmonics
         of a deeply varying stiffness do not die out.
@@ -151,7 +151,7 @@ def _torsion(
 def _free_impedance(
     coefficients: Coefficients, frequency: NDArray[np.float64]
 ) -> NDArray[np.complex128]:
-    """Return P of both free inertias, shape (n, n_frequencies); 0 at rest, where nothing holds."""
+    """Return P of both free inertias, shape (n, n_frequencies); 0 at frequency zero."""
     ratio_squared = coefficients.ratio**2
     inertia = coefficients.input_inertia[:, None] * ratio_squared
     damping = coefficients.input_damping[:, None] * ratio_squared

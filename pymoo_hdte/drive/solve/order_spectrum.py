@@ -137,7 +137,7 @@ class _Grid:
             family = fractions == fraction
             argument = np.outer(orders[family], within)
             cosine, sine = np.cos(argument), np.sin(argument)
-            # Real products, because complex ones this small already wake the threads of BLAS.
+            # Real products, because complex ones even of this size start the threads of BLAS.
             real, imaginary = phasors.real[:, family].copy(), phasors.imag[:, family].copy()
             in_phase = real @ cosine - imaginary @ sine
             if fraction == 0.0:
@@ -147,7 +147,7 @@ class _Grid:
                 self.fractional.append((float(fraction), in_phase, quadrature))
 
     def envelope(self) -> NDArray[np.float64]:
-        """Return what no turn exceeds at each point within the turn, shape (n, points)."""
+        """Return an upper bound over all turns at each point within the turn, shape (n, points)."""
         return self.whole + sum(
             np.hypot(in_phase, quadrature) for _, in_phase, quadrature in self.fractional
         )

@@ -17,7 +17,7 @@ from pymoo_hdte.laws.law import Law, PortState, Response, Values, periodic_phase
 
 _STEPS = 100
 _TOLERANCE = 1e-12
-"""Largest change of the torsion, relative to the way of the leg, that ends the root search."""
+"""Largest change of the torsion, relative to the length of the leg, that ends the root search."""
 _DOUBLINGS = 20
 _LEAST_WAY = 1e-7
 """rad. The search starts no smaller: within a clearance hardly any torque is a long way."""
@@ -28,9 +28,9 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     """Return the torsion d along a path of slow load with the input locked, from rest.
 
-    Laws at the mesh answer as they stand. Dry friction at the output, its level with all of the
-    Stribeck excess, holds the mesh torque until the load has left it by that much, whichever way.
-    Where a clearance leaves the torsion free, it moves no further than it must.
+    Laws at the mesh act unchanged. Dry friction at the output, its level with all of the Stribeck
+    excess, holds the mesh torque until the load differs from it by that much, in either direction.
+    Where a clearance leaves the torsion free, it moves no further than necessary.
 
     The angle of the locked input is not known: a stiffness and clearances that vary with it are
     taken at their means, which is wrong by up to the depth of the variation and by up to half the
@@ -60,8 +60,8 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
 def mean_torsion(coefficients: Coefficients, torque: Values) -> Values:
     """Return the mean torsion between consecutive points of the path, the load growing steadily.
 
-    By parts, the integral of d over T is one of T over d: the jump of a clearance and the rest
-    before breakaway are averaged as they are, however wide apart the points.
+    Integration by parts turns the integral of d over T into one of T over d, which averages the
+    jump of a clearance and the rest before breakaway exactly, however far apart the points are.
 
     Parameters, errors and limits are those of `quasi_static_torsion`; b is the number of points.
 
@@ -180,7 +180,7 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
 
 
 def _play(torque: Values, breakaway: float) -> Values:
-    """Return the torque that dry friction lets through to the mesh, from rest."""
+    """Return the torque that dry friction transmits to the mesh, from rest."""
     held = np.empty_like(torque)
     last = 0.0
     for sample, load in enumerate(torque):

@@ -1,6 +1,6 @@
 """Parametric stability of a drive with varying stiffness, by Floquet multipliers.
 
-Hill's method answers for an unstable drive too, so its callers ask here first.
+Hill's method gives a result for an unstable drive, too, so its callers check stability first.
 """
 
 from __future__ import annotations
@@ -88,8 +88,8 @@ def _phase(coefficients: Coefficients, period: float) -> float:
 def require_stable(coefficients: Coefficients) -> None:
     """Raise `UnstableDrive`, naming the design, if a multiplier lies outside the unit circle.
 
-    A stiffness that varies a thousand times more slowly than the drive vibrates pumps no energy
-    into it (tongues of parametric resonance shrink exponentially with their order), so such drives
+    A stiffness that varies a thousand times more slowly than the drive vibrates transfers no energy
+    to it (tongues of parametric resonance shrink exponentially with their order), so such drives
     pass as stable without integration, as does a constant stiffness.
     """
     if not (len(coefficients.stiffness) and coefficients.stiffness_variations):

@@ -1,4 +1,4 @@
-"""Eq. (9) integrated from rest, torque-driven: the reference that the steady state is held against.
+"""Eq. (9) integrated from rest, torque-driven: the reference for the steady state.
 
 The state is (th_in, th_in', th_d, th_d') with th_d = th_in / N - th_out, so that the transmission
 error, a part in 10^4 of the angles, is integrated to its own precision.
@@ -90,7 +90,7 @@ def equations_of_motion(
     def losses(rate: float) -> float:
         return dry("input", 0.0, rate, 0.0) + dry("output", 0.0, rate / ratio, 0.0) / ratio
 
-    # What is left of the holding torque is second order: speed and torsion fluctuate.
+    # The error of the holding torque is of second order, by fluctuations of speed and torsion.
     remembering = memories(coefficients)
     places = np.cumsum([4, *(law.states for law in remembering)])[:-1]
     left = _holding_torque(coefficients) - holding - losses(speed)

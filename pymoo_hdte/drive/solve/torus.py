@@ -20,7 +20,7 @@ Matrices = NDArray[np.float64]
 
 _TOLERANCE = 1e-8
 _LARGEST_MULTIPLE = 4
-"""An order whose fraction is up to this many times a known one needs no angle of its own."""
+"""An order whose fraction is at most this multiple of a known one needs no angle of its own."""
 
 
 def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
@@ -71,7 +71,7 @@ class Torus:
     ----------
     orders : ndarray, shape (n_harmonics,)
         Orders of the kept harmonics; the first is 0. Others may be negative: a real signal's line
-        at -o is the conjugate of that at o, so only one of the two stands here.
+        at -o is the conjugate of that at o, so only one of the two is kept.
     size : int
         Number G of grid points.
     """
@@ -85,7 +85,8 @@ class Torus:
         half = [k for k in every if k > (0,) * len(k)]
         self._multiples = np.array([(0,) * len(self.highest), *half])
         self.orders = self._multiples @ np.array(self.fundamentals)
-        # Four points a cycle of the highest harmonic: no square folds back, of the cubes only its.
+        # Four points a cycle of the highest harmonic: squares are free of aliasing, and cubes of
+        # all but the highest harmonic.
         grids = [2.0 * np.pi * np.arange(4 * most) / (4 * most) for most in self.highest]
         mesh = np.meshgrid(*grids, indexing="ij")
         self._shape = mesh[0].shape
@@ -101,7 +102,7 @@ class Torus:
         self._analysis = weights * np.exp(-1j * argument)
 
     def _flat(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
-        """Return where multiples (..., n_angles) stand in a flattened transform of the grid."""
+        """Return the indices of multiples (..., n_angles) in a flattened transform of the grid."""
         wrapped = np.moveaxis(multiples % np.array(self._shape), -1, 0)
         return np.asarray(np.ravel_multi_index(tuple(wrapped), self._shape))
 
@@ -110,14 +111,14 @@ class Torus:
         return self._find(order) @ self._phases
 
     def place(self, order: float) -> tuple[int, bool]:
-        """Return the index of an order among the harmonics, and whether it stands there as -o."""
+        """Return the index of an order among the harmonics, and whether it is there as -o."""
         found = self.find(order)
         if found is None:
             raise InvalidInput("order", order, f"within {self.highest} times {self.fundamentals}")
         return found
 
     def find(self, order: float) -> tuple[int, bool] | None:
-        """Return what `place` does, or None for an order that is not kept."""
+        """Return the same as `place`, or None for an order that is not kept."""
         for sign in (1.0, -1.0):
             places = np.flatnonzero(np.abs(self.orders - sign * order) < _TOLERANCE)
             if places.size:
@@ -130,9 +131,9 @@ class Torus:
     def path(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return grid values (n, G) in the order in which a slow beat passes them, twice over.
 
-        One input turn after the other, each at the next point of the other angles. What depends on
-        the sequence of extremes but not on time sees the same as in the real, slower beat; the
-        second passage is free of the start from rest.
+        One input turn after the other, each at the next point of the other angles. Laws that depend
+        on the sequence of extremes but not on time respond as in the real, slower beat; the second
+        passage is independent of the start from rest.
         """
         points = self._shape[0]
         turns = values.reshape(len(values), points, self.size // points).swapaxes(1, 2)

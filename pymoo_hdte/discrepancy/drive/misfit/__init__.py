@@ -1,1 +1,1 @@
-"""Where the misfit of a drive lives: its map, the places it is in, and both in words."""
+"""Location of the misfit of a drive: its map, the flagged cells, and both in words."""

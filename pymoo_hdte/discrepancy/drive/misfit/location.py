@@ -1,9 +1,9 @@
-"""Where the model is wrong: the map channel x order x speed x load, and where it may be trusted.
+"""Where the model is wrong, on the map channel x order x speed x load, and where it is right.
 
-A cell's misfit is weighed by its own marginal covariance, so that it stays in its cell, and held
-against base parameters that the misfit did not bias: those of the model with its named effects,
-refitted to the cells that it explains. Flagged is what the named effects move by more than the
-noise, and what the model with them still gets wrong.
+A cell's misfit is weighted by the marginal covariance of the cell, so that it does not spread to
+others, and computed with base parameters that the misfit did not bias: those of the model with its
+named effects, refitted to the cells that it explains. A cell is flagged if the named effects change
+it by more than the noise, or if the model with them still misses it.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 __all__ = ["Location", "locate", "refit_clean"]
 
-# Of the robust fit, which ends in the same place with finer ones; what is flagged is in `Rules`.
+# Settings of the robust fit; finer ones give the same result. What is flagged is in `Rules`.
 _LINEARISATIONS = 2
 _ROUNDS = 15
-"""Of renewed weights, for one linearisation."""
+"""Most rounds of reweighting for one linearisation."""
 _EVALUATIONS = 10
-"""Of the residuals, when the weights stand."""
+"""Most evaluations of the residuals once the weights are fixed."""
 _SETTLED = 0.05
 """Relative change of all weights that ends the rounds."""
 _CAUCHY = 4.0
@@ -93,15 +93,15 @@ def locate(finding: DriveFinding) -> Location:
 def refit_clean(data: Data, fitted: Fit) -> Fit:
     """Refit a model within its bounds to the cells that it does not contradict.
 
-    First with the weights of Cauchy's distribution, because a misfit that the fit has spread over
-    all cells makes clean ones look wrong; then with the cells that are still wrong left out. A
-    torsion sweep that contradicts the running records is left out too.
+    First with the weights of Cauchy's distribution, because a fit spreads a misfit over all cells,
+    so that clean ones look wrong; then without the cells that are still wrong. A torsion sweep that
+    contradicts the running records is left out too.
 
     Parameters
     ----------
     data : Data
     fitted : Fit
-        Its effects are kept; returned as it is where it contradicts nothing.
+        Its effects are kept; returned unchanged if it contradicts no cell.
     """
     degrees_of_freedom, rules = cell_degrees_of_freedom(data), data.rules
     chi_square, sweep = _misfit(data, fitted)
@@ -118,7 +118,7 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
 
 
 def _robust_step(data: Data, fitted: Fit) -> Values:
-    """Return values with which the linearised model misses least by Cauchy's measure.
+    """Return the values that minimise Cauchy's loss of the linearised model.
 
     Weights are renewed after every solution of the bounded linear problem until they settle.
     """
@@ -145,7 +145,7 @@ def _robust_step(data: Data, fitted: Fit) -> Values:
         weakened = _weakened(data, factor, False)
         matrix = np.concatenate([weakened.whiten(slopes), others_slopes], axis=1).T
         right = -np.concatenate([weakened.whiten(difference), others])
-        # Values may lie at a bound, and beyond it by rounding.
+        # Values at a bound may exceed it by rounding.
         step = lsq_linear(matrix, right, (np.minimum(lower, 0.0), np.maximum(upper, 0.0))).x
     return np.clip(fitted.values + step * objective.scale, objective.lower, objective.upper)
 

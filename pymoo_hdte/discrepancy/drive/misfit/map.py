@@ -18,7 +18,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """Where the misfit lives. Cells have shape (r, 4, 1 + m): record, channel, order.
+    """Location of the misfit. Cells have shape (r, 4, 1 + m): record, channel, order.
 
     Channels are those of `order_lines.CHANNELS`. Order 0 is the mean.
 
@@ -35,19 +35,20 @@ class Location:
         Of the misfit: two degrees of freedom for a line, one for a mean.
     p_value : ndarray, shape (r, 4, 1 + m)
     moved : ndarray, shape (r, 4, 1 + m)
-        Chi-square of what the named effects change; zero where none is named.
+        Chi-square of the change by the named effects; zero where none is named.
     flagged : ndarray of bool, shape (r, 4, 1 + m)
-        Cells that the named effects move by more than the root mean square of the noise, and
-        those whose misfit the model with them leaves significant at `Rules.false_discovery_rate`.
+        Cells that the named effects change by more than the root mean square of the noise, and
+        those with a misfit of the model with these effects that is significant at
+        `Rules.false_discovery_rate`.
     sweep_p_value : float or None
         Of the torsion sweep, None without one.
     sweep_flagged : bool
     named : bool
         Whether there are named effects.
     rules : Rules
-        By which cells were flagged.
+        Thresholds by which cells were flagged.
     sentence, trusted : str
-        Where the misfit lives, and where the model may be trusted as it is.
+        Where the misfit is, and where the model may be trusted as it is.
     """
 
     records: tuple[str, ...]
@@ -72,7 +73,7 @@ class Location:
         return int(np.isfinite(self.chi_square).sum())
 
     def summary(self) -> dict[str, Any]:
-        """Return what ``verdict.json`` says of it, as plain types."""
+        """Return its entry in ``verdict.json``, as plain types."""
         flagged = [
             {
                 "record": self.records[record],

@@ -1,8 +1,8 @@
 """What kind of misfit it is: of a torque, a compliance or the kinematics.
 
-At low speed, where inertia is small, the torsion is the torque over the stiffness. A transmission
-error that follows the torques measured is therefore caused by them, and one that does not is made
-in the mesh or in an encoder.
+At low speed, where inertia is small, the torsion is the torque over the stiffness. A misfit of the
+transmission error that follows the measured torques is therefore caused by them, and one that does
+not arises in the mesh or in an encoder.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Values = NDArray[np.float64]
 def sizes(location: Location) -> Values:
     """Return the flagged cells in standard deviations, zero elsewhere.
 
-    Not as chi-square, of which a single cell of a quiet sensor would make up nearly all.
+    Not as chi-square, which a single cell of a sensor with little noise would dominate.
     """
     size = np.maximum(np.nan_to_num(location.chi_square), np.nan_to_num(location.moved))
     return np.where(location.flagged, np.sqrt(size), 0.0)
@@ -62,7 +62,7 @@ def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
     if size[slow].sum() <= rules.slow_share * size.sum():
         return "It shows at speed only, as a torque of inertia or damping does"
     misfit = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)[slow]
-    # As twists: what the torques do to the torsion through the stiffness.
+    # Torques divided by the stiffness, to compare them with the torsion.
     error = misfit[:, 0]
     from_input = misfit[:, 1] * believed.ratio / believed.stiffness
     from_output = misfit[:, 2] / believed.stiffness
@@ -86,7 +86,7 @@ def _torque(
 ) -> str:
     """Return the words for a torque, with the side on which it acts.
 
-    One on the output has to pass through the drive and shows on both sides.
+    A torque on the output is transmitted through the drive and shows on both sides.
     """
     if _power(from_output) < rules.caused_share * _power(from_input):
         return "It is torque-like and acts on the input: the output torque hardly shows it"
@@ -99,14 +99,14 @@ def _power(lines: NDArray[np.complex128]) -> float:
 
 @dataclass(frozen=True)
 class StrayLines:
-    """Lines that are no orders.
+    """Lines that do not belong to an order.
 
     Attributes
     ----------
     frequency : float or None
-        Hz, of a line that records at several speeds share.
+        Hz, of a line that is common to records at several speeds.
     broad : tuple of str
-        Channels in which many neighbouring lines share the power.
+        Channels in which the power is spread over many neighbouring lines.
     """
 
     frequency: float | None = None
@@ -114,13 +114,13 @@ class StrayLines:
 
 
 def stray_lines(data: Data, unexpected: Sequence[float]) -> StrayLines:
-    """Return the lines of a campaign that are no orders.
+    """Return the lines of a campaign that do not belong to an order.
 
     Parameters
     ----------
     data : Data
     unexpected : sequence of float
-        Orders of the features that are there only because records showed something at them.
+        Orders of the features that were added because records have significant lines at them.
     """
     if not unexpected:
         return StrayLines()
@@ -143,13 +143,13 @@ def stray_lines(data: Data, unexpected: Sequence[float]) -> StrayLines:
 
 
 def _lines_in_effect(power: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how many lines share the power (4, k) of each channel: (sum p)^2 / sum p^2."""
+    """Return the effective number of lines of each channel's power (4, k): (sum p)^2 / sum p^2."""
     square = np.maximum(np.sum(power**2, axis=1), np.finfo(float).tiny)
     return np.asarray(np.sum(power, axis=1) ** 2 / square)
 
 
 def _shared(peaks: NDArray[np.float64], rules: Rules) -> float | None:
-    """Return the frequency that peaks (k, 2), in Hz at a speed, have in common at many speeds."""
+    """Return the frequency common to peaks (k, 2) of (Hz, speed) at many speeds, or None."""
     frequencies, speeds = peaks.T
     for frequency in frequencies:
         same = np.abs(frequencies / frequency - 1.0) < rules.fixed_frequency_width

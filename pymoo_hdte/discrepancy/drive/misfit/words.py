@@ -19,25 +19,25 @@ from pymoo_hdte.discrepancy.drive.misfit.nature import (
 )
 
 _WORDS = [name.replace("_", " ") for name in CHANNELS]
-# How much a sentence lists; what is flagged and claimed is in `Rules`.
+# Length of the lists in sentences; thresholds of flagging and of statements are in `Rules`.
 _SHOWN = 3
-"""Most orders that a sentence lists."""
+"""Largest number of orders that a sentence lists."""
 _MINOR = 0.05
 """Share of the misfit below which an order or a channel is not mentioned."""
 _HALF_WIDTH = 0.05
-"""Relative distance within which a line belongs to a fixed frequency, with what leaks from it."""
+"""Relative distance within which a line belongs to a fixed frequency or leaks from it."""
 
 
 def sentences(location: Location, data: Data, unexpected: Sequence[float]) -> tuple[str, str]:
-    """Return where the misfit lives, and where the model may be trusted as it is.
+    """Return where the misfit is, and where the model may be trusted as it is.
 
     Parameters
     ----------
     location : Location
     data : Data
-        For lines that are no orders, and for stiffness and ratio.
+        For lines that do not belong to an order, and for stiffness and ratio.
     unexpected : sequence of float
-        Orders beyond the expected ones at which records show more than noise.
+        Orders beyond the expected ones with significant lines.
     """
     believed, stray = data.campaign.believed, stray_lines(data, unexpected)
     parts, kind = [], ""
@@ -61,7 +61,7 @@ def sentences(location: Location, data: Data, unexpected: Sequence[float]) -> tu
 
 
 def _where(location: Location, stray: StrayLines, ratio: float) -> str:
-    """Return the orders, or what takes their place, with their channels."""
+    """Return the orders, or else a broad band or fixed frequency, with the channels."""
     size = sizes(location)
     if stray.broad:
         names = _listed([_WORDS[CHANNELS.index(name)] for name in stray.broad])
@@ -101,7 +101,7 @@ def _orders(location: Location, size: Values, ratio: float) -> str:
 def _weight(size: Values) -> Values:
     """Return the weight of orders from their sizes (4, 1 + m).
 
-    The input angle counts where nothing else does: the loop that holds the speed moves it a lot.
+    The input angle counts only where no other channel does: the speed loop moves it strongly.
     """
     return size[:3].sum(axis=0) if size[:3].any() else size[3]
 
@@ -123,14 +123,14 @@ def _channels(size: Values) -> str:
 
 
 def _growth(location: Location, broad: bool) -> str:
-    """Return how the strongest line, or the whole of a broad band, changes with speed and load."""
+    """Return how the strongest line, or a whole broad band, changes with speed and load."""
     size = sizes(location).sum(axis=0)
     if size[:3].any():
         size = size[:3]
     channel, order = np.unravel_index(int(np.argmax(size)), size.shape)
     degrees_of_freedom = 1.0 if order == 0 else 2.0
     chi_square = location.chi_square[:, channel]
-    # What noise adds to the square of an amplitude, on average, is taken off.
+    # The mean contribution of noise to the square of an amplitude is subtracted.
     real = np.clip(1.0 - degrees_of_freedom / np.maximum(chi_square, 1e-12), 0.0, 1.0)
     power = np.abs(location.misfit[:, channel]) ** 2 * real
     chosen = np.nansum(power[:, 1:], axis=1) if broad else power[:, order]
@@ -178,12 +178,12 @@ def _trusted(location: Location, ratio: float) -> str:
 
 
 def _conditions(location: Location, clean: Flags) -> str:
-    """Return the records without misfit, as a limit of speed or load where they keep to one."""
+    """Return the records without misfit, as a limit of speed or load where one describes them."""
     for condition, unit in ((location.load_torque, "N.m"), (location.speed_rpm, "r/min")):
         size = np.abs(condition)
         limit = size[clean].max()
         if np.array_equal(clean, size <= limit):
-            # Two digits of the largest; below that is what a sensor's zero makes of no load.
+            # Rounded to two digits of the largest load; the zero error of a sensor lies below that.
             step = min(10.0 ** np.floor(np.log10(size.max()) - 1.0), 1.0)
             limit = round(limit / step) * step
             return f"in all records {f'up to {limit:g} {unit}' if limit else 'without load'}"
