@@ -1,4 +1,4 @@
-"""kill -9 at any moment, then the same command again: the bytes of a run that nobody disturbed.
+"""kill -9 at any moment, then the same command again: the bytes of an undisturbed run.
 
 Moments are either random, from the start of the interpreter to the last file, or one of the steps
 in which a file is written: in the midst of its bytes, or just before it gets its name.
@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 EXPERIMENT = ("table7", "--seeds", "1")
 """Six jobs, five tables and two figures in a few seconds."""
 STEPS = 48
-"""Of the undisturbed run, about: two for each of its files."""
+"""About the number of steps of the undisturbed run: two for each of its files."""
 PATIENCE = 300.0
 """Seconds after which a run hangs."""
 COUNTS = ("kills", "finished", "partial", "different", "failed", "orphaned")
@@ -35,7 +35,7 @@ COUNTS = ("kills", "finished", "partial", "different", "failed", "orphaned")
 
 @dataclass(frozen=True)
 class Reference:
-    """Files of a run that nobody disturbed, by their path, and how long it took."""
+    """Files of an undisturbed run, by their path, and how long it took."""
 
     files: dict[str, bytes]
     seconds: float

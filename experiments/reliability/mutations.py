@@ -1,4 +1,4 @@
-"""Mutations of folders: what typing errors, other programs, broken disks and pranks make of them.
+"""Mutations of folders: typing errors, other programs' changes, disk faults and pranks.
 
 A mutated folder is a pure function of the folder and the generator.
 """

@@ -27,7 +27,7 @@ CONNECT_SECONDS = 10
 
 
 class WorkerLost(RuntimeError):
-    """Worker after worker ended while a job was with them; this job or another is the cause."""
+    """Several workers in turn ended while they held a job; this job or another is the cause."""
 
 
 class WrongWorker(RuntimeError):
@@ -138,7 +138,7 @@ class DaskExecutor(Executor):
 
     def _drop(self, task: Task, future: Future[Any]) -> None:
         if future.cancelled():
-            # In the client's own thread: nobody waits for the scheduler's answer.
+            # In the client's own thread, so that the caller does not wait for the scheduler.
             self._loop.add_callback(task.cancel)
 
     async def _deliver(self, task: Task, future: Future[Any]) -> None:

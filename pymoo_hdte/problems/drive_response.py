@@ -105,7 +105,7 @@ class DriveResponse:
 
     @property
     def variant(self) -> str:
-        """Name of the model, with its order if not the paper's, and whether a duty cycle is given."""
+        """Name: the model, its order if not the paper's, and whether it has a duty cycle."""
         order = "" if self._order == PAPERS_ORDER else f"_order{self._order}"
         return self.model.name + order + ("" if self._given is None else "_duty_cycle")
 

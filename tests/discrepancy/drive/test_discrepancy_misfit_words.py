@@ -180,7 +180,7 @@ def test_a_fixed_frequency_is_found_though_its_orders_differ():
     found = stray_lines(data, (3.5,))
     assert found.frequency == pytest.approx(83.0, rel=5e-3)
     assert found.broad == ()
-    # Without anything unexpected nobody looks.
+    # Without anything unexpected there is no search.
     assert stray_lines(data, ()) == StrayLines()
 
 
