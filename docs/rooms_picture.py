@@ -1,6 +1,6 @@
 """Draw docs/rooms.png, a picture of the package's architecture, made from its imports.
 
-A room is a folder; modules in no folder of their own are the ground that all rooms stand on.
+A room is a folder; modules outside all folders, which every room may use, are not drawn.
 An arrow means "imports from"; one that follows from others (a over b over c) is left out.
 """
 

@@ -139,8 +139,9 @@ print(f"standard deviation {noise.truncated_std / noise.std:.4f} of that before 
 #    \mathrm{Cov} \, C' = \sum_{m,n} \mathrm{E} (T_m T_n) \, \mathrm{Cov} (C_m, C_n) + \sum_{m,n}
 #    \mathrm{Cov} (T_m, T_n) \, \mathrm{E} \, C_m \, \mathrm{E} \, C_n^\top .
 #
-# Nothing large is subtracted. After the last variable, :math:`C` is
-# :math:`f`, with its mean and variance.
+# Nothing large is subtracted. After the last variable, :math:`C` is :math:`f` itself, with its mean
+# and variance.
+#
 # An independent check by quadrature of the surrogate itself:
 
 design = np.array([[0.9, 1.1]])

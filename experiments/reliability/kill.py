@@ -132,7 +132,7 @@ def visible(folder: Path) -> list[Path]:
 
 
 def steady(folder: Path) -> dict[str, bytes]:
-    """Return the visible files that come out alike every time: neither times nor the page."""
+    """Return the visible files that are the same in every run: neither times nor the page."""
     names = {path: str(path.relative_to(folder)) for path in visible(folder)}
     return {
         name: path.read_bytes()
@@ -142,7 +142,7 @@ def steady(folder: Path) -> dict[str, bytes]:
 
 
 def whole(path: Path) -> bool:
-    """Whether a file ends as its kind does."""
+    """Whether a file is complete, by what ends a file of its type."""
     text = path.read_bytes()
     try:
         if path.suffix == ".json":

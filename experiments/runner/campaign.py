@@ -252,7 +252,7 @@ def _package(job: Job) -> Path:
 
 @cache
 def origin(package: Path) -> dict[str, str]:
-    """Name all that decides the bytes which jobs of the folder ``package`` give in this process.
+    """Name all that determines the bytes of the results of jobs in the folder ``package``.
 
     A job's outcome may depend on any module of its package, not only on its own. The answer is
     kept, because what a process has loaded outlives a change of the files.

@@ -172,10 +172,10 @@ class DaskExecutor(Executor):
 
 
 class _Call:
-    """A call that is made where its pickle is opened.
+    """A call that stays pickled until a worker makes it.
 
-    Dask opens what it carries outside of jobs, too. A worker without our modules would end of that,
-    then the next one, and the run would wait for ever. Opened within a job, it is the job's error.
+    Dask also unpickles arguments outside of jobs. That would end a worker without our modules, then
+    the next one, and the run would wait for ever. Unpickled within a job, it is the job's error.
     """
 
     def __init__(self, call: Callable[[], Any]) -> None:

@@ -151,7 +151,7 @@ def test_shares_stay_probabilities(moves, survived):
 
 
 def most_spread_by_recount(F, size):
-    """The readable twin: measure every distance anew before each removal."""
+    """A simple reference: compute every distance again before each removal."""
     span = np.ptp(F, axis=0)
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
     rows = list(range(len(F)))

@@ -30,7 +30,7 @@ def test_an_interior_optimum_is_no_harder_than_one_on_the_bound():
     problem = MovedZDT("zdt1", rotated=False, seed=1)
     distance = IGD(problem.pareto_front(1000))
     assert distance(run(ElitistSwarm(), problem, n_gen=100).F) < 0.012
-    # The faithful swarm lives on the bounds.
+    # AMP-MOPSO, as printed, relies on optima that lie on the bounds.
     assert distance(run(AMPMOPSO(), problem, n_gen=100).F) > 0.1
 
 

@@ -1,4 +1,4 @@
-"""What a campaign cannot tell is said, and only where it cannot."""
+"""Limits of what a campaign can tell are stated, and only where they apply."""
 
 import re
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Words on a misfit: what is planted is what is said, for effects that no list holds."""
+"""Words on a misfit describe what was planted, for effects that are not listed."""
 
 from dataclasses import replace
 from types import SimpleNamespace
