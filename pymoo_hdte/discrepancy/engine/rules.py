@@ -22,8 +22,8 @@ from pymoo_hdte.discrepancy.engine.rules_of_report import ReportRules
 class Rules(ReportRules, RecordRules):
     """Every threshold that decides what is named, refused, flagged or shown as certain.
 
-    ``analyse(campaign, rules=...)`` and ``investigate(..., rules=...)`` take one; `RULES` is what
-    they take by default. `explained` returns all of them in words.
+    ``analyse(measured, rules=...)`` takes them, for drives and mechanisms; `RULES` is its
+    default. `explained` returns all of them in words.
 
     Raises
     ------
