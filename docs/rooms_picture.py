@@ -1,6 +1,6 @@
-"""Draw docs/rooms.png, the picture of the architecture page: the package's rooms, from its imports.
+"""Draw docs/rooms.png, a picture of the package's architecture, made from its imports.
 
-A room is a folder; modules in no folder of their own are the ground that all rooms stand on.
+A room is a folder; modules outside all folders, which every room may use, are not drawn.
 An arrow means "imports from"; one that follows from others (a over b over c) is left out.
 """
 
@@ -35,7 +35,7 @@ def imports() -> dict[str, set[str]]:
 
 
 def _file(module: str) -> Path:
-    """Return the file that a module, or a name in a module, stands in."""
+    """Return the file of a module, or of the module that defines a name."""
     parts = module.split(".")[1:]
     while parts:
         path = ROOT.joinpath(*parts)

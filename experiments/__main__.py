@@ -26,7 +26,7 @@ SMALL = [one for one in EXPERIMENTS if one.has_small_version]
 STORED = [one for one in EXPERIMENTS if one.reads_outcome]
 SEEDED = [one for one in EXPERIMENTS if one.takes_seeds]
 SEEDS = 20
-"""Runs of every algorithm in the paper, and here unless the user says otherwise."""
+"""Runs of every algorithm: the paper's number, and the default here."""
 INTERRUPTED = 130
 """Exit code that a shell expects of a program ended by Ctrl-C."""
 
@@ -72,7 +72,7 @@ def _run(chosen: Sequence[Experiment], context: Context) -> int:
             save(context.out, experiment.name, experiment.run(context))
             report = write_report(context.out)
         except KeyboardInterrupt:
-            # Impatient further presses must not stop the workers' orderly end half-way.
+            # Further presses of Ctrl-C must not interrupt the orderly end of the workers.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             message = (
                 f"Interrupted during {experiment.name}. What is finished is kept in {context.out}; "

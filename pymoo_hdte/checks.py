@@ -11,20 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 MOST_SHOWN = 200
-"""Characters of a field or value in a message; a damaged file may hold a million."""
+"""Most characters of a field or value in a message; a damaged file may hold a million."""
 
 
 class InvalidInput(ValueError):
-    """A value that a user supplied is not allowed; the message says which, and what is.
+    """A value that a user supplied is not allowed; the message names it and what is allowed.
 
     Attributes
     ----------
     field : str
-        Name of what was supplied.
+        Name of the argument or field.
     value : Any
-        What it was.
+        The value supplied.
     allowed : str
-        What it may be.
+        Description of the allowed values.
     """
 
     def __init__(self, field: str, value: Any, allowed: str) -> None:

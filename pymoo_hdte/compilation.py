@@ -1,4 +1,4 @@
-"""Compilation of number-crunching functions, kept on disk for the next process where it may be."""
+"""Compilation of numerical functions by numba, cached on disk where that is possible."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ F = TypeVar("F", bound=Callable)
 def compiled(function: F) -> Dispatcher[F]:
     """Return ``function`` as machine code, which numba makes at the first call.
 
-    Without any place to write, as in a read-only installation for a user without a home, every
+    If no cache can be written, as in a read-only installation for a user without a home, every
     process compiles anew.
     """
     try:

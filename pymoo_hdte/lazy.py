@@ -1,7 +1,7 @@
 """Names of a package that are imported when they are first used, as its stub lists them.
 
 The stub, ``__init__.pyi`` beside ``__init__.py``, imports the names as any package does; type
-checkers and editors read it, and so does `lazy_names`, so that the list stands once.
+checkers and editors read it, and so does `lazy_names`, so that the list is written only once.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def lazy_names(package: str, file: str) -> Lazy:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         value = getattr(import_module(homes[name]), name)
-        # Found there from now on, without this function.
+        # The next access finds the name in the module and does not call this function.
         setattr(sys.modules[package], name, value)
         return value
 

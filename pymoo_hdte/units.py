@@ -1,4 +1,4 @@
-"""Units at the edges of the package: what files may be given in; everything inside is SI."""
+"""Units that input files may use, with factors to SI; inside the package everything is SI."""
 
 import math
 
@@ -42,7 +42,7 @@ _ENDINGS = {
     "_r_min": UNITS["speed"]["r/min"],
     "_um": UNITS["length"]["um"],
 }
-"""Of names of fields and columns that are not in SI."""
+"""Factors to SI by the ending of the name of a field or column that is not in SI."""
 
 
 def si_unit(quantity: str) -> str:

@@ -20,7 +20,7 @@ class EyringDrag(Aperiodic):
     knee: float
 
     def __post_init__(self):
-        """Refuse numbers that are no drag."""
+        """Refuse values that a drag cannot have."""
         real_number("eyring_drag.level", self.level)
         real_number("eyring_drag.knee", self.knee, above=0.0)
 

@@ -2,8 +2,8 @@
 
     python docs/examples/virtual_campaign.py FOLDER
 
-FOLDER must be new or empty. The believed drive knows nothing of the ripple, and its parameters are
-off within their tolerances, as those of a real one are.
+FOLDER must be new or empty. The believed drive has no ripple, and its parameters are off
+within their tolerances, as those of a real one are.
 """
 
 import sys

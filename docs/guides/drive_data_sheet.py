@@ -7,8 +7,8 @@ teeth, rated speed and load, stiffness, inertias, dampings, errors of the parts.
 says how the static error is made up and which effects the drive has beside the equations of motion.
 Nothing has to be programmed.
 
-The two files here describe an invented drive of ratio 81; their values are plausible and nobody
-measured them. They stand in :doc:`/examples`. Copy them and put your own numbers in.
+The two files here describe an invented drive of ratio 81; their values are plausible but not
+measured. They stand in :doc:`/examples`. Copy them and put your own numbers in.
 """
 
 import sys
@@ -201,7 +201,8 @@ ax.legend()
 plt.show()
 
 # %%
-# Check the chosen design on the model itself before you build it: the surrogate has done its duty.
+# Check the chosen design on the model itself before you build it: the surrogate only served the
+# search.
 
 check = np.append(model.nominal[0], result.X[chosen])[np.newaxis]
 print(f"model {model.dte_arcsec(check)[0]:.2f}, surrogate {problem.surrogate(check)[0]:.2f} arcsec")

@@ -5,7 +5,7 @@ Mathematics: exact moments
 A robust design needs the mean and the standard deviation of a response over its scatter, for every
 design anew. If the response is a Chebyshev polynomial and the scatter is independent, both are
 polynomials of the design, so nothing has to be sampled. This page derives them and holds each step
-against a quadrature that knows nothing of it.
+against an independent quadrature.
 """
 
 import matplotlib.pyplot as plt
@@ -38,8 +38,8 @@ from pymoo_hdte.surrogate import (
 #
 # with the Chebyshev polynomials :math:`T_n(\cos \varphi) = \cos (n \varphi)` (paper, Eqs. 14-25).
 # Its coefficients are those of the interpolation at the :math:`(k + 1)^d` roots of :math:`T_{k+1}`
-# in every variable. Here is one of three variables: a noise that no designer chooses, and two that
-# scatter around a design.
+# in every variable. Here is one of three variables: a noise variable, and two that scatter around a
+# design.
 
 
 def response(points):
@@ -139,9 +139,10 @@ print(f"standard deviation {noise.truncated_std / noise.std:.4f} of that before 
 #    \mathrm{Cov} \, C' = \sum_{m,n} \mathrm{E} (T_m T_n) \, \mathrm{Cov} (C_m, C_n) + \sum_{m,n}
 #    \mathrm{Cov} (T_m, T_n) \, \mathrm{E} \, C_m \, \mathrm{E} \, C_n^\top .
 #
-# Nothing large is subtracted. When no variable is left, the mean and the variance of :math:`f` are.
+# Nothing large is subtracted. After the last variable, :math:`C` is :math:`f` itself, with its mean
+# and variance.
 #
-# A quadrature of the surrogate itself, which knows none of this:
+# An independent check by quadrature of the surrogate itself:
 
 design = np.array([[0.9, 1.1]])
 

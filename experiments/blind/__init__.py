@@ -1,1 +1,1 @@
-"""Blind campaigns: what the discrepancy workflow finds of what a virtual rig hides."""
+"""Blind campaigns: which hidden effects of a virtual rig the discrepancy workflow finds."""

@@ -16,7 +16,7 @@ from pymoo_hdte.units import ARCSEC
 Values = NDArray[np.float64]
 
 RATED_TORQUE = 40.0
-"""N.m, where mesh laws are scaled."""
+"""Load at which mesh laws are scaled, N.m."""
 WOUND = (0.1, 0.2, 0.4)
 """Where a soft wind-up ends, as shares of the torsion at rated torque."""
 SLIPS = (0.03, 0.1, 0.3)
@@ -52,7 +52,7 @@ Law = Callable[[RecordMotion], Values]
 
 @dataclass(frozen=True)
 class Term:
-    """A candidate law: the effect it speaks for, where it acts, and its torque for a motion.
+    """A candidate law: the effect it indicates, where it acts, and its torque for a motion.
 
     ``positive`` says that its coefficient cannot be negative.
     """
@@ -68,7 +68,7 @@ def terms(believed: BelievedDrive, orders: Sequence[float]) -> list[Term]:
 
     Ports are "input", "output" and "mesh" of the drive, "load", "motor", and of the reading of the
     output angle "encoder" (a line) and "drift" (with time). Lines of the load are no effect of the
-    workflow's list: they speak for "unlisted".
+    workflow's list: they count as "unlisted".
     """
     slow = [1.0 / believed.ratio, 2.0 / believed.ratio]
     off_centre = [order for order in orders if np.any(np.isclose(order, slow))]
@@ -145,7 +145,7 @@ def _missing_in_clearance(motion: RecordMotion, size: float) -> Values:
 
 
 def _slipping_spring(motion: RecordMotion, size: float) -> Values:
-    """Return the stretch of a spring that slips there, once what came before is forgotten."""
+    """Return the stretch of a spring that slips there, once its initial state has no effect."""
     path = np.tile(motion.torsion, 2 if motion.closed else 1)
     return _stretch(path, size)[-len(motion.torsion) :]
 

@@ -1,4 +1,4 @@
-"""Words of a verdict as numbers, which is what the store of a campaign keeps."""
+"""Words of a verdict coded as numbers, as the store of a campaign keeps numbers only."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Outcomes of blind cases: as objects, and as the small CSV that the repository keeps.
 
-Seconds stand in a file of their own, because they differ from run to run.
+Seconds are in a separate file, because they differ from run to run.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
 from pymoo_hdte.io.text_table import csv_text
 
 CONFIDENT = ("named", "parameter")
-"""Statuses that leave no choice."""
+"""Statuses that give a single answer."""
 OPENED = 1.5
-"""Multiple of the noise floor beyond which a gap that was none has been opened."""
+"""Multiple of the noise floor beyond which the revision has opened a gap."""
 _CASE = ("kind", "truth", "size", "number")
 _WORDS = ("status", "chosen", "equivalents", "truth_in_class", *RIVALS)
 
@@ -68,7 +68,7 @@ class Outcome:
 
     @property
     def right(self) -> bool:
-        """Whether the first name is hidden, or all that is hidden stands in the class.
+        """Whether the first name is a hidden effect, or the class holds all that is hidden.
 
         A parameter out of tolerance has to be the right one.
         """
@@ -94,7 +94,7 @@ class Outcome:
 
     @property
     def both(self) -> bool:
-        """Whether all that is hidden is named, or stands in the class."""
+        """Whether all that is hidden is named or in the class."""
         return self._hidden <= set(self.names) or self._in_class
 
     @property
@@ -135,7 +135,7 @@ class Outcome:
         return after / max(before, error)
 
     def gap(self, name: str) -> Gap | None:
-        """Return one of `blind_scoring.GAPS`; None where nothing was proved."""
+        """Return one of `experiments.blind.scoring.GAPS`; None where nothing was proved."""
         if f"{name}_before" not in self.numbers:
             return None
         before, after, floor = (self.numbers[f"{name}_{s}"] for s in ("before", "after", "floor"))
@@ -173,7 +173,7 @@ class Outcome:
 
 
 def outcome(case: Case, run: Run) -> Outcome:
-    """Turn the run of a `BlindJob` into words."""
+    """Decode the run of a `BlindJob`."""
     cells = dict(zip(run.columns, run.values[0].tolist(), strict=True))
     chosen = []
     for place in ("first", "second"):

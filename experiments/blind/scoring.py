@@ -33,11 +33,11 @@ from pymoo_hdte.discrepancy.engine.verdict import Verdict
 
 PARTS = ("analyse", "locate", "prove", "next_experiment")
 RIVALS = ("largest_residual_rule", "sparse_regression")
-"""Simpler tools of `blind_rivals`, from an analysis to a name, "adequate" or "unlisted"."""
+"""Functions of `simpler_tools`, from an analysis to a name, "adequate" or "unlisted"."""
 COMPARED = ("none", "single", "unlisted")
 """Kinds on which the simpler tools are run too."""
 REVISED = ("single", "pair")
-"""Kinds that a right verdict adds a listed effect to."""
+"""Kinds of cases in which a right verdict adds a listed effect to the model."""
 GAPS = ("transmission_error", "leading", "overall")
 """Gaps on held-out records: that of the verdict's document, that of the channel in which the base
 stands out of the noise most, and that of all features."""

@@ -35,7 +35,7 @@ from pymoo_hdte.laws.unknowns import Parameter
 FALSE_ALARMS = 0.01
 """Chance that noise alone moves the largest of all cells, or the best of all terms, so far."""
 LEAST_SHARE = 0.5
-"""Of the excess chi-square, which the regression must explain to name anything."""
+"""Share of the excess chi-square that the regression must explain to name anything."""
 EFFECTS_IN_BASE = ("damping", "load_inertia")
 """Base parameters that are effects of the list where they lie beyond their tolerance."""
 _THRESHOLDS = 30
@@ -47,9 +47,8 @@ def largest_residual_rule(analysis: DriveFinding) -> str:
     """Name the effect by the cell in which the base model is most wrong.
 
     A cell is a mean or an order line of a channel in all records together, the torsion sweeps, or
-    the zero of the input torque; a table, such as an engineer keeps in mind, holds an effect for
-    each. "adequate" if no cell is beyond what the largest of so many would be by chance
-    (Bonferroni).
+    the zero of the input torque; a table, such as an engineer would use, gives an effect for each.
+    "adequate" if no cell is beyond what the largest of so many would be by chance (Bonferroni).
 
     Parameters
     ----------
@@ -146,7 +145,7 @@ def sparse_regression(analysis: DriveFinding) -> str:
     """Name the effect by sparse regression of the residual torques on candidate laws.
 
     Sequentially thresholded least squares (Brunton, Proctor, Kutz, PNAS 113, 2016; that of
-    pysindy) on the library of `torque_balances.terms`, of all records and sweeps together, after
+    pysindy) on the library of `candidate_terms.terms`, of all records and sweeps together, after
     what the base parameters explain within their tolerances. The threshold is the one that
     predicts the held-out records best; a sweep, of which none is held out, counts among them.
     Among the effects that are left, the one that alone explains most is named. "adequate" if
@@ -211,7 +210,7 @@ def chosen_support(train: Regression, test: Regression) -> NDArray[np.bool_]:
 def stlsq_support(laws: Values, target: Values, threshold: float) -> NDArray[np.bool_]:
     """Return which columns of unit norm (n, q) keep a coefficient above the threshold."""
     with warnings.catch_warnings():
-        # Said of a threshold that nothing passes, which is an answer here.
+        # The warning of a threshold that no column passes; that is a valid answer here.
         warnings.filterwarnings("ignore", message="Sparsity parameter is too big")
         found = STLSQ(threshold=threshold).fit(laws, target[:, None])
     return np.asarray(found.coef_[0] != 0.0)

@@ -235,7 +235,7 @@ def _sweep(
 
 
 def _at_rest(points: TorsionPoints) -> RecordMotion:
-    """Return the motion of a sweep: slow, at an input angle that nobody knows."""
+    """Return the motion of a sweep: slow, at an unknown input angle."""
     unknown, rest = np.full_like(points.angle, np.nan), np.zeros_like(points.angle)
     direction = np.sign(points.path[points.intervals + 1] - points.path[points.intervals])
     intercept = np.polyfit(points.torque, points.angle, 1)[1]

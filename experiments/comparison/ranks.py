@@ -39,7 +39,7 @@ class Friedman(NamedTuple):
 class RivalTest(NamedTuple):
     """A control against one rival: p after Holm, and on how many problems it is better, worse.
 
-    ``ahead`` is whether the signed ranks, which p is about, speak for the control.
+    ``ahead`` is whether the signed ranks, which p is about, favour the control.
     """
 
     rival: str

@@ -1,4 +1,4 @@
-"""Who takes part: each contestant by name, what it needs, and how it is run."""
+"""The contestants by name: what each needs and how it is run."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 POPULATION = 100
-"""Of every algorithm that has one."""
+"""Population of every algorithm that has one."""
 
 
 class Offer(NamedTuple):

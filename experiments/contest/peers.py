@@ -108,7 +108,7 @@ def _extent(scores: Scores) -> list[str]:
 
 
 def _broken_off(scores: Scores) -> list[str]:
-    # A generation has at most the 100 solutions that everybody runs with.
+    # A generation has at most 100 solutions, the population of all algorithms.
     least = np.array(scores.budgets)[:, np.newaxis] - POPULATION
     early = (scores.spent > 0) & (scores.spent < least)
     counts = dict(zip(scores.algorithms, early[:, :, -1].sum(axis=(0, 2)).tolist(), strict=True))

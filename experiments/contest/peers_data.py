@@ -1,6 +1,6 @@
 """Scores of algorithms on the benchmark: measured from runs, and as the CSV that the repo keeps.
 
-Seconds stand in a file of their own, because they differ from run to run.
+Seconds are in a separate file, because they differ from run to run.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FINAL_SIZE = 50
 MEASURES = (*Indicators._fields, "igd_crowding", "hypervolume_crowding")
 """Indicators of the final set thinned out evenly, and two of that thinned out by crowding."""
 DIGITS = 6
-"""Kept of an indicator: with four, hypervolumes near 1 would tie that do not."""
+"""Digits kept of an indicator: with four, different hypervolumes near 1 would tie."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from experiments.contest.offer import POPULATION, Offer
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
 
 _PARTITIONS = {2: 99, 3: 12}
-"""Of the reference directions of NSGA-III: 100 for two objectives and 91 for three."""
+"""Partitions of the directions of NSGA-III: 100 directions for two objectives, 91 for three."""
 
 
 def _nsga3(problem: Problem) -> Algorithm:

@@ -1,4 +1,4 @@
-"""How the elitist swarm stands against each rival, and against what was demanded of it."""
+"""The elitist swarm compared with each rival, and with the targets set beforehand."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ SUBSETS: dict[str, tuple[str, ...]] = {
     "without WFG": ("WFG",),
     "without WFG and rotated ZDT": ("WFG", "ZDT rotated"),
 }
-"""Held-out problems, and the families left out of them."""
+"""Subsets of the held-out problems, with the families left out."""
 SPACING_PLACE = 3
 MOVED_ZDT4_IGD = 0.3
 SLIGHT = 0.01
-"""Part of a hypervolume below which a defeat is counted apart."""
+"""Relative loss of hypervolume below which a defeat is counted separately."""
 
 
 def must_reach_table(scores: Scores) -> Table:
@@ -179,7 +179,7 @@ def rivals_table(scores: Scores) -> Table:
 
 
 def subsets_table(scores: Scores) -> Table:
-    """Rank again without the problems that are less strange to our algorithm than the others."""
+    """Rank again without the held-out families that may favour our algorithm."""
     columns = [Column("held-out problems"), Column("number"), Column("evaluations")]
     for indicator in ("igd", "hypervolume"):
         heads = (OURS, "best rival", "its rank", "beaten")

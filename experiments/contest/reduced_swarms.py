@@ -1,4 +1,4 @@
-"""The elitist swarm less one of its parts, or with one more: what its ablation compares."""
+"""Variants of the elitist swarm for its ablation: one part removed, changed or added."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class EqualShares(SuccessShares):
     """All moves alike, whatever their success."""
 
     def learn(self, moves: NDArray[np.int_], survived: NDArray[np.bool_]) -> None:
-        """Learn nothing."""
+        """Keep the shares as they are."""
 
 
 class EqualSwarm(ElitistSwarm):

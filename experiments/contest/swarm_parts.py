@@ -61,7 +61,7 @@ def _parts_table(scores: Scores) -> Table:
         for variant, (row, test) in enumerate(zip(rows, tests, strict=True), start=1):
             interval = f"{low[variant]:.3f}..{high[variant]:.3f}"
             row += [float(cost[variant]), interval, test.better, test.worse, test.p]
-        # What counts is said of the last group, the held-out one.
+        # The finding is about the last group, the held-out problems.
         shown = [test.rival for test in tests if test.beaten]
     order = np.argsort(-cost[1:], kind="stable")
     return Table(

@@ -1,7 +1,7 @@
-"""Solutions that lie on their level of f1 exactly, and local optima replaced from beside them.
+"""Refined fronts: solutions exactly on their level of f1, local optima replaced by better ones.
 
-The last digits of a front: what `FrontSearch` finds may rest beside its level, or on a local
-optimum that is as good as the global one to six digits.
+This settles the last digits: `FrontSearch` may stop beside a level, or at a local optimum that is
+as good as the global one to six digits.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pymoo_hdte.problems.reference import ReferenceFront
 _BESIDE = 1e-6
 """A design closer to its level than this, relatively, is meant to be on it."""
 _FAR = 0.1
-"""Of the search space in some variable."""
+"""Distance of neighbours, as a share of the search space in some variable."""
 _IMPROVEMENT = 1e-10
 
 
@@ -50,7 +50,7 @@ def without_local_optima(
 
 
 def hand_over(search: LevelSearch, levels: NDArray[np.float64], solutions: list[Solution]) -> None:
-    """Try at each level but the ends the solution beside it, until nothing improves.
+    """Start each inner level from its neighbours' solutions until nothing improves.
 
     Only neighbours far apart are tried: one of them may be a local optimum.
     """

@@ -1,4 +1,4 @@
-"""True fronts of the robust DTE problems on their surrogates: computed twice, held against stored.
+"""True fronts of the robust DTE problems on surrogates: computed twice, compared with stored.
 
 Writes ``front_<name>.csv`` beside its report; copied to ``pymoo_hdte/problems/data`` it is what
 ``pareto_front()`` of that problem returns.

@@ -1,1 +1,1 @@
-"""Machines that others measured, beside what is known of them."""
+"""Published measurements of machines, compared with what is known of them."""

@@ -1,4 +1,4 @@
-"""EMPS: the friction of a positioning system, which the literature knows."""
+"""EMPS: the friction of a positioning system, known from the literature."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SOURCE = "Janot, Gautier, Brunot (2019), nonlinearbenchmark.org; its offset is -
 
 
 def run(context: Context) -> Result:
-    """Start from the model without friction; hold verdict, values and proof against the known."""
+    """Start from the model without friction; compare verdict, values and proof with known ones."""
     return measured_result(RIG, _judged)
 
 

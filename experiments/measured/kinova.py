@@ -43,7 +43,7 @@ ORDERS = (200.0, 400.0)
 
 
 def run(context: Context) -> Result:
-    """Start from the model without friction; hold verdict, orders and limits against the known."""
+    """Start from the model without friction; compare verdict, orders, limits with known ones."""
     return measured_result(RIG, _judged)
 
 

@@ -30,7 +30,7 @@ class MeasuredRig:
     name : str
         Of the experiment and of its file in ``data``.
     folder : str
-        Of the records, in `measured_rigs.MEASURED`.
+        Folder of the records, in `experiments.measured.rigs.MEASURED`.
     title : str
     origin : str
         Where the records are published.

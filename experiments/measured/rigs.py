@@ -1,4 +1,4 @@
-"""What the studies of other people's measurements share: the data, the verdict, their twins."""
+"""Shared parts of the studies of published measurements: data, verdict and tables."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
 from pymoo_hdte.discrepancy.report.mechanism_figures import misfit_over_motion, overlay
 
 MEASURED = Path(__file__).resolve().parents[3] / "shared" / "measured"
-"""Where the measurements lie, which are not part of the project."""
+"""Folder of the measurements, which are not part of the project."""
 RIGS = DATA
 _BANDS = 12
 

@@ -1,7 +1,7 @@
 """Twins of measured rigs: the same excitation, a truth that is known, noise as the sensors have it.
 
-If a twin without a missing effect is adequate, and one in which another effect is hidden gets that
-one, then the verdicts on the real records come from the data and not from the name of the machine.
+If a twin without a missing effect is adequate, and another effect hidden in a twin is named, then
+the verdicts on the real records come from the data and not from the name of the machine.
 """
 
 from __future__ import annotations
@@ -89,8 +89,8 @@ def twins_table(found: Sequence[Twin]) -> Table:
             )
             for twin in found
         ),
-        note="Without friction, whatever the real rig has. The disturbance has the colour of what "
-        "nobody explains in the real records.",
+        note="Without friction, whatever the real rig has. The disturbance has the spectrum of "
+        "what the model leaves unexplained in the real records.",
     )
 
 

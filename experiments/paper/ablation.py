@@ -36,7 +36,7 @@ FLOWCHART = (
 
 
 def run(context: Context) -> Result:
-    """Compare AMP-MOPSO with itself less one or both strategies."""
+    """Compare AMP-MOPSO with variants that lack one or both strategies."""
     comparisons = compare(context, PARTS, "ablation")
     return Result(
         title=f"Fig. 17: ablation of AMP-MOPSO, seeds 1 to {context.seeds}",

@@ -75,7 +75,7 @@ def deviation_table(optimum: Choice) -> Table:
 def _order_note(
     to_ours: NDArray[np.float64], published: NDArray[np.float64], optimum: Choice
 ) -> str:
-    """Say which prototypes are nearest and farthest, and how little of that the model decides."""
+    """Say which prototypes are nearest and farthest, and how little that depends on the model."""
     numbers = list(TABLE_6)
     ours, theirs = ((numbers[d.argmin()], numbers[d.argmax()]) for d in (to_ours, published))
     name, share, swept = _idle_sweep(optimum)

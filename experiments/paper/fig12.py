@@ -29,7 +29,7 @@ STYLES = {0.35: (BLUE, "-"), 0.05: (ORANGE, "--"), 0.0: (GREEN, ":")}
 N_SAMPLES = 20_000
 SEED = 3
 ALIKE_PERCENT = 1.0
-"""As for Table 8."""
+"""Differences that count as agreeing, as for Table 8."""
 
 SETTING = (
     "theta_s follows its truncated normal distribution; K, J_in, B_in and B_fc are uniform around "

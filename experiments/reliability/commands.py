@@ -16,7 +16,7 @@ from pymoo_hdte.reports.folder import ReportFolder
 
 
 class Wrong(Exception):
-    """Something was accepted that must not be, or left behind."""
+    """Invalid input was accepted, or files were left behind."""
 
 
 def discrepancy(folder: Path) -> None:

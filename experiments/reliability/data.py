@@ -1,6 +1,6 @@
 """Outcomes of the reliability suite: as objects, and as the small CSV files that are kept.
 
-Memory and seconds stand in a file of their own, because they differ from run to run.
+Memory and seconds are in a separate file, because they differ from run to run.
 """
 
 from __future__ import annotations

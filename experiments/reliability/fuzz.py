@@ -33,11 +33,11 @@ SEED = 20261122
 REFUSED, ACCEPTED, FAILED, HUNG, CRASHED = range(5)
 OUTCOMES = ("refused", "accepted", "failed", "hung", "crashed")
 LONGEST_MESSAGE = 1000
-"""Characters; nobody reads a longer error."""
+"""Most characters that an error may have."""
 MOST_MEMORY = 8 * 2**30
-"""Address space of the process that reads, so that none takes the machine with it."""
+"""Address space of the reading process, so that it cannot exhaust the machine."""
 START_SECONDS = 120.0
-"""For imports, and to make the original."""
+"""Seconds for imports and to make the original."""
 READY = "ready"
 OUTCOME_LINE = rb"(?m)^outcome (\d+)\n"
 ROOT = Path(__file__).parents[2]

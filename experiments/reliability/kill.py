@@ -1,4 +1,4 @@
-"""kill -9 at any moment, then the same command again: the bytes of a run that nobody disturbed.
+"""kill -9 at any moment, then the same command again: the bytes of an undisturbed run.
 
 Moments are either random, from the start of the interpreter to the last file, or one of the steps
 in which a file is written: in the midst of its bytes, or just before it gets its name.
@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 EXPERIMENT = ("table7", "--seeds", "1")
 """Six jobs, five tables and two figures in a few seconds."""
 STEPS = 48
-"""Of the undisturbed run, about: two for each of its files."""
+"""About the number of steps of the undisturbed run: two for each of its files."""
 PATIENCE = 300.0
 """Seconds after which a run hangs."""
 COUNTS = ("kills", "finished", "partial", "different", "failed", "orphaned")
@@ -35,7 +35,7 @@ COUNTS = ("kills", "finished", "partial", "different", "failed", "orphaned")
 
 @dataclass(frozen=True)
 class Reference:
-    """Files of a run that nobody disturbed, by their path, and how long it took."""
+    """Files of an undisturbed run, by their path, and how long it took."""
 
     files: dict[str, bytes]
     seconds: float
@@ -132,7 +132,7 @@ def visible(folder: Path) -> list[Path]:
 
 
 def steady(folder: Path) -> dict[str, bytes]:
-    """Return the visible files that come out alike every time: neither times nor the page."""
+    """Return the visible files that are the same in every run: neither times nor the page."""
     names = {path: str(path.relative_to(folder)) for path in visible(folder)}
     return {
         name: path.read_bytes()
@@ -142,7 +142,7 @@ def steady(folder: Path) -> dict[str, bytes]:
 
 
 def whole(path: Path) -> bool:
-    """Whether a file ends as its kind does."""
+    """Whether a file is complete, by what ends a file of its type."""
     text = path.read_bytes()
     try:
         if path.suffix == ".json":

@@ -1,4 +1,4 @@
-"""What a machine may deny a run: space, the right to write, solitude, memory."""
+"""Runs that lack disk space, write permission, memory or a folder of their own."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from experiments.reliability.mutations import put
 from experiments.runner.campaign import Run
 
 SIZES = (0, 4, 8, 16, 32, 64, 128, 256, 512)
-"""kB of a full disk."""
+"""Sizes of the full disks, kB."""
 PLENTY = "64m"
 
 
@@ -205,7 +205,7 @@ def _disk() -> Iterator[Path | None]:
 
 @contextmanager
 def _read_only() -> Iterator[Path | None]:
-    """Give a folder that nobody can write to; permissions do not bind the superuser."""
+    """Give a read-only folder; permissions do not bind the superuser."""
     if os.geteuid() == 0:
         with _disk() as disk:
             if disk is not None:

@@ -1,4 +1,4 @@
-"""Mutations of folders: what typing errors, other programs, broken disks and pranks make of them.
+"""Mutations of folders: typing errors, other programs' changes, disk faults and pranks.
 
 A mutated folder is a pure function of the folder and the generator.
 """
@@ -31,7 +31,7 @@ class Folder:
 
 
 Files = dict[str, bytes | Link | Folder]
-"""What stands in a folder, by name."""
+"""Contents of a folder, by name."""
 
 MOST_MUTATIONS = 3
 """In one input."""
@@ -44,7 +44,7 @@ def mutated(files: Files, rng: np.random.Generator) -> tuple[Files, list[str]]:
     files, names = dict(files), []
     for _ in range(rng.integers(1, MOST_MUTATIONS + 1)):
         if files:
-            # Every file alike would leave the table that names all others nearly untouched.
+            # With equal chances the table that names all other files would hardly ever change.
             tables = [name for name in files if name.endswith(".toml")]
             name = pick(tables if tables and rng.random() < 0.5 else list(files), rng)
             names.append(f"{_mutate(files, name, rng)} of {name}")

@@ -40,7 +40,7 @@ ONE_JOB = Lock()
 class Run:
     """What one job gives: named columns of numbers (n, columns), and the seconds it took.
 
-    ``parts`` are the seconds of its parts, where somebody asks for them.
+    ``parts`` are the seconds of its parts, where they are needed.
     """
 
     columns: tuple[str, ...]
@@ -183,7 +183,8 @@ def _run_in_executor(executor: Executor, jobs: Sequence[Job], keep: Keep) -> Non
 
 
 def _run_one_by_one(executor: Executor, suspects: Sequence[Job], keep: Keep) -> None:
-    # A job that shares a worker with the culprit goes down with it; alone it is cleared or caught.
+    # Jobs on the worker of the job that ended it are lost too; alone, each shows if it was the
+    # cause.
     caught: dict[str, WorkerLost] = {}
     for job in suspects:
         try:
@@ -205,7 +206,7 @@ def _named(job: Job) -> Iterator[None]:
     try:
         yield
     except BrokenExecutor:
-        # No job is to blame.
+        # The executor failed, not a job.
         raise
     except Exception as error:
         error.add_note(f"In the job {job.key}.")
@@ -251,7 +252,7 @@ def _package(job: Job) -> Path:
 
 @cache
 def origin(package: Path) -> dict[str, str]:
-    """Name all that decides the bytes which jobs of the folder ``package`` give in this process.
+    """Name all that determines the bytes of the results of jobs in the folder ``package``.
 
     A job's outcome may depend on any module of its package, not only on its own. The answer is
     kept, because what a process has loaded outlives a change of the files.

@@ -1,4 +1,4 @@
-"""What the machine is that times were measured on."""
+"""Description of the machine on which times were measured."""
 
 from __future__ import annotations
 

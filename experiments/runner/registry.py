@@ -53,7 +53,7 @@ class Context:
     quick: bool = False
 
     def command(self, experiment: str) -> str:
-        """Return what one types to get this extent of an experiment."""
+        """Return the command for this extent of an experiment."""
         option = " --full" if self.full else " --quick" if self.quick else ""
         return f"python -m experiments {experiment}{option}"
 

@@ -38,7 +38,7 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """What it comes to, in a word or two."""
+        """The outcome in a word or two."""
         if self.check:
             return "Holds" if self.agrees else "Fails"
         if self.fitted:
@@ -51,7 +51,7 @@ class Column:
     """One column of a table: what it holds, in which unit, shown with how many digits.
 
     Neighbouring columns of the same ``group`` stand under one heading. ``paper`` marks numbers that
-    the paper printed, so that nobody takes them for ours.
+    the paper printed, so that they are not taken for ours.
     """
 
     name: str

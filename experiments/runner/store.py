@@ -1,4 +1,4 @@
-"""Results on disk: JSON for the report, CSV and PNG for everybody else."""
+"""Results on disk: JSON for the report, CSV and PNG for other uses."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ CONNECT_SECONDS = 10
 
 
 class WorkerLost(RuntimeError):
-    """Worker after worker ended while a job was with them; this job or another is the cause."""
+    """Several workers in turn ended while they held a job; this job or another is the cause."""
 
 
 class WrongWorker(RuntimeError):
@@ -138,7 +138,7 @@ class DaskExecutor(Executor):
 
     def _drop(self, task: Task, future: Future[Any]) -> None:
         if future.cancelled():
-            # In the client's own thread: nobody waits for the scheduler's answer.
+            # In the client's own thread, so that the caller does not wait for the scheduler.
             self._loop.add_callback(task.cancel)
 
     async def _deliver(self, task: Task, future: Future[Any]) -> None:
@@ -172,10 +172,10 @@ class DaskExecutor(Executor):
 
 
 class _Call:
-    """A call that is made where its pickle is opened.
+    """A call that stays pickled until a worker makes it.
 
-    Dask opens what it carries outside of jobs, too. A worker without our modules would end of that,
-    then the next one, and the run would wait for ever. Opened within a job, it is the job's error.
+    Dask also unpickles arguments outside of jobs. That would end a worker without our modules, then
+    the next one, and the run would wait for ever. Unpickled within a job, it is the job's error.
     """
 
     def __init__(self, call: Callable[[], Any]) -> None:

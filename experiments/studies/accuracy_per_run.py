@@ -1,4 +1,4 @@
-"""What a model run buys: test error of several surrogates over the runs they take."""
+"""Accuracy for the cost: test error of several surrogates over their model runs."""
 
 from __future__ import annotations
 

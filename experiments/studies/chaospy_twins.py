@@ -1,4 +1,4 @@
-"""What chaospy makes of our distributions, moments and Sobol indices: the same, by other means.
+"""Our distributions, moments and Sobol indices computed a second time with chaospy.
 
 chaospy works in standard variables here (theta_s in units of its std, bands as -1 .. 1): in
 physical units its orthogonal polynomials lose the digits that a narrow band needs.

@@ -1,4 +1,4 @@
-"""Our probability calculus beside chaospy's, and what a model run buys: whether 1024 are needed."""
+"""Our moments and indices beside chaospy's, and whether 1024 model runs are needed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which tolerance deserves money: Sobol indices, and what halving each scatter would gain."""
+"""Which tolerance to tighten: Sobol indices, and what halving each scatter would gain."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pymoo_hdte.drive import PARAMETERS, PRESETS
 from pymoo_hdte.surrogate import SobolIndices
 
 MATTERS_PERCENT = 1.0
-"""A variable with less than this total share of both mean and variance decides nothing."""
+"""A variable with less than this total share of both mean and variance has hardly any influence."""
 
 SMALLEST_DRAWN = 1e-4
 """Percent; smaller falls stand at the left edge of the figure."""

@@ -43,7 +43,7 @@ class LeaderArchive:
         return len(self.points)
 
     def update(self, population: Population, points: Points) -> None:
-        """Let an evaluated population in and keep the best.
+        """Add an evaluated population and keep the best.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What all swarms share: their size, their first positions, and what they refuse."""
+"""What all swarms share: population size, first positions and checks of the problem."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from pymoo.util.display.multi import MultiObjectiveOutput
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.checks import InvalidInput, whole_number
 
-# First positions computed from the bounds miss them by a few roundings; those are let in.
+# First positions computed from the bounds miss them by a few roundings; those are accepted.
 _EDGE = 1e-12
 
 
 class Swarm(Algorithm):
-    """Base of `ParticleSwarm` and `ElitistSwarm`, which tell its parameters and errors."""
+    """Base of `ParticleSwarm` and `ElitistSwarm`, which document its parameters and errors."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class Swarm(Algorithm):
         sampling: Sampling | NDArray | Population | None,
         **kwargs: Any,
     ) -> None:
-        # pymoo's base class swallows misspelt arguments without a word.
+        # pymoo's base class ignores misspelt arguments silently.
         unknown = set(kwargs) - set(inspect.signature(Algorithm.__init__).parameters)
         if unknown:
             raise TypeError(f"{type(self).__name__} has no argument {', '.join(sorted(unknown))}")
@@ -108,7 +108,7 @@ class Swarm(Algorithm):
 
 
 def particles_at(X: NDArray[np.float64]) -> Population:
-    """Return particles at ``X`` (n, d), for less than Population.new."""
+    """Return particles at ``X`` (n, d), faster than Population.new."""
     config = Individual.default_config()
     particles = [Individual(config) for _ in X]
     for particle, x in zip(particles, X, strict=True):

@@ -29,9 +29,9 @@ class ElitistSwarm(Swarm):
     out evenly. A move gets more particles the more of them survive. There is nothing to tune and no
     schedule: a run may be stopped or continued at any generation.
 
-    It is what was left of ideas for AMP-MOPSO, whose results it does not borrow, when those that
-    seemed to gain nothing in tuning were taken out, inertia among them. Not every part that stayed
-    is shown to help: ``python -m experiments swarm_parts`` tells what each is worth.
+    It comes from ideas for AMP-MOPSO, whose published results do not apply to it; parts that seemed
+    to gain nothing in tuning, such as inertia, were removed. Not every remaining part is shown to
+    help: ``python -m experiments swarm_parts`` measures what each contributes.
 
     With more than five objectives nearly all positions are non-dominated, and it fails as NSGA-II
     does, whose ranks it shares: it is no better than random positions on DTLZ2 with six objectives
@@ -93,11 +93,11 @@ class ElitistSwarm(Swarm):
         self.success = SuccessShares(len(self.moves))
         self.pop = infills
 
-    # Callbacks may change the population, so it is read anew wherever it counts.
+    # Callbacks may change the population, so it is read again wherever it is used.
     def _infill(self) -> Population:
         swarm, random_state = self._points(self.pop), self.random_state
         lowest, highest = self.problem.bounds()
-        # Of a population that is not as long as it was, particles move in turn.
+        # If a callback changed the length of the population, particles move in turn.
         X = np.resize(swarm.X, (self.pop_size, swarm.X.shape[1]))
         front = swarm[best_front(swarm)]
         leaders = self._leaders(front) if len(front) else X

@@ -57,7 +57,7 @@ class LinearDecrease:
         progress : float
             Elapsed share t / G_max of the generations, in [0, 1].
         front : ndarray, shape (n, m)
-            Objectives of the archive, in any units; play no part.
+            Objectives of the archive, in any units; not used.
 
         Returns
         -------
@@ -99,7 +99,7 @@ class EntropyWeight:
         Parameters
         ----------
         progress : float
-            Elapsed share t / G_max of the generations, in [0, 1]; plays no part.
+            Elapsed share t / G_max of the generations, in [0, 1]; not used.
         front : ndarray, shape (n, m)
             Objectives of the archive, in any units.
 

@@ -1,8 +1,8 @@
 """Moves of an elitist swarm: where a particle steps from where it is.
 
-A particle of an elitist swarm stands on the best position it knows, so that its own memory pulls it
-nowhere. What is left of the classical swarm is the pull of a leader, here in three forms that suit
-different landscapes: scaled, exact, and along directions that the swarm itself spans.
+In an elitist swarm a particle's position is its own best, so that the cognitive term of the
+classical swarm is zero. The pull of a leader remains, here in three forms that suit different
+landscapes: scaled, exact, and along differences of particles.
 """
 
 from __future__ import annotations
@@ -63,12 +63,12 @@ class Attraction:
 
 
 class Exchange:
-    """Half of the variables take the value of the leader as it is.
+    """Half of the variables take the leader's value unchanged.
 
-    Where good values lie in separate valleys, anything between two of them is bad. It is the
+    This suits good values in separate valleys, where values between two of them are bad. It is the
     exemplar of J. J. Liang, A. K. Qin, P. N. Suganthan, S. Baskar, "Comprehensive learning particle
     swarm optimizer for global optimization of multimodal functions", IEEE Transactions on
-    Evolutionary Computation 10 (2006) 281-295, followed all the way.
+    Evolutionary Computation 10 (2006) 281-295, with a full step to it.
     """
 
     TAKES_PART = 0.5
@@ -88,9 +88,9 @@ class Difference:
     """All variables together, along the leader's direction and the difference of two particles.
 
     A step is c r (leader - X) + 0.5 (X_a - X_b) with c = 1.5, one uniform r a particle and a, b
-    drawn from the swarm. It turns with the coordinate system, as the other moves do not, and so
-    serves problems whose variables belong together (differential evolution, "current to best":
-    K. Price, R. Storn, J. Lampinen, "Differential Evolution", Springer 2005).
+    drawn from the swarm. Unlike the other moves it does not depend on the coordinate axes, which
+    suits problems whose variables interact (differential evolution, "current to best": K. Price, R.
+    Storn, J. Lampinen, "Differential Evolution", Springer 2005).
     """
 
     STRENGTH = 1.5
@@ -112,7 +112,7 @@ class Difference:
 class SparseMutation:
     """Normal steps of random length in few variables.
 
-    Each variable is struck with probability 0.5 / d, at least one in a particle that would stay
+    Each variable changes with probability 0.5 / d, at least one in a particle that would stay
     where it is. The standard deviation is span 10^-u with u uniform in [0.3, 2.3] for every
     particle: from half of the box to half a percent of it, at all times, so that no schedule is
     needed.

@@ -70,7 +70,7 @@ class Flat:
     ) -> NDArray[np.float64]:
         """Return zeros, shape (n, d), in the units of the problem's variables.
 
-        Parameters as in `Pyramid.mutation`; only the lengths n and d play a part.
+        Parameters as in `Pyramid.mutation`; only the lengths n and d are used.
         """
         return np.zeros((len(ranks), len(span)))
 

@@ -1,4 +1,4 @@
-"""Which move a particle makes: the more often a move has led to survivors, the more often."""
+"""Choice of a particle's move: moves that have led to more survivors are chosen more often."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class SuccessShares:
     Probability matching (D. Thierens, "An adaptive pursuit strategy for allocating operator
     probabilities", GECCO 2005, section 2): the share of a move grows with the rate at which its
     particles survived, old generations fading by 0.9 each, and never falls below 0.05, so that a
-    move that has become useful is found out.
+    move that has become useful is noticed.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ class SuccessShares:
         return np.searchsorted(np.cumsum(self.shares)[:-1], random_state.random(n), side="right")
 
     def learn(self, moves: NDArray[np.int_], survived: NDArray[np.bool_]) -> None:
-        """Take note of the moves (n,) of a generation and of which particles survived (n,)."""
+        """Record the moves (n,) of a generation and which particles survived (n,)."""
         n_moves = len(self.shares)
         fading = self.MEMORY
         self._tried = fading * self._tried + np.bincount(moves, minlength=n_moves)
         self._survived = fading * self._survived + np.bincount(moves[survived], minlength=n_moves)
-        # One success in two imagined trials, so that a move never tried has a rate of its own.
+        # A prior of one success in two trials gives a rate to a move that was never tried.
         rate = (self._survived + 1.0) / (self._tried + 2.0)
         self.shares = self.SMALLEST + (1.0 - n_moves * self.SMALLEST) * rate / rate.sum()

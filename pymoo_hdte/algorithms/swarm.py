@@ -54,14 +54,14 @@ class ParticleSwarm(Swarm):
     ------
     InvalidInput
         From the constructor for a size that is not allowed; from ``setup`` for a problem with
-        integer, binary or mixed variables, without finite bounds or with one objective, or if
-        nothing tells G_max; from ``ask`` for first positions that do not fit.
+        integer, binary or mixed variables, without finite bounds or with one objective, or if G_max
+        is not known; from ``ask`` for first positions that do not fit.
     TypeError
         For an argument that does not exist.
 
     Notes
     -----
-    What the paper (Section 5.1) leaves open is settled as the field does:
+    What the paper (Section 5.1) leaves open follows common practice:
 
     - generation 1 is the initial sample; the move from generation t to t + 1 uses t in the
       schedules, the archive of generation t and the Pareto ranks of the swarm at generation t;
@@ -80,11 +80,12 @@ class ParticleSwarm(Swarm):
       archive and ranks (Deb et al. 2002); a solution that is not finite comes last.
 
     Callbacks may change the population: velocity and own best travel with an individual (as ``V``
-    and ``best`` of its data), and one put in enters the archive, at rest. Leaders and own bests
-    that have left the population keep their values if the problem changes; a callback evaluates
-    ``leaders.members`` and the ``best`` again as well. Within pymoo's
-    `AdaptiveEpsilonConstraintHandling` the swarm runs, but hardly gets back from what was allowed
-    at first: AMP-MOPSO then finds nothing feasible of TNK, where it finds a front on its own.
+    and ``best`` of its data), and one put in enters the archive, with zero velocity. Leaders and
+    own bests that have left the population keep their values if the problem changes; a callback
+    must evaluate ``leaders.members`` and the ``best`` again as well. Within pymoo's
+    `AdaptiveEpsilonConstraintHandling` the swarm runs, but hardly returns from violations that were
+    allowed at first: on TNK, AMP-MOPSO then finds nothing feasible, while it finds a front without
+    that wrapper.
     """
 
     def __init__(
@@ -128,7 +129,7 @@ class ParticleSwarm(Swarm):
     def _evaluated(self, infills: Population | None) -> Points:
         points = super()._evaluated(infills)
         for told, asked in zip(infills.tolist(), self.asked.tolist(), strict=True):  # type: ignore[union-attr]
-            # Individuals made anew from a particle's numbers have lost what it carried.
+            # New individuals made from a particle's arrays lack its velocity and own best.
             if "V" not in told.data:
                 told.data |= {"V": asked.data["V"], "best": asked.data["best"]}
         return points
@@ -144,7 +145,7 @@ class ParticleSwarm(Swarm):
 
     def _infill(self) -> Population:
         self._admit_newcomers()
-        # Callbacks may change the population; if its length, particles move in turn.
+        # If a callback changed the length of the population, particles move in turn.
         particles = self.pop[np.arange(self.pop_size) % len(self.pop)]
         swarm, random_state = self._points(particles), self.random_state
         lowest, highest = self.problem.bounds()
@@ -177,11 +178,11 @@ class ParticleSwarm(Swarm):
         self._settle(infills, points)
 
     def _settle(self, infills: Population, points: Points) -> None:
-        # A copy, as `self.off` shall tell what callbacks bring into the population.
+        # A copy: individuals of the population not in `self.off` were put in by callbacks.
         self.pop = infills.copy()
         former, self.leaders = self.leaders.members, self._empty_archive()
         if len(former):
-            # Judged anew: callbacks evaluate again, and constraint handling may grow stricter.
+            # Compared again: callbacks may re-evaluate, constraint handling may grow stricter.
             infills = Population.merge(former, infills)
             points = self._points(former).followed_by(points)
         self.leaders.update(infills, points)

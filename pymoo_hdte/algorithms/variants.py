@@ -13,9 +13,9 @@ class MOPSO(ParticleSwarm):
     """Basic swarm: inertia weight falling linearly from 0.9 to 0.4, c1 = c2 = 2, no mutation.
 
     The paper compares with a MOPSO (Table 7) and does not describe it; this one has the archive of
-    AMP-MOPSO and none of its strategies: in the line of Coello Coello, Pulido and Lechuga (2004),
-    with crowding in place of their grid and without their mutation. Parameters, errors and
-    choices: see `ParticleSwarm`.
+    AMP-MOPSO and none of its strategies. It follows Coello Coello, Pulido and Lechuga (2004), with
+    crowding in place of their grid and without their mutation. Parameters, errors and choices: see
+    `ParticleSwarm`.
     """
 
     def __init__(self, pop_size: int = 100, archive_size: int = 50, **kwargs: Any) -> None:

@@ -26,7 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run what the command line asks for; return the exit code."""
     options = _parser().parse_args(arguments)
     try:
-        # A log wants errors, not progress.
+        # Progress is for a terminal only; a log file gets errors alone.
         told = sys.stderr.isatty() and not options.quiet
         outcome = options.command.run(options, _say if told else _silent)
         if options.json:
@@ -71,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _print(text: str) -> None:
-    """Print to stdout, whatever characters it can show, and meet its errors here."""
+    """Print to stdout, replacing characters it cannot show; flush, so that errors show here."""
     encoding = sys.stdout.encoding or "utf-8"
     print(text.encode(encoding, "replace").decode(encoding), flush=True)
 

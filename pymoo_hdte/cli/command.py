@@ -1,4 +1,4 @@
-"""What every command of the command line is made of."""
+"""Types and helpers that all commands of the command line share."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Outcome(NamedTuple):
 
 
 def heading(kind: str, sentences: Sequence[str], limits: Sequence[str]) -> dict[str, Any]:
-    """Return how the document of a command begins: what it is, and what it says in words."""
+    """Return the first fields of a command's document: format, version, sentences and limits."""
     return {
         "format": f"pymoo_hdte {kind}",
         "version": 1,
@@ -34,7 +34,7 @@ def heading(kind: str, sentences: Sequence[str], limits: Sequence[str]) -> dict[
 
 
 def outcome_of(document: dict[str, Any], out: Path) -> Outcome:
-    """Return what a command found whose document begins with a `heading`, and where its page is."""
+    """Return the outcome of a document that begins with a `heading`, naming the page in ``out``."""
     lines = [*document["sentences"], *document["limits"], f"Report: {out / PAGE_FILE}"]
     return Outcome(document, "\n".join(lines))
 

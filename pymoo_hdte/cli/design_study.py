@@ -29,7 +29,7 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Settings:
-    """What a study is made with.
+    """Settings of a study.
 
     Attributes
     ----------
@@ -188,7 +188,7 @@ class DesignStudy:
 
     @property
     def gains(self) -> dict[str, Gain]:
-        """What mean and standard deviation gain; both designs were checked on the same drives."""
+        """Gains in mean and standard deviation; both designs were checked on the same drives."""
         before, after = self.initial_check, self.optimum_check
         promised = (self.initial - self.objectives).tolist()
         errors = (
@@ -213,7 +213,7 @@ def run_design_study(
         One of `PREFERENCES`.
     settings : Settings
     callback : pymoo.core.callback.Callback, optional
-        Told of every generation.
+        Called after every generation.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Which drive a command works on: a data sheet, and the model of what moves in it."""
+"""The drive that a command works on: its data sheet and its model."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
 
 
 def _make(sheet: DataSheet) -> tuple[object, ...]:
-    """Return by what a preset knows the drive it was made for."""
+    """Return the fields that identify the drive a preset was made for."""
     teeth = sheet.flexspline_teeth, sheet.circular_spline_teeth
     return sheet.name, *teeth, sheet.nominal.static_error
 

@@ -52,7 +52,7 @@ class Parameter:
 
     @property
     def series(self) -> Series | None:
-        """What the prototypes say of the series; None for a single one."""
+        """Statistics over the prototypes; None for a single one."""
         if len({prototype for prototype, _ in self.fits}) < 2:
             return None
         return series({key: fit.slope for key, fit in self.fits.items()})

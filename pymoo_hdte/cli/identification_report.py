@@ -25,7 +25,7 @@ SHEET_FILE = "identified_sheet.toml"
 FOLDER = ReportFolder("parameters.json", optional=(SHEET_FILE,))
 
 _TOO_EQUAL = 1e-3
-"""Scatter over prototypes, as a share of one record's error, that no separate drives show."""
+"""Scatter over prototypes, as a share of one record's error, too small for separate drives."""
 
 
 def write_identification_report(
@@ -212,7 +212,7 @@ def _loops_figure(found: Identification) -> Figure:
 
 
 def _strips(found: Identification) -> dict[str, str]:
-    """Draw the value of every run over the number of its prototype, a parameter a figure."""
+    """Draw the value of every run over the number of its prototype, one figure per parameter."""
     pictures = {}
     for one in found.parameters:
         figure = Figure(figsize=(6.4, 2.4), layout="constrained")

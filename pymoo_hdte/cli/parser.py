@@ -1,4 +1,4 @@
-"""How the command lines, of the package and of its experiments, say what is wrong with them."""
+"""Argument parser of the package and of its experiments, with errors in one line."""
 
 from __future__ import annotations
 

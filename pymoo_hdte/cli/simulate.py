@@ -8,9 +8,9 @@ from pymoo_hdte.cli.command import Command, Outcome, Say, outcome_of
 from pymoo_hdte.cli.drive_arguments import DRIVE_DETAILS, add_drive_arguments, read_drive
 
 FASTEST_INPUT = 50_000.0
-"""r/min; no strain wave gear turns as fast."""
+"""r/min; faster than any strain wave gear turns."""
 LARGEST_LOAD = 1e6
-"""N.m; none bears as much."""
+"""N.m; more than any strain wave gear bears."""
 
 _DETAILS = f"""example:
   pymoo-hdte simulate hs_20_100 --speed 1500 --load 20 --out reports/at-1500

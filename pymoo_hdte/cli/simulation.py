@@ -18,12 +18,12 @@ from pymoo_hdte.drive.dte_map import (
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 FASTEST = 2.0
-"""End of the speeds that are looked at, as a multiple of the condition's."""
+"""Highest speed of the map, as a multiple of the condition's."""
 SPEEDS = 80
 SETTLE = 1.5
 """s."""
 TURNS_TO_SETTLE = 0.02
-"""Of the output: at low speed the record needs as much before it begins."""
+"""Least output turns before the record begins, which count at low speed."""
 
 Values = NDArray[np.float64]
 

@@ -24,9 +24,9 @@ SPEEDS_FILE = "speeds.csv"
 FOLDER = ReportFolder("simulation.json", (TURN_FILE, LINES_FILE, SPEEDS_FILE))
 
 _NEAR = 0.15
-"""A resonance this close to the speed, as a share, is worth a word."""
+"""A resonance this close to the speed, as a share, is mentioned."""
 _APART = 0.01
-"""Share by which the two solvers may differ before a reader should know."""
+"""Share by which the two solvers may differ before the report mentions it."""
 _SMALL = 1e-3
 """Lines below this share of the largest are left out of figure and table."""
 

@@ -12,15 +12,15 @@ from pymoo_hdte.identification.linear_fit import LinearFit, fit_line
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 INPUT_SPEEDS = np.arange(200.0, 2001.0, 200.0) * REVOLUTION_PER_MINUTE
-"""Of the runs for B_in and B_fc, rad/s."""
+"""Speeds of the runs for B_in and B_fc, rad/s."""
 
 OUTPUT_SPEEDS = np.arange(2.0, 20.1, 2.0) * REVOLUTION_PER_MINUTE
-"""Of the runs for B_out, rad/s."""
+"""Speeds of the runs for B_out, rad/s."""
 
 FEWEST_SPEEDS = 3
 
 SPEED_TOLERANCE = 0.01
-"""Two assemblies ran at one speed if theirs differ by no more than this share."""
+"""Relative difference up to which speeds of two assemblies count as equal."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Drawing errors as the measured statistics say, also where they are not normal or independent."""
+"""Sampling of errors from measured statistics, also where not normal or not independent."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def draw_errors(
     Each error follows its `ErrorStatistics.marginals`, normal and lognormal ones truncated at three
     standard deviations. If any correlation is significant, all errors are tied by a Gaussian copula
     (Nelsen, An Introduction to Copulas, Springer 2006) with the measured correlation matrix;
-    otherwise they are independent, as Section 2.1 has them.
+    otherwise they are independent, as in Section 2.1.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ _SIGMA_PER_MEDIAN = 1.0 / 0.6744897501960817
 """Of normal noise: standard deviation over median absolute value."""
 
 _EFFICIENCY = 0.37
-"""Share of the data that a variance from medians is worth."""
+"""Statistical efficiency of a variance that is estimated from medians."""
 
 _MOST_CORRELATION = 0.99
 

@@ -199,7 +199,7 @@ def _rows(table: TextTable, names: Sequence[str]) -> _Run:
 
 
 def _allowed(name: str, values: NDArray[np.float64]) -> tuple[str, NDArray[np.bool_]]:
-    """Return what the values of a column may be, and which of them are that."""
+    """Return which values a column may have, in words, and which of these values are allowed."""
     if name in KEY:
         return "a whole number of at least 1", (values >= 1.0) & (values == np.floor(values))
     return f"at most {LARGEST:g} in size", np.abs(values) <= LARGEST

@@ -19,7 +19,7 @@ TOLERANCE = 0.1
 """Share of the peak torque by which a torque may miss zero or run backwards on a branch."""
 
 FEWEST_SAMPLES = 3
-"""On each branch."""
+"""Fewest samples on each branch."""
 
 _NOISE_BAND = 3.0
 """Samples within this many standard deviations of an extreme torque may be the turning point."""

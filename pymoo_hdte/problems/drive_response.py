@@ -36,10 +36,10 @@ OBJECTIVES = ("mean_dte_arcsec", "std_dte_arcsec")
 
 UNITS = dict(zip(PARAMETERS[1:], PARAMETER_UNITS[1:], strict=True))
 UNITS |= dict.fromkeys(OBJECTIVES, "arcsec")
-"""Of design variables and objectives, by name."""
+"""Units of design variables and objectives, by name."""
 
 _SHARE_DECIMALS = 12
-"""Weights in other units have the same shares up to rounding, and the same front."""
+"""Shares of weights are rounded to this: weights in other units then give the same front."""
 
 
 class DriveResponse:
@@ -105,15 +105,15 @@ class DriveResponse:
 
     @property
     def variant(self) -> str:
-        """The drive model, with the order if it is not the paper's, and whether a duty cycle."""
+        """Name: the model, its order if not the paper's, and whether it has a duty cycle."""
         order = "" if self._order == PAPERS_ORDER else f"_order{self._order}"
         return self.model.name + order + ("" if self._given is None else "_duty_cycle")
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What the response is, JSON-able, without texts that only say so.
+        """What defines the response, JSON-able, without names and descriptions.
 
-        A duty cycle stands in the place of the model's own speed and load.
+        A duty cycle replaces the model's own speed and load.
         """
         left_out = {"name", "description", "provenance", "data_sheet"}
         if self._given is not None:

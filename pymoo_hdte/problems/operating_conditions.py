@@ -18,7 +18,7 @@ from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 COLUMNS = ("speed_rpm", "load_Nm", "weight")
 """Columns of a file of operating conditions, in any order."""
 LARGEST_WEIGHT = 1e15
-"""So that sums of weights are finite."""
+"""Limit that keeps sums of weights finite."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Stored fronts of surrogates: reading, writing, and telling to which problem a front belongs.
+"""Stored fronts of surrogates: reading, writing, and matching a front to its problem.
 
 `experiments/fronts/reference_front.py` computes them. A file is a CSV with one header comment that
 holds the settings of the problem as JSON; a front is only used for a problem of the same settings.
@@ -40,9 +40,9 @@ class StoredFront:
     Parameters
     ----------
     variant : str
-        The problem in a word; its front is stored under that name.
+        Short name of the problem, under which its front is stored.
     settings : dict
-        What decides that front, JSON-able.
+        What determines that front, JSON-able.
     """
 
     n_obj: int
@@ -53,7 +53,7 @@ class StoredFront:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What decides the stored front, JSON-able: physics, surrogate, scatter, search space."""
+        """What determines the stored front, JSON-able: model, surrogate, scatter, search box."""
         return dict(self._settings)
 
     def name(self) -> str:
@@ -97,5 +97,5 @@ def format_reference(
 
 
 def _normalised(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the settings as JSON gives them back, so that both sides compare alike."""
+    """Return the settings after a round trip through JSON, to compare them with stored ones."""
     return json.loads(json.dumps(settings))

@@ -31,7 +31,7 @@ def make_moments(
     n_samples: int,
     sample_seed: int,
 ) -> ExactMoments | SampledMoments:
-    """Return the moments of one of the `MOMENTS`; number and seed of samples only serve the second.
+    """Return the moments of one of the `MOMENTS`; only sampled ones need number and seed.
 
     Raises
     ------

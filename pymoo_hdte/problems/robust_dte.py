@@ -44,8 +44,8 @@ class RobustDTE(StoredFront, RobustProblem):
     box : float
         Relative half-width of the search space, above 0 and below 1; the paper's is 0.25.
     conditions : sequence of OperatingCondition, optional
-        A duty cycle. The DTE is then its weighted mean over these conditions, of which each part
-        runs through all; without, it is that under the rated condition of the data sheet.
+        A duty cycle. The DTE is then its weighted mean over these conditions, all of which each
+        drive runs through; without, it is that under the rated condition of the data sheet.
 
     Attributes
     ----------

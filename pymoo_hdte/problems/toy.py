@@ -3,8 +3,8 @@
     y = x_1 + x_2 + a_1 (3 - x_1) + a_2 (x_3 - 3/2)
 
 with x_j uniform in u_j (1 +- t) around the design u in [1, 2]^3 and a_1, a_2 independent normals of
-mean zero, truncated at three standard deviations. As in the drive, a larger x_1 costs mean and buys
-robustness; x_2 has its optimum on the bound and x_3 inside.
+mean zero, truncated at three standard deviations. As in the drive, a larger x_1 raises the mean and
+lowers the scatter; x_2 has its optimum on the bound and x_3 inside.
 """
 
 from __future__ import annotations

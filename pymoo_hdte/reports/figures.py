@@ -1,4 +1,4 @@
-"""Figures of the reports: colours, and pictures that stand in the page itself."""
+"""Figures of the reports: colours, and pictures that are embedded in the page."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ PAGE_FILE = "report.html"
 
 @dataclass(frozen=True)
 class ReportFolder:
-    """What the folder of one kind of report holds, and by what an earlier one is known.
+    """The files of one kind of report, by which an earlier report is recognised.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class ReportFolder:
         return (*self.always, *self.optional)
 
     def check(self, out: Path) -> None:
-        """Refuse a folder that could not take a report, before anybody waits for one.
+        """Refuse a folder that could not take a report, before the long work starts.
 
         Parameters
         ----------

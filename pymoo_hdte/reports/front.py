@@ -1,4 +1,4 @@
-"""A front to point at: the figure stands in the page, a script shows the design under the pointer.
+"""Interactive figure of a front: a script shows the design under the pointer.
 
 Without the script, or printed, it is an ordinary figure; the page lists all designs beside it.
 """
@@ -26,7 +26,7 @@ class Front:
     ----------
     points : ndarray, shape (n, 2)
     marked : dict of int
-        Row that has a sign and a word of its own, by word.
+        Row that has its own marker and label, by label.
     initial : ndarray, shape (2,)
         Drawn beside the front.
     axes : tuple of str

@@ -9,7 +9,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 
 def page(package: str, template: str, **values: Any) -> str:
-    """Return a page from a template of a package, which may include what stands in this one."""
+    """Return a page from a template of a package, which may include files of this one."""
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(one, ".") for one in (package, "pymoo_hdte.reports")]),
         autoescape=True,
@@ -23,7 +23,7 @@ def page(package: str, template: str, **values: Any) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a number for the reader, without an exponent where it can be helped."""
+    """Return a number for the reader, without an exponent where possible."""
     if value is None or not np.isfinite(value):
         return "\N{EN DASH}"
     size = abs(value)

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array
 
-# Points computed from the bounds themselves miss them by a few roundings; those are let in.
+# Points computed from the bounds themselves miss them by a few roundings; those are accepted.
 _EDGE = 1e-12
 
 LARGEST = 1e150
-"""What may be squared and is still finite: the limit of bounds and coefficients."""
+"""Largest size of bounds and coefficients; its square is still finite."""
 
 
 class ExtrapolationError(InvalidInput):

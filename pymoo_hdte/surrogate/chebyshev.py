@@ -1,4 +1,4 @@
-"""The Chebyshev surrogate: a tensor polynomial that stands in for a costly function on a box."""
+"""The Chebyshev surrogate: a tensor polynomial that approximates a costly function on a box."""
 
 from __future__ import annotations
 
@@ -220,7 +220,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> tuple[Box, NDArray[np.float6
     Raises
     ------
     InvalidInput
-        As `FileFormat.read`; if the box is none, or the orders are not those of the coefficients.
+        As `FileFormat.read`; if the box is not valid or the orders do not fit the coefficients.
     OSError
         If the file cannot be read.
     """

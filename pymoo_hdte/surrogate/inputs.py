@@ -1,8 +1,8 @@
 """The two kinds of uncertain input of a robust design study.
 
 Each is described by a standard variable that does not depend on the design: `TruncatedNormal`
-*is* the input's value, `UniformBand` multiplies the design's value. Samples of the standard
-variable serve every design alike, which is what common random numbers need.
+*is* the input's value, `UniformBand` multiplies the design's value. The same samples of the
+standard variable serve all designs (common random numbers).
 """
 
 from __future__ import annotations

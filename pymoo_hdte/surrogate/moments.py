@@ -106,10 +106,10 @@ def _moments_on_grid(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return mean and variance on the Chebyshev grid of designs.
 
-    Variables are integrated out one after the other. With some of them gone, what is left is a
-    polynomial whose coefficients are random; their mean vector and covariance matrix follow from
-    those of the step before by the laws of total mean and total covariance. Nothing large is
-    subtracted, so a small variance keeps its digits.
+    Variables are integrated out one after the other. After each step the rest is a polynomial whose
+    coefficients are random; their mean vector and covariance matrix follow from those of the step
+    before by the laws of total mean and total covariance. Nothing large is subtracted, so a small
+    variance keeps its digits.
     """
     mean = coefficients.reshape(1, -1)
     covariance = np.broadcast_to(0.0, (1, coefficients.size, coefficients.size))

@@ -18,7 +18,7 @@ _POINTS_AT_ONCE = 8192
 
 
 class SampledMoments:
-    """Monte Carlo mean and standard deviation as the paper has them (Section 5.1).
+    """Monte Carlo mean and standard deviation as in the paper (Section 5.1).
 
     The samples of the inputs' standard variables are drawn once, at construction, one input after
     the other in the surrogate's order: all designs and all calls share them (common random
@@ -112,7 +112,7 @@ class SampledMoments:
         return self.design_box.from_cube(self.design_box.to_cube(designs))
 
     def _blocks(self, designs: NDArray[np.float64]) -> Iterator[tuple[slice, NDArray[np.float64]]]:
-        """Yield a few designs at a time: where they stand, and their sampled points.
+        """Yield a few designs at a time: their rows and their sampled points.
 
         The points have shape (designs * samples, d), the samples running fastest.
         """

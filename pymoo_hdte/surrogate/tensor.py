@@ -118,7 +118,7 @@ class TensorPolynomial:
         for axis in axes:
             part = np.zeros_like(self.coefficients)
             derivative = chebder(self.coefficients, axis=axis + 1)
-            # chebder shortens the axis by one, but keeps the length one of a constant.
+            # chebder shortens the axis by one, but leaves an axis of length one (a constant).
             part[tuple(slice(size) for size in derivative.shape)] = derivative
             parts.append(part)
         return TensorPolynomial(np.concatenate(parts))

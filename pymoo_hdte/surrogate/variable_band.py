@@ -18,7 +18,7 @@ from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
 
 _AT_ONCE = 2**15
-"""Numbers in one array: more leave the processor's cache, fewer leave numpy idle."""
+"""Numbers in one array: more exceed the processor's cache, fewer cost numpy overhead."""
 
 Arrays = list[NDArray[np.float64]]
 
@@ -152,7 +152,7 @@ class VariableBandMoments:
 
 
 def _legendre_rule(size: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return nodes s, shape (size,), and what takes values there to coefficients, (size, size).
+    """Return nodes s, shape (size,), and the matrix from values there to coefficients.
 
     Column l gives the coefficient of the l-th Legendre polynomial, normalised for s uniform in
     -1..1; exact for polynomials of degree below ``size``.

@@ -26,7 +26,7 @@ def archived(archive, batch):
 
 
 def least_crowded_by_recount(F, size):
-    """The readable twin: count every distance anew before each removal."""
+    """A simple reference: compute every distance again before each removal."""
     span = np.ptp(F, axis=0)
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
     rows = list(range(len(F)))

@@ -110,7 +110,7 @@ def test_shares_follow_success_down_to_a_floor(rng):
     survived = np.concatenate([np.ones(100, bool), np.zeros(100, bool), np.arange(100) < 50])
     for _ in range(60):
         success.learn(moves, survived)
-    # Rates 1, 0 and 1/2, but for the imagined trials; 0.85 is left above the floors.
+    # Rates 1, 0 and 1/2, but for the prior's trials; 0.85 is left above the floors.
     np.testing.assert_allclose(
         success.shares, [0.05 + 0.85 / 1.5, 0.05, 0.05 + 0.425 / 1.5], atol=2e-3
     )
@@ -151,7 +151,7 @@ def test_shares_stay_probabilities(moves, survived):
 
 
 def most_spread_by_recount(F, size):
-    """The readable twin: measure every distance anew before each removal."""
+    """A simple reference: compute every distance again before each removal."""
     span = np.ptp(F, axis=0)
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
     rows = list(range(len(F)))

@@ -30,7 +30,7 @@ def test_an_interior_optimum_is_no_harder_than_one_on_the_bound():
     problem = MovedZDT("zdt1", rotated=False, seed=1)
     distance = IGD(problem.pareto_front(1000))
     assert distance(run(ElitistSwarm(), problem, n_gen=100).F) < 0.012
-    # The faithful swarm lives on the bounds.
+    # AMP-MOPSO, as printed, relies on optima that lie on the bounds.
     assert distance(run(AMPMOPSO(), problem, n_gen=100).F) > 0.1
 
 
@@ -89,7 +89,7 @@ def test_every_evaluation_is_counted_and_none_happens_in_ask():
 
 
 def test_a_run_stopped_early_is_the_beginning_of_a_longer_one():
-    """No part follows a schedule, so nobody has to know in advance how long a run will be."""
+    """No part follows a schedule, so the length of a run need not be known in advance."""
     short = run(ElitistSwarm(**SMALL), n_gen=8)
     long = run(ElitistSwarm(**SMALL), n_gen=20, save_history=True)
     np.testing.assert_array_equal(long.history[7].opt.get("F"), short.opt.get("F"))

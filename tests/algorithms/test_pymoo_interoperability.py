@@ -1,4 +1,4 @@
-"""Problems and swarms beside what else pymoo 0.6.2 has: nothing of it needs to know of us."""
+"""Problems and swarms work with the other parts of pymoo 0.6.2, none of which is changed."""
 
 import io
 import pickle

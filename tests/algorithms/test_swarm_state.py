@@ -1,4 +1,4 @@
-"""What swarms know lies in the population, where callbacks, wrappers and users of ask change it."""
+"""A swarm's state is in the population, which callbacks, wrappers and users of ask may change."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The example of a rig of one's own finds what it hides, and its page says nothing else."""
+"""The example of a rig of one's own finds what it hides, and its page shows that output."""
 
 import contextlib
 import io

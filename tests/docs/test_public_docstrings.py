@@ -1,7 +1,7 @@
 """Every public name has shapes, units, errors and source: what a machine can check of that.
 
-What it cannot is whether they are right. The rules are planted with faults below, each of which
-must be found; the published methods are listed by hand, with a word of the source they must name.
+It cannot check whether they are right. The rules are tested on faulty docstrings below; each fault
+must be found. The published methods are listed by hand, with a word of the source they must name.
 """
 
 from __future__ import annotations

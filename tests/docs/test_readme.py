@@ -1,4 +1,4 @@
-"""The README's Python and commands run as printed, its pictures are drawn, its numbers are ours."""
+"""The README's Python and commands run as printed; its pictures and numbers are reproduced."""
 
 import contextlib
 import csv

@@ -23,7 +23,7 @@ EFFECTS = [
     LawAtPort("position_dependent_friction", "output", PeriodicFriction(1.0, 0.3, 0.1)),
     MeshStiffnessVariation(0.05, 0.7, 4.0),
 ]
-# The mirror image speaks for hysteresis.
+# Hysteresis is tested by the mirror image instead.
 MEMORYLESS = memoryless(EFFECTS)
 
 

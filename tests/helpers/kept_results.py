@@ -1,4 +1,4 @@
-"""What is long in the making and needed in several files: one worker makes it for all."""
+"""Slow results that several test files need: one worker computes each for all."""
 
 import fcntl
 import hashlib
@@ -13,9 +13,9 @@ FOLDER = "PYMOO_HDTE_KEPT_RESULTS"
 
 
 def kept(make: Callable) -> Callable:
-    """Keep what a function returns, for the other workers as a file; whoever comes second waits.
+    """Keep what a function returns, in a file for the other workers, which wait for it.
 
-    The function must depend on nothing but its arguments, and nobody may change what it returns.
+    The function must depend on nothing but its arguments, and its result must not be changed.
     """
     known = {}
 

@@ -81,7 +81,7 @@ def measured(effects=(), rng=None, data=None, **changes):
 
 
 def with_sweep(data, effects=(), rng=None, **changes):
-    """Add a torsion sweep up, down and up again that the same drive gives, whatever it means."""
+    """Add a torsion sweep up, down and up again of the same drive."""
     turns = np.array([0.0, 40.0, -40.0, 40.0])
     legs = [np.linspace(one, other, 21) for one, other in pairwise(turns)]
     path = np.concatenate([legs[0], *(leg[1:] for leg in legs[1:])])

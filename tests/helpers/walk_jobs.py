@@ -1,4 +1,4 @@
-"""Jobs for workers of a cluster: quick to import, and deadly if need be."""
+"""Jobs for workers of a cluster: quick to import; some kill their worker."""
 
 import os
 import signal
@@ -13,7 +13,7 @@ from experiments.runner.campaign import Run
 
 @dataclass(frozen=True)
 class Walk:
-    """A job that tells which process did it, in the place of the seconds of its parts."""
+    """A job whose result holds the id of its process instead of the seconds of its parts."""
 
     seed: int
 
@@ -29,7 +29,7 @@ class Walk:
 
 @dataclass(frozen=True)
 class DeadlyWalk(Walk):
-    """The same job, but its process is killed in its midst if ``cartridge`` is loaded."""
+    """The same job, but it kills its process once, if the file ``cartridge`` exists."""
 
     cartridge: Path
 
@@ -42,7 +42,7 @@ class DeadlyWalk(Walk):
 
 @dataclass(frozen=True)
 class EndlesslyDeadlyWalk(Walk):
-    """The same job, but whoever runs it is killed."""
+    """The same job, but it kills every process that runs it."""
 
     def execute(self) -> Run:
         os.kill(os.getpid(), signal.SIGKILL)

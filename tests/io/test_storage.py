@@ -1,4 +1,4 @@
-"""Stored files years later, and in the hands of an enemy: refused by InvalidInput, at no cost."""
+"""Stored files of old releases, and hostile files: refused by InvalidInput at low cost."""
 
 import io
 import json

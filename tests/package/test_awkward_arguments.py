@@ -84,7 +84,7 @@ VALID = {
 }
 
 STRANGE = (np.empty(0), np.empty((0, 3)), np.zeros((20, 1)), np.array(1.0), object())
-"""What neither compares nor counts as other values do."""
+"""Values that cannot be compared or counted like ordinary ones."""
 
 scalars = st.one_of(
     st.none(),

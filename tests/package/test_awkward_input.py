@@ -1,4 +1,4 @@
-"""Input that nobody means to give: what the fuzz campaign found, each with its clear refusal."""
+"""Malformed input that the fuzz campaign found, each with its clear refusal."""
 
 import re
 from fractions import Fraction

@@ -1,4 +1,4 @@
-"""Data flows one way: no room imports from one that stands above it, not even for types."""
+"""Imports go one way: no room imports from a room above it, not even for types."""
 
 import ast
 from pathlib import Path

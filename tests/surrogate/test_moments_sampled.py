@@ -1,4 +1,4 @@
-"""Sampled moments: honest Monte Carlo with common random numbers."""
+"""Sampled moments: Monte Carlo with common random numbers."""
 
 import pickle
 

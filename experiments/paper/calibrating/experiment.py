@@ -33,7 +33,7 @@ from pymoo_hdte.drive import preset
 
 OUTCOMES = "calibration.csv"
 SEEDS = {"table8": (1, 2), "table5": (1,)}
-"""Seeds of the fits, by direction; four numbers need no second look."""
+"""Seeds of the fits, by direction; four numbers need no second seed."""
 REPLICATES = 20
 LEAST_WIDTH = dict(zip(WIDTHS, (0.5, 0.1), strict=True))
 """Least distance of the ends of a front that counts as a trade-off, arcsec."""

@@ -149,7 +149,7 @@ def _global_search(
     rng = np.random.default_rng(seed)
 
     def cost(searched: NDArray[np.float64]) -> float:
-        # The logarithm keeps far-off members comparable without letting them rule the search.
+        # The logarithm keeps distant members comparable, but they do not dominate the search.
         return float(np.log1p(np.sum(residuals(searched) ** 2)))
 
     found = differential_evolution(

@@ -20,7 +20,7 @@ ANGLES = (0.0, 14.5, 20.0, 25.0, 28.6, 30.0)
 """Pressure angles of the flexspline's pitch circle, degrees; the paper prints none."""
 
 ASSUMED_ANGLE = 20.0
-"""Of the data sheet, degrees."""
+"""Pressure angle of the data sheet, degrees."""
 
 _TRIED = np.arange(0.0, 81.0, 10.0)
 """Pressure angles between which means are interpolated, degrees."""

@@ -1,4 +1,4 @@
-"""Fig. 5 and what of it gives the printed static error."""
+"""Fig. 5, and which statistic of it gives the printed static error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a campaign cannot tell is said, and only where it cannot."""
+"""Limits of what a campaign can tell are stated, and only where they apply."""
 
 import re
 from dataclasses import replace
@@ -113,7 +113,7 @@ def test_no_rate_of_sampling_shows_order_14(campaign):
     quiet = said(fast, chosen=periodic(1.0, 7.0))
     (sentence,) = set(said(fast, chosen=periodic(1.2, 7.0, 6.99))) - set(quiet)
     assert "Order 14, the second harmonic of order 7" in sentence
-    # Where somebody expects that line, it is looked at.
+    # Where that line is expected, it is examined.
     expected = [*ORDERS, 14.0]
     assert said(fast, orders=expected, chosen=periodic(1.2, 7.0)) == said(fast, orders=expected)
 

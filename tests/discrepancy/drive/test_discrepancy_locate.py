@@ -1,4 +1,4 @@
-"""Where the misfit lives: closed forms of the statistics, planted misfits, unbiased refits."""
+"""Location of the misfit: closed forms of the statistics, planted misfits, unbiased refits."""
 
 from dataclasses import replace
 

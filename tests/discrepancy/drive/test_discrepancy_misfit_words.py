@@ -1,4 +1,4 @@
-"""Words on a misfit: what is planted is what is said, for effects that no list holds."""
+"""Words on a misfit describe what was planted, for effects that are not listed."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -181,7 +181,7 @@ def test_a_fixed_frequency_is_found_though_its_orders_differ():
     found = stray_lines(data, (3.5,))
     assert found.frequency == pytest.approx(83.0, rel=5e-3)
     assert found.broad == ()
-    # Without anything unexpected nobody looks.
+    # Without anything unexpected there is no search.
     assert stray_lines(data, ()) == StrayLines()
 
 

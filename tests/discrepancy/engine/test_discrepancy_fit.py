@@ -129,7 +129,7 @@ def test_a_planted_base_comes_back_with_the_scatter_that_the_fit_states(repeated
     pulls = []
     for truth, fitted in repeated:
         deviation = np.sqrt(np.diag(fitted.covariance))
-        # What the records hardly speak of runs into its tolerance.
+        # What the records hardly determine runs into its tolerance.
         told = deviation < 0.2 * reach
         pulls.append(np.where(told, (fitted.values - truth) / deviation, np.nan))
     told = np.all(np.isfinite(pulls), axis=0)

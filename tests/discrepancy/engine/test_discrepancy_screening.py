@@ -1,4 +1,4 @@
-"""First-order signatures: what a candidate could remove, in closed form and in earnest."""
+"""First-order signatures: what a candidate could remove, in closed form and by a fit."""
 
 from dataclasses import replace
 

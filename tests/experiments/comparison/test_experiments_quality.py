@@ -1,4 +1,4 @@
-"""Quality of fronts: closed forms, and the traps of fronts that look too good."""
+"""Quality of fronts: closed forms, and fronts that indicators could overrate."""
 
 import numpy as np
 import pytest

@@ -37,7 +37,7 @@ def test_the_budget_is_spent_and_not_more(contestant):
     assert len(offers) == 1
     assert offers[0].F.shape[1] == 2
     assert offers[0].spent == Counting.rows - before
-    # NSGA-III's population is that of its directions; nobody spends more than allowed.
+    # NSGA-III's population is that of its directions; none spends more than allowed.
     assert 600 < Counting.rows - before <= 700
 
 

@@ -85,7 +85,7 @@ def test_wfg_fronts_are_what_pymoo_finds_at_the_optimal_distances(number):
     positions = problem._rand_optimal_position(300, random_state=np.random.default_rng(number))
     F = problem.evaluate(problem._positional_to_optimal(positions))
     # WFG1 raises distances to the power 0.02, by which the rounding of 0.35, 5.6e-17, becomes
-    # 0.07 in both objectives: in floating point nobody comes closer to its front than that.
+    # 0.07 in both objectives: in floating point no design comes closer to its front.
     rounding = 0.0694639 if number == 1 else 0.0
     normal = (F - rounding) / [2.0, 4.0]
     front = wfg_front(number) / [2.0, 4.0]

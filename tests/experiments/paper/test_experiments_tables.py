@@ -92,7 +92,7 @@ def test_ctrl_c_leaves_a_readable_report_and_code_130(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        # A shell starts background jobs deaf to Ctrl-C, and the suite may be one.
+        # A shell starts background jobs that ignore Ctrl-C, and the suite may be one.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not list(tmp_path.glob("runs/*/*.csv")) and process.poll() is None:

@@ -1,4 +1,4 @@
-"""The benchmark's arithmetic and its facts on the machine; its times are no business of tests."""
+"""The benchmark's arithmetic and its facts on the machine; times are not tested."""
 
 import time
 

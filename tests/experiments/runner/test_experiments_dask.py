@@ -129,7 +129,7 @@ def finished(folder: Path) -> dict[str, int]:
 
 @pytest.fixture(autouse=True)
 def impatient():
-    """A wait without end is a failure, and not a wait without end."""
+    """Turn an endless wait into a failure of the test."""
 
     handler = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("waits without end"))
     # Again and again, because what is interrupted may begin another wait.
