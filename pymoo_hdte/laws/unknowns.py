@@ -135,10 +135,10 @@ class Family:
         )
 
     def lines(self, values: Values) -> list[tuple[float, float, float]]:
-        """Return (order, amplitude, phase) for the values of `waves`."""
+        """Return (order, amplitude, phase) for the values of `waves`, or of its first lines."""
         return [
             (order, amplitude, phase)
-            for order, (_, amplitude, phase) in zip(self.orders, lines_of(values), strict=True)
+            for order, (_, amplitude, phase) in zip(self.orders, lines_of(values), strict=False)
         ]
 
 
