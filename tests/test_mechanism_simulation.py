@@ -1,7 +1,6 @@
 """Mechanisms in time against closed forms, other integrators, and what must be conserved."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +10,8 @@ from scipy.linalg import expm
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset
+from pymoo_hdte.drive import simulation as drive_simulation
 from pymoo_hdte.drive.effects import KinematicReaction
-from pymoo_hdte.drive.solve import time_domain
 from pymoo_hdte.laws import friction
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
@@ -245,7 +244,7 @@ def test_the_drive_is_an_instance(effects):
     sheet = replace(model.sheet, flexspline_teeth=20, circular_spline_teeth=22)
     model = replace(model, sheet=sheet, effects=effects)
     design = model.nominal * [1.0, 1.0, 1.0, 1.0, 4e3]
-    run = time_domain.simulate(model, design, ramp=0.1, settle=0.2)
+    run = drive_simulation.simulate(model, design, ramp=0.1, settle=0.2)
     torque = harmonic_balance(model.coefficients(design[None])).motor_torque[0, 0].real
     mechanism, laws = drive_mechanism(model, design)
     error = CubicSpline(run.time, run.transmission_error)
@@ -299,7 +298,12 @@ def test_wrong_arguments_are_named(mechanism, channels, arguments, named):
 def test_what_cannot_be_followed_ends_in_an_error(of_speed, gain, message, monkeypatch):
     monkeypatch.setattr(exponential_steps, "_STEPS_ANYWAY", 500)
     mechanism = block(loops=[replace(LOOP, position_gain=gain, speed_gain=0.0)])
-    law = SimpleNamespace(orders=(), respond=lambda state: Response(of_speed(state.speed)))
+
+    class OfSpeed(Aperiodic):
+        def respond(self, state):
+            return Response(of_speed(state.speed))
+
+    law = OfSpeed()
     with pytest.raises(ArithmeticError, match=message):
         simulate(mechanism, record(TIME, wanted=1.0), [at(law)], start={"q": (0.1, 0.5)})
 
