@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.misfit.nature import StrayLines, stray_lines
 from pymoo_hdte.discrepancy.drive.misfit.words import sentences
 from pymoo_hdte.discrepancy.engine.candidate import in_words
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 CONDITIONS = [(rpm, load) for rpm in (10.0, 200.0, 1000.0, 2000.0) for load in (0.0, 10.0, 40.0)]
@@ -172,7 +173,7 @@ def recorded(torque_on_input, twist=None):
         orders=np.array([1.0, 2.0, 3.5]),
     )
     campaign = SimpleNamespace(believed=BELIEVED, rig=RIG)
-    return SimpleNamespace(campaign=campaign, features=features)
+    return SimpleNamespace(campaign=campaign, features=features, rules=RULES)
 
 
 def test_a_fixed_frequency_is_found_though_its_orders_differ():
