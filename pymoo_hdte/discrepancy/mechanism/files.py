@@ -27,7 +27,7 @@ Numbers of the mechanism are in SI; the columns of the records have units of the
     speed_gain = 243.45
     limit = 10.0                                   # optional
     [[effects]]                                    # optional: laws that are known to be there
-    name = "coulomb_friction"                      # registered, with all its numbers 
+    name = "coulomb_friction"                      # registered, with all its numbers
     port = "joint"
     level = 20.4
 
