@@ -89,7 +89,7 @@ class BlindJob:
 
         Seconds are those of the processor, so that other work on the machine does not count.
         """
-        tools = hypotheses()
+        tools = other_tools()
         try:
             scores, parts = score(self.case, tools)
         except Exception:
@@ -99,7 +99,7 @@ class BlindJob:
         return Run(COLUMNS, np.array([row]), sum(parts), parts)
 
 
-def hypotheses() -> dict[str, Tool]:
+def other_tools() -> dict[str, Tool]:
     """Return the simpler tools by name.
 
     They are imported here only, so that a report of stored outcomes does not need their packages.

@@ -14,7 +14,7 @@ from pymoo_hdte.drive.effects import KinematicReaction
 from pymoo_hdte.laws import Aperiodic, friction
 from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
 from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.law import Aperiodic, PortState, Response, periodic_phase
+from pymoo_hdte.laws.law import PortState, Response, periodic_phase
 from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, SoftWindup
 from pymoo_hdte.mechanism import (
     BelievedValue,

@@ -351,7 +351,7 @@ def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
 ):
     monkeypatch.setattr(blind, "all_cases", lambda: MADE_UP)
     monkeypatch.setattr(blind_scoring, "score", made_up_score)
-    monkeypatch.setattr(blind_scoring, "rivals", dict)
+    monkeypatch.setattr(blind_scoring, "other_tools", dict)
     # No rival is asked, so none need be installed.
     monkeypatch.setattr(blind, "require", lambda *_: None)
     context = Context(1, tmp_path, Campaign(tmp_path), full=True)
