@@ -142,7 +142,7 @@ class Effect:
 
     @property
     def drives(self) -> bool:
-        """Whether it is a driving force: see `Behaviour.driving`."""
+        """Whether it is a driving force: see `Behaviour.drives`."""
         return bool(getattr(self.law, "drives", False))
 
     def guesses(self, sizes: Sizes) -> Sequence[Guess]:
@@ -180,7 +180,21 @@ class Effect:
             With the field ``name.number``: for an unknown number, or one that is missing or that
             the law does not take.
         """
-        return self._made(self.law, values)
+        if self.law is None:
+            raise InvalidInput(f"{self.name}.law", None, "an effect that is a law at a port")
+        for one in values:
+            one_of(f"number of {self.name}", one, tuple(self.quantities))
+        for number in self.quantities:
+            if number not in values and number not in self._defaults:
+                allowed = "a finite number (it is missing)"
+                raise InvalidInput(f"{self.name}.{number}", None, allowed)
+        numbers = {one: real_number(f"{self.name}.{one}", value) for one, value in values.items()}
+        try:
+            return self.law(**numbers)
+        except InvalidInput as error:
+            # A law may have the name of another effect that shares it, or none.
+            number = error.field.rpartition(".")[2]
+            raise InvalidInput(f"{self.name}.{number}", error.value, error.allowed) from None
 
     def numbers_of(self, law: Any) -> dict[str, float]:
         """Return the numbers of a law in SI, from which `law_of` makes an equal law.
@@ -223,21 +237,6 @@ class Effect:
     def _defaults(self) -> dict[str, float]:
         return {one.name: one.default for one in fields(self.kind) if one.default is not MISSING}
 
-    def _made(self, kind: Any, values: Mapping[str, float]) -> Any:
-        for one in values:
-            one_of(f"number of {self.name}", one, tuple(self.quantities))
-        for number in self.quantities:
-            if number not in values and number not in self._defaults:
-                allowed = "a finite number (it is missing)"
-                raise InvalidInput(f"{self.name}.{number}", None, allowed)
-        numbers = {one: real_number(f"{self.name}.{one}", value) for one, value in values.items()}
-        try:
-            return kind(**numbers)
-        except InvalidInput as error:
-            # A law may have the name of another effect that shares it, or none.
-            number = error.field.rpartition(".")[2]
-            raise InvalidInput(f"{self.name}.{number}", error.value, error.allowed) from None
-
 
 _EFFECTS: dict[str, Effect] = {}
 
@@ -261,15 +260,19 @@ def register(effect: Effect) -> Effect:
 
 @contextmanager
 def registered(*more: Effect) -> Iterator[None]:
-    """Make effects known inside a block only; errors as of `register`."""
+    """Make effects known inside a block only; errors as of `register`.
+
+    Effects of the package that are imported in the block stay known.
+    """
     before = dict(_EFFECTS)
     try:
         for effect in more:
             register(effect)
         yield
     finally:
-        _EFFECTS.clear()
-        _EFFECTS.update(before)
+        for name, effect in list(_EFFECTS.items()):
+            if name not in before and not effect.kind.__module__.startswith("pymoo_hdte."):
+                del _EFFECTS[name]
 
 
 def effects() -> tuple[Effect, ...]:

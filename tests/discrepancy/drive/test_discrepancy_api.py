@@ -134,6 +134,10 @@ def test_other_things_are_not_analysed():
         analyse("campaign")
 
 
+class OwnFriction(CoulombFriction):
+    """A law of the user's."""
+
+
 def test_effects_of_the_user_are_looked_for_and_known_from_then_on(campaign, records):
     asked = []
 
@@ -141,7 +145,7 @@ def test_effects_of_the_user_are_looked_for_and_known_from_then_on(campaign, rec
         asked.append(sizes)
         return []
 
-    own = Effect("own_effect", CoulombFriction, ("input",), {"level": "torque"}, "Own.", guess)
+    own = Effect("own_effect", OwnFriction, ("input",), {"level": "torque"}, "Own.", guess)
     with registered():
         analyse(campaign, effects=[own])
         (of_drive,) = {one.stiffness for one in asked}
