@@ -272,7 +272,7 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 #
 # .. code-block:: python
 #
-#    Experiment("stiffer", "What a stiffer drive would gain"),
+#    Experiment("stiffer", "studies.stiffer", "What a stiffer drive would gain"),
 #
 # and from then on ``python -m experiments stiffer`` runs it, stores its tables as CSV and its
 # figures as PNG, and shows it on the page ``index.html``. The folder is no part of the installed
@@ -288,6 +288,8 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 #
 # To try it without the line in the registry, all it takes is a folder and a campaign in this
 # process:
+
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]
 
 from stiffer import run
 
