@@ -117,10 +117,10 @@ class Law(Protocol):
 class Memory(Law, Protocol):
     """A law whose force depends on the previous motion, by inner states that solvers keep.
 
+    Their number is above 0; all are 0 at rest and have the unit of the motion.
+
     Attributes
     ----------
-    states : int
-        Number of inner states, above 0; all are 0 at rest and have the unit of the motion.
     shortest : float
         The shortest distance over which a state changes, m or rad, which integrators must resolve.
     """
