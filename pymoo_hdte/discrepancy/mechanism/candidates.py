@@ -52,7 +52,7 @@ def _sought(
     for effect in law_effects():
         if effect.of_reading == port.read:
             yield effect, sizes
-        if effect.drives and not port.read:
+        if effect.drives and not effect.of_reading and not port.read:
             for read in data.mechanism.ports:
                 # The reading of a force sensor may be caused by a torque that acts on the motion.
                 if read.read and dict(read.motion) == dict(port.motion):

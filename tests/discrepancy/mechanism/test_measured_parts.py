@@ -10,6 +10,7 @@ from scipy.stats import t
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.candidates import mechanism_candidates
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
@@ -22,6 +23,7 @@ from pymoo_hdte.mechanism.motion import motion_of
 STEP, DURATION, CUTOFF = 2e-3, 6.0, 25.0
 TIME = np.arange(0.0, DURATION, STEP)
 INERTIA, VISCOUS = 0.05, 0.4
+PERIODIC = ("kinematic_error", "torque_ripple", "position_dependent_friction")
 
 JOINT = Mechanism(
     {"q": BelievedValue(0.06, 0.5)},
@@ -45,6 +47,17 @@ def turning(name, speed, friction, noise=1e-3, swing=0.2, seed=0):
 
 def dry(q, v):
     return 0.8 * np.tanh(v / 1e-4)
+
+
+def test_what_a_sensor_reads_is_kinematic_there_and_a_torque_where_it_moves():
+    ports = [*JOINT.ports, Port("cell", {"q": 1.0}, read=True)]
+    joint = Mechanism(JOINT.inertias, ports, JOINT.inputs)
+    one = turning("one", 1.5, dry)
+    record = Record(one.name, one.role, one.time, one.channels | {"cell": one.channels["torque"]})
+    data = measured_data(joint, [record], CUTOFF)
+    found = mechanism_candidates(data, {"bearing": 1.0, "cell": 1.0}, {"cell": (17.0, 34.0)})
+    periodic = {(one.name, one.port) for one in found if one.name in PERIODIC}
+    assert periodic == {("kinematic_error", "cell"), ("torque_ripple", "bearing")}
 
 
 def test_the_orders_of_a_ripple_are_found_and_none_in_noise():
