@@ -81,11 +81,7 @@ class Data(Observations):
             mean = [MEANS.index(channel)] if channel in MEANS else []
             places = np.append(mean, self.features.places(channel)).astype(int)
             found.append((first + places).ravel())
-        return [*found, n_records * n_features + np.arange(self._sweep_residuals)]
-
-    @property
-    def _sweep_residuals(self) -> int:
-        return sum(len(points.angle) - 1 for points in self.torsion)
+        return [*found, n_records * n_features + np.arange(self.n_sweep_residuals)]
 
     def excess(self, fitted: Fit) -> Excess:
         """Return the excess chi-square of a fit by record and part of the data.
@@ -95,7 +91,7 @@ class Data(Observations):
         """
         n_records, n_features = self.features.values.shape
         n_running = n_records * n_features
-        n_sweeps = self._sweep_residuals
+        n_sweeps = self.n_sweep_residuals
         whitened = fitted.residuals[:n_running].reshape(n_records, n_features)
         cells = cell_chi_square(self, np.einsum("rij,rj->ri", self.whiteners, whitened))
         known = np.isfinite(cells)

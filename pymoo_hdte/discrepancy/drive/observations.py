@@ -127,6 +127,11 @@ class Observations:
             found.append((torsion - points.angle) @ points.whitening.T)
         return np.hstack(found)
 
+    @property
+    def n_sweep_residuals(self) -> int:
+        """Number of residuals of the sweeps: one a point, less the constant of each sweep."""
+        return sum(len(points.angle) - 1 for points in self.torsion)
+
     def whiten(self, differences: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return whitened differences of features (..., r, f), flat: shape (..., r f)."""
         white = np.empty_like(differences)

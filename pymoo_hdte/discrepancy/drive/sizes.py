@@ -64,7 +64,7 @@ def scales_of(data: Observations, base: Fit) -> Scales:
         max(_size(features, residual, channel), _size(features, noise, channel))
         for channel in range(3)
     )
-    swept = base.residuals[n_running : n_running + sum(len(one.angle) - 1 for one in data.torsion)]
+    swept = base.residuals[n_running : n_running + data.n_sweep_residuals]
     if len(swept):
         deviation = np.median(np.concatenate([one.deviation for one in data.torsion]))
         error = max(error, float(deviation * np.sqrt(np.mean(swept**2))))
