@@ -13,7 +13,12 @@ from matplotlib.figure import Figure
 PICTURE = Path(__file__).with_name("rooms.png")
 ROOT = Path(__file__).resolve().parents[1] / "pymoo_hdte"
 WIDTH = 12.0
-COLOURS = {"discrepancy": "#FBE3D1", "drive": "#D6E8F5", "mechanism": "#D6E8F5", "laws": "#D6E8F5"}
+COLOURS = {
+    "discrepancy": "#FBE3D1",
+    "drive": "#D6E8F5",
+    "mechanism": "#D6E8F5",
+    "effects": "#D6E8F5",
+}
 OTHER = "#EEF0F2"
 
 

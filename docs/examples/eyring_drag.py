@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.laws import Aperiodic, Effect, Guess, Response, unknown
+from pymoo_hdte.effects import Aperiodic, Effect, Guess, Response, unknown
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,7 @@ print(f"static error of 2000 prototypes: mean {static.mean():.1f}, std {static.s
 # matter for most drives: ``load_inertia`` (a link on the output, which brings the torsional
 # resonance down), ``damping_reference`` (losses measured at the input act at the output with the
 # square of the ratio) and ``mesh_stiffness_variation`` (two lobes pass the teeth per input turn).
-# Friction, play, hysteresis and others are listed in the module ``pymoo_hdte.laws``.
+# Friction, play, hysteresis and others are listed in the module ``pymoo_hdte.effects``.
 
 model = load_model(EXAMPLES / "my_drive_model.toml", sheet)
 for name, value, unit in zip(PARAMETERS, model.nominal, PARAMETER_UNITS, strict=True):

@@ -22,7 +22,7 @@ from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange
 from pymoo_hdte.discrepancy import MeasuredMechanism, analyse
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
 from pymoo_hdte.drive.toml_text import model_toml
-from pymoo_hdte.laws import register
+from pymoo_hdte.effects import register
 from pymoo_hdte.mechanism import (
     BelievedValue,
     Input,
@@ -53,7 +53,7 @@ from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 # derivatives, which Newton's method needs. Laws that depend on no angle inherit ``Aperiodic``;
 # those that vary with one inherit ``Periodic`` and name their order, so that solvers keep its
 # harmonics. What else solvers ask of a law (inner states, clearance, breakaway) has a default in
-# ``pymoo_hdte.laws.law.Behaviour``.
+# ``pymoo_hdte.effects.law.Behaviour``.
 #
 # The ``Effect`` names the ports of a drive where the law makes sense, its numbers with their units,
 # its sentence in a report, what it holds as a special case, and a *guess*: from the sizes of a port

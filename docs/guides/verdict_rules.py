@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import adequate
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.verdict import STATUSES
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
 # %%

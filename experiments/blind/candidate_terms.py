@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
-from pymoo_hdte.laws.hysteresis import slip_along
+from pymoo_hdte.effects.hysteresis import slip_along
 from pymoo_hdte.units import ARCSEC
 
 Values = NDArray[np.float64]

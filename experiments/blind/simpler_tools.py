@@ -30,7 +30,7 @@ from pymoo_hdte.discrepancy.drive.observations import (
 )
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine.candidate import Layout
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter
 
 FALSE_ALARMS = 0.01
 """Chance that noise alone moves the largest of all cells, or the best of all terms, so far."""

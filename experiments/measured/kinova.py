@@ -11,7 +11,7 @@ from experiments.runner.registry import Context
 from experiments.runner.result import Finding, Result, Table
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.report.mechanism_document import limits
-from pymoo_hdte.laws.effect import place_of
+from pymoo_hdte.effects.effect import place_of
 
 RIG = MeasuredRig(
     name="kinova",

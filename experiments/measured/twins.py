@@ -17,7 +17,7 @@ from experiments.runner.result import Column, Table
 from experiments.runner.result import Finding as Agreement
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.proof import fitted_mechanism
-from pymoo_hdte.laws.friction import NonlinearDrag
+from pymoo_hdte.effects.friction import NonlinearDrag
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import ForceBalance
 from pymoo_hdte.mechanism.motion import noise_of

@@ -26,7 +26,7 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest, next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.drive import DriveModel
-from pymoo_hdte.laws.effect import Effect, register
+from pymoo_hdte.effects.effect import Effect, register
 
 ONE_THREAD = threadpool_limits.wrap(limits=1)
 """One thread: the matrices are small, so that several threads would be much slower."""

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
+from pymoo_hdte.effects.quantities import with_unit
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import read_toml
-from pymoo_hdte.laws.quantities import with_unit
 from pymoo_hdte.units import si_unit
 
 ERROR_CLASSES = ("e_m", "e_g", "e_w", "e_p", "e_h")

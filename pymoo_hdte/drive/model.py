@@ -26,11 +26,11 @@ from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.hill import hill_steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
+from pymoo_hdte.effects.effect import place_of
+from pymoo_hdte.effects.quantities import with_unit
 from pymoo_hdte.io.archive import FileFormat
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import read_toml
-from pymoo_hdte.laws.effect import place_of
-from pymoo_hdte.laws.quantities import with_unit
 from pymoo_hdte.units import ARCSEC
 
 PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.laws.law import Law, Memory, PortState, periodic_phase
+from pymoo_hdte.effects.law import Law, Memory, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Loop, Mechanism, Port
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 from pymoo_hdte.mechanism.records import Record

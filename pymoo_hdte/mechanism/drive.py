@@ -18,7 +18,7 @@ def drive_mechanism(
 ) -> tuple[Mechanism, tuple[LawAt, ...]]:
     """Return one design of a drive as a mechanism, and the effects at its ports.
 
-    Coordinates are ``input_angle`` and ``output_angle``, rad. Ports are those of `laws.law`:
+    Coordinates are ``input_angle`` and ``output_angle``, rad. Ports are those of `effects.law`:
     ``input`` and ``output``, against the housing, and ``mesh``, whose motion is the torsion
     th_in / N - th_out - theta_s(th_in). Inputs are ``motor_torque``, N.m at the input, and
     ``load_torque``, N.m against the output.

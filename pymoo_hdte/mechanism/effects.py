@@ -2,9 +2,9 @@
 
 # The import registers the effects of a drive; some of them are laws, or readings, elsewhere too.
 from pymoo_hdte.drive import effects as _of_drives  # noqa: F401
-from pymoo_hdte.laws.effect import Effect, effects
+from pymoo_hdte.effects.effect import Effect, known_effects
 
 
 def law_effects() -> list[Effect]:
     """Return the effects that are laws, at ports or of readings."""
-    return [one for one in effects() if one.law is not None]
+    return [one for one in known_effects() if one.law is not None]

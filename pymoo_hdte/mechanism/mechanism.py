@@ -2,7 +2,7 @@
 
 M q'' = sum over inputs of B gain u - sum over ports of A (stiffness d + damping d' + laws(d, d')),
 where the motion at a port is d = A^T q plus its kinematic error. The laws are those of
-`pymoo_hdte.laws`; units are SI throughout, N and m or N.m and rad depending on the coordinate.
+`pymoo_hdte.effects`; units are SI throughout, N and m or N.m and rad depending on the coordinate.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.laws.law import Law
+from pymoo_hdte.effects.law import Law
 
 
 @dataclass(frozen=True)

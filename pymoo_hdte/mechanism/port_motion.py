@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.laws.law import Law, PortState, periodic_phase
+from pymoo_hdte.effects.law import Law, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Port
 from pymoo_hdte.mechanism.motion import SmoothedMotion
 

@@ -21,7 +21,7 @@ from pymoo_hdte.drive import (
     preset,
     simulate_drive,
 )
-from pymoo_hdte.laws import effects, register, registered
+from pymoo_hdte.effects import known_effects, register, registered
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.simulation import simulate_mechanism
 from pymoo_hdte.problems import RobustDTE
@@ -190,10 +190,10 @@ def rotor_record(seed, role):
 def test_name_belongs_to_one_effect_and_only_inside_its_block():
     with pytest.raises(InvalidInput, match="no other effect has"):
         register(replace(EYRING_DRAG, sentence="Another."))
-    names = [one.name for one in effects()]
+    names = [one.name for one in known_effects()]
     with registered(replace(EYRING_DRAG, name="own_drag")):
-        assert [one.name for one in effects()] == [*names, "own_drag"]
-    assert [one.name for one in effects()] == names
+        assert [one.name for one in known_effects()] == [*names, "own_drag"]
+    assert [one.name for one in known_effects()] == names
 
 
 @pytest.mark.parametrize(
@@ -204,6 +204,9 @@ def test_name_belongs_to_one_effect_and_only_inside_its_block():
         {"ports": ("wrist",)},
         {"quantities": {"heat": "torque"}},
         {"sentence": " "},
+        {"sentence": "Drag of the {oil}."},
+        {"sentence": "Drag at the {port."},
+        {"ports": ("input",), "sought": ("output",)},
     ],
 )
 def test_effects_that_say_nothing_are_refused(changes):

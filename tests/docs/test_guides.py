@@ -199,7 +199,7 @@ def test_reference_holds_every_public_name():
                 assert re.search(line, PAGES[page], flags=re.M)
     packages = {path.parent.name for path in (ROOT / "pymoo_hdte").glob("*/__init__.py")}
     # Those two serve the command line, which has a page of its own.
-    assert packages - {"cli", "io", "laws", "reports", "virtual"} <= set(PAGES)
+    assert packages - {"cli", "io", "effects", "reports", "virtual"} <= set(PAGES)
 
 
 @pytest.mark.skipif(not (ROOT / ".ci").is_dir(), reason="an sdist comes without the gate")

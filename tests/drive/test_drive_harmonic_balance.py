@@ -34,17 +34,17 @@ from pymoo_hdte.drive.solve.torus import (
     stacked,
     unstacked,
 )
-from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.laws.friction import (
+from pymoo_hdte.effects.friction import (
     CoulombFriction,
     NonlinearDrag,
     PeriodicFriction,
     PeriodicTorque,
     StribeckFriction,
 )
-from pymoo_hdte.laws.hysteresis import MaxwellSlip, slip_along
-from pymoo_hdte.laws.law import PortState, periodic_phase
-from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
+from pymoo_hdte.effects.hysteresis import MaxwellSlip, slip_along
+from pymoo_hdte.effects.law import PortState, periodic_phase
+from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
+from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.units import ARCSEC
 

@@ -28,7 +28,7 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, ErrorSource, Mesh, Nominal
 from pymoo_hdte.drive.effects import drive_effects
-from pymoo_hdte.laws.effect import place_of
+from pymoo_hdte.effects.effect import place_of
 
 any_size = st.floats(allow_nan=False, allow_infinity=False)
 at_least_0 = st.floats(min_value=0.0, allow_infinity=False)

@@ -12,8 +12,8 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import MeshStiffnessVariation, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.effects import LawAtPort
 from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion
-from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction
-from pymoo_hdte.laws.law import Periodic
+from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction
+from pymoo_hdte.effects.law import Periodic
 from pymoo_hdte.units import ARCSEC
 
 # Friction that varies over an output turn shakes the speed of a constant torque in cubes of its

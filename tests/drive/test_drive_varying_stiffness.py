@@ -18,8 +18,8 @@ from pymoo_hdte.drive import (
     simulate_drive,
 )
 from pymoo_hdte.drive.effects import effect_from_fields
+from pymoo_hdte.effects.stiffness import PeriodicStiffness
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.laws.stiffness import PeriodicStiffness
 from pymoo_hdte.units import ARCSEC
 
 

@@ -6,15 +6,15 @@ from pymoo_hdte.drive.effects import (
     LawAtPort,
     drive_effects,
 )
-from pymoo_hdte.laws.friction import (
+from pymoo_hdte.effects.friction import (
     CoulombFriction,
     NonlinearDrag,
     PeriodicFriction,
     PeriodicTorque,
     StribeckFriction,
 )
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.units import ARCSEC
 
 LAWS = {one.name: one for one in drive_effects() if one.change is None}

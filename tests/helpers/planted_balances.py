@@ -15,8 +15,8 @@ from pymoo_hdte.drive import (
     MeshStiffnessVariation,
     ThermalDrift,
 )
-from pymoo_hdte.laws.friction import CoulombFriction, NonlinearDrag, PeriodicTorque
-from pymoo_hdte.laws.stiffness import HardeningStiffness
+from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag, PeriodicTorque
+from pymoo_hdte.effects.stiffness import HardeningStiffness
 from pymoo_hdte.units import ARCSEC
 
 EFFECTS = {

@@ -14,7 +14,7 @@ from pymoo_hdte.drive import (
     ThermalDrift,
 )
 from pymoo_hdte.drive.datasheet import ErrorSource, Mesh, Nominal
-from pymoo_hdte.laws.effect import effect_named
+from pymoo_hdte.effects.effect import effect_named
 
 MODEL = DriveModel(
     name="a sample",

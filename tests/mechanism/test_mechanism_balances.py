@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.fft import dct
 
-from pymoo_hdte.laws.friction import CoulombFriction, PeriodicTorque
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.law import PortState, periodic_phase
-from pymoo_hdte.laws.linear import ConstantForce, DirectionalFriction, LinearDamper, LinearSpring
-from pymoo_hdte.laws.stiffness import HardeningStiffness
+from pymoo_hdte.effects.friction import CoulombFriction, PeriodicTorque
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.law import PortState, periodic_phase
+from pymoo_hdte.effects.linear import ConstantForce, DirectionalFriction, LinearDamper, LinearSpring
+from pymoo_hdte.effects.stiffness import HardeningStiffness
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import ForceBalance, balance_names, quantity_names
 from pymoo_hdte.mechanism.motion import highest_frequency, motion_of, noise_of, smooth, timing_noise

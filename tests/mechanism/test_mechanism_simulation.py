@@ -11,11 +11,11 @@ from scipy.linalg import expm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
 from pymoo_hdte.drive.effects import KinematicReaction
-from pymoo_hdte.laws import Aperiodic, friction
-from pymoo_hdte.laws.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.law import PortState, Response, periodic_phase
-from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, SoftWindup
+from pymoo_hdte.effects import Aperiodic, friction
+from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.law import PortState, Response, periodic_phase
+from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, SoftWindup
 from pymoo_hdte.mechanism import (
     BelievedValue,
     ErrorLine,

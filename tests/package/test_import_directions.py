@@ -12,7 +12,7 @@ ROOT = Path(pymoo_hdte.__file__).parent
 EXPERIMENTS = Path(experiments.__file__).parent
 TESTS = Path(__file__).parents[1]
 LOWEST_FIRST = (
-    *("checks", "lazy", "units", "compilation", "io", "laws", "reports"),
+    *("checks", "lazy", "units", "compilation", "io", "effects", "reports"),
     *("drive.solve", "drive.effects", "drive", "mechanism", "surrogate", "validation"),
     "identification",
     *(

@@ -152,4 +152,6 @@ def test_the_virtual_rig_knows_nothing_of_the_laws_it_must_test():
     for path in modules:
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.ImportFrom):
-                assert not (node.module or "").startswith(("pymoo_hdte.drive", "pymoo_hdte.laws"))
+                assert not (node.module or "").startswith(
+                    ("pymoo_hdte.drive", "pymoo_hdte.effects")
+                )

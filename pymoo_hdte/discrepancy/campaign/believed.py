@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.drive import DampingReference, DriveEffect, LoadInertia
-from pymoo_hdte.laws.effect import place_of
+from pymoo_hdte.effects.effect import place_of
 from pymoo_hdte.units import ARCSEC
 
 MECHANICAL = (

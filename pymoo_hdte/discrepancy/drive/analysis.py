@@ -23,7 +23,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
-from pymoo_hdte.laws.effect import effect_named
+from pymoo_hdte.effects.effect import effect_named
 
 
 @dataclass(frozen=True, eq=False)

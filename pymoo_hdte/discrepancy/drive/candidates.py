@@ -9,8 +9,8 @@ from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine import candidate
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, candidate_of
 from pymoo_hdte.drive.effects import DriveEffect, DriveSizes, LawAtPort, drive_effects
-from pymoo_hdte.laws.effect import effect_named, place_of
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.effect import effect_named, place_of
+from pymoo_hdte.effects.unknowns import Parameter
 
 _OF_THEIR_OWN = ("load_inertia", "damping")
 """Base parameters that an effect in the library covers under another name."""

@@ -25,7 +25,7 @@ from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Response
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.drive import DriveEffect
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 

@@ -25,7 +25,7 @@ from pymoo_hdte.discrepancy.drive.prediction import Prediction, coefficients_of,
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.drive import DriveEffect, SteadyMotion, mean_torsion
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 Values = NDArray[np.float64]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pymoo_hdte.discrepancy.campaign.believed import MECHANICAL, BelievedDrive, Rig
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter
 
 __all__ = ["MECHANICAL", "READING", "base_parameters"]
 

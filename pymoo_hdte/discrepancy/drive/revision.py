@@ -29,7 +29,7 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.drive.datasheet import Nominal
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
-from pymoo_hdte.laws.effect import Place, place_of
+from pymoo_hdte.effects.effect import Place, place_of
 from pymoo_hdte.units import ARCSEC
 
 SHEET_FILE = "revised_model_sheet.toml"

@@ -1,4 +1,4 @@
-"""Sizes of the ports of a drive, from which effects are guessed: see `pymoo_hdte.laws.guess`.
+"""Sizes of the ports of a drive, from which effects are guessed: see `pymoo_hdte.effects.guess`.
 
 All of them come from the records and the believed drive: its speeds and loads, and the residual of
 the base in each channel.

@@ -1,12 +1,11 @@
 """A candidate: one effect that a verdict can name, with its unknowns, ranges and sentence.
 
 A candidate turns a vector of values into effects of a model of the machine. It is made from a guess
-of its effect: see `pymoo_hdte.laws.guess`.
+of its effect: see `pymoo_hdte.effects.guess`.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -14,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.laws.effect import Effect, Place, place_of
-from pymoo_hdte.laws.guess import Guess
-from pymoo_hdte.laws.unknowns import Parameter, Values
+from pymoo_hdte.effects.effect import Effect, Place, place_of
+from pymoo_hdte.effects.guess import Guess
+from pymoo_hdte.effects.sentences import out_of_tolerance_sentence, sentence_at
+from pymoo_hdte.effects.unknowns import Parameter, Values
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def candidate_of(
         lambda values: tuple(
             standing(name, port, part) for name, part in effect.parts(guess, values)
         ),
-        sentence.format(port=port, order=orders, force=force),
+        sentence_at(sentence, port, orders, force),
         order,
         effect.exact,
         listed=not guess.name,
@@ -145,7 +145,7 @@ def out_of_tolerance(name: str, words: str) -> Candidate:
         (),
         ((),),
         lambda v: (),
-        f"The {words} lies outside its tolerance.",
+        out_of_tolerance_sentence(words),
         exact=True,
         frees=name,
     )
@@ -167,20 +167,3 @@ class Layout:
     def array(self, attribute: str) -> NDArray[np.float64]:
         """Return one attribute of all parameters, shape (n_parameters,)."""
         return np.array([getattr(parameter, attribute) for parameter in self.parameters])
-
-
-_PORT = r"([A-Za-z]\w*(?: of \w+)?)"
-
-
-_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
-
-
-def in_words(text: str) -> str:
-    """Return a text with all labels of candidates, such as ``torque_ripple:input@6``, in words."""
-    return _LABEL.sub(_words, text).replace(")+", ") and ")
-
-
-def _words(label: re.Match[str]) -> str:
-    name, form, port, order = label.groups()
-    details = [port.replace("_", " "), form, None if order is None else f"order {order}"]
-    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 Response = Callable[[Sequence[Any]], Vector]

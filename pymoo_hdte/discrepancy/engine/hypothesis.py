@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, count, fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened
-from pymoo_hdte.laws.effect import is_contained
+from pymoo_hdte.effects.effect import is_contained
 
 
 @dataclass(frozen=True, eq=False)

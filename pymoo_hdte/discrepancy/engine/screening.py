@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
-from pymoo_hdte.laws.unknowns import HARMONIC_NAMES
+from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ import numpy as np
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, candidate_of
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
-from pymoo_hdte.laws.effect import Effect, place_of
-from pymoo_hdte.laws.guess import Sizes
+from pymoo_hdte.effects.effect import Effect, place_of
+from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.mechanism import LawAt, Port
 from pymoo_hdte.mechanism.effects import law_effects
 

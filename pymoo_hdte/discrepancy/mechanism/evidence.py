@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate, out_of_tolerance
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Response, Unknowns, Vector, built
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import ForceBalance, balance_names, quantity_names
 

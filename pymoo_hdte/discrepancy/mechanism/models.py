@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import toml_text, toml_with_lines
-from pymoo_hdte.laws.effect import effect_named
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.effects import (
     law_effects,

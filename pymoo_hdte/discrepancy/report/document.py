@@ -14,12 +14,13 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.laws.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
+from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
 SCHEMA_VERSION = 1
 """Version of ``verdict.json``: raised when a field is removed or changes name, type or meaning."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.engine.candidate import Candidate, in_words
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
@@ -20,8 +20,9 @@ from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
-from pymoo_hdte.laws.effect import effect_named
-from pymoo_hdte.laws.unknowns import line_with_variance
+from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.unknowns import line_with_variance
 
 
 def mechanism_verdict_document(

@@ -13,14 +13,14 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
 from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
-from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     adequate,
     unexplained,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 METRICS = {

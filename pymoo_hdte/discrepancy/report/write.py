@@ -8,7 +8,7 @@ from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
-from pymoo_hdte.discrepancy.drive.limits import campaign_limits
+from pymoo_hdte.discrepancy.drive.coverage import campaign_limits
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.proof import Proof
@@ -18,7 +18,6 @@ from pymoo_hdte.discrepancy.drive.revision import (
     drive_model,
     revised_model,
 )
-from pymoo_hdte.discrepancy.engine.candidate import in_words
 from pymoo_hdte.discrepancy.report.document import believed_in_words, verdict_document
 from pymoo_hdte.discrepancy.report.figures import (
     gap_by_channel,
@@ -41,6 +40,7 @@ from pymoo_hdte.discrepancy.report.tables import (
 )
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
+from pymoo_hdte.effects.sentences import in_words
 from pymoo_hdte.reports.figures import data_uri
 from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.html import page

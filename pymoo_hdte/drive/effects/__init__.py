@@ -1,6 +1,6 @@
 """Effects of a drive beside the laws at its ports, one file each or a few that belong together."""
 
-from pymoo_hdte import laws
+from pymoo_hdte import effects as effects_at_ports
 from pymoo_hdte.drive.effects.base import (
     DriveEffect,
     DriveSizes,
@@ -29,5 +29,5 @@ __all__ = [
     "ThermalDrift",
     "drive_effects",
     "effect_from_fields",
-    "laws",
+    "effects_at_ports",
 ]

@@ -1,8 +1,8 @@
 """Effects in a drive model: laws at ports, or other changes of Eq. (9).
 
 An effect changes the coefficients of the equations of motion, or what sensors read of them; this
-serves every solver. The effect is defined by `laws.effect.Effect`, with its names, quantities and
-form in files.
+serves every solver. The effect is defined by `effects.effect.Effect`, with its names, quantities
+and form in files.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.effects.effect import Effect, effect_named, known_effects
+from pymoo_hdte.effects.guess import Sizes
+from pymoo_hdte.effects.law import Law, Values
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.laws.effect import Effect, effect_named, effects
-from pymoo_hdte.laws.guess import Sizes
-from pymoo_hdte.laws.law import Law, Values
 
 Lines = NDArray[np.complex128]
 
@@ -219,7 +219,7 @@ def _law_effect(name: str) -> Effect:
 
 def drive_effects() -> list[Effect]:
     """Return the effects that a drive model may have."""
-    return [one for one in effects() if one.ports]
+    return [one for one in known_effects() if one.ports]
 
 
 def effect_from_fields(table: Fields) -> DriveEffect:

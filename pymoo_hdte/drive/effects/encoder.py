@@ -11,10 +11,10 @@ import numpy as np
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes, Lines, Session
-from pymoo_hdte.laws.effect import Effect, register
-from pymoo_hdte.laws.guess import Guess
-from pymoo_hdte.laws.law import Values
-from pymoo_hdte.laws.unknowns import unknown, wave_starts
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.guess import Guess
+from pymoo_hdte.effects.law import Values
+from pymoo_hdte.effects.unknowns import unknown, wave_starts
 
 ENCODER_LINE = "encoder_line"
 """Name of an error of the encoder's scale, which no verdict names: see `Guess.name`."""

@@ -9,10 +9,10 @@ from typing import ClassVar
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.laws.effect import Effect, register
-from pymoo_hdte.laws.guess import Guess
-from pymoo_hdte.laws.stiffness import PeriodicStiffness
-from pymoo_hdte.laws.unknowns import wave_starts
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.guess import Guess
+from pymoo_hdte.effects.stiffness import PeriodicStiffness
+from pymoo_hdte.effects.unknowns import wave_starts
 
 WAVE_GENERATOR_ORDER = 2.0
 """Order of the effects of the wave generator's two lobes, in cycles per input turn."""

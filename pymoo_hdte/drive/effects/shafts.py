@@ -13,9 +13,9 @@ from typing import ClassVar
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.laws.effect import Effect, register
-from pymoo_hdte.laws.guess import Guess
-from pymoo_hdte.laws.unknowns import unknown
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.guess import Guess
+from pymoo_hdte.effects.unknowns import unknown
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
-from pymoo_hdte.laws.effect import Effect, register
-from pymoo_hdte.laws.friction import PeriodicTorque
-from pymoo_hdte.laws.guess import Guess, Sizes
-from pymoo_hdte.laws.unknowns import Family, unknown, wave_starts
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.friction import PeriodicTorque
+from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.unknowns import Family, unknown, wave_starts
 
 
 @dataclass(frozen=True)

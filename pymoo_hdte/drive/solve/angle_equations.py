@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.steady_motion import CONSTANT_TORQUE, Phasors, SpeedLoop
 from pymoo_hdte.drive.solve.torus import Matrices, Torus
-from pymoo_hdte.laws.law import Memory, PortState, Response
+from pymoo_hdte.effects.law import Memory, PortState, Response
 
 _STATIC_STEPS = 8
 

@@ -17,8 +17,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.laws.law import Law
-from pymoo_hdte.laws.stiffness import PeriodicStiffness
+from pymoo_hdte.effects.law import Law
+from pymoo_hdte.effects.stiffness import PeriodicStiffness
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from pymoo_hdte.checks import finite_array
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.laws.law import Law, PortState, Response, Values, periodic_phase
+from pymoo_hdte.effects.law import Law, PortState, Response, Values, periodic_phase
 
 _STEPS = 100
 _TOLERANCE = 1e-12

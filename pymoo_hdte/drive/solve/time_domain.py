@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
-from pymoo_hdte.laws.law import PORTS, Law, Memory, PortState, periodic_phase
+from pymoo_hdte.effects.law import PORTS, Law, Memory, PortState, periodic_phase
 
 
 def smooth_step(x: float) -> tuple[float, float]:

@@ -19,8 +19,8 @@ from pymoo_hdte.discrepancy import (
 )
 from pymoo_hdte.discrepancy import analysis as api
 from pymoo_hdte.drive import load_datasheet, load_model
-from pymoo_hdte.laws import Effect, effect_named, registered
-from pymoo_hdte.laws.friction import CoulombFriction
+from pymoo_hdte.effects import Effect, effect_named, registered
+from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.lazy import lazy_names
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 

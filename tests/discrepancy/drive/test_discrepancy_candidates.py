@@ -18,8 +18,8 @@ from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.drive import preset
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.drive.toml_text import model_toml
+from pymoo_hdte.effects.unknowns import line_with_variance, lines_of, polar, wave, wave_starts
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.laws.unknowns import line_with_variance, lines_of, polar, wave, wave_starts
 from pymoo_hdte.units import ARCSEC
 
 NAMES = {

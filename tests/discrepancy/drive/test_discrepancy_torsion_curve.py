@@ -14,10 +14,10 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import Rig, TorsionRecord, read_campaign
 from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
 from pymoo_hdte.drive import mean_torsion, preset, quasi_static_torsion
-from pymoo_hdte.laws.friction import CoulombFriction, StribeckFriction
-from pymoo_hdte.laws.hysteresis import MaxwellSlip
-from pymoo_hdte.laws.law import PortState
-from pymoo_hdte.laws.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
+from pymoo_hdte.effects.friction import CoulombFriction, StribeckFriction
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.law import PortState
+from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.units import ARCSEC
 
 K = 2.583e4

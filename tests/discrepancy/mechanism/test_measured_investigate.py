@@ -23,7 +23,7 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
     quantities,
     remainder,
 )
-from pymoo_hdte.laws.friction import CoulombFriction
+from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 
 OSCILLATOR = Mechanism(

@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.report.mechanism_document import effects, limits
-from pymoo_hdte.laws.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.motion import motion_of
 

@@ -9,7 +9,7 @@ import pytest
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE, read_rig
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_mechanism_model
-from pymoo_hdte.laws.effect import effect_named
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.mechanism import (
     BelievedValue,
     ErrorLine,

@@ -7,9 +7,9 @@ from law_cases import LAWS
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, model_text, read_mechanism_model
-from pymoo_hdte.laws.effect import effect_named
-from pymoo_hdte.laws.linear import ConstantForce
-from pymoo_hdte.laws.stiffness import PeriodicClearance
+from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.linear import ConstantForce
+from pymoo_hdte.effects.stiffness import PeriodicClearance
 from pymoo_hdte.mechanism import (
     BelievedValue,
     ErrorLine,

@@ -29,7 +29,7 @@ from pymoo_hdte.drive import (
     load_model,
     preset,
 )
-from pymoo_hdte.laws.stiffness import SoftWindup
+from pymoo_hdte.effects.stiffness import SoftWindup
 from pymoo_hdte.reports.html import digits, number
 from pymoo_hdte.units import ARCSEC
 

@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy.drive.misfit.map import (
     Values,
     benjamini_hochberg,
 )
-from pymoo_hdte.discrepancy.drive.misfit.words import sentences
+from pymoo_hdte.discrepancy.drive.misfit.where import sentences
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
 from pymoo_hdte.discrepancy.drive.observations import (
     as_lines,

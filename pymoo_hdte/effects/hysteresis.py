@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.compilation import compiled
-from pymoo_hdte.laws.effect import Effect, register
-from pymoo_hdte.laws.guess import Guess, Sizes
-from pymoo_hdte.laws.law import Aperiodic, PortState, Response, Values
-from pymoo_hdte.laws.unknowns import unknown
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.law import Aperiodic, PortState, Response, Values
+from pymoo_hdte.effects.unknowns import unknown
 
 SPRINGS = 4
 

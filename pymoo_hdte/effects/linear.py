@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.laws.effect import Effect, register
-from pymoo_hdte.laws.friction import SMOOTHING_SPEED
-from pymoo_hdte.laws.guess import Guess, Sizes
-from pymoo_hdte.laws.law import Aperiodic, PortState, Response
-from pymoo_hdte.laws.unknowns import unknown
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.friction import SMOOTHING_SPEED
+from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.law import Aperiodic, PortState, Response
+from pymoo_hdte.effects.unknowns import unknown
 
 
 @dataclass(frozen=True)

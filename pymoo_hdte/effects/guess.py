@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pymoo_hdte.laws.unknowns import Family, Parameter, Values, harmonics_among
+from pymoo_hdte.effects.unknowns import Family, Parameter, Values, harmonics_among
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, highest_order
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED
-from pymoo_hdte.laws.unknowns import harmonics_among
+from pymoo_hdte.effects.unknowns import harmonics_among
 
 _SAME_ORDER = 1e-6
 """Largest difference of order at which two lines count as the same."""

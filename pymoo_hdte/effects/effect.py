@@ -16,10 +16,11 @@ from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Protocol
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.law import PORTS
+from pymoo_hdte.effects.quantities import si_unit, with_unit
+from pymoo_hdte.effects.sentences import check_sentence
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.laws.guess import Guess, Sizes
-from pymoo_hdte.laws.law import PORTS
-from pymoo_hdte.laws.quantities import si_unit, with_unit
 
 Place = tuple[str, str, float | None]
 """Name, port and order of an effect."""
@@ -84,11 +85,11 @@ class Effect:
     ------
     InvalidInput
         For a name that is no such word, neither law nor change, quantities that are no fields of
-        the law, an unknown port, or an empty sentence.
+        the law, an unknown port, or a sentence that is empty or has an unknown blank.
 
     Examples
     --------
-    >>> from pymoo_hdte.laws import effect_named
+    >>> from pymoo_hdte.effects import effect_named
     >>> coulomb = effect_named("coulomb_friction")
     >>> coulomb.ports, coulomb.unit("level")
     (('input', 'output'), 'N.m')
@@ -113,15 +114,16 @@ class Effect:
             raise InvalidInput("effect.name", self.name, "words in lower case with underscores")
         if self.law is None and self.change is None:
             raise InvalidInput(f"{self.name}.law", None, "a dataclass with the numbers of a law")
-        for port in (*self.ports, *(self.sought or ())):
+        for port in self.ports:
             one_of(f"{self.name}.ports", port, DRIVE_PORTS)
+        for port in self.sought or ():
+            one_of(f"{self.name}.sought", port, self.ports)
         if getattr(self.law, "states", 0) and set(self.ports) - {"mesh"}:
             allowed = '("mesh",): solvers keep inner states of laws at the mesh of a drive only'
             raise InvalidInput(f"{self.name}.ports", self.ports, allowed)
         for number in self.quantities:
             one_of(f"{self.name}.quantities", number, [one.name for one in fields(self.kind)])
-        if not str(self.sentence).strip():
-            raise InvalidInput(f"{self.name}.sentence", self.sentence, "a sentence")
+        check_sentence(f"{self.name}.sentence", self.sentence)
 
     @property
     def kind(self) -> type[Any]:
@@ -160,7 +162,11 @@ class Effect:
         """Return the name of a part: an effect may include the law of another."""
         if type(part) in (self.law, self.change):
             return self.name
-        return next(one.name for one in _EFFECTS.values() if one.law is type(part))
+        for one in _EFFECTS.values():
+            if one.law is type(part):
+                return one.name
+        allowed = "laws of registered effects only"
+        raise InvalidInput(f"{self.name}.guess", type(part).__name__, allowed)
 
     def unit(self, unknown: str) -> str:
         """Return the SI unit of a number, of an unknown of a guess or of a phase; 1 for none."""
@@ -275,7 +281,7 @@ def registered(*more: Effect) -> Iterator[None]:
                 del _EFFECTS[name]
 
 
-def effects() -> tuple[Effect, ...]:
+def known_effects() -> tuple[Effect, ...]:
     """Return all effects that are known: those of the package first, in the order of its files."""
     return tuple(_EFFECTS.values())
 

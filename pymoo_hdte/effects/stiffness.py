@@ -10,10 +10,10 @@ import numpy as np
 from scipy.special import expit
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.laws.effect import Effect, register
-from pymoo_hdte.laws.guess import Guess, Sizes
-from pymoo_hdte.laws.law import Aperiodic, Law, Periodic, PortState, Response, Values
-from pymoo_hdte.laws.unknowns import Family, Parameter, polar, unknown, wave
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
+from pymoo_hdte.effects.unknowns import Family, Parameter, polar, unknown, wave
 
 
 @dataclass(frozen=True)

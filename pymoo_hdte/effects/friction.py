@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.laws.effect import Effect, register
-from pymoo_hdte.laws.guess import Guess, Sizes
-from pymoo_hdte.laws.law import Aperiodic, Law, Periodic, PortState, Response, Values
-from pymoo_hdte.laws.unknowns import Family, unknown, wave_starts
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
+from pymoo_hdte.effects.unknowns import Family, unknown, wave_starts
 
 FRICTION_PORTS = ("input", "output")
 

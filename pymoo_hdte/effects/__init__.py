@@ -1,0 +1,26 @@
+"""Effects: laws of force over motion at the ports of any machine, each with its sentence."""
+
+from pymoo_hdte.effects import friction, hysteresis, linear, stiffness
+from pymoo_hdte.effects.effect import Effect, effect_named, known_effects, register, registered
+from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.law import Aperiodic, Periodic, PortState, Response
+from pymoo_hdte.effects.unknowns import unknown
+
+__all__ = [
+    "Aperiodic",
+    "Effect",
+    "Guess",
+    "Periodic",
+    "PortState",
+    "Response",
+    "Sizes",
+    "effect_named",
+    "friction",
+    "hysteresis",
+    "known_effects",
+    "linear",
+    "register",
+    "registered",
+    "stiffness",
+    "unknown",
+]

@@ -1,0 +1,70 @@
+"""Sentences of effects as reports print them, and labels of candidates in words.
+
+Each effect brings its own sentence (`Effect.sentence`, beside its law); here its blanks are filled.
+"""
+
+from __future__ import annotations
+
+import re
+import string
+
+from pymoo_hdte.checks import InvalidInput, one_of
+
+BLANKS = ("port", "order", "force")
+"""What a sentence may leave open: the port, the orders, and the word for what acts there."""
+_PORT = r"([A-Za-z]\w*(?: of \w+)?)"
+_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
+
+
+def check_sentence(field: str, sentence: str) -> None:
+    """Refuse a sentence that is empty or has a blank that nothing fills.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    if not str(sentence).strip():
+        raise InvalidInput(field, sentence, "a sentence")
+    try:
+        blanks = [blank for _, blank, _, _ in string.Formatter().parse(sentence)]
+    except ValueError:
+        raise InvalidInput(field, sentence, "a sentence with every { closed by a }") from None
+    for blank in blanks:
+        if blank is not None:
+            one_of(f"blank of {field}", blank, BLANKS)
+
+
+def sentence_at(sentence: str, port: str, orders: str, force: str) -> str:
+    """Return the sentence of an effect with its blanks filled.
+
+    Parameters
+    ----------
+    sentence : str
+        Of an effect or of one of its guesses.
+    port, orders : str
+        Where it is, and its orders in words; empty for an effect that has none.
+    force : str
+        Word for what acts at the port, ``"torque"`` in a drive.
+
+    Examples
+    --------
+    >>> sentence_at("A {force} ripple at the {port}.", "input", "", "torque")
+    'A torque ripple at the input.'
+    """
+    return sentence.format(port=port, order=orders, force=force)
+
+
+def out_of_tolerance_sentence(parameter: str) -> str:
+    """Return the sentence for a base parameter, given in words, that is out of tolerance."""
+    return f"The {parameter} lies outside its tolerance."
+
+
+def in_words(text: str) -> str:
+    """Return a text with all labels of candidates, such as ``torque_ripple:input@6``, in words."""
+    return _LABEL.sub(_words, text).replace(")+", ") and ")
+
+
+def _words(label: re.Match[str]) -> str:
+    name, form, port, order = label.groups()
+    details = [port.replace("_", " "), form, None if order is None else f"order {order}"]
+    return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"
