@@ -50,11 +50,9 @@ class Data(Observations):
         """Share of the base's excess up to which a residual counts as the model's own error."""
         return self.rules.model_accuracy**2
 
-    def objective(
-        self, candidates: Sequence[Candidate], slopes: NDArray[np.float64] | None = None
-    ) -> Objective:
+    def objective(self, candidates: Sequence[Candidate]) -> Objective:
         """Return whitened residuals of the drive with candidates."""
-        return Objective(self, candidates, slopes)
+        return Objective(self, candidates)
 
     def response(self, fitted: Fit) -> Response:
         """Return how the whitened residuals of a fit respond to further effects."""

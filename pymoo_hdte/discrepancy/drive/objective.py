@@ -7,11 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.observations import Observations
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Unknowns, Vector, built
 from pymoo_hdte.drive import DriveEffect, SteadyMotion
 
+_IN_SWEEPS = ("stiffness", "locked_stiffness", "output_torque_gain", "output_torque_zero")
+"""Base parameters on which the torsion with the input locked depends."""
+_READ_ONLY = ("offset", "input_torque_gain", "input_torque_zero", "locked_stiffness")
+"""Base parameters on which the motion of a running record does not depend: readings at most."""
 LOST = 1e3
 """Residual of a sweep's point at which the model cannot transmit the torque."""
 
@@ -25,8 +30,7 @@ class Objective(Unknowns):
     candidates : sequence of Candidate
     slopes : ndarray, shape (n_base, r, f), optional
         Derivatives of the features by base parameters, kept where they are given. Those of a model
-        without an effect also serve with it: an effect changes features far more than their slopes,
-        and an error of the slopes slows a search down but hardly moves its optimum.
+        without an effect also serve for the uncertainty of one with it, not for a search.
     """
 
     def __init__(
@@ -66,8 +70,11 @@ class Objective(Unknowns):
         slopes = self.slopes_at(values) if self.slopes is None else self.slopes
         moved = values + np.diag(steps * self.scale)
         base, effects = self._parts(values)
-        torsion = self._torsion(np.vstack([base, moved[:n_base, :n_base]]), effects)
-        features, sweeps = list(slopes), list((torsion[1:] - torsion[0]) / steps[:n_base, None])
+        swept = [k for k, one in enumerate(self.data.base) if one.name in _IN_SWEEPS]
+        torsion = self._torsion(np.vstack([base, moved[swept, :n_base]]), effects)
+        by_base = np.zeros((n_base, torsion.shape[1]))
+        by_base[swept] = (torsion[1:] - torsion[0]) / steps[swept, None]
+        features, sweeps = list(slopes), list(by_base)
         here = self._features(base, effects)[0]
         for place in range(n_base, len(values)):
             base, effects = self._parts(moved[place])
@@ -86,10 +93,33 @@ class Objective(Unknowns):
         base, effects = self._parts(values)
         n_base = base.shape[1]
         steps = self.steps(values)[:n_base]
-        features = self._features(
-            np.vstack([base, base + np.diag(steps * self.scale[:n_base])]), effects
-        )
-        return (features[1:] - features[0]) / steps[:, None, None]
+        moving = [k for k, one in enumerate(self.data.base) if one.name not in _READ_ONLY]
+        moved = base + np.diag(steps * self.scale[:n_base])
+        features = self._features(np.vstack([base, moved[moving]]), effects)
+        found = np.empty((n_base, *features.shape[1:]))
+        found[moving] = (features[1:] - features[0]) / steps[moving, None, None]
+        for place, one in enumerate(self.data.base):
+            if one.name in _READ_ONLY:
+                found[place] = self.scale[place] * self._reading(one.name, base[0], features[0])
+        return found
+
+    def _reading(
+        self, name: str, base: Vector, features: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the derivative of features (r, f) by a parameter of `_READ_ONLY`."""
+        found = np.zeros_like(features)
+        if name == "offset":
+            found[:, MEANS.index(0)] = 1.0
+        elif name == "input_torque_zero":
+            found[:, MEANS.index(1)] = 1.0
+        elif name == "input_torque_gain":
+            of_channel = np.append(self.data.features.places(1), MEANS.index(1))
+            names = [one.name for one in self.data.base]
+            gain, zero = (base[names.index(f"input_torque_{one}")] for one in ("gain", "zero"))
+            found[:, of_channel] = features[:, of_channel]
+            found[:, MEANS.index(1)] -= zero
+            found /= 1.0 + gain
+        return found
 
     def _parts(self, values: Vector) -> tuple[NDArray[np.float64], tuple[DriveEffect, ...]]:
         """Return the base parameters as one row, and the effects."""

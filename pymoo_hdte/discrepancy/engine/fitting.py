@@ -9,10 +9,10 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import minimum
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import Parameter
 
@@ -40,8 +40,6 @@ class Fit:
         Whitened: of running records, of sweeps, of priors.
     jacobian : ndarray, shape (n_residuals, n_parameters)
         Of the residuals, by parameters in units of their scale.
-    slopes : ndarray, first axis n_base
-        By base parameters in units of their scale; of the features, not whitened, for a drive.
     """
 
     candidates: tuple[Candidate, ...]
@@ -49,7 +47,6 @@ class Fit:
     values: Vector
     residuals: Vector
     jacobian: NDArray[np.float64]
-    slopes: NDArray[np.float64]
 
     @property
     def chi_square(self) -> float:
@@ -120,32 +117,17 @@ def fit(
     data: Evidence,
     candidates: Sequence[Candidate] = (),
     start: Vector | None = None,
-    evaluations: int | None = None,
-    slopes: NDArray[np.float64] | None = None,
+    steps: int | None = None,
 ) -> Fit:
     """Fit base parameters and those of candidates from ``start`` (by default their own starts).
 
-    With ``slopes`` (see `Objective`) a fit takes a fifth of the time; without, they are renewed in
-    every step. It takes ``evaluations`` steps at most, by default as many as the rules allow.
+    It takes at most ``steps`` steps, by default as many as the rules allow.
     """
-    objective = data.objective(candidates, slopes)
-    scale = objective.scale
-    inner = 1e-6 * (objective.upper - objective.lower)
+    objective = data.objective(candidates)
     begin = objective.start if start is None else start
-    begin = np.clip(begin, objective.lower + inner, objective.upper - inner)
-    found = least_squares(
-        lambda scaled: objective.residuals(scaled * scale),
-        begin / scale,
-        jac=lambda scaled: objective.jacobian(scaled * scale),
-        bounds=(objective.lower / scale, objective.upper / scale),
-        max_nfev=data.rules.fit_evaluations if evaluations is None else evaluations,
-        xtol=1e-5,
-        ftol=1e-6,
-        gtol=1e-9,
-    )
-    values = found.x * scale
-    kept = objective.slopes_at(values) if slopes is None else slopes
-    return Fit(objective.candidates, objective.parameters, values, found.fun, found.jac, kept)
+    most = data.rules.fit_evaluations if steps is None else steps
+    values, residuals, jacobian = minimum(objective, begin, most)
+    return Fit(objective.candidates, objective.parameters, values, residuals, jacobian)
 
 
 class Residuals(Protocol):
@@ -164,10 +146,6 @@ class Residuals(Protocol):
 
     def jacobian(self, values: Vector) -> NDArray[np.float64]:
         """Return derivatives (n_residuals, n_parameters) in units of the parameters' scale."""
-        ...
-
-    def slopes_at(self, values: Vector) -> NDArray[np.float64]:
-        """Return derivatives by base parameters, for other fits to start from."""
         ...
 
 
@@ -199,9 +177,7 @@ class Evidence(Protocol):
         """Share of the base's excess up to which a residual is attributed to no effect."""
         ...
 
-    def objective(
-        self, candidates: Sequence[Candidate], slopes: NDArray[np.float64] | None
-    ) -> Residuals:
+    def objective(self, candidates: Sequence[Candidate]) -> Residuals:
         """Return the residuals of a model with candidates; see `objective.Objective`."""
         ...
 

@@ -121,10 +121,8 @@ class MeasuredData:
         constant, slopes = self._linear
         return constant + slopes @ base - self.whitened_forces(base, (*self.known, *effects))
 
-    def objective(
-        self, candidates: Sequence[Candidate], slopes: Values | None = None
-    ) -> BalanceObjective:
-        """Return whitened residuals with candidates; slopes are known and need not be given."""
+    def objective(self, candidates: Sequence[Candidate]) -> BalanceObjective:
+        """Return whitened residuals with candidates."""
         return BalanceObjective(self, candidates)
 
     def response(self, fitted: Fit) -> Response:
@@ -250,10 +248,6 @@ class BalanceObjective(Unknowns):
         n_base = len(self.data.base)
         effects = (*self.data.known, *self._effects(values[n_base:]))
         return self.data.whitened_forces(values[:n_base], effects)
-
-    def slopes_at(self, values: Vector) -> Values:
-        """Return derivatives by base parameters, which do not depend on the values."""
-        return self.data._linear[1].T
 
     def _effects(self, values: Vector) -> tuple[LawAt, ...]:
         parts = built(self.candidates, values)

@@ -114,7 +114,7 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
     chi_square, sweep = _misfit(data, fitted)
     factor = np.where(_significant(chi_square, degrees_of_freedom, rules), _LEFT_OUT, 1.0)
     weakened = _weakened(data, factor, _wrong(sweep, rules))
-    return fit(weakened, fitted.candidates, values, _EVALUATIONS, fitted.slopes)
+    return fit(weakened, fitted.candidates, values, _EVALUATIONS)
 
 
 def _robust_step(data: Data, fitted: Fit) -> Values:
@@ -125,7 +125,7 @@ def _robust_step(data: Data, fitted: Fit) -> Values:
     degrees_of_freedom = cell_degrees_of_freedom(data)
     _, sweep = _misfit(data, fitted)
     kept = replace(data, torsion=()) if _wrong(sweep, data.rules) else data
-    objective = Objective(kept, fitted.candidates, fitted.slopes)
+    objective = Objective(kept, fitted.candidates)
     difference, others = objective.differences(fitted.values)
     slopes, others_slopes = objective.derivatives(fitted.values)
     lower = (objective.lower - fitted.values) / objective.scale

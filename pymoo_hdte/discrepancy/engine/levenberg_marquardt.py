@@ -1,0 +1,116 @@
+"""Bounded nonlinear least squares with few unknowns and slow residuals.
+
+The Levenberg-Marquardt method in Moré's scaling (Lecture Notes in Mathematics 630, 1978), whose
+linear problem is solved within the bounds (BVLS: Stark and Parker, Computational Statistics 10,
+1995). A parameter at a bound therefore neither shortens a step nor has to leave its bound first,
+which a trust region inside the bounds needs many steps for; and unknowns in which residuals are
+linear (gains, zeros, levels, parts of lines) are solved for exactly in every step.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+# Settings of the search: finer ones do not change a result by more than the tolerances.
+SETTLED = 0.01
+"""Chi-square that a step promises or brings, below which the search has converged."""
+SETTLED_SHARE = 1e-7
+"""The same relative to chi-square: where a model is far off, its last digits decide nothing."""
+_DAMPING = 1e-3
+"""First damping relative to the scaled curvature."""
+_GOOD, _POOR = 0.75, 0.25
+"""Ratios of the reduction to the promised one above and below which damping is changed."""
+_ATTEMPTS = 12
+"""Most dampings tried for one step."""
+
+
+class Differentiable(Protocol):
+    """Residuals of bounded unknowns, with derivatives."""
+
+    scale: Vector
+    lower: Vector
+    upper: Vector
+
+    def residuals(self, values: Vector) -> Vector:
+        """Return residuals (n,) at values (n_unknowns,)."""
+        ...
+
+    def jacobian(self, values: Vector) -> Matrix:
+        """Return derivatives (n, n_unknowns) by unknowns in units of their scale."""
+        ...
+
+
+def minimum(problem: Differentiable, start: Vector, steps: int) -> tuple[Vector, Vector, Matrix]:
+    """Return where the sum of squares is least near a start, with residuals and derivatives there.
+
+    Parameters
+    ----------
+    problem : Differentiable
+    start : ndarray, shape (n_unknowns,)
+        Moved to the nearest bound where it is outside.
+    steps : int
+        Most steps.
+
+    Returns
+    -------
+    values : ndarray, shape (n_unknowns,)
+    residuals : ndarray, shape (n,)
+    jacobian : ndarray, shape (n, n_unknowns)
+    """
+    values = np.clip(start, problem.lower, problem.upper)
+    residuals, jacobian = problem.residuals(values), problem.jacobian(values)
+    size, damping = np.zeros(len(values)), _DAMPING
+    for _ in range(steps):
+        size = np.maximum(size, np.linalg.norm(jacobian, axis=0))
+        before = residuals @ residuals
+        found = _step(problem, values, residuals, jacobian, size, damping)
+        if found is None:
+            break
+        values, residuals, damping = found
+        jacobian = problem.jacobian(values)
+        if before - residuals @ residuals <= SETTLED + SETTLED_SHARE * before:
+            break
+    return values, residuals, jacobian
+
+
+def _step(
+    problem: Differentiable,
+    values: Vector,
+    residuals: Vector,
+    jacobian: Matrix,
+    size: Vector,
+    damping: float,
+) -> tuple[Vector, Vector, float] | None:
+    """Return the next values, their residuals and the damping.
+
+    None if no step reduces the sum of squares by what counts.
+    """
+    orthonormal, triangle = np.linalg.qr(jacobian)
+    along, before = orthonormal.T @ residuals, residuals @ residuals
+    size = np.maximum(size, 1e-12)
+    # Values at a bound may exceed it by rounding.
+    lower = np.minimum((problem.lower - values) / problem.scale, 0.0) - 1e-14
+    upper = np.maximum((problem.upper - values) / problem.scale, 0.0) + 1e-14
+    right = np.concatenate([-along, np.zeros(len(size))])
+    for _ in range(_ATTEMPTS):
+        matrix = np.vstack([triangle, np.diag(np.sqrt(damping) * size)])
+        step = lsq_linear(matrix, right, (lower, upper), method="bvls").x
+        moved = np.clip(values + step * problem.scale, problem.lower, problem.upper)
+        promised = along @ along - np.sum((along + triangle @ step) ** 2)
+        if promised <= SETTLED / 10.0:
+            return None
+        there = problem.residuals(moved)
+        gain = before - there @ there
+        if gain > 0.0:
+            share = gain / promised
+            factor = 0.2 if share > _GOOD else 1.0 if share > _POOR else 2.0
+            return moved, there, max(factor * damping, 1e-9)
+        damping *= 5.0
+    return None
