@@ -35,6 +35,7 @@ at_least_0 = st.floats(min_value=0.0, allow_infinity=False)
 above_0 = st.floats(min_value=0.0, exclude_min=True, allow_infinity=False)
 # Between the bounds of every law's every field.
 share = st.floats(min_value=0.0, max_value=1.0, exclude_max=True)
+AT_LEAST_1 = ("sharpness", "order", "torsion", "spread", "fading", "exponent", "reference")
 texts = st.text(min_size=1).filter(str.strip)
 
 
@@ -43,7 +44,7 @@ def laws():
         kind = LAWS[name].law
         values = {
             field.name: st.floats(min_value=1.0, allow_infinity=False)
-            if field.name in ("sharpness", "order", "torsion", "spread", "fading")
+            if field.name in AT_LEAST_1
             else share
             for field in fields(kind)
             if field.init and field.name != "locked"

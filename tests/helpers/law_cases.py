@@ -31,6 +31,7 @@ EFFECTS = [
     LawAtPort("position_dependent_friction", "input", PeriodicFriction(1.0, 0.3, 0.02)),
     LawAtPort("nonlinear_drag", "input", NonlinearDrag(1e-6)),
     LawAtPort("torque_ripple", "input", PeriodicTorque(6.0, 1.0, 0.015)),
+    LawAtPort("nonlinear_drag", "input", NonlinearDrag(2e-6, 0.5, 100.0)),
     KinematicErrorLine(3.0, 2 * ARCSEC, 0.7),
     KinematicReaction(),
 ]
