@@ -24,7 +24,7 @@ _NEGLIGIBLE_SPEED = 1e-150
 """rad/s. Keeps a quotient finite at rest."""
 
 
-def _sign(speed: Values) -> tuple[Values, Values]:
+def smoothed_sign(speed: Values) -> tuple[Values, Values]:
     """Return the smoothed sign of a speed and its derivative."""
     value = np.tanh(speed / SMOOTHING_SPEED)
     return value, (1.0 - value**2) / SMOOTHING_SPEED
@@ -41,7 +41,7 @@ class CoulombFriction(Aperiodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        sign, slope = _sign(state.speed)
+        sign, slope = smoothed_sign(state.speed)
         return Response(self.level * sign, damping=self.level * slope)
 
     @property
@@ -87,7 +87,7 @@ class StribeckFriction(Aperiodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        sign, slope = _sign(state.speed)
+        sign, slope = smoothed_sign(state.speed)
         ratio = state.speed / self.fading
         extra = self.excess * np.exp(-(ratio**2))
         falling = -2.0 * ratio / self.fading * extra * sign
@@ -215,7 +215,7 @@ class PeriodicFriction(Periodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        sign, slope = _sign(state.speed)
+        sign, slope = smoothed_sign(state.speed)
         level = self.level * self.cosine(state)
         return Response(level * sign, damping=level * slope)
 

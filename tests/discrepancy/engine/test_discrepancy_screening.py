@@ -28,6 +28,7 @@ PLANTED = {
     "soft_windup:mesh": (0.1, 3e-4, 3.0),
     "nonlinear_drag:input": (0.0088, 2.0),
     "nonlinear_drag/sublinear:input": (0.02, 0.5),
+    "load_dependent_friction:input": (0.1,),
     "kinematic_reaction:input": (1.0,),
     "thermal_drift:sensor": (2e-8, 1000.0),
     "load_inertia:output": (0.03,),
