@@ -1,6 +1,6 @@
 """Effects: laws of force over motion at the ports of any machine, each with its sentence."""
 
-from pymoo_hdte.effects import friction, hysteresis, linear, stiffness
+from pymoo_hdte.effects import friction, hysteresis, linear, load_friction, stiffness
 from pymoo_hdte.effects.effect import Effect, effect_named, known_effects, register, registered
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Periodic, PortState, Response
@@ -19,6 +19,7 @@ __all__ = [
     "hysteresis",
     "known_effects",
     "linear",
+    "load_friction",
     "register",
     "registered",
     "stiffness",

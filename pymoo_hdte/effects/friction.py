@@ -20,8 +20,11 @@ SMOOTHING_SPEED = 1e-4
 """rad/s. Dry friction follows tanh(speed / this): exact to rounding wherever a drive turns, and its
 sign is undecided only below 1 % of the slowest output speed of interest (10 r/min at the input)."""
 
+_NEGLIGIBLE_SPEED = 1e-150
+"""rad/s. Keeps a quotient finite at rest."""
 
-def _sign(speed: Values) -> tuple[Values, Values]:
+
+def smoothed_sign(speed: Values) -> tuple[Values, Values]:
     """Return the smoothed sign of a speed and its derivative."""
     value = np.tanh(speed / SMOOTHING_SPEED)
     return value, (1.0 - value**2) / SMOOTHING_SPEED
@@ -38,7 +41,7 @@ class CoulombFriction(Aperiodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        sign, slope = _sign(state.speed)
+        sign, slope = smoothed_sign(state.speed)
         return Response(self.level * sign, damping=self.level * slope)
 
     @property
@@ -84,7 +87,7 @@ class StribeckFriction(Aperiodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        sign, slope = _sign(state.speed)
+        sign, slope = smoothed_sign(state.speed)
         ratio = state.speed / self.fading
         extra = self.excess * np.exp(-(ratio**2))
         falling = -2.0 * ratio / self.fading * extra * sign
@@ -123,24 +126,66 @@ register(
 
 @dataclass(frozen=True)
 class NonlinearDrag(Aperiodic):
-    """T = coefficient ``speed |speed|``; N.m.s2/rad2."""
+    """T = coefficient ``speed |speed|`` (``|speed|`` / reference)^(exponent - 2).
+
+    Exponent 2 is quadratic drag, whatever the reference. Grease that thins as it is sheared, and
+    rolling bearings, whose torque grows with the power 2/3 (Palmgren, Ball and Roller Bearing
+    Engineering, 1959), have exponents below 1. Exponent 1 is a machine's own damping.
+
+    Attributes
+    ----------
+    coefficient : float
+        Of the quadratic drag with the same torque at the reference speed, N.m.s2/rad2.
+    exponent : float
+        Power of the speed with which the torque grows.
+    reference : float
+        rad/s.
+    """
 
     coefficient: float
+    exponent: float = 2.0
+    reference: float = 1.0
 
     def __post_init__(self) -> None:
         real_number("nonlinear_drag.coefficient", self.coefficient)
+        real_number("nonlinear_drag.exponent", self.exponent, above=0.0)
+        real_number("nonlinear_drag.reference", self.reference, above=0.0)
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        size = np.abs(state.speed)
-        return Response(
-            self.coefficient * state.speed * size, damping=2.0 * self.coefficient * size
-        )
+        # Below exponent 1 the slope at rest would be infinite: it is that at the smoothing speed.
+        smoothing = SMOOTHING_SPEED if self.exponent < 1.0 else _NEGLIGIBLE_SPEED
+        size = np.hypot(state.speed, smoothing)
+        damping = self.coefficient * self.reference * (size / self.reference) ** (self.exponent - 1)
+        share = state.speed / size
+        slope = damping * (1.0 + (self.exponent - 1.0) * share**2)
+        return Response(damping * state.speed, damping=slope)
 
 
 def _drag(sizes: Sizes) -> list[Guess]:
-    typical = sizes.force / sizes.speed**2
-    return [Guess((unknown("coefficient", 0.0, 20.0 * typical, typical),))]
+    """Guess drags by their torque at the largest speed, with exponents above and below 1.
+
+    Exponents near 1 are left out, where a drag is the damping of the port.
+    """
+    speed = sizes.speed
+
+    def build(values: Sequence[float]) -> tuple[Law, ...]:
+        level, exponent = values
+        return (NonlinearDrag(level / speed**2, exponent, speed),)
+
+    level = unknown("level", 0.0, sizes.largest, sizes.force)
+    faster, slower = unknown("exponent", 1.2, 4.0, 2.0), unknown("exponent", 0.2, 0.85, 0.6)
+    sentence = "A friction at the {port} that grows, but slower than the speed."
+    return [
+        Guess((level, faster), [(level.start, power) for power in (2.0, 3.0, 1.5)], build),
+        Guess(
+            (level, slower),
+            [(level.start, power) for power in (0.6, 0.35)],
+            build,
+            form="sublinear",
+            sentence=sentence,
+        ),
+    ]
 
 
 register(
@@ -148,10 +193,12 @@ register(
         "nonlinear_drag",
         NonlinearDrag,
         FRICTION_PORTS,
-        {"coefficient": "quadratic drag"},
+        {"coefficient": "quadratic drag", "exponent": "", "reference": "speed"},
         "A drag at the {port} that grows faster than the speed.",
         _drag,
+        # At the output it would have to be N times as large, as Stribeck friction.
         sought=("input",),
+        of_fit={"level": "torque"},
     )
 )
 
@@ -168,7 +215,7 @@ class PeriodicFriction(Periodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
-        sign, slope = _sign(state.speed)
+        sign, slope = smoothed_sign(state.speed)
         level = self.level * self.cosine(state)
         return Response(level * sign, damping=level * slope)
 

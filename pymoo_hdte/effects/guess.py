@@ -36,6 +36,10 @@ class Sizes:
         Whether records move it in both directions.
     loaded : bool
         Whether records hold it under steady loads, so that corners of its spring show.
+    load : float
+        Largest torque that the port passes on; 0 where solvers do not know it.
+    driven : bool
+        Whether the load opposes the motion in some records and drives it in others.
     read : bool
         Whether it is the reading of a force sensor.
     slower : float
@@ -59,6 +63,8 @@ class Sizes:
     damping: float = 0.0
     both_ways: bool = True
     loaded: bool = False
+    load: float = 0.0
+    driven: bool = False
     read: bool = False
     slower: float = 1.0
     expected: tuple[float, ...] = ()

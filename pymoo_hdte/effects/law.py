@@ -43,6 +43,10 @@ class PortState:
     path, back : callable
         ``path`` arranges values of the shape of ``position`` in the order in which the port passes
         them, shape (n, steps), including a running-in; ``back`` undoes that.
+    load : ndarray or None
+        Torque that the machine passes on through the port, N.m; None where a solver does not know
+        it. At the input of a drive it is what the output delivers to its load, bearings and laws,
+        over the ratio, without what accelerates inertias.
     """
 
     position: Values
@@ -51,6 +55,7 @@ class PortState:
     stiffness: Values
     path: Callable[[Values], Values] = _whole
     back: Callable[[Values], Values] = _whole
+    load: Values | None = None
 
 
 @dataclass(frozen=True)
@@ -96,6 +101,11 @@ class Law(Protocol):
 
     @property
     def rattles(self) -> bool:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def loaded(self) -> bool:
         """See `Behaviour`."""
         ...
 
@@ -161,6 +171,9 @@ class Behaviour:
     """Whether the law removes the spring of its port, so that parts may lose contact."""
     drives: ClassVar[bool] = False
     """Whether the force is a driving force, whatever the direction of motion."""
+    loaded: ClassVar[bool] = False
+    """Whether the force depends on the torque that the port passes on, `PortState.load`, which only
+    solvers of a drive know, and at the input."""
     varies_stiffness: ClassVar[bool] = False
     """Whether it is K depth cos(order angle + phase) times the position, with these three numbers:
     then Hill's method and the stability of the drive know it too."""

@@ -324,6 +324,8 @@ def test_slopes_are_the_derivatives_of_torques(law, positions):
         StribeckFriction(0.2, 0.1, 20.0),
         PeriodicFriction(1.0, 0.2, 0.1),
         NonlinearDrag(1e-5),
+        NonlinearDrag(1e-5, 3.0, 100.0),
+        NonlinearDrag(1e-5, 0.4, 100.0),
     ],
 )
 @given(speed=st.floats(0.5, 300.0), sign=st.sampled_from([-1.0, 1.0]))

@@ -14,6 +14,7 @@ from pymoo_hdte.effects.friction import (
     StribeckFriction,
 )
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.load_friction import LoadFriction
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.units import ARCSEC
 
@@ -31,6 +32,8 @@ EFFECTS = [
     LawAtPort("position_dependent_friction", "input", PeriodicFriction(1.0, 0.3, 0.02)),
     LawAtPort("nonlinear_drag", "input", NonlinearDrag(1e-6)),
     LawAtPort("torque_ripple", "input", PeriodicTorque(6.0, 1.0, 0.015)),
+    LawAtPort("nonlinear_drag", "input", NonlinearDrag(2e-6, 0.5, 100.0)),
+    LawAtPort("load_dependent_friction", "input", LoadFriction(0.2, 0.1)),
     KinematicErrorLine(3.0, 2 * ARCSEC, 0.7),
     KinematicReaction(),
 ]

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.fft import dct
 
-from pymoo_hdte.effects.friction import CoulombFriction, PeriodicTorque
+from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag, PeriodicTorque
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.effects.linear import ConstantForce, DirectionalFriction, LinearDamper, LinearSpring
@@ -149,6 +149,11 @@ LAWS = [
         DirectionalFriction(1.0, 0.5),
         lambda d, v: np.tanh(v / 1e-4) ** 2 * (1.0 + 0.5 * np.abs(v)),
     ),
+    (
+        "nonlinear_drag",
+        NonlinearDrag(3.0, 0.5, 0.2),
+        lambda d, v: 3.0 * 0.2**2 * np.sign(v) * np.sqrt(np.abs(v) / 0.2),
+    ),
     ("torque_ripple", PeriodicTorque(7.0, 0.3, 2.0), lambda d, v: -2.0 * np.cos(7.0 * d + 0.3)),
 ]
 
@@ -179,7 +184,9 @@ def test_a_law_that_is_linear_takes_what_the_port_of_its_coefficient_does(cutoff
     assert balance.forces(laws) == pytest.approx(-terms, abs=1e-6 * np.abs(terms).max())
 
 
-@pytest.mark.parametrize("law", [DirectionalFriction(1.0, 0.5), LinearDamper(0.3)])
+@pytest.mark.parametrize(
+    "law", [DirectionalFriction(1.0, 0.5), LinearDamper(0.3), NonlinearDrag(2.0, 0.4, 0.1)]
+)
 def test_damping_of_a_law_is_its_derivative_by_the_speed(law):
     # The smoothed sign turns within 1e-4; beyond it only what is viscous is left.
     speed = np.array([-0.3, -2e-4, -5e-5, 3e-5, 1e-4, 0.2])

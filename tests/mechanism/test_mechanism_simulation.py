@@ -68,6 +68,7 @@ def test_at_resonance_the_response_lags_by_a_quarter_and_inputs_are_straight_bet
 
 LAWS = {
     "dry": (friction.StribeckFriction(0.6, 0.4, 0.3),),
+    "grease": (friction.NonlinearDrag(20.0, 0.5, 0.3),),
     "cogging": (PeriodicTorque(9.0, 0.3, 0.7), PeriodicFriction(7.0, 1.0, 0.3)),
     "springs": (HardeningStiffness(300.0, 0.4, 0.05), SoftWindup(0.3, 0.02, 4.0)),
     "clearance": (DeadZone(0.02), CoulombFriction(0.2)),

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
+from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS, Features
-from pymoo_hdte.discrepancy.drive.observations import Observations
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive.effects import DriveSizes
 
@@ -42,6 +42,8 @@ class Scales:
     error, input_torque, output_torque : float
         Residual of the base in the transmission error, rad, and in the two torques, N.m: root mean
         square over a record, means and lines together.
+    driven : bool
+        Whether the load opposes the motion in some records and drives it in others.
     """
 
     speed: float
@@ -51,9 +53,10 @@ class Scales:
     error: float
     input_torque: float
     output_torque: float
+    driven: bool = False
 
 
-def scales_of(data: Observations, base: Fit) -> Scales:
+def scales_of(data: Data, base: Fit) -> Scales:
     """Return the scales of records with a fitted base."""
     features = data.features
     n_running = features.values.size
@@ -69,6 +72,9 @@ def scales_of(data: Observations, base: Fit) -> Scales:
         deviation = np.median(np.concatenate([one.deviation for one in data.torsion]))
         error = max(error, float(deviation * np.sqrt(np.mean(swept**2))))
     when = features.conditions
+    # A load below what a sensor's zero is known to has no direction.
+    least = data.campaign.torque_scale * data.rules.least_held_load
+    braking = when.output_torque * np.sign(when.input_speed)
     paths = [np.abs(one.path).max() for one in data.torsion]
     return Scales(
         speed=float(np.abs(when.input_speed).max()),
@@ -78,6 +84,7 @@ def scales_of(data: Observations, base: Fit) -> Scales:
         error=error,
         input_torque=input_torque,
         output_torque=output_torque,
+        driven=bool(braking.max() > least and braking.min() < -least),
     )
 
 
@@ -135,6 +142,7 @@ def port_sizes(
         travel=scales.torque / believed.stiffness,
         stiffness=believed.stiffness,
         loaded=True,
+        driven=scales.driven,
         seen=tuple(sorted(seen)),
         shown=tuple(orders),
         error=scales.error,
@@ -155,6 +163,7 @@ def port_sizes(
             residual=residual[port],
             largest=largest[port],
             speed=shared.speed / slower[port],
+            load=scales.torque / believed.ratio if port == "input" else 0.0,
             slower=slower[port],
             expected=_SHAFTS[port],
         )

@@ -133,8 +133,10 @@ class AngleEquations:
             output_loss=np.asarray(output.damping),
         )
 
-    def _laws(self, port: str, position: Values, speed: Values) -> Response:
-        """Return the sum of the laws at a port."""
+    def _laws(
+        self, port: str, position: Values, speed: Values, load: Values | None = None
+    ) -> Response:
+        """Return the sum of the laws at a port, which passes on ``load`` besides them."""
         # The angle of periodic laws at the output omits the small fluctuation of the output.
         slower = self.coefficients.ratio if port == "output" else 1.0
 
@@ -142,7 +144,7 @@ class AngleEquations:
             return self.torus.phase(order / slower)
 
         stiffness = self.coefficients.stiffness[:, None]
-        state = PortState(position, speed, phase, stiffness, self._path, self._back)
+        state = PortState(position, speed, phase, stiffness, self._path, self._back, load)
         total = Response(np.zeros_like(speed))
         for place, law in self.coefficients.laws:
             if place == port:
@@ -189,18 +191,21 @@ class AngleEquations:
         """Return the residual of the second equation, N.m."""
         return self.torus.phasors(
             self.output_inertia * motion.output_acceleration
-            + self.output_damping * motion.output_speed
-            + motion.output_friction
+            + self.delivered(motion)
             - motion.mesh_torque
-            + self.load
         )
+
+    def delivered(self, motion: TorsionMotion) -> Values:
+        """Return the torque, N.m, that the output passes on to load, bearings and laws there."""
+        return self.output_damping * motion.output_speed + motion.output_friction + self.load
 
     def input_residual(self, motion: TorsionMotion) -> Phasors:
         """Return the residual of the first equation, N.m; its mean is the motor's constant."""
         coefficients = self.coefficients
         reaction = coefficients.reaction * self._static_slope
         still = np.zeros_like(motion.angular_speed)
-        friction = self._laws("input", still, motion.angular_speed)
+        delivered = self.delivered(motion) / coefficients.ratio
+        friction = self._laws("input", still, motion.angular_speed, delivered)
         resisting = (
             coefficients.input_inertia[:, None] * motion.energy_slope
             + coefficients.input_damping[:, None] * motion.angular_speed

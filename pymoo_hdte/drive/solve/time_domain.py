@@ -117,14 +117,15 @@ def equations_of_motion(
             mesh_torque += law.torque(states)
         input_torque = accelerating * envelope_rate + (holding + left) * envelope
         input_torque += losses(speed * envelope)
-        resisting = bearing_in * input_speed + laws("input", position, input_speed, position)
-        lever = 1.0 / ratio - reaction * envelope * slope
-        acceleration = (input_torque - resisting - mesh_torque * lever) / inertia_in
         output_speed = input_speed / ratio - error_rate
         output_angle = position / ratio
-        resisting = load * envelope + bearing_out * output_speed
-        resisting += laws("output", output_angle, output_speed, output_angle)
-        output_acceleration = (mesh_torque - resisting) / inertia_out
+        delivered = load * envelope + bearing_out * output_speed
+        delivered += laws("output", output_angle, output_speed, output_angle)
+        output_acceleration = (mesh_torque - delivered) / inertia_out
+        resisting = bearing_in * input_speed
+        resisting += laws("input", position, input_speed, position, delivered / ratio)
+        lever = 1.0 / ratio - reaction * envelope * slope
+        acceleration = (input_torque - resisting - mesh_torque * lever) / inertia_in
         rates = [input_speed, acceleration, error_rate, acceleration / ratio - output_acceleration]
         for law, states in zip(remembering, kept, strict=True):
             rates += law.rates(torsion_rate, states).tolist()
@@ -148,8 +149,8 @@ def _aperiodic(coefficients: Coefficients) -> tuple[tuple[str, Law], ...]:
     return tuple((port, law) for port, law in coefficients.laws if not law.orders)
 
 
-def _laws_at_ports(coefficients: Coefficients) -> Callable[[str, float, float, float], float]:
-    """Return a function from port, position, speed and angle to the torque of its laws.
+def _laws_at_ports(coefficients: Coefficients) -> Callable[..., float]:
+    """Return a function from port, position, speed, angle and load to the torque of its laws.
 
     Laws with memory are left out: their state is the integrator's (see `memories`).
     """
@@ -159,11 +160,17 @@ def _laws_at_ports(coefficients: Coefficients) -> Callable[[str, float, float, f
         for port in PORTS
     }
 
-    def torque(port: str, position: float, speed: float, angle: float) -> float:
+    def torque(port: str, position: float, speed: float, angle: float, load: float = 0.0) -> float:
         here = at_port[port]
         if not here:
             return 0.0
-        state = PortState(np.array([position]), np.array([speed]), periodic_phase(angle), stiffness)
+        state = PortState(
+            np.array([position]),
+            np.array([speed]),
+            periodic_phase(angle),
+            stiffness,
+            load=np.array([load]),
+        )
         return sum(np.asarray(law.respond(state).torque).item() for law in here)
 
     return torque

@@ -26,7 +26,8 @@ NAMES = {
     "hardening_stiffness", "soft_windup", "hysteresis", "backlash", "clearance_variation",
     "coulomb_friction", "stribeck_friction", "position_dependent_friction", "nonlinear_drag",
     "mesh_stiffness_variation", "kinematic_error", "kinematic_reaction", "eccentricity",
-    "torque_ripple", "load_inertia", "damping_reference", "thermal_drift",
+    "torque_ripple", "load_dependent_friction", "load_inertia", "damping_reference",
+    "thermal_drift",
 }  # fmt: skip
 """Of design section 7, "Words"."""
 SEEN = [3.0, 6.0, 46.0 / BELIEVED.ratio]

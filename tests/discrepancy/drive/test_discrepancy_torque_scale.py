@@ -112,7 +112,7 @@ def test_an_angle_stays_and_a_torque_grows():
     }
     torques = {"coulomb_friction/level", "stribeck_friction/level", "stribeck_friction/excess",
                "position_dependent_friction/mean", "position_dependent_friction/level_cosine",
-               "nonlinear_drag/coefficient", "hysteresis/force", "torque_ripple/amplitude_sine",
+               "nonlinear_drag/level", "hysteresis/force", "torque_ripple/amplitude_sine",
                "load_inertia/inertia", "hardening_stiffness/coefficient"}  # fmt: skip
     assert torques <= grown
     angles = {"backlash/half_width", "kinematic_error/amplitude_cosine", "hysteresis/torsion",

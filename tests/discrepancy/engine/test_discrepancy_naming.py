@@ -333,7 +333,7 @@ def test_a_second_effect_must_remove_most_of_what_is_left():
 
 def test_a_second_effect_is_looked_for_where_the_first_explains_least():
     """The curve takes 96 % of the excess, and nothing of that of the input torque."""
-    data = planted({CUBIC: (6e9,), DRAG: (2e-7,)})
+    data = planted({CUBIC: (6e9,), DRAG: (0.0088, 2.0)})
     verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE])
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC, DRAG})
     alone = next(one for one in verdict.alternatives if one.label == CUBIC)
@@ -348,7 +348,7 @@ def test_a_second_effect_is_looked_for_in_the_sweep_alone(monkeypatch):
     """The first leaves so much of a running record that the whole hides what the sweep shows."""
     conditions = [(rpm, load) for rpm in (10.0, 1000.0, 2000.0) for load in (0.0, 20.0, 40.0)]
     drag, friction = of_labels([DRAG, OUTPUT_FRICTION])
-    built = (*drag.build((5e-7,)), *friction.build((0.05,)))
+    built = (*drag.build((0.022, 2.0)), *friction.build((0.05,)))
     empty = known_data(conditions, EMPTY.features.orders)
     running = measured(built, np.random.default_rng(4), empty)[0]
     data = with_sweep(disturbed(running, 4000.0), built)

@@ -18,13 +18,17 @@ from pymoo_hdte.units import ARCSEC
 
 SEEN = [3.0, 6.0]
 FEW = CONDITIONS[::2]
+SPEEDS = [*FEW, (600.0, 0.0), (1000.0, 40.0), (1400.0, 20.0)]
+"""So many speeds that two powers of the speed differ."""
 PLANTED = {
     "torque_ripple:input@3": (0.002, 0.001, 0.0, 0.001),
     "kinematic_error:mesh@3": (0.3 * ARCSEC, 0.2 * ARCSEC, 0.1 * ARCSEC, 0.0),
     "eccentricity:sensor@0.009901": (0.3 * ARCSEC, 0.2 * ARCSEC),
     "hardening_stiffness:mesh": (1e9,),
     "soft_windup:mesh": (0.1, 3e-4, 3.0),
-    "nonlinear_drag:input": (2e-7,),
+    "nonlinear_drag:input": (0.0088, 2.0),
+    "nonlinear_drag/sublinear:input": (0.02, 0.5),
+    "load_dependent_friction:input": (0.1,),
     "kinematic_reaction:input": (1.0,),
     "thermal_drift:sensor": (2e-8, 1000.0),
     "load_inertia:output": (0.03,),
@@ -39,7 +43,7 @@ def of_label(data, label):
 @pytest.mark.parametrize("label", PLANTED)
 def test_the_planted_effect_comes_first(label):
     effects = of_label(known_data(), label).build(PLANTED[label])
-    data, _ = measured(effects, np.random.default_rng(1), known_data(FEW))
+    data, _ = measured(effects, np.random.default_rng(1), known_data(SPEEDS))
     first, *_ = screen(data, fit(data), library(data, SEEN))
     assert first.candidate.label == label
 
