@@ -51,16 +51,8 @@ class DriveFinding:
 
         If records with rattling were left out of the fit, they are left out here, too.
         """
-        records = self.campaign.held_out
-        if not records:
-            return None
-        features = measure(self.campaign, records, self.data.features.orders.tolist())
-        if len(self.data.features.records) < len(self.campaign.train):
-            held = _flanks_held(features, self.campaign.torque_scale, self.data.rules)
-            features = features.rows(np.flatnonzero(held))
-        if not features.records:
-            return None
-        return replace(self.data, features=features, torsion=())
+        held_out = self.data.held_out
+        return None if held_out is None else self.data.beside(held_out)
 
 
 def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
@@ -108,7 +100,10 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     if unexpected:
         orders = _apart(unexpected, campaign, expected, rules)
         features = measure(campaign, campaign.train, orders)
-    data = training_data(campaign, features, rules)
+    held_out = None
+    if campaign.held_out:
+        held_out = measure(campaign, campaign.held_out, features.orders.tolist())
+    data = training_data(campaign, features, rules, held_out)
     if any(effect_named(effect.name).rattles for effect in campaign.believed.effects):
         data = _loaded(data)
     _check_steady(data)
@@ -176,10 +171,15 @@ def _loaded(data: Data) -> Data:
 
     With a clearance such a drive rattles and has no steady state that could be fitted.
     """
-    held = _flanks_held(data.features, data.campaign.torque_scale, data.rules)
-    if np.all(held) or held.sum() < data.rules.fewest_records:
+    scale, rules = data.campaign.torque_scale, data.rules
+    held = _flanks_held(data.features, scale, rules)
+    if np.all(held) or held.sum() < rules.fewest_records:
         return data
-    return replace(data, features=data.features.rows(np.flatnonzero(held)))
+    kept = data.held_out
+    if kept is not None:
+        loaded = np.flatnonzero(_flanks_held(kept, scale, rules))
+        kept = kept.rows(loaded) if len(loaded) else None
+    return replace(data, features=data.features.rows(np.flatnonzero(held)), held_out=kept)
 
 
 def _flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:

@@ -38,14 +38,23 @@ def _standing(name: str, port: str, part: Any) -> Any:
     return LawAtPort(name, port, part) if effect_named(name).change is None else part
 
 
-def out_of_tolerance(base: Sequence[Parameter], at_bounds: Sequence[str]) -> list[Candidate]:
+def out_of_tolerance(
+    base: Sequence[Parameter],
+    at_bounds: Sequence[str],
+    error_orders: Sequence[float],
+    together: bool = False,
+) -> list[Candidate]:
     """Return a candidate for each base parameter that a fit left at a bound.
 
     A parameter believed to be zero cannot be out of tolerance: if it is not zero, it is missing.
+    What an effect covers under another name is one only ``together`` with others.
     """
     believed = {parameter.name: parameter.start for parameter in base}
+    words = {name: name.replace("_", " ") for name in MECHANICAL}
+    for line, order in enumerate(error_orders):
+        words[f"error_amplitude_{line}"] = f"amplitude of order {order:.4g} of the static error"
     return [
-        candidate.out_of_tolerance(name, name.replace("_", " "))
+        candidate.out_of_tolerance(name, words[name])
         for name in at_bounds
-        if name in MECHANICAL and name not in _OF_THEIR_OWN and believed[name] > 0.0
+        if name in words and believed[name] > 0.0 and (together or name not in _OF_THEIR_OWN)
     ]

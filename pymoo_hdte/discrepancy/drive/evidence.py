@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,9 +41,12 @@ class Data(Observations):
     ----------
     rules : Rules
         Thresholds of the verdict.
+    held_out : Features or None
+        Of the records that are kept out of the fit.
     """
 
     rules: Rules = RULES
+    held_out: Features | None = None
 
     @property
     def remainder(self) -> float:
@@ -102,15 +105,41 @@ class Data(Observations):
         chi_square[-1, -1], degrees_of_freedom[-1, -1] = sweeps @ sweeps, n_sweeps
         return Excess(chi_square - degrees_of_freedom, degrees_of_freedom)
 
-    def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
+    def out_of_tolerance(self, at_bounds: Sequence[str], together: bool = False) -> list[Candidate]:
         """Return a candidate for each base parameter that a fit left at a bound."""
-        return out_of_tolerance(self.base, at_bounds)
+        lines = self.campaign.believed.error_orders
+        return out_of_tolerance(self.base, at_bounds, lines, together)
+
+    def held_out_chi_square(self, fitted: Fit) -> float | None:
+        """Return chi-square of the held-out records; None where there are none."""
+        if self.held_out is None:
+            return None
+        data = self.beside(self.held_out)
+        difference = data.predict(fitted.values[None, : len(self.base)], fitted.effects)[0]
+        white = data.whiten(difference - data.features.values)
+        return float(white @ white)
+
+    def beside(self, features: Features) -> Data:
+        """Return other records of the campaign as data, at the same reference."""
+        return replace(self, features=features, torsion=(), held_out=None)
 
 
-def training_data(campaign: Campaign, features: Features, rules: Rules = RULES) -> Data:
-    """Return features of training records with first guesses, and the sweeps."""
+def training_data(
+    campaign: Campaign,
+    features: Features,
+    rules: Rules = RULES,
+    held_out: Features | None = None,
+) -> Data:
+    """Return features of training records with first guesses, the sweeps, and held-out features."""
     points = tuple(torsion_points(record, campaign.rig) for record in campaign.torsion)
-    return Data(campaign, features, start_parameters(campaign, features), points, rules=rules)
+    return Data(
+        campaign,
+        features,
+        start_parameters(campaign, features),
+        points,
+        rules=rules,
+        held_out=held_out,
+    )
 
 
 def start_parameters(campaign: Campaign, features: Features) -> tuple[Parameter, ...]:

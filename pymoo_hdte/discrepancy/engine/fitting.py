@@ -193,8 +193,15 @@ class Evidence(Protocol):
         """Return the excess chi-square of a fit by record and part."""
         ...
 
-    def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
-        """Return a candidate for each base parameter that a fit left at a bound."""
+    def out_of_tolerance(self, at_bounds: Sequence[str], together: bool = False) -> list[Candidate]:
+        """Return a candidate for each base parameter that a fit left at a bound.
+
+        Those that an effect covers under another name only if several are freed ``together``.
+        """
+        ...
+
+    def held_out_chi_square(self, fitted: Fit) -> float | None:
+        """Return chi-square on the records kept out of the fit; None where it is not known."""
         ...
 
 

@@ -147,22 +147,13 @@ def contains(one: Hypothesis, other: Hypothesis) -> bool:
     )
 
 
-def refined(data: Evidence, one: Hypothesis, excess: float) -> Hypothesis:
-    """Continue the fit of a hypothesis from its last values, with slopes of its own."""
-    evaluations = data.rules.refinement_evaluations
-    return hypothesis_of(fit(data, one.candidates, one.fit.values, evaluations), excess)
-
-
 def fit_all(
     data: Evidence, base: Fit, chosen: Sequence[Screened], excess: float
 ) -> list[Hypothesis]:
     """Fit candidates, each jointly with the given effects; by rising BIC."""
-    rules, found = data.rules, []
+    found = []
     for one in chosen:
-        start = np.concatenate([base.values, one.start])
-        effects = (*base.candidates, one.candidate)
-        evaluations = rules.pair_evaluations if base.candidates else rules.fit_evaluations
-        fitted = fit(data, effects, start, evaluations, base.slopes)
+        fitted = fit(data, (*base.candidates, one.candidate), np.append(base.values, one.start))
         found.append(hypothesis_of(fitted, excess))
     return sorted(found, key=lambda one: one.bic)
 

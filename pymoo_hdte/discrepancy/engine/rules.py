@@ -217,6 +217,32 @@ class Rules(ReportRules, RecordRules):
         f"{BY_HAND}: well below `second_share`, since the screening is linear.",
         at_least=0.0,
     )
+    most_effects: int = rule(
+        3,
+        "1",
+        "Most effects of one set, base parameters out of tolerance counted as one.",
+        f"{BY_HAND}: each further effect has to be earned beside all others; a campaign of a dozen "
+        "records seldom tells four apart.",
+    )
+    most_firsts: int = rule(
+        2,
+        "1",
+        "Sets of one size that are extended by a further effect, and that are fitted from other "
+        "starts.",
+        f"{BY_HAND} as a budget of time: the better of two effects alone need not be one of both.",
+    )
+    most_freed_rounds: int = rule(
+        3,
+        "1",
+        "Rounds in which base parameters that reach a bound are freed.",
+        f"{BY_HAND}: freeing the ones at bounds may carry others to theirs.",
+    )
+    certain_deviations: float = rule(
+        1.959964,
+        "standard deviations",
+        "Strength of an effect below which its interval contains nothing.",
+        "Test level: half-width of the 95 % interval of a normal value, which reports print.",
+    )
     most_seconds: int = rule(
         2,
         "1",

@@ -13,26 +13,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     alike,
     contains,
     down_to_noise,
     explains,
-    fit_all,
-    hypothesis_of,
-    refined,
-    varied,
 )
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.engine.screening import Screened, screen
-from pymoo_hdte.discrepancy.engine.selection import with_second
+from pymoo_hdte.discrepancy.engine.screening import screen
+from pymoo_hdte.discrepancy.engine.search import Search
 
-STATUSES = ("adequate", "named", "class", "parameter", "unlisted")
-EXPLAINED = ("named", "class", "parameter")
+NOT_PROVEN = "the error on the records kept out of the fit does not shrink"
+STATUSES = ("adequate", "named", "class", "parameter", "unlisted", "partial")
+EXPLAINED = ("named", "class", "parameter", "partial")
 """Statuses that say what is missing."""
 
 
@@ -54,6 +53,9 @@ class Verdict:
     degrees_of_freedom : int
     rules : Rules
         Thresholds of the verdict.
+    doubts : tuple of str
+        What forbids to name the chosen effects plainly; with ``"partial"`` they are certain as far
+        as they go.
     """
 
     status: str
@@ -63,6 +65,7 @@ class Verdict:
     equivalent: tuple[Hypothesis, ...]
     degrees_of_freedom: int
     rules: Rules = RULES
+    doubts: tuple[str, ...] = ()
 
     @property
     def accepted(self) -> Fit:
@@ -84,89 +87,127 @@ def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict
     degrees_of_freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     screened = screen(data, base, candidates)
-    excess = base.chi_square - degrees_of_freedom
-    gain = screened[0].reduction
-    if down_to_noise(base, degrees_of_freedom, rules) and gain < rules.single_effect_gain:
+    gain = max((one.reduction for one in screened), default=0.0)
+    quiet = down_to_noise(base, degrees_of_freedom, rules)
+    if quiet and gain < rules.single_effect_gain:
         return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules)
-    singles = _fit_best(data, base, screened, excess)
-    if not explains(data, singles[0], base, degrees_of_freedom):
-        singles[0] = _searched(data, base, singles[0], excess)
-    chosen, hypotheses = with_second(data, base, singles, candidates)
-    others = [hypothesis for hypothesis in hypotheses if hypothesis is not chosen]
-    chosen, others = _least_special(data, refined(data, chosen, excess), others, excess)
-    if not explains(data, chosen, base, degrees_of_freedom):
-        return Verdict("unlisted", base, chosen, tuple(others), (), degrees_of_freedom, rules)
-    near = [
-        alike(hypothesis, chosen, degrees_of_freedom, rules, rules.refit_margin)
-        for hypothesis in others
-    ]
-    others = [
-        refined(data, hypothesis, excess) if flag else hypothesis
-        for hypothesis, flag in zip(others, near, strict=True)
-    ]
-    equivalent = tuple(
-        hypothesis
-        for hypothesis in others
-        if alike(hypothesis, chosen, degrees_of_freedom, rules)
-        and explains(data, hypothesis, base, degrees_of_freedom)
+    if not screened:
+        return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
+    search = Search(data, base, candidates)
+    search.singles(screened)
+    if not search.enough(search.found[0]):
+        search.grow()
+    chosen = _best(search)
+    search.exchanges(chosen)
+    chosen = _best(search)
+    others = [one for one in search.found if one is not chosen]
+    equivalent = [one for one in others if _is_rival(search, one, chosen)]
+    if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
+        equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
+        chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
+    doubts = doubts_of(search, chosen)
+    status = _status(search, chosen, equivalent, doubts)
+    rivals = tuple(equivalent) if status == "class" else ()
+    return Verdict(
+        status, base, chosen, tuple(others), rivals, degrees_of_freedom, rules, tuple(doubts)
     )
-    listed = [hypothesis for hypothesis in equivalent if hypothesis.listed]
-    if not chosen.listed and listed:
-        others = [chosen if hypothesis is listed[0] else hypothesis for hypothesis in others]
-        equivalent = tuple(
-            chosen if hypothesis is listed[0] else hypothesis for hypothesis in equivalent
-        )
-        chosen = listed[0]
-    status = _status(chosen, equivalent)
-    return Verdict(status, base, chosen, tuple(others), equivalent, degrees_of_freedom, rules)
 
 
-def _least_special(
-    data: Evidence, chosen: Hypothesis, others: list[Hypothesis], excess: float
-) -> tuple[Hypothesis, list[Hypothesis]]:
-    """Return the chosen set, or a special case that fits as well once converged; and the others.
+def _best(search: Search) -> Hypothesis:
+    """Return the set of least BIC of those that explain the misfit, of all if none does.
 
-    Fits with few steps sometimes stall, and of two such fits the one with more unknowns may lead.
+    A set of several effects counts only if each of them is earned.
     """
-    fitted = [
-        refined(data, one, excess) if one.names != chosen.names and contains(chosen, one) else one
-        for one in others
-    ]
-    best = min([chosen, *(one for one in fitted if one not in others)], key=lambda one: one.bic)
-    return best, [one for one in (chosen, *fitted) if one is not best]
+    found = search.found
+    explaining = (one for one in found if _explains(search, one) and search.earned(one))
+    best = next(explaining, None)
+    if best is not None:
+        return best
+    return next(one for one in found if search.earned(one))
 
 
-def _status(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> str:
-    """Return the status of a set that explains the misfit."""
-    if not chosen.listed:
+def _explains(search: Search, one: Hypothesis) -> bool:
+    return explains(search.data, one, search.base, search.degrees_of_freedom)
+
+
+def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
+    """Tell whether a set explains the data as well as the chosen one by something else.
+
+    A law that contains the chosen one and fits no better is not a different explanation.
+    """
+    return (
+        alike(one, chosen, search.degrees_of_freedom, search.data.rules)
+        and not contains(one, chosen)
+        and _explains(search, one)
+        and search.earned(one)
+    )
+
+
+def doubts_of(search: Search, chosen: Hypothesis) -> list[str]:
+    """Return what forbids to name a set plainly, in words; nothing if it may be named."""
+    found, fitted = [], chosen.fit
+    for candidate, rows in rows_of(fitted):
+        bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
+        if bounded:
+            found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
+        elif not strength_is_certain(fitted, candidate, rows, search.data.rules):
+            found.append(f"the interval of {candidate.label} contains nothing")
+    if any(one.frees in fitted.at_bounds for one in chosen.candidates):
+        found.append("a base parameter ended at ten times or a tenth of what is believed")
+    before = search.data.held_out_chi_square(search.base)
+    after = search.data.held_out_chi_square(fitted)
+    if before is not None and after is not None and after >= before:
+        found.append(NOT_PROVEN)
+    per_degree = fitted.chi_square / search.degrees_of_freedom
+    if per_degree > search.data.rules.contradicting_chi_square:
+        found.append(f"what is left is {np.sqrt(per_degree):.3g} times the noise")
+    return found
+
+
+def rows_of(fitted: Fit) -> list[tuple[Candidate, NDArray[np.int_]]]:
+    """Return the places of each candidate's unknowns among the values of a fit."""
+    start = len(fitted.values) - sum(len(one.parameters) for one in fitted.candidates)
+    found = []
+    for candidate in fitted.candidates:
+        end = start + len(candidate.parameters)
+        found.append((candidate, np.arange(start, end)))
+        start = end
+    return found
+
+
+def strength_is_certain(
+    fitted: Fit, candidate: Candidate, rows: NDArray[np.int_], rules: Rules
+) -> bool:
+    """Tell whether the strength of an effect differs from nothing, by its own interval.
+
+    The strength is the first unknown, or the largest of the lines that the effect has.
+    """
+    if not len(rows):
+        return True
+    names = [parameter.name for parameter in candidate.parameters]
+    lines = [row for row, name in zip(rows, names, strict=True) if name.endswith("_cosine")]
+    if not lines:
+        deviation = np.sqrt(fitted.covariance[rows[0], rows[0]])
+        return bool(abs(fitted.values[rows[0]]) > rules.certain_deviations * deviation)
+    limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
+    sizes = []
+    for row in lines:
+        pair = np.array([row, row + 1])
+        block = fitted.covariance[np.ix_(pair, pair)]
+        sizes.append(fitted.values[pair] @ np.linalg.solve(block, fitted.values[pair]))
+    return bool(max(sizes) > limit)
+
+
+def _status(
+    search: Search, chosen: Hypothesis, equivalent: Sequence[Hypothesis], doubts: Sequence[str]
+) -> str:
+    """Return the status of the best set: what it may be called."""
+    explained = _explains(search, chosen)
+    if not chosen.listed or not explained or NOT_PROVEN in doubts:
         return "unlisted"
     if equivalent:
         return "class"
+    if doubts:
+        return "partial"
     out = all(candidate.name == "parameter" for candidate in chosen.candidates)
     return "parameter" if out else "named"
-
-
-def _searched(data: Evidence, base: Fit, single: Hypothesis, excess: float) -> Hypothesis:
-    """Return the best of fits from all starts of a single effect, with slopes of their own.
-
-    An inertia that is larger by half moves a resonance past lines, so that chi-square does not
-    decrease steadily on the way there.
-    """
-    found = [refined(data, single, excess)]
-    (candidate,) = single.candidates
-    if len(candidate.starts) > 1 and not candidate.linear:
-        begins = [np.concatenate([base.values, start]) for start in candidate.starts]
-        fits = [fit(data, single.candidates, begin) for begin in begins]
-        found += [hypothesis_of(fitted, excess) for fitted in fits]
-    return min(found, key=lambda one: one.bic)
-
-
-def _fit_best(
-    data: Evidence, base: Fit, screened: Sequence[Screened], excess: float
-) -> list[Hypothesis]:
-    """Fit the most promising candidates jointly with the given effects; by rising BIC."""
-    rules = data.rules
-    least = rules.promising_share * screened[0].reduction
-    promising = [one for one in screened if one.reduction >= least]
-    chosen = varied(promising, rules.most_of_one_name)[: rules.most_fitted]
-    return fit_all(data, base, chosen, excess)

@@ -154,11 +154,15 @@ class MeasuredData:
         ratios = self._chi_square(known) / self._coefficients
         return float(ratios[:, : len(self.mechanism.coordinates)].max())
 
-    def out_of_tolerance(self, at_bounds: Sequence[str]) -> list[Candidate]:
+    def out_of_tolerance(self, at_bounds: Sequence[str], together: bool = False) -> list[Candidate]:
         """Return a candidate for each quantity of the mechanism that a fit left at a bound."""
         return [
             out_of_tolerance(name, name) for name in at_bounds if name in self.mechanism.quantities
         ]
+
+    def held_out_chi_square(self, fitted: Fit) -> None:
+        """Return None: held-out records of a mechanism are simulated, once the verdict stands."""
+        return
 
     def with_rest(self, residuals: Vector) -> MeasuredData:
         """Return the data with whitened residuals (n,) beyond the sensors' noise as further noise.

@@ -1,0 +1,297 @@
+"""Search for the set of effects that explains a misfit: every set is fitted to the end.
+
+Sets grow by the effects that could remove most of what is left, in total or in the part of the data
+that is explained worst. Sets of several effects are tried by exchange of each member as well, and
+compared with what is left of them if a member is removed: each member has to be earned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.excess import Excess
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, count, fit
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    down_to_noise,
+    hypothesis_of,
+    varied,
+)
+from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.discrepancy.engine.screening import Screened, screen
+from pymoo_hdte.effects.effect import is_contained
+
+Vector = NDArray[np.float64]
+Effects = tuple[Candidate, ...]
+
+
+class Search:
+    """Sets of effects fitted jointly with the base, each once.
+
+    Parameters
+    ----------
+    data : Evidence
+    base : Fit
+        Without any of them.
+    candidates : sequence of Candidate
+        Effects that may be missing, and base parameters that may be out of tolerance.
+
+    Attributes
+    ----------
+    found : list of Hypothesis
+        All sets fitted so far.
+    """
+
+    def __init__(self, data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> None:
+        self.data, self.base, self.candidates = data, base, candidates
+        self.degrees_of_freedom = len(base.residuals) - len(base.values)
+        self.excess = base.chi_square - self.degrees_of_freedom
+        self._by_label: dict[frozenset[str], Hypothesis] = {}
+
+    @property
+    def found(self) -> list[Hypothesis]:
+        """All sets fitted so far, by rising BIC."""
+        return sorted(self._by_label.values(), key=lambda one: one.bic)
+
+    def singles(self, screened: Sequence[Screened]) -> None:
+        """Fit the most promising single effects, and the base parameters out of tolerance."""
+        rules = self.data.rules
+        least = rules.promising_share * screened[0].reduction
+        promising = [one for one in screened if one.reduction >= least]
+        for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
+            self._fit((one.candidate,), np.append(self.base.values, one.start))
+        self._parameters()
+        for best in self.found[: rules.most_firsts]:
+            if not self.enough(best):
+                self._from_other_starts(best)
+        self._special_cases(self.found[0])
+
+    def grow(self) -> None:
+        """Fit sets of more effects as long as what is left could be that of a further one."""
+        rules = self.data.rules
+        for size in range(1, rules.most_effects):
+            grown = [one for one in self.found if len(_true(one)) == size]
+            for one in grown[: rules.most_firsts]:
+                if not self._could_count(one):
+                    return
+                self._extend(one)
+            best = [one for one in self.found if len(_true(one)) == size + 1][:1]
+            for one in best:
+                self._exchange(one)
+                self._special_cases(one)
+
+    def enough(self, one: Hypothesis) -> bool:
+        """Tell whether a set explains the data down to the noise."""
+        return down_to_noise(one.fit, self.degrees_of_freedom, self.data.rules)
+
+    def earned(self, one: Hypothesis) -> bool:
+        """Tell whether each member of a set is earned: without it the rest explains clearly less.
+
+        Base parameters out of tolerance are values and no effects, and count as one member.
+        """
+        members = _true(one)
+        if len(members) == 1:
+            return True
+        return all(self._earned(one, self.without(one, member), member) for member in members)
+
+    def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
+        """Return a set without one of its members, fitted to the end."""
+        kept = tuple(other for other in one.candidates if other not in member)
+        return self._fit(kept, _values(one, kept))
+
+    def exchanges(self, one: Hypothesis) -> None:
+        """Fit the sets in which each member is exchanged, for a comparison of evidence."""
+        if len(_true(one)) > 1:
+            self._exchange(one)
+
+    def _fit(self, effects: Effects, *starts: Vector) -> Hypothesis:
+        """Return a set fitted from the best of some starts; from the first alone if it is known."""
+        label = frozenset(one.label for one in effects)
+        known = self._by_label.get(label)
+        if known is not None:
+            return known
+        fits = [fit(self.data, effects, start) for start in starts]
+        best = hypothesis_of(min(fits, key=lambda one: one.chi_square), self.excess)
+        self._by_label[label] = best
+        return best
+
+    def _from_other_starts(self, one: Hypothesis) -> None:
+        """Fit a set again from the believed values, and from all starts of a single effect.
+
+        An inertia that is larger by half moves a resonance past lines, so that chi-square does not
+        decrease steadily on the way there; and values of the base that hide an effect lie far off.
+        """
+        believed = np.array([parameter.start for parameter in self.data.base])
+        starts = [np.append(believed, _values(one, one.candidates)[len(believed) :])]
+        (*others, last) = one.candidates
+        if not others and len(last.starts) > 1 and not last.linear:
+            starts += [np.append(believed, start) for start in last.starts]
+            starts += [np.append(self.base.values, start) for start in last.starts]
+        fits = [one.fit, *(fit(self.data, one.candidates, start) for start in starts)]
+        best = hypothesis_of(min(fits, key=lambda each: each.chi_square), self.excess)
+        self._by_label[frozenset(each.label for each in one.candidates)] = best
+
+    def _parameters(self) -> None:
+        """Fit all base parameters that want to leave their tolerances together.
+
+        Those that stay within once others are free, or that gain nothing, keep their tolerances.
+        If all of them together do no better than one effect, fewer are not tried.
+        """
+        freed: Effects = ()
+        bounds, values = self.base.at_bounds, self.base.values
+        for _ in range(self.data.rules.most_freed_rounds):
+            names = {one.frees for one in freed}
+            free = self.data.out_of_tolerance(bounds, together=True)
+            more = [one for one in free if one.frees not in names]
+            if not more:
+                break
+            freed = (*freed, *more)
+            found = fit(self.data, freed, values)
+            bounds, values = found.at_bounds, found.values
+        if not freed:
+            return
+        needed = tuple(one for one in freed if self._outside(one, values))
+        best = self.found[0].bic if self._by_label else np.inf
+        if not needed or found.chi_square > best:
+            return
+        if len(needed) > 1:
+            needed = self._pruned(self._fit(needed, values))
+        alone = self.data.out_of_tolerance([str(one.frees) for one in needed])
+        for one in alone:
+            self._fit((one,), values)
+
+    def _outside(self, one: Candidate, values: Vector) -> bool:
+        """Tell whether a base parameter lies outside its tolerance."""
+        for parameter, value in zip(self.data.base, values, strict=False):
+            if parameter.name == one.frees:
+                return not parameter.lower <= value <= parameter.upper
+        return False
+
+    def _pruned(self, one: Hypothesis) -> Effects:
+        """Return the parameters of a set whose removal would cost more than they do."""
+        while len(one.candidates) > 1:
+            fewer = [self.without(one, (each,)) for each in one.candidates]
+            best = min(fewer, key=lambda each: each.bic)
+            if best.bic > one.bic:
+                break
+            one = best
+        return one.candidates
+
+    def _could_count(self, one: Hypothesis) -> bool:
+        """Tell whether a further effect beside a set could be justified at all."""
+        if self.enough(one):
+            return False
+        return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
+
+    def _extend(self, one: Hypothesis) -> None:
+        """Fit a set with each of the effects that would remove most of what it leaves."""
+        others = [
+            other
+            for other in self.candidates
+            if other.frees is None and all(other.goes_with(each) for each in one.candidates)
+        ]
+        if not others:
+            return
+        before, after = (self.data.excess(each) for each in (self.base, one.fit))
+        ill = [] if one.exact else ill_explained(before, after, self.data.rules)
+        screened = screen(self.data, one.fit, others)
+        left = one.fit.chi_square - self.degrees_of_freedom
+        chosen = self._hopeful(screened, [each.reduction for each in screened], left)
+        for part in ill:
+            reductions = [each.by_part[part] for each in screened]
+            of_part = self._hopeful(screened, reductions, float(after.of_parts[part]))
+            chosen += [each for each in of_part if each not in chosen]
+        for more in chosen:
+            self._fit((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
+
+    def _hopeful(
+        self, screened: Sequence[Screened], reductions: Sequence[float], left: float
+    ) -> list[Screened]:
+        """Return the best candidates, to first order, if they remove enough of what is left."""
+        rules = self.data.rules
+        order = np.argsort([-reduction for reduction in reductions], kind="stable")
+        enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
+        return varied(enough, 1)[: rules.most_seconds]
+
+    def _exchange(self, one: Hypothesis) -> None:
+        """Fit sets in which one member is replaced by what would do as much beside the others."""
+        for member in _true(one):
+            self._extend(self.without(one, member))
+
+    def _special_cases(self, one: Hypothesis) -> None:
+        """Fit sets in which one member is replaced by a special case of it at the same port."""
+        for member in one.candidates:
+            for other in self.candidates:
+                if other.port != member.port or not is_contained(other.name, member.name):
+                    continue
+                kept = tuple(each for each in one.candidates if each is not member)
+                if all(other.goes_with(each) for each in kept):
+                    start = np.append(_values(one, kept), other.starts[0])
+                    self._fit((*kept, other), start)
+
+    def _earned(self, one: Hypothesis, rest: Hypothesis, member: Effects) -> bool:
+        """Tell whether a set explains most of what is left without one of its members.
+
+        What a law without exact form leaves may be an error of its form: unless the whole set
+        explains the data down to the noise, a member must also be large relative to the base's
+        excess at the port of another, and relative to the model's own error elsewhere.
+        """
+        rules = self.data.rules
+        if self.enough(rest):
+            return False
+        left = rest.fit.chi_square - self.degrees_of_freedom
+        removed = rest.fit.chi_square - one.fit.chi_square
+        if rest.exact:
+            return left > 0.0 and removed >= rules.explained_share * left
+        per_degree = rest.fit.chi_square / self.degrees_of_freedom
+        if per_degree > rules.contradicting_chi_square and self.enough(one):
+            return True
+        before, alone, both = (self.data.excess(each) for each in (self.base, rest.fit, one.fit))
+        parts = ill_explained(before, alone, rules)
+        if not parts:
+            return False
+        same_port = any(a.port == b.port for a in member for b in rest.candidates)
+        least = rules.second_form_share if same_port else self.data.remainder
+        for part in (slice(None), parts[0]):
+            whole, residual, after = (np.sum(each.of_parts[part]) for each in (before, alone, both))
+            if residual - after >= max(rules.second_share * residual, least * whole):
+                return True
+        return False
+
+
+def ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
+    """Return the parts of the data that contradict both a base and a fit, the worst first.
+
+    The worst one, and all others that the fit explains by no more than half.
+    """
+    wrong = np.flatnonzero(before.significant(rules) & after.significant(rules))
+    residual = after.of_parts[wrong] / before.of_parts[wrong]
+    ranked = wrong[np.argsort(-residual)].tolist()
+    return ranked[: max(1, int(np.sum(residual > 1.0 - rules.explained_part_share)))]
+
+
+def _true(one: Hypothesis) -> list[Effects]:
+    """Return the members of a set; base parameters out of tolerance are one together."""
+    freed = tuple(each for each in one.candidates if each.frees is not None)
+    return [(each,) for each in one.candidates if each.frees is None] + ([freed] if freed else [])
+
+
+def _values(one: Hypothesis, kept: Sequence[Candidate]) -> Vector:
+    """Return the values of the base and of some members of a set."""
+    n_base = len(one.fit.values) - count(one.candidates)
+    parts = [one.fit.values[:n_base]]
+    for candidate, values in _by_member(one, n_base):
+        if candidate in kept:
+            parts.append(values)
+    return np.concatenate(parts)
+
+
+def _by_member(one: Hypothesis, start: int) -> Iterator[tuple[Candidate, Vector]]:
+    for candidate in one.candidates:
+        end = start + len(candidate.parameters)
+        yield candidate, one.fit.values[start:end]
+        start = end
