@@ -153,7 +153,8 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
     )
     if ratio.max() <= rules.changed_noise_ratio:
         return data, verdict
-    again = judge(renewed, fit(renewed), listed)
+    known = (verdict.chosen, *verdict.alternatives)
+    again = judge(renewed, fit(renewed), listed, known)
     return (data, verdict) if again.chosen is None else (renewed, again)
 
 

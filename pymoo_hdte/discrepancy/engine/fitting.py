@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
-from pymoo_hdte.discrepancy.engine.levenberg_marquardt import minimum
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SETTLED_SHARE, minimum
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import Parameter
 
@@ -118,15 +118,17 @@ def fit(
     candidates: Sequence[Candidate] = (),
     start: Vector | None = None,
     steps: int | None = None,
+    settled: float = SETTLED_SHARE,
 ) -> Fit:
     """Fit base parameters and those of candidates from ``start`` (by default their own starts).
 
-    It takes at most ``steps`` steps, by default as many as the rules allow.
+    It takes at most ``steps`` steps, by default as many as the rules allow, and ends earlier where
+    one removes less than the share ``settled`` of chi-square.
     """
     objective = data.objective(candidates)
     begin = objective.start if start is None else start
     most = data.rules.fit_evaluations if steps is None else steps
-    values, residuals, jacobian = minimum(objective, begin, most)
+    values, residuals, jacobian = minimum(objective, begin, most, settled)
     return Fit(objective.candidates, objective.parameters, values, residuals, jacobian)
 
 

@@ -47,7 +47,9 @@ class Differentiable(Protocol):
         ...
 
 
-def minimum(problem: Differentiable, start: Vector, steps: int) -> tuple[Vector, Vector, Matrix]:
+def minimum(
+    problem: Differentiable, start: Vector, steps: int, settled: float = SETTLED_SHARE
+) -> tuple[Vector, Vector, Matrix]:
     """Return where the sum of squares is least near a start, with residuals and derivatives there.
 
     Parameters
@@ -57,6 +59,8 @@ def minimum(problem: Differentiable, start: Vector, steps: int) -> tuple[Vector,
         Moved to the nearest bound where it is outside.
     steps : int
         Most steps.
+    settled : float
+        Share of the sum of squares that a step has to remove for the search to go on.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def minimum(problem: Differentiable, start: Vector, steps: int) -> tuple[Vector,
             break
         values, residuals, damping = found
         jacobian = problem.jacobian(values)
-        if before - residuals @ residuals <= SETTLED + SETTLED_SHARE * before:
+        if before - residuals @ residuals <= SETTLED + settled * before:
             break
     return values, residuals, jacobian
 

@@ -51,6 +51,8 @@ class Search:
         self.degrees_of_freedom = len(base.residuals) - len(base.values)
         self.excess = base.chi_square - self.degrees_of_freedom
         self._by_label: dict[frozenset[str], Hypothesis] = {}
+        self._finished: set[frozenset[str]] = set()
+        self._extended: set[frozenset[str]] = set()
 
     @property
     def found(self) -> list[Hypothesis]:
@@ -65,24 +67,34 @@ class Search:
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
             self._fit((one.candidate,), np.append(self.base.values, one.start))
         self._parameters()
-        for best in self.found[: rules.most_firsts]:
-            if not self.enough(best):
-                self._from_other_starts(best)
+        self._finish_near(1)
+        if not self.enough(self.found[0]):
+            self._from_other_starts(self.found[0])
         self._special_cases(self.found[0])
+        self._finish_near(1)
 
     def grow(self) -> None:
         """Fit sets of more effects as long as what is left could be that of a further one."""
         rules = self.data.rules
         for size in range(1, rules.most_effects):
-            grown = [one for one in self.found if len(_true(one)) == size]
-            for one in grown[: rules.most_firsts]:
+            grown = self._of_size(size)[: rules.most_firsts if size == 1 else 1]
+            for one in grown:
                 if not self._could_count(one):
                     return
                 self._extend(one)
-            best = [one for one in self.found if len(_true(one)) == size + 1][:1]
-            for one in best:
-                self._exchange(one)
+            self._finish_near(size + 1)
+            for one in self._of_size(size + 1)[:1]:
+                if size == 1:
+                    self._exchange(one)
                 self._special_cases(one)
+            self._finish_near(size + 1)
+
+    def resume(self, known: Sequence[Hypothesis]) -> None:
+        """Fit sets that another search has found, from their values."""
+        for one in known:
+            self._fit(one.candidates, one.fit.values)
+        for size in {len(_true(one)) for one in known}:
+            self._finish_near(size)
 
     def enough(self, one: Hypothesis) -> bool:
         """Tell whether a set explains the data down to the noise."""
@@ -101,23 +113,43 @@ class Search:
     def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
         """Return a set without one of its members, fitted to the end."""
         kept = tuple(other for other in one.candidates if other not in member)
-        return self._fit(kept, _values(one, kept))
+        return self._finish(self._fit(kept, _values(one, kept)))
 
-    def exchanges(self, one: Hypothesis) -> None:
-        """Fit the sets in which each member is exchanged, for a comparison of evidence."""
-        if len(_true(one)) > 1:
-            self._exchange(one)
+    def _of_size(self, size: int) -> list[Hypothesis]:
+        """Return the sets of a number of members, by rising BIC."""
+        return [one for one in self.found if len(_true(one)) == size]
 
-    def _fit(self, effects: Effects, *starts: Vector) -> Hypothesis:
-        """Return a set fitted from the best of some starts; from the first alone if it is known."""
-        label = frozenset(one.label for one in effects)
+    def _fit(self, effects: Effects, start: Vector) -> Hypothesis:
+        """Return a set fitted from a start so far as to rank it, unless it is known already."""
+        label = _label(effects)
         known = self._by_label.get(label)
         if known is not None:
             return known
-        fits = [fit(self.data, effects, start) for start in starts]
-        best = hypothesis_of(min(fits, key=lambda one: one.chi_square), self.excess)
+        trial = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
+        best = hypothesis_of(trial, self.excess)
         self._by_label[label] = best
         return best
+
+    def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
+        """Return a set fitted to the end from its last values, and from other starts."""
+        label = _label(one.candidates)
+        if label not in self._finished or starts:
+            fits = [fit(self.data, one.candidates, start) for start in (one.fit.values, *starts)]
+            best = min(fits, key=lambda each: each.chi_square)
+            self._by_label[label] = hypothesis_of(best, self.excess)
+            self._finished.add(label)
+        return self._by_label[label]
+
+    def _finish_near(self, size: int) -> None:
+        """Fit the best sets of a size to the end, and those that may come as near."""
+        rules = self.data.rules
+        for place in range(len(self._of_size(size))):
+            same = self._of_size(size)
+            best, one = same[0], same[place]
+            near = rules.refit_margin * rules.evidence_distance
+            misfit = max(best.fit.chi_square / self.degrees_of_freedom, 1.0)
+            if place < rules.most_firsts or one.bic - best.bic < near * misfit:
+                self._finish(one)
 
     def _from_other_starts(self, one: Hypothesis) -> None:
         """Fit a set again from the believed values, and from all starts of a single effect.
@@ -129,11 +161,8 @@ class Search:
         starts = [np.append(believed, _values(one, one.candidates)[len(believed) :])]
         (*others, last) = one.candidates
         if not others and len(last.starts) > 1 and not last.linear:
-            starts += [np.append(believed, start) for start in last.starts]
             starts += [np.append(self.base.values, start) for start in last.starts]
-        fits = [one.fit, *(fit(self.data, one.candidates, start) for start in starts)]
-        best = hypothesis_of(min(fits, key=lambda each: each.chi_square), self.excess)
-        self._by_label[frozenset(each.label for each in one.candidates)] = best
+        self._finish(one, *starts)
 
     def _parameters(self) -> None:
         """Fit all base parameters that want to leave their tolerances together.
@@ -187,8 +216,12 @@ class Search:
             return False
         return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
 
-    def _extend(self, one: Hypothesis) -> None:
+    def _extend(self, one: Hypothesis, by_part: bool = True) -> None:
         """Fit a set with each of the effects that would remove most of what it leaves."""
+        label = _label(one.candidates)
+        if label in self._extended:
+            return
+        self._extended.add(label)
         others = [
             other
             for other in self.candidates
@@ -197,7 +230,8 @@ class Search:
         if not others:
             return
         before, after = (self.data.excess(each) for each in (self.base, one.fit))
-        ill = [] if one.exact else ill_explained(before, after, self.data.rules)
+        by_part = by_part and not one.exact
+        ill = ill_explained(before, after, self.data.rules) if by_part else []
         screened = screen(self.data, one.fit, others)
         left = one.fit.chi_square - self.degrees_of_freedom
         chosen = self._hopeful(screened, [each.reduction for each in screened], left)
@@ -220,7 +254,7 @@ class Search:
     def _exchange(self, one: Hypothesis) -> None:
         """Fit sets in which one member is replaced by what would do as much beside the others."""
         for member in _true(one):
-            self._extend(self.without(one, member))
+            self._extend(self.without(one, member), by_part=False)
 
     def _special_cases(self, one: Hypothesis) -> None:
         """Fit sets in which one member is replaced by a special case of it at the same port."""
@@ -272,6 +306,10 @@ def ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
     residual = after.of_parts[wrong] / before.of_parts[wrong]
     ranked = wrong[np.argsort(-residual)].tolist()
     return ranked[: max(1, int(np.sum(residual > 1.0 - rules.explained_part_share)))]
+
+
+def _label(effects: Effects) -> frozenset[str]:
+    return frozenset(one.label for one in effects)
 
 
 def _true(one: Hypothesis) -> list[Effects]:

@@ -81,8 +81,16 @@ class Verdict:
         return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
 
 
-def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict:
-    """Return the verdict on a fitted base, by the rules of its data."""
+def judge(
+    data: Evidence,
+    base: Fit,
+    candidates: Sequence[Candidate],
+    known: Sequence[Hypothesis] = (),
+) -> Verdict:
+    """Return the verdict on a fitted base, by the rules of its data.
+
+    If sets are ``known`` from nearly the same data, only these are compared.
+    """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
@@ -94,11 +102,12 @@ def judge(data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> Verdict
     if not screened:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
     search = Search(data, base, candidates)
-    search.singles(screened)
-    if not search.enough(search.found[0]):
-        search.grow()
-    chosen = _best(search)
-    search.exchanges(chosen)
+    if known:
+        search.resume(known)
+    else:
+        search.singles(screened)
+        if not search.enough(search.found[0]):
+            search.grow()
     chosen = _best(search)
     others = [one for one in search.found if one is not chosen]
     equivalent = [one for one in others if _is_rival(search, one, chosen)]
