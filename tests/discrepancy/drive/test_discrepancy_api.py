@@ -6,8 +6,7 @@ import sys
 
 import measured_oscillator as rig
 import pytest
-from quick_campaigns import quick_campaign
-from virtual_rig_cases import effect
+from quick_campaigns import RIPPLING, quick_analysis, quick_campaign
 
 import pymoo_hdte.discrepancy
 from pymoo_hdte.checks import InvalidInput
@@ -33,12 +32,12 @@ OSCILLATOR = Mechanism(
 
 @pytest.fixture(scope="module")
 def campaign():
-    return quick_campaign(5, effect("input", ripple=0.02, ripple_order=3.0))
+    return quick_campaign(*RIPPLING)
 
 
 @pytest.fixture(scope="module")
-def analysis(campaign):
-    return analyse(campaign)
+def analysis():
+    return quick_analysis(*RIPPLING)
 
 
 @pytest.fixture(scope="module")
