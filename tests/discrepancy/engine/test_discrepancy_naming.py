@@ -90,7 +90,9 @@ def test_adequacy_in_closed_form():
         )
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (2, 3))]
+)
 def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
     stiffness, inertia = np.random.default_rng(seed).uniform(0.92, 1.08, 2)
     verdict = verdict_on(planted({}, seed, stiffness=stiffness, input_inertia=inertia))

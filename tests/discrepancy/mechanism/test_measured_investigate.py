@@ -95,7 +95,9 @@ def test_nothing_hidden_is_adequate_and_proved_to_be():
 
 
 @pytest.mark.parametrize("force_noise", [1e-3, 1.0])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (2, 3))]
+)
 def test_a_force_that_jumps_between_samples_is_no_missing_effect(seed, force_noise):
     finding = examine_mechanism(OSCILLATOR, [rig.relay_record(seed, force_noise)])
     assert finding.verdict.status == "adequate"
