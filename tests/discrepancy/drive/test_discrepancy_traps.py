@@ -57,6 +57,7 @@ def test_repeatability_left_out_is_a_false_alarm(clean, unsearched):
     assert examine_drive(replace(clean, rig=exact), unsearched).verdict.status != "adequate"
 
 
+@pytest.mark.nightly
 def test_repeatability_of_one_channel_only_is_a_false_alarm(clean, unsearched, monkeypatch):
     carried = Data._repeatability
 
