@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import qmc, truncnorm
 
 from pymoo_hdte.cli import __main__ as cli
-from pymoo_hdte.cli import optimum_report
+from pymoo_hdte.cli import design_study, optimum_report
 from pymoo_hdte.cli.design_study import Gain, Settings, _check, run_design_study
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
@@ -115,11 +115,11 @@ def test_json_is_the_document(written, capsys, tmp_path, document):
 
 @pytest.fixture(scope="module")
 def checks(study):
-    """The checks of the nominal and of the chosen design on 25 sets of random drives."""
-    return [
-        [_check(study.problem, design, seed) for design in (study.problem.nominal, study.design)]
-        for seed in range(25)
-    ]
+    """The checks of the nominal and of the chosen design on 25 small sets of random drives."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(design_study, "CHECKED_DRIVES", 250)
+        designs = (study.problem.nominal, study.design)
+        return [[_check(study.problem, design, seed) for design in designs] for seed in range(25)]
 
 
 class TestCheck:

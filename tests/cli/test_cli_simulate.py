@@ -75,8 +75,9 @@ def test_without_options_the_rated_condition(tmp_path, capsys):
     assert any("differs" in one for one in found["limits"]) is False
 
 
-def test_slow_motion_has_its_turn_too(tmp_path, capsys):
-    assert simulate("hs_20_100", "--speed", 20, "--out", tmp_path / "out", "--json") == 0
+@pytest.mark.parametrize("speed", [100, pytest.param(20, marks=pytest.mark.nightly)])
+def test_slow_motion_has_its_turn_too(speed, tmp_path, capsys):
+    assert simulate("hs_20_100", "--speed", speed, "--out", tmp_path / "out", "--json") == 0
     dte = json.loads(capsys.readouterr().out)["dte_arcsec"]
     assert dte["integrated"] == pytest.approx(dte["steady_state"], rel=1e-3)
 
@@ -88,17 +89,15 @@ def test_a_resonance_nearby_is_said(tmp_path, capsys):
     assert "DTE" in printed.split("\n")[0]
 
 
-def test_files_of_a_drive_are_taken(tmp_path):
+def test_files_of_a_drive_are_taken(written, tmp_path):
     (tmp_path / "sheet.toml").write_text(sheet_toml(hs_20_100()))
     (tmp_path / "model.toml").write_text(model_toml(preset("calibrated")))
-    for arguments, out in (
-        ((tmp_path / "sheet.toml", "--model", tmp_path / "model.toml"), tmp_path / "files"),
-        (("hs_20_100",), tmp_path / "words"),
-    ):
-        assert simulate(*arguments, "--out", out, "--quiet") == 0
+    files = (tmp_path / "sheet.toml", "--model", tmp_path / "model.toml")
+    condition = ("--speed", 1500, "--load", 20)
+    assert simulate(*files, *condition, "--out", tmp_path / "files", "--quiet") == 0
     names = ("transmission_error.csv", "order_lines.csv", "speeds.csv")
     for name in names:
-        assert (tmp_path / "files" / name).read_bytes() == (tmp_path / "words" / name).read_bytes()
+        assert (tmp_path / "files" / name).read_bytes() == (written / name).read_bytes()
 
 
 @pytest.mark.parametrize(

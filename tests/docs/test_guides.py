@@ -19,7 +19,14 @@ from pymoo_hdte.surrogate import TruncatedNormal
 GUIDES = {path.stem: path for path in (DOCS / "guides").glob("*.py")}
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (DOCS / "reference").glob("*.md")}
 NOISE = TruncatedNormal(0.0, 1.0)
-LONG = ("drive_data_sheet", "extend", "robust_study")
+LONG = (
+    "drive_data_sheet",
+    "exact_moments",
+    "extend",
+    "own_problem",
+    "robust_study",
+    "verdict_rules",
+)
 """Guides that the documentation is built with and nightly runs judge; the suite runs the others."""
 NUMBER = r"(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 
@@ -124,6 +131,7 @@ def test_the_invented_drive_does_what_its_guide_says():
     assert after < before
 
 
+@pytest.mark.nightly
 def test_own_problems_meet_their_closed_forms():
     ((n, length),) = numbers_of("own_problem", "# solutions, median length #")
     assert n == 100
@@ -151,6 +159,7 @@ def test_tongue_of_instability_lies_where_mathieu_has_it():
     assert high == pytest.approx(1.05, abs=0.005)
 
 
+@pytest.mark.nightly
 def test_verdicts_of_the_guide():
     text = output_of("verdict_rules")
     assert re.search(r"friction 0 N\.m: .* adequate\n", text)

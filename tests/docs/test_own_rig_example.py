@@ -9,9 +9,11 @@ import shlex
 import sys
 from decimal import Decimal
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from kept_results import kept
 from places import DOCS
 from scipy.integrate import solve_ivp
 
@@ -40,13 +42,31 @@ def run_example(folder):
     return text.getvalue(), names
 
 
+@kept
+def example():
+    """Return what the example prints, two of the names it defines and its files, by their path."""
+    with TemporaryDirectory() as top:
+        folder = Path(top) / "my_rig"
+        printed, names = run_example(folder)
+        files = {
+            path.relative_to(folder): path.read_bytes()
+            for path in folder.rglob("*")
+            if path.is_file()
+        }
+    names = {name: names[name] for name in ("TRUTH", "RIG")}
+    return printed.replace(str(folder), "my_rig"), names, files
+
+
 @pytest.fixture(scope="module")
 def rig(tmp_path_factory):
     """The folder of the example, what it printed, its names and its verdict."""
     folder = tmp_path_factory.mktemp("example") / "my_rig"
-    printed, names = run_example(folder)
+    printed, names, files = example()
+    for path, content in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(content)
     verdict = json.loads((folder / "report" / "verdict.json").read_text(encoding="utf-8"))
-    return folder, printed.replace(str(folder), "my_rig"), names, verdict
+    return folder, printed, names, verdict
 
 
 @pytest.fixture

@@ -43,6 +43,7 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.committed import committed_file
 from experiments.runner.registry import Context
 from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import optimum_report
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import harmonic_balance
 from pymoo_hdte.problems import RobustDTE
@@ -100,13 +101,29 @@ def test_every_snippet_is_run_here():
     assert len(SNIPPETS) == 3
 
 
+def commands_for_a_design():
+    """Return the arguments of the commands that optimise a drive and simulate the optimum."""
+    lines = [line for block in COMMANDS for line in block.splitlines()]
+    return [
+        shlex.split(line)[1:]
+        for line in lines
+        if "pymoo-hdte optimise" in line or "simulate" in line
+    ]
+
+
+def test_the_simulation_takes_what_the_optimisation_wrote():
+    optimise, simulate = commands_for_a_design()
+    out = Path(cli._parser().parse_args(optimise).out)
+    sheet, _, model = simulate[1:4]
+    assert {Path(sheet), Path(model)} <= {out / name for name in optimum_report.FOLDER.files}
+    cli._parser().parse_args(simulate)
+
+
+@pytest.mark.nightly
 def test_the_commands_for_a_design_run_one_after_the_other(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    lines = [line for block in COMMANDS for line in block.splitlines()]
-    designs = [line for line in lines if "pymoo-hdte optimise" in line or "simulate" in line]
-    assert len(designs) == 2
-    for line in designs:
-        assert cli.main(shlex.split(line)[1:]) == 0
+    for arguments in commands_for_a_design():
+        assert cli.main(arguments) == 0
     found = json.loads((tmp_path / "reports" / "optimum" / "optimum.json").read_text())
     promised = found["initial"]["mean_dte_arcsec"] - found["designs"]["balanced"]["mean_dte_arcsec"]
     confirmed = found["checked_on_the_model"]["falls_by_arcsec"]["mean_dte_arcsec"]["model"]

@@ -142,7 +142,7 @@ def test_integration_from_rest_reaches_the_steady_state(model, angle, rng):
     """Hill's method leaves out how the angle itself fluctuates; the harmonic balance does not."""
     resonant = any(isinstance(effect, LoadInertia) for effect in model.effects)
     tolerance = 1e-2 if resonant and angle == "free" else 1e-4
-    designs = random_designs(model, 2, rng)
+    designs = random_designs(model, 1, rng)
     balance = harmonic_balance(model.coefficients(designs)).spectrum()
     balanced = balance.peak_to_peak(model.sheet.ratio) / ARCSEC
     for design, expected, exact in zip(designs, model.dte_arcsec(designs), balanced, strict=True):
@@ -238,8 +238,15 @@ def test_the_load_acts_even_if_the_error_has_odd_orders_only():
     assert amplitudes[2.0][0] == pytest.approx(quasi_static, rel=0.02)
 
 
-@pytest.mark.parametrize("depth", [0.3, 0.8])
-@pytest.mark.parametrize("speed", [50.0, 209.0])
+@pytest.mark.parametrize(
+    ("depth", "speed"),
+    [
+        (0.3, 209.0),
+        (0.8, 209.0),
+        pytest.param(0.3, 50.0, marks=pytest.mark.nightly),
+        pytest.param(0.8, 50.0, marks=pytest.mark.nightly),
+    ],
+)
 def test_deep_variations_agree_with_integration(depth, speed):
     effects = (DampingReference(5.0), MeshStiffnessVariation(depth, 1.0))
     model = replace(preset("published"), effects=effects).at(speed, 40.0)

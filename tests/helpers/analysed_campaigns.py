@@ -1,8 +1,7 @@
 """Campaigns of few short records, fitted with one effect only or with none."""
 
-from functools import cache
-
 import numpy as np
+from kept_results import kept
 from planted_features import SCALES
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
@@ -49,7 +48,7 @@ def analysed(campaign, label=None, status="named"):
     )
 
 
-@cache
+@kept
 def ripple_analysis():
     """Return what is found on a rig whose motor torque has a ripple."""
     rig = true_rig(effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7))
@@ -57,7 +56,7 @@ def ripple_analysis():
     return analysed(campaign, "torque_ripple:input@6")
 
 
-@cache
+@kept
 def clean_analysis():
     """Return what is found on a rig that is as believed."""
     campaign = run_campaign(true_rig(), BELIEVED, RIG, np.random.default_rng(6), CONDITIONS)

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 
+import cloudpickle
+
 FOLDER = "PYMOO_HDTE_KEPT_RESULTS"
 """Environment variable with the folder of this run of the suite; the workers inherit it."""
 
@@ -34,5 +36,6 @@ def _made_once(name: str, make: Callable):
     with path.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not path.exists():
-            path.write_bytes(pickle.dumps(make()))
+            # Findings hold functions made on the way, which pickle alone cannot write.
+            path.write_bytes(cloudpickle.dumps(make()))
     return pickle.loads(path.read_bytes())

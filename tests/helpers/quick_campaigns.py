@@ -8,7 +8,7 @@ from kept_results import kept
 from virtual_rig_cases import BELIEVED, RIG, effect
 
 from pymoo_hdte.cli import __main__ as cli
-from pymoo_hdte.discrepancy import Campaign, write_campaign
+from pymoo_hdte.discrepancy import Campaign, DriveAnalysis, analyse, write_campaign
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
 
@@ -27,6 +27,8 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
+RIPPLING = (5, effect("input", ripple=0.02, ripple_order=3.0))
+"""Seed and effect of a quick campaign on a rig whose motor torque has a ripple."""
 
 
 @kept
@@ -35,6 +37,12 @@ def quick_campaign(seed: int, *effects) -> Campaign:
     rng = np.random.default_rng(seed)
     rig = draw_rig(BELIEVED, effects, rng)
     return run_campaign(rig, BELIEVED, RIG, rng, CONDITIONS)
+
+
+@kept
+def quick_analysis(seed: int, *effects) -> DriveAnalysis:
+    """Return what is found in `quick_campaign`."""
+    return analyse(quick_campaign(seed, *effects))
 
 
 def write_ripple_campaign(folder: Path) -> None:

@@ -3,11 +3,11 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import measured_oscillator as rig
 import pytest
-from quick_campaigns import quick_campaign
-from virtual_rig_cases import effect
+from quick_campaigns import RIPPLING, quick_analysis, quick_campaign
 
 import pymoo_hdte.discrepancy
 from pymoo_hdte.checks import InvalidInput
@@ -33,12 +33,12 @@ OSCILLATOR = Mechanism(
 
 @pytest.fixture(scope="module")
 def campaign():
-    return quick_campaign(5, effect("input", ripple=0.02, ripple_order=3.0))
+    return quick_campaign(*RIPPLING)
 
 
 @pytest.fixture(scope="module")
-def analysis(campaign):
-    return analyse(campaign)
+def analysis():
+    return quick_analysis(*RIPPLING)
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +147,7 @@ def test_effects_of_the_user_are_looked_for_and_known_from_then_on(campaign, rec
 
     own = Effect("own_effect", OwnFriction, ("input",), {"level": "torque"}, "Own.", guess)
     with registered():
-        analyse(campaign, effects=[own])
+        analyse(replace(campaign, running=campaign.running[:4], torsion=()), effects=[own])
         (of_drive,) = {one.stiffness for one in asked}
         assert of_drive == campaign.believed.stiffness
         asked.clear()

@@ -8,8 +8,8 @@ import measured_oscillator as rig
 import numpy as np
 import pytest
 from planted_features import SCALES
-from quick_campaigns import quick_campaign
-from virtual_rig_cases import BELIEVED, effect
+from quick_campaigns import RIPPLING, quick_analysis, quick_campaign
+from virtual_rig_cases import BELIEVED
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli import __main__ as cli
@@ -49,12 +49,12 @@ SAME_FIT = 2.0
 
 @pytest.fixture(scope="module")
 def campaign():
-    return quick_campaign(5, effect("input", ripple=0.02, ripple_order=3.0))
+    return quick_campaign(*RIPPLING)
 
 
 @pytest.fixture(scope="module")
-def analysis(campaign):
-    return analyse(campaign)
+def analysis():
+    return quick_analysis(*RIPPLING)
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,10 @@ from pymoo_hdte.units import ARCSEC
 
 SCALE = 46.0 / 101.0
 """Order of a line that an encoder shows 46 times in its turn."""
-ORDERS = [1.0 / 101.0, SCALE, 1.0, 2.0, 2.02, 3.0, 4.0, 5.0, 6.0]
+ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 5.0, 6.0]
 EMPTY = known_data(CONDITIONS[::2], ORDERS)
+OF_ENCODER = known_data(CONDITIONS[::2], [1.0 / 101.0, SCALE, *ORDERS])
+"""With orders of the output's encoder, which make every solution much longer."""
 RIPPLE, LINE = "torque_ripple:input@5", "kinematic_error:mesh@3"
 SOFT, CUBIC = "soft_windup:mesh", "hardening_stiffness:mesh"
 DRAG, OUTPUT_FRICTION = "nonlinear_drag:input", "coulomb_friction:output"
@@ -34,24 +36,24 @@ FEW = [RIPPLE, LINE, SOFT, REACTION, INERTIA, "nonlinear_drag:input"]
 """Rivals enough where the rule is tested and not the choice among all."""
 
 
-def of_labels(labels, seen=SEEN):
-    found = {candidate.label: candidate for candidate in library(EMPTY, seen)}
+def of_labels(labels, seen=SEEN, empty=EMPTY):
+    found = {candidate.label: candidate for candidate in library(empty, seen)}
     return [found[label] for label in labels]
 
 
-def planted(effects, seed=4, seen=SEEN, **changes):
+def planted(effects, seed=4, seen=SEEN, empty=EMPTY, **changes):
     """Data of a drive with effects, given as a mapping of labels to values."""
     built = [
         effect
-        for candidate, values in zip(of_labels(effects, seen), effects.values(), strict=True)
+        for candidate, values in zip(of_labels(effects, seen, empty), effects.values(), strict=True)
         for effect in candidate.build(values)
     ]
-    return measured(tuple(built), np.random.default_rng(seed), EMPTY, **changes)[0]
+    return measured(tuple(built), np.random.default_rng(seed), empty, **changes)[0]
 
 
 def disturbed(data, chi_square, record=3):
     """Add to one record's input torque a line that no drive has, worth so much of chi-square."""
-    values, place = data.features.values.copy(), data.features.places(1)[6, 0]
+    values, place = data.features.values.copy(), data.features.places(1)[ORDERS.index(4.0), 0]
     shift = np.zeros_like(values)
     shift[record, place] = 1.0
     worth = np.sum(data.whiten(shift) ** 2)
@@ -88,7 +90,9 @@ def test_adequacy_in_closed_form():
         )
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (2, 3))]
+)
 def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
     stiffness, inertia = np.random.default_rng(seed).uniform(0.92, 1.08, 2)
     verdict = verdict_on(planted({}, seed, stiffness=stiffness, input_inertia=inertia))
@@ -100,16 +104,17 @@ def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
 
 
 @pytest.mark.parametrize(
-    ("label", "values"),
+    ("label", "values", "rivals"),
     [
-        (SOFT, (0.3, 3e-4, 3.0)),
-        (REACTION, (1.0,)),
-        (INERTIA, (0.03,)),
+        (SOFT, (0.3, 3e-4, 3.0), FEW),
+        pytest.param(SOFT, (0.3, 3e-4, 3.0), None, marks=pytest.mark.nightly),
+        (REACTION, (1.0,), FEW),
+        (INERTIA, (0.03,), FEW),
     ],
 )
-def test_a_planted_effect_is_named_with_its_values(label, values):
+def test_a_planted_effect_is_named_with_its_values(label, values, rivals):
     data = planted({label: values})
-    verdict = verdict_on(data, None if label == SOFT else FEW)
+    verdict = verdict_on(data, rivals)
     assert verdict.status == "named"
     assert labels_of(verdict) == {label}
     fitted = verdict.chosen.fit
@@ -175,7 +180,9 @@ def test_a_parameter_out_of_tolerance_does_not_hide_an_effect_beside_it():
 def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
     label = "eccentricity:sensor@0.009901"
     seen = [1.0 / 101.0]
-    verdict = verdict_on(planted({label: (2.0 * ARCSEC, 0.5 * ARCSEC)}, seen=seen), seen=seen)
+    verdict = verdict_on(
+        planted({label: (2.0 * ARCSEC, 0.5 * ARCSEC)}, seen=seen, empty=OF_ENCODER), seen=seen
+    )
     assert verdict.status == "class"
     names = {
         one.name
@@ -187,7 +194,9 @@ def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
 
 def test_an_error_of_the_encoder_s_scale_is_described_though_it_is_in_no_list():
     label = f"encoder_line:sensor@{SCALE:.4g}"
-    verdict = verdict_on(planted({label: (2.0 * ARCSEC, 0.0)}, seen=[SCALE]), seen=[SCALE])
+    verdict = verdict_on(
+        planted({label: (2.0 * ARCSEC, 0.0)}, seen=[SCALE], empty=OF_ENCODER), seen=[SCALE]
+    )
     assert verdict.status == "unlisted"
     assert labels_of(verdict) == {label}
     assert "encoder errs 46 times in its turn" in sentence(verdict)

@@ -12,7 +12,16 @@ from experiments.contest.problems import problem_of
 BUDGETS = (400, 700)
 
 
-@pytest.fixture(params=CONTESTANTS)
+LONG = ["AGE-MOEA-II"]
+"""pymoo compiles it for seconds in every process; nightly runs test it as the others are here."""
+
+
+@pytest.fixture(
+    params=[
+        pytest.param(name, marks=pytest.mark.nightly if name in LONG else ())
+        for name in CONTESTANTS
+    ]
+)
 def contestant(request):
     """Every contestant in turn, as far as its library is installed."""
     entry = CONTESTANTS[request.param]

@@ -153,6 +153,7 @@ def test_the_report_is_made_from_the_committed_ladder(tmp_path):
     assert len(result.tables[1].rows) == len(ladder_rungs())
 
 
+@pytest.mark.nightly
 def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
     budget = Budget(population=6, generations=1, starts=1, local_evaluations=2)
     rung = Candidate(("load_inertia",), "semi_amplitude", NARROW)

@@ -171,7 +171,7 @@ def test_a_campaign_s_damping_errors_are_those_of_least_squares(rng):
         assert repeats == pytest.approx(std * slope_error_per_noise(name), rel=0.4)
 
 
-@pytest.mark.parametrize("experiment", [table2, table3])
+@pytest.mark.parametrize("experiment", [pytest.param(table2, marks=pytest.mark.nightly), table3])
 def test_experiments_run_and_their_own_checks_hold(experiment, few, monkeypatch, tmp_path):
     monkeypatch.setattr(experiment, "N_CAMPAIGNS", 8)
     first, second = (experiment.run(Context(1, tmp_path, Campaign(tmp_path))) for _ in range(2))

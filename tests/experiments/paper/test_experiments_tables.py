@@ -19,8 +19,20 @@ from pymoo_hdte.decision import deviation_degree
 SMALL = {"population": 20, "generations": 5, "final_size": 8}
 
 
+SMALL_RUNS = f"""
+import sys
+from functools import partial
+from experiments.__main__ import main
+from experiments.comparison import paired
+paired.OptimisationRun = partial(paired.OptimisationRun, **{SMALL})
+sys.exit(main())
+"""
+"""``python -m experiments`` with optimisations of a hundredth of the evaluations."""
+EXTENTS = [["-c", SMALL_RUNS], pytest.param(["-m", "experiments"], marks=pytest.mark.nightly)]
+
+
 def run_experiments(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "experiments", *arguments]
+    command = [sys.executable, *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -74,19 +86,26 @@ def test_deviation_degrees_of_the_prototypes_come_out_to_the_printed_digit():
     assert np.round(degrees, 3).tolist() == [p.deviation_degree for p in TABLE_6.values()]
 
 
-@pytest.mark.parametrize("seeds", ["1", pytest.param("2", marks=pytest.mark.nightly)])
-def test_workers_and_repetition_do_not_change_a_byte(seeds, tmp_path):
+@pytest.mark.parametrize(
+    ("extent", "seeds"),
+    [
+        (["-c", SMALL_RUNS], "1"),
+        pytest.param(["-m", "experiments"], "2", marks=pytest.mark.nightly),
+    ],
+)
+def test_workers_and_repetition_do_not_change_a_byte(extent, seeds, tmp_path):
     for out, workers in (("one", "1"), ("two", "2")):
         arguments = ("table7", "--seeds", seeds, "--workers", workers, "--out", str(tmp_path / out))
-        assert run_experiments(*arguments).returncode == 0
+        assert run_experiments(*extent, *arguments).returncode == 0
     one, two = (steady_files(tmp_path / out) for out in ("one", "two"))
     assert one == two
     assert {"table7/quality.csv", "table7/fronts.png", "table7/result.json"} <= set(one)
 
 
-def test_ctrl_c_leaves_a_readable_report_and_code_130(tmp_path):
+@pytest.mark.parametrize("extent", EXTENTS)
+def test_ctrl_c_leaves_a_readable_report_and_code_130(extent, tmp_path):
     arguments = ["table7", "--workers", "2", "--out", str(tmp_path)]
-    command = [sys.executable, "-m", "experiments", *arguments]
+    command = [sys.executable, *extent, *arguments]
     process = subprocess.Popen(
         command,
         stderr=subprocess.PIPE,

@@ -147,23 +147,29 @@ def interruptible():
     signal.signal(signal.SIGINT, handler)
 
 
-def test_three_workers_of_which_one_is_killed_write_the_bytes_of_one_process(tmp_path):
+@pytest.mark.parametrize(
+    ("n_workers", "algorithms"),
+    [(2, ()), pytest.param(3, ("NSGA-II", "AMP-MOPSO"), marks=pytest.mark.nightly)],
+)
+def test_workers_of_which_one_is_killed_write_the_bytes_of_one_process(
+    n_workers, algorithms, tmp_path
+):
     cartridge = tmp_path / "cartridge"
     walks = [Walk(seed) for seed in range(1, 12)]
     walks.insert(4, DeadlyWalk(12, cartridge))
     runs = [
         OptimisationRun("calibrated", algorithm, seed=1, population=20, generations=5)
-        for algorithm in ("NSGA-II", "AMP-MOPSO")
+        for algorithm in algorithms
     ]
     jobs = [*walks, *runs]
     alone = Campaign(tmp_path / "alone").run(jobs, "walks")
     cartridge.touch()
     with cluster(tmp_path / "cluster") as dask:
-        workers = [dask.worker("--no-nanny") for _ in range(3)]
+        workers = [dask.worker("--no-nanny") for _ in range(n_workers)]
         with make_executor(1, dask.address) as executor:
             together = Campaign(tmp_path / "together", executor).run(jobs, "walks")
         assert [w.poll() for w in workers].count(-signal.SIGKILL) == 1
-        assert [w.poll() for w in workers].count(None) == 2
+        assert [w.poll() for w in workers].count(None) == n_workers - 1
     assert values(tmp_path / "together") == values(tmp_path / "alone")
     assert len(finished(tmp_path / "together")) == len(jobs)
     for one, other in zip(alone, together, strict=True):
@@ -173,6 +179,7 @@ def test_three_workers_of_which_one_is_killed_write_the_bytes_of_one_process(tmp
     assert list(dask.home.iterdir()) == []
 
 
+@pytest.mark.nightly
 def test_a_job_that_kills_every_worker_is_named_and_all_others_are_kept(tmp_path):
     jobs = [Walk(seed) for seed in range(1, 8)]
     jobs.insert(1, EndlesslyDeadlyWalk(8))
@@ -187,6 +194,7 @@ def test_a_job_that_kills_every_worker_is_named_and_all_others_are_kept(tmp_path
     assert finished(tmp_path).keys() == {f"walk_seed{seed}" for seed in range(1, 8)}
 
 
+@pytest.mark.nightly
 def test_without_a_scheduler_nothing_finished_is_lost_and_a_rerun_does_the_rest(tmp_path):
     jobs = [Walk(seed) for seed in range(1, 13)]
     out = tmp_path / "out"
@@ -207,6 +215,7 @@ def test_without_a_scheduler_nothing_finished_is_lost_and_a_rerun_does_the_rest(
     assert values(out) == values(tmp_path / "alone")
 
 
+@pytest.mark.nightly
 @pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_leaves_whole_files_and_a_cluster_that_does_the_rest(tmp_path, capsys, caplog):
     jobs = [Walk(seed) for seed in range(1, 13)]
@@ -230,6 +239,7 @@ def test_an_interrupt_leaves_whole_files_and_a_cluster_that_does_the_rest(tmp_pa
     assert values(out) == values(tmp_path / "alone")
 
 
+@pytest.mark.nightly
 def test_a_worker_with_another_source_or_none_is_refused(tmp_path):
     other, none = tmp_path / "other", tmp_path / "none"
     other.mkdir()
