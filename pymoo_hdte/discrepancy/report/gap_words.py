@@ -7,6 +7,9 @@ import numpy as np
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.proof import Proof
 
+_SHOWN = 3
+"""Most records that a sentence names."""
+
 
 def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
     """Return how much the gap shrank on held-out records, in words."""
@@ -18,8 +21,8 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
     if not finding.verdict.accepted.candidates:
         return f"Nothing was added. On {where}: off by {gap.before:.3g} {gap.unit}, {noise}."
     words = f"On {where}: off by {gap.before:.3g} before, {gap.after:.3g} after, {noise}"
-    if gap.after > gap.before or proof.overall.after > proof.overall.before:
-        where = "there" if gap.after > gap.before else "in all channels together"
+    if gap.worse or proof.overall.worse:
+        where = "there" if gap.worse else "in all channels together"
         return f"{words}. The revised model is worse {where}: do not use it.{_worse(proof)}"
     if gap.shrinkage is not None:
         words += f"; {percent(min(gap.shrinkage, 1.0))} of what the noise does not explain is gone"
@@ -40,10 +43,10 @@ def _worse(proof: Proof) -> str:
         if gap.worse
     ]
     records = [name for name, gap in zip(proof.records, proof.by_record, strict=True) if gap.worse]
-    if records and len(records) < len(proof.records):
-        parts.append(f"the transmission error in {', '.join(records)}")
+    if len(records) > _SHOWN:
+        parts.append(f"transmission error of {len(records)} of {len(proof.records)} records")
     elif records:
-        parts.append("the transmission error in every record")
+        parts.append(f"transmission error of {', '.join(records)}")
     return f" Worse than before: {'; '.join(parts)}." if parts else ""
 
 
