@@ -37,6 +37,8 @@ class Trend:
         Fitted misfit at the least and at the largest condition, with its sign.
     reach : float
         Half-width of the interval of ``end - start``.
+    size : float
+        Root mean square misfit of all records, beside which a change has to matter.
     rules : Rules
         Thresholds by which it is put in words.
     """
@@ -44,6 +46,7 @@ class Trend:
     start: float
     end: float
     reach: float
+    size: float
     rules: Rules
 
     @property
@@ -55,7 +58,7 @@ class Trend:
         """
         low, high = abs(self.start), abs(self.end)
         change = abs(self.end - self.start)
-        matters = (1.0 - 1.0 / self.rules.growth_ratio) * max(low, high)
+        matters = (1.0 - 1.0 / self.rules.growth_ratio) * max(low, high, self.size)
         if change <= self.reach and change + self.reach > matters:
             return "unknown"
         if change <= matters:
@@ -106,11 +109,12 @@ def trends(
     if freedom > 0:
         quantile = student.isf(rules.growth_chance / 2.0, freedom)
         reaches = quantile * np.sqrt(np.diag(covariance))
+    size = float(np.sqrt(np.mean(values**2)))
     found: dict[str, Trend | None] = {} if joined else dict.fromkeys(sizes)
     for place, name in enumerate(names, start=1):
         low, high = design[:, place].min(), design[:, place].max()
         ends = slope[0] + slope[place] * np.array([low, high])
-        found[name] = Trend(float(ends[0]), float(ends[1]), float(reaches[place]), rules)
+        found[name] = Trend(float(ends[0]), float(ends[1]), float(reaches[place]), size, rules)
     return found
 
 
@@ -129,7 +133,7 @@ def _clause(name: str, trend: Trend | None) -> str:
         return f"was measured at one {name} only"
     ratio = trend.ratio
     fold = "" if ratio is None or ratio > 100.0 else f" ({ratio:.2g}-fold)"
-    together = ", which were varied together" if " or " in name else ""
+    name += ", which were varied together" if " or " in name else ""
     words = {
         "grows": f"grows with {name}{fold}",
         "falls": f"falls with {name}{fold}",
@@ -137,7 +141,7 @@ def _clause(name: str, trend: Trend | None) -> str:
         "steady": f"hardly changes with {name}",
         "unknown": f"shows no sure change with {name}",
     }
-    return words[trend.kind] + together
+    return words[trend.kind]
 
 
 def _varied(name: str, size: Values, rules: Rules) -> bool:
