@@ -93,8 +93,8 @@ def matters(error=0.2, torque=0.01, enough=(1.0, 0.05), whole=True):
 def test_an_effect_below_what_is_good_enough_is_real_and_irrelevant():
     said = matters().sentence
     assert said.startswith("Real and irrelevant at the stated size")
-    assert "transmission error by at most 0.2 arcsec, where 1 arcsec is good enough" in said
-    assert "torques by at most 0.01 N.m, where 0.05 N.m is good enough" in said
+    assert "transmission error by at most 0.2 arcsec (1 arcsec is good enough)" in said
+    assert "torques by at most 0.01 N.m (0.05 N.m is good enough)" in said
     assert "not counted" not in said
     assert "What is left beyond the noise is not counted" in matters(whole=False).sentence
 
@@ -102,8 +102,8 @@ def test_an_effect_below_what_is_good_enough_is_real_and_irrelevant():
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"error": 2.0}, "transmission error by up to 2 arcsec, where 1 arcsec is good enough"),
-        ({"torque": 0.1}, "torques by up to 0.1 N.m, where 0.05 N.m is good enough"),
+        ({"error": 2.0}, "transmission error by up to 2 arcsec (1 arcsec is good enough)"),
+        ({"torque": 0.1}, "torques by up to 0.1 N.m (0.05 N.m is good enough)"),
     ],
 )
 def test_an_effect_above_it_is_not(changes, words):

@@ -50,14 +50,13 @@ class Relevance:
         compared = [one for one in self._compared() if one[2] is not None]
         if self.irrelevant:
             words = " and ".join(
-                f"{what} by at most {_shown(change, what)}, where {_shown(limit, what)} is good "
-                "enough"
+                f"{what} by at most {_shown(change, what)} ({_shown(limit, what)} is good enough)"
                 for what, change, limit in compared
             )
             rest = "" if self.whole else " What is left beyond the noise is not counted."
             return f"Real and irrelevant at the stated size: it changes {words}.{rest}"
         words = " and ".join(
-            f"{what} by up to {_shown(change, what)}, where {_shown(limit, what)} is good enough"
+            f"{what} by up to {_shown(change, what)} ({_shown(limit, what)} is good enough)"
             for what, change, limit in compared
             if limit is not None and change >= limit
         )
