@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_features import analysed, known_data, listed, measured
+from planted_features import analysed, known_data, listed, measured, with_sweep
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.drive.misfit.location import groups_within_noise, locate, refit_clean
@@ -144,7 +144,9 @@ def test_an_unlisted_effect_flags_the_cells_where_it_is_and_no_other(case):
 
 def located_with_stiffness(factor):
     """Locate what a drive of another stiffness misses, which is freed where out of tolerance."""
-    data, truth = measured(rng=np.random.default_rng(12), stiffness=factor)
+    rng = np.random.default_rng(12)
+    data, truth = measured(rng=rng, stiffness=factor)
+    data = with_sweep(data, (), rng, stiffness=factor)
     freed = out_of_tolerance("stiffness", "stiffness")
     if factor == 1.05:
         return data, truth, locate(analysed(data, "adequate"))
@@ -164,11 +166,15 @@ def test_a_freed_value_flags_the_cells_that_it_moves_and_is_not_trusted_there():
     assert "wherever it was measured" not in found.trusted
     assert "transmission error" not in found.trusted
     assert "grows with load" in found.sentence
+    # With the input locked the torsion is the same.
+    assert found.sweep_flagged
+    assert "the sweep with the input locked shows it" in found.sentence
 
 
 def test_a_value_within_its_tolerance_is_trusted():
     _, _, found = located_with_stiffness(1.05)
     assert not found.flagged.any()
+    assert not found.sweep_flagged
     assert "wherever it was measured" in found.trusted
 
 

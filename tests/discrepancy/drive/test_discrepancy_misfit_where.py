@@ -312,6 +312,11 @@ def test_trust_needs_the_gap_of_all_cells_together_to_be_noise():
     where, trusted = said({}, within_noise=within(records=[3]))
     assert "in 1 of 12 records" in where
     assert "all orders but" not in trusted
+    where, trusted = said({}, within_noise=within(orders=[2, 3]))
+    assert "at all orders but order 1 and order 2" in trusted
+    assert "together they do: in order 1 and order 2" in where
+    # All records are met as a whole, which says nothing of any one of them.
+    assert "record" not in trusted
     nothing = within(channels=range(4), orders=range(len(ORDERS)), records=range(len(SPEED)))
     assert "No channel, order or record" in said({}, within_noise=nothing)[1]
 
