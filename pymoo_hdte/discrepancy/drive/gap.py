@@ -35,8 +35,12 @@ class Gap:
 
     @property
     def worse(self) -> bool:
-        """Whether the correction made it larger by more than rounds to the same."""
-        return self.after - self.before > self.worse_share * self.noise_floor
+        """Whether the correction made it larger by more than rounds to the same.
+
+        A gap within the noise is not called worse, as it cannot be said to shrink.
+        """
+        beyond = self.after > (1.0 + self.least_share) * self.noise_floor
+        return beyond and self.after - self.before > self.worse_share * self.noise_floor
 
     @property
     def reduction(self) -> float:

@@ -282,6 +282,14 @@ def test_what_shows_at_speed_only_is_not_there_at_rest():
     assert "shows at speed only" not in said({(1, 4): fast + 0.3})[0]
 
 
+def test_one_fast_record_that_is_off_is_no_inertia():
+    one = np.where((SPEED > 1500.0) & (LOAD == 10.0), 20.0 * ARCSEC, 0.0)
+    where, trusted = said({(0, 4): one})
+    assert "shows at speed only" not in where
+    assert "differs from record to record" in where
+    assert "in 11 of 12 records" in trusted
+
+
 def test_the_growth_of_a_broad_band_is_that_of_all_its_lines(monkeypatch):
     monkeypatch.setattr(
         "pymoo_hdte.discrepancy.drive.misfit.where.stray_lines",

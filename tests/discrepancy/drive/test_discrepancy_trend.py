@@ -94,6 +94,10 @@ def test_few_or_noisy_records_say_nothing(rng):
     three = [0, 2, 11]
     assert set(kinds(plane(0.1, 0.0, 1.0)[three], NOISE[three], SPEED[three], LOAD[three]).values()
     ) == {"unknown"}  # fmt: skip
+    uneven = 1.0 + 0.9 * np.cos(9.0 * np.arange(COUNT))
+    assert "differs from record to record" in in_words(
+        trends(uneven + 0j, NOISE, SPEED, LOAD, RULES)
+    )
     rough = plane(1.0, 0.0, 0.3) + rng.normal(0.0, 0.5, COUNT)
     assert kinds(rough, np.full(COUNT, 0.5)) == {"speed": "unknown", "load": "unknown"}
     assert "no sure change" in in_words(trends(rough + 0j, np.full(COUNT, 0.5), SPEED, LOAD, RULES))
@@ -159,7 +163,7 @@ def test_the_order_of_records_does_not_matter(places):
 
 @given(*[st.floats(-10.0, 10.0)] * 2, *[st.floats(0.0, 10.0)] * 2)
 def test_a_kind_says_what_its_numbers_do(start, end, reach, size):
-    trend = Trend(start, end, reach, size, RULES)
+    trend = Trend(start, end, reach, size, 0.0, RULES)
     low, high, change = abs(start), abs(end), abs(end - start)
     if trend.kind == "grows":
         assert high > low

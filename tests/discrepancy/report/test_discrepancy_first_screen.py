@@ -56,7 +56,7 @@ def test_a_gap_that_shrinks_everywhere_is_not_called_worse():
     [
         ({"transmission_error": 9.0}, "worse there: do not use it", ("transmission_error",)),
         ({"overall": (4.7, 4.9)}, "worse in all channels together: do not use it", ("overall",)),
-        ({"output_torque": 21.0}, "Worse than before: output torque 19.4 before, 21 after",
+        ({"output_torque": 23.0}, "Worse than before: output torque 19.4 before, 23 after",
          ("output_torque",)),
         ({"input_torque": 0.23}, "Worse than before: input torque 0.21 before, 0.23 after",
          ("input_torque",)),
@@ -72,6 +72,10 @@ def test_what_gets_worse_is_said(changes, words, names):
     assert ("do not use it" in gap_sentence(NAMED, found)) == ("do not use it" in words)
 
 
+def test_a_gap_within_the_noise_is_not_called_worse():
+    assert proof(output_torque=21.0, input_torque=0.21).worse == ()
+
+
 def test_without_an_effect_or_a_record_nothing_is_claimed():
     assert gap_sentence(NOTHING, proof()).startswith("Nothing was added.")
     assert gap_sentence(NAMED, None).startswith("No record was held out")
@@ -79,8 +83,8 @@ def test_without_an_effect_or_a_record_nothing_is_claimed():
 
 @given(st.floats(0.0, 1e3), st.floats(0.0, 1e3), st.floats(1e-3, 1e3))
 def test_worse_is_larger_by_more_than_the_rule_says(before, after, floor):
-    gap = Gap(before, after, floor, "arcsec", worse_share=0.05)
-    assert gap.worse == (after > before and after - before > 0.05 * floor)
+    gap = Gap(before, after, floor, "arcsec", least_share=0.1, worse_share=0.05)
+    assert gap.worse == (after - before > 0.05 * floor and after > 1.1 * floor)
     assert not (gap.worse and gap.shrinkage is not None and gap.shrinkage > 0.0)
 
 

@@ -154,7 +154,8 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
     First with the weights of Cauchy's distribution, because a fit spreads a misfit over all cells,
     so that clean ones look wrong; then without the cells that are still wrong. A torsion sweep that
     contradicts the running records is left out too. The robust fit begins at the fitted values and
-    at sensors without error, since a fit takes a misfit for a zero or a gain where it can.
+    at sensors without error if it left one beyond its stated limit, since a fit takes a misfit for
+    a zero or a gain where it can.
 
     Parameters
     ----------
@@ -166,7 +167,8 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
     chi_square, sweep = _misfit(data, fitted)
     if not (_significant(chi_square, degrees_of_freedom, rules).any() or _wrong(sweep, rules)):
         return fitted
-    begins = (fitted.values, _with_sensors_as_stated(data, fitted.values))
+    stated, priors = _with_sensors_as_stated(data, fitted)
+    begins = [fitted.values, *([stated] if np.abs(priors).max() > 1.0 else [])]
     found = [_robust(data, replace(fitted, values=values)) for values in begins]
     fitted = min(found, key=lambda one: _robust_loss(data, one))
     values = fitted.values
@@ -176,12 +178,17 @@ def refit_clean(data: Data, fitted: Fit) -> Fit:
     return fit(weakened, fitted.candidates, values, _EVALUATIONS, fitted.slopes)
 
 
-def _with_sensors_as_stated(data: Data, values: Values) -> Values:
-    """Return values with gains and zeros of the torque sensors where their prior has them."""
-    prior = np.array([np.isfinite(one.prior) for one in data.base])
-    stated = values.copy()
-    stated[: len(prior)][prior] = Layout(data.base).array("start")[prior]
-    return stated
+def _with_sensors_as_stated(data: Data, fitted: Fit) -> tuple[Values, Values]:
+    """Return values with gains and zeros of the torque sensors where their prior has them.
+
+    With them, how far the fit left these, in units of their stated limits.
+    """
+    layout = Layout(data.base)
+    prior, start = layout.array("prior"), layout.array("start")
+    bounded = np.flatnonzero(np.isfinite(prior))
+    stated = fitted.values.copy()
+    stated[bounded] = start[bounded]
+    return stated, ((fitted.values[: len(prior)] - start) / prior)[bounded]
 
 
 def _robust(data: Data, fitted: Fit) -> Fit:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, residual_spectrum
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.misfit.map import Location
+from pymoo_hdte.discrepancy.drive.misfit.map import Flags, Location
 from pymoo_hdte.discrepancy.drive.misfit.trend import strongest, trends
 from pymoo_hdte.discrepancy.engine.rules import Rules
 
@@ -38,7 +38,10 @@ def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
     slow = speed <= np.median(speed)
     size = sizes(location)[:, :3].sum(axis=(1, 2))
     if size[slow].sum() <= rules.slow_share * size.sum():
-        return "It shows at speed only, as a torque of inertia or damping does"
+        if _kind(location, range(3), "speed") == "grows":
+            return "It shows at speed only, as a torque of inertia or damping does"
+        # No more than some records have it, which happen to be fast ones.
+        slow = np.ones_like(slow)
     misfit = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)[slow]
     # Torques divided by the stiffness, to compare them with the torsion.
     error = misfit[:, 0]
@@ -53,7 +56,9 @@ def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
         return "It is torque-like and acts on the output of the drive: the input has to supply it"
     if location.sweep_flagged:
         return "It is in the torsion: the sweep with the input locked shows it, too"
-    return _WITHOUT_TORQUE[_kind_with_load(location)]
+    kind = _kind(location, [0], "load", slow)
+    # Fast records are near resonances, but more records may say what the slow ones leave open.
+    return _WITHOUT_TORQUE[_kind(location, [0], "load") if kind == "unknown" else kind]
 
 
 _WITHOUT_TORQUE = {
@@ -66,12 +71,18 @@ _WITHOUT_TORQUE = {
 }
 
 
-def _kind_with_load(location: Location) -> str:
-    """Return how the strongest misfit of the transmission error changes with the load."""
-    _, order = strongest(sizes(location).sum(axis=0), [0])
-    conditions = location.speed_rpm, location.load_torque
-    misfit, noise = location.misfit[:, 0, order], location.noise[:, 0, order]
-    trend = trends(misfit, noise, *conditions, location.rules).get("load")
+def _kind(
+    location: Location, channels: Sequence[int], name: str, records: Flags | None = None
+) -> str:
+    """Return how the strongest misfit of some channels changes with ``speed`` or ``load``."""
+    channel, order = strongest(sizes(location).sum(axis=0), channels)
+    records = np.ones(len(location.records), dtype=bool) if records is None else records
+    misfit, noise = (
+        location.misfit[records, channel, order],
+        location.noise[records, channel, order],
+    )
+    conditions = location.speed_rpm[records], location.load_torque[records]
+    trend = trends(misfit, noise, *conditions, location.rules).get(name)
     return "unknown" if trend is None else trend.kind
 
 

@@ -39,6 +39,8 @@ class Trend:
         Half-width of the interval of ``end - start``.
     size : float
         Root mean square misfit of all records, beside which a change has to matter.
+    scatter : float
+        Standard deviation, beyond the noise, of the records from the fitted plane.
     rules : Rules
         Thresholds by which it is put in words.
     """
@@ -47,6 +49,7 @@ class Trend:
     end: float
     reach: float
     size: float
+    scatter: float
     rules: Rules
 
     @property
@@ -66,6 +69,11 @@ class Trend:
         if self.start * self.end < 0.0 and min(low, high) >= matters:
             return "turns"
         return "grows" if high > low else "falls"
+
+    @property
+    def scattered(self) -> bool:
+        """Whether records differ by as much as a change that matters, whatever the condition."""
+        return self.scatter > (1.0 - 1.0 / self.rules.growth_ratio) * self.size
 
     @property
     def ratio(self) -> float | None:
@@ -103,8 +111,9 @@ def trends(
         names, columns = ["speed or load"], columns[:1]
     design = _design(columns, len(misfit))
     values = _signed(misfit, noise, design, speed, load)
-    slope, covariance = _regressed(values, design, noise)
     freedom = len(values) - design.shape[1]
+    added = _added_variance(values, design, noise, freedom) if freedom > 0 else 0.0
+    slope, covariance = _regressed(values, design, noise**2 + added)
     reaches = np.full(len(slope), np.inf)
     if freedom > 0:
         quantile = student.isf(rules.growth_chance / 2.0, freedom)
@@ -114,7 +123,9 @@ def trends(
     for place, name in enumerate(names, start=1):
         low, high = design[:, place].min(), design[:, place].max()
         ends = slope[0] + slope[place] * np.array([low, high])
-        found[name] = Trend(float(ends[0]), float(ends[1]), float(reaches[place]), size, rules)
+        found[name] = Trend(
+            float(ends[0]), float(ends[1]), float(reaches[place]), size, added**0.5, rules
+        )
     return found
 
 
@@ -124,6 +135,8 @@ def in_words(found: dict[str, Trend | None]) -> str:
     if kinds == ["steady", "steady"]:
         return "is nearly the same at all speeds and loads"
     if kinds == ["unknown", "unknown"]:
+        if any(trend is not None and trend.scattered for trend in found.values()):
+            return "differs from record to record, but not surely with speed or load"
         return "shows no sure change with speed or load"
     return " and ".join(_clause(name, trend) for name, trend in found.items())
 
@@ -203,11 +216,11 @@ def _left(values: Values, design: Values, weight: Values) -> float:
     return float(weight @ (values - design @ slope) ** 2)
 
 
-def _regressed(values: Values, design: Values, noise: Values) -> tuple[Values, NDArray[np.float64]]:
+def _regressed(
+    values: Values, design: Values, variance: Values
+) -> tuple[Values, NDArray[np.float64]]:
     """Return the coefficients and their covariance."""
-    freedom = len(values) - design.shape[1]
-    added = _added_variance(values, design, noise, freedom) if freedom > 0 else 0.0
-    weight = 1.0 / (noise**2 + added)
+    weight = 1.0 / variance
     covariance = np.linalg.pinv(design.T @ (weight[:, None] * design))
     slope = covariance @ (design.T @ (weight * values))
     return slope, np.asarray(covariance)
