@@ -72,6 +72,18 @@ def test_a_phase_that_passes_a_resonance_is_no_change_of_sign_of_what_grows():
     assert kinds(passed)["speed"] == "grows"
 
 
+def test_a_resonance_does_not_hide_that_the_load_changes_nothing():
+    resonance = np.select([SPEED == 1000.0, SPEED == 200.0], [8.0, 1.5], 1.0)
+    assert kinds(resonance) == {"speed": "unknown", "load": "steady"}
+    milder = np.where(SPEED == 1000.0, 2.0, 1.0)
+    assert kinds(milder * plane(0.1, 0.0, 1.0))["load"] == "grows"
+    # A zero load that a sensor reads a little differently every time is one load.
+    around = LOAD + np.where(LOAD == 0.0, 0.1 * np.cos(np.arange(COUNT)), 0.0)
+    assert kinds(resonance, load=around)["load"] == "steady"
+    turned = resonance * np.where(SPEED > 500.0, -1.0, 1.0)
+    assert kinds(turned) == {"speed": "unknown", "load": "steady"}
+
+
 def test_a_condition_that_was_not_varied_is_not_judged():
     one_load = np.full(COUNT, 40.0)
     assert kinds(plane(0.1, 1.0, 0.0), load=one_load) == {"speed": "grows", "load": None}

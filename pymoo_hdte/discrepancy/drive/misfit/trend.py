@@ -111,22 +111,49 @@ def trends(
         names, columns = ["speed or load"], columns[:1]
     design = _design(columns, len(misfit))
     values = _signed(misfit, noise, design, speed, load)
+    found: dict[str, Trend | None] = {} if joined else dict.fromkeys(sizes)
+    for place, name in enumerate(names, start=1):
+        found[name] = trend = _trend(values, noise, design, place, rules)
+        if trend.kind == "unknown" and len(names) == 2:
+            (other,) = set(names) - {name}
+            alike = _alike(other, sizes[other], rules)
+            grouped = np.column_stack([columns[place - 1], alike])
+            found[name] = _trend(
+                _signed(misfit, noise, grouped, speed, load), noise, grouped, 0, rules
+            )
+    return found
+
+
+def _trend(values: Values, noise: Values, design: Values, place: int, rules: Rules) -> Trend:
+    """Return the change with the condition in one column of a regression."""
     freedom = len(values) - design.shape[1]
     added = _added_variance(values, design, noise, freedom) if freedom > 0 else 0.0
     slope, covariance = _regressed(values, design, noise**2 + added)
-    reaches = np.full(len(slope), np.inf)
+    reach = np.inf
     if freedom > 0:
-        quantile = student.isf(rules.growth_chance / 2.0, freedom)
-        reaches = quantile * np.sqrt(np.diag(covariance))
+        reach = student.isf(rules.growth_chance / 2.0, freedom) * covariance[place, place] ** 0.5
+    column = design[:, place]
+    # Conditions have the mean zero, and so has their product nearly.
+    level = float(np.mean(design @ slope) - slope[place] * column.mean())
+    start, end = level + slope[place] * np.array([column.min(), column.max()])
     size = float(np.sqrt(np.mean(values**2)))
-    found: dict[str, Trend | None] = {} if joined else dict.fromkeys(sizes)
-    for place, name in enumerate(names, start=1):
-        low, high = design[:, place].min(), design[:, place].max()
-        ends = slope[0] + slope[place] * np.array([low, high])
-        found[name] = Trend(
-            float(ends[0]), float(ends[1]), float(reaches[place]), size, added**0.5, rules
-        )
-    return found
+    return Trend(float(start), float(end), float(reach), size, added**0.5, rules)
+
+
+def _alike(name: str, size: Values, rules: Rules) -> NDArray[np.float64]:
+    """Return which records have which level of a condition, 0 or 1, shape (r, levels).
+
+    Between records of one speed, a resonance makes no difference that the load did not make.
+    """
+    order = np.argsort(size)
+    low, high = size[order[:-1]], size[order[1:]]
+    if name == "speed":
+        steps = high > rules.one_speed_ratio * low
+    else:
+        steps = high - low > rules.one_load_range * size.max()
+    level = np.empty(len(size), dtype=int)
+    level[order] = np.cumsum([0, *steps])
+    return np.eye(level.max() + 1)[level]
 
 
 def in_words(found: dict[str, Trend | None]) -> str:
