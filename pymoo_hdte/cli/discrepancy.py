@@ -103,6 +103,7 @@ def _summary(document: dict[str, Any], out: Path) -> str:
     lines = [
         f"{document['status']}{': ' + names if names else ''}",
         document["sentence"],
+        *([relevance["sentence"]] if (relevance := document.get("relevance")) else []),
         document["location"]["sentence"],
         *document["limits"],
         f"Next: {in_words(document['next_experiment']['description'])}",

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import InitVar, dataclass, replace
 
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.believed_model import believed_of_model
 from pymoo_hdte.discrepancy.campaign.plausibility import (
@@ -42,13 +42,16 @@ class Campaign:
     rules : Rules
         Thresholds for refusing records. They are used for the checks and not kept: pass them to
         ``dataclasses.replace`` again.
+    good_enough_error, good_enough_torque : float or None
+        Changes of the transmission error, rad, and of torques, N.m, below which an effect is
+        reported as real and irrelevant.
 
     Raises
     ------
     InvalidInput
         For no running record, a name used twice, the same measurement under two names, beliefs that
         no drive can have, or a record that contradicts them or the stated noise (see
-        `plausibility`).
+        `plausibility`); for a size that is good enough and not above zero.
     """
 
     title: str
@@ -58,12 +61,17 @@ class Campaign:
     running: tuple[RunningRecord, ...]
     torsion: tuple[TorsionRecord, ...]
     rules: InitVar[Rules] = RULES
+    good_enough_error: float | None = None
+    good_enough_torque: float | None = None
 
     def __post_init__(self, rules: Rules) -> None:
         for field in ("title", "drive"):
             text = getattr(self, field)
             if not isinstance(text, str) or not text.strip() or not text.isprintable():
                 raise InvalidInput(field, text, "one line of printable text")
+        for field in ("good_enough_error", "good_enough_torque"):
+            if (size := getattr(self, field)) is not None:
+                real_number(field, size, above=0.0)
         if not self.running:
             raise InvalidInput("running records", 0, "at least one")
         self._check_each_once()

@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.campaign.format import (
     COLUMNS,
     CONTROL,
     ENDING,
+    GOOD_ENOUGH,
     PLAIN_ENDING,
     RIG,
     RUNNING,
@@ -64,6 +65,11 @@ def read_campaign(folder: str | Path, rules: Rules = RULES) -> Campaign:
         title, drive = top.text("title"), top.text("drive")
         believed = believed_from_fields(top, folder) if top.has("model") else _believed(top)
         rig = _rig(top.table("rig"))
+        enough = {
+            name: top.number(key, above=0.0) * factor
+            for name, (key, factor) in GOOD_ENOUGH.items()
+            if top.has(key)
+        }
         entries = top.tables("record")
         top.finish()
         files = [entry.text("file") for entry in entries]
@@ -74,7 +80,7 @@ def read_campaign(folder: str | Path, rules: Rules = RULES) -> Campaign:
         running = tuple(record for record in records if isinstance(record, RunningRecord))
         torsion = tuple(record for record in records if isinstance(record, TorsionRecord))
         try:
-            return Campaign(title, drive, believed, rig, running, torsion, rules)
+            return Campaign(title, drive, believed, rig, running, torsion, rules, **enough)
         except InvalidInput as error:
             raise _placed_in_files(error, records, files) from None
 
@@ -118,9 +124,11 @@ def write_campaign(campaign: Campaign, folder: str | Path) -> None:
 
 def _table(campaign: Campaign) -> dict[str, Any]:
     tests = ((campaign.running, "running", RUNNING), (campaign.torsion, "torsion", TORSION))
+    stated = {name: one for name, one in GOOD_ENOUGH.items() if getattr(campaign, name) is not None}
     return {
         "title": campaign.title,
         "drive": campaign.drive,
+        **_in_units(campaign, stated),
         "believed": _believed_table(campaign.believed),
         "rig": _in_units(campaign.rig, RIG),
         "record": [

@@ -3,7 +3,9 @@
 =========================  ===================================================================
 table                      fields; those with ``=`` may be left out
 =========================  ===================================================================
-top                        ``title``, ``drive``
+top                        ``title``, ``drive``; what is good enough, for effects that are real
+                           but do not matter: ``good_enough_arcsec`` of transmission error,
+                           ``good_enough_N_m`` of torque, both optional
 ``[believed]``             ``ratio``, ``stiffness_Nm_per_rad``, ``damping_output_Nms_per_rad``,
                            ``input_inertia_kgm2``, ``input_damping_Nms_per_rad``,
                            ``output_damping_Nms_per_rad``, ``output_inertia_kgm2``,
@@ -92,6 +94,11 @@ RIG = _named(
     output_torque_zero="output_torque_zero_Nm",
     repeatability="repeatability_arcsec",
     torsion_angle_noise="torsion_angle_noise_arcsec",
+)
+
+GOOD_ENOUGH = _named(
+    good_enough_error="good_enough_arcsec",
+    good_enough_torque="good_enough_N_m",
 )
 
 RUNNING = _named(

@@ -165,6 +165,20 @@ def cell_chi_square(data: Observations, difference: Values) -> Values:
     return found
 
 
+def cell_noise(data: Observations) -> Values:
+    """Return the standard deviation of a part of each cell, shape (r, 4, 1 + m).
+
+    Of a mean its own, of a line the root mean square of those of its real and imaginary part.
+    """
+    variance = np.diagonal(data.covariance, axis1=1, axis2=2)
+    found = np.full((len(variance), *cell_degrees_of_freedom(data).shape), np.nan)
+    for channel in range(len(CHANNELS)):
+        if channel in MEANS:
+            found[:, channel, 0] = variance[:, MEANS.index(channel)]
+        found[:, channel, 1:] = variance[:, data.features.places(channel)].mean(axis=2)
+    return np.sqrt(found)
+
+
 def as_lines(data: Observations, difference: Values) -> NDArray[np.complex128]:
     """Return differences of features (r, f) as phasors of cells (r, 4, 1 + m)."""
     found = np.full((len(difference), *cell_degrees_of_freedom(data).shape), np.nan, dtype=complex)

@@ -17,14 +17,17 @@ from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
+from pymoo_hdte.discrepancy.drive.gap import DEVIATIONS, Gap
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.drive import OrderSpectrum
 from pymoo_hdte.units import ARCSEC, UNITS
 from pymoo_hdte.validation import ValidationMetrics, validation_metrics
 
 _OVERLAY_TURNS = 2.0
 _OVERLAY_POINTS = 400
+
+__all__ = ["Gap", "Overlay", "Proof", "prove"]
 
 Values = NDArray[np.float64]
 
@@ -97,6 +100,16 @@ class Proof:
     worst: str
     overlays: tuple[Overlay, ...]
 
+    @property
+    def worse(self) -> tuple[str, ...]:
+        """What the correction made worse: channels, ``overall``, and records by their name.
+
+        Of a record, its transmission error.
+        """
+        gaps = {**self.channels, "overall": self.overall}
+        records = zip(self.records, self.by_record, strict=True)
+        return tuple(name for name, gap in (*gaps.items(), *records) if gap.worse)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the entry in the verdict as plain values, the transmission error first."""
         metrics = None
@@ -109,6 +122,7 @@ class Proof:
             "overall": self.overall.as_dict(),
             "channels": {name: gap.as_dict() for name, gap in self.channels.items()},
             "leading_channel": self.leading,
+            "worse": list(self.worse),
             "records": {
                 name: gap.as_dict() for name, gap in zip(self.records, self.by_record, strict=True)
             },
@@ -154,9 +168,7 @@ def prove(finding: DriveFinding) -> Proof | None:
     return Proof(
         records=tuple(record.name for record in data.features.records),
         channels=gaps,
-        overall=Gap(
-            float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, data.rules.least_gap_share
-        ),
+        overall=Gap(float(overall[0]), float(overall[1]), 1.0, DEVIATIONS, *_shares(data.rules)),
         by_record=tuple(
             _gap(data, error[:, [k]].sum(axis=2), error_floor[[k]].sum(axis=1), CHANNELS[0])
             for k in range(error.shape[1])
@@ -196,7 +208,11 @@ def _gap(data: Data, squares: Values, noise: Values, channel: str) -> Gap:
     unit, size = SHOWN_IN[channel]
     before, after = np.sqrt(squares.mean(axis=1)) / size
     floor = float(np.sqrt(noise.mean()) / size)
-    return Gap(float(before), float(after), floor, unit, data.rules.least_gap_share)
+    return Gap(float(before), float(after), floor, unit, *_shares(data.rules))
+
+
+def _shares(rules: Rules) -> tuple[float, float]:
+    return rules.least_gap_share, rules.worse_share
 
 
 def _height(gap: Gap) -> float:
@@ -265,45 +281,3 @@ SHOWN_IN = {
     "output_torque": ("mN.m", UNITS["torque"]["mN.m"]),
 }
 """Channels whose gap is shown, with their unit and its size in SI."""
-
-
-DEVIATIONS = "standard deviations of the noise"
-
-
-@dataclass(frozen=True)
-class Gap:
-    """Root mean squares of measured minus predicted, in ``unit``.
-
-    Attributes
-    ----------
-    before, after : float
-        Of the fitted base, and of the model with the named effects.
-    noise_floor : float
-    unit : str
-    least_share : float
-        Least excess of a gap over the noise floor, as a share of it, for a shrinkage to be stated.
-    """
-
-    before: float
-    after: float
-    noise_floor: float
-    unit: str
-    least_share: float = RULES.least_gap_share
-
-    @property
-    def reduction(self) -> float:
-        """1 - after / before."""
-        return 1.0 - self.after / self.before if self.before > 0.0 else 0.0
-
-    @property
-    def shrinkage(self) -> float | None:
-        """1 - (after - floor) / (before - floor), or None where there was no gap to shrink."""
-        excess = self.before - self.noise_floor
-        if excess <= self.least_share * self.noise_floor:
-            return None
-        return 1.0 - (self.after - self.noise_floor) / excess
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the gap as plain values."""
-        sizes = {name: getattr(self, name) for name in ("before", "after", "noise_floor", "unit")}
-        return sizes | {"shrinkage": self.shrinkage, "reduction": self.reduction}

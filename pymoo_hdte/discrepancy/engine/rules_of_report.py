@@ -44,12 +44,21 @@ class ReportRules(RuleSet):
         at_most=1.0,
     )
     growth_ratio: float = rule(
-        2.0,
+        1.25,
         "ratio of amplitudes",
-        "A misfit grows or falls with speed or load if the upper half of the conditions has more, "
-        "or less, of it by this factor.",
-        f"{BY_HAND}.",
+        "A misfit grows or falls with speed or load if a regression over all records gives it, at "
+        "one end of the condition, this multiple of its amplitude at the other; below, it hardly "
+        "changes.",
+        f"{BY_HAND}: a change of a fifth is what a reader would not call the same.",
         at_least=1.0,
+    )
+    growth_chance: float = rule(
+        0.01,
+        "probability",
+        "Chance that a misfit that does not change with speed or load is said to do so.",
+        "Test level of Student's distribution, two-sided, for the slope of the regression; the "
+        "interval with which a change that matters is excluded has the same level.",
+        at_most=1.0,
     )
     fixed_frequency_width: float = rule(
         0.02,
@@ -104,6 +113,13 @@ class ReportRules(RuleSet):
         "share of the noise floor",
         "A gap that exceeds the noise floor by no more cannot be said to shrink.",
         f"{BY_HAND}: the floor is no better known, and the quotient would be of two small numbers.",
+        at_least=0.0,
+    )
+    worse_share: float = rule(
+        0.05,
+        "share of the noise floor",
+        "A gap that the correction makes larger by more is said to have become worse.",
+        f"{BY_HAND}: below, both gaps print as the same number.",
         at_least=0.0,
     )
     separated_chi_square: float = rule(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
+from pymoo_hdte.discrepancy.drive.misfit.relevance import relevance
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -47,6 +48,7 @@ def verdict_document(
     proposal : Proposal
     """
     verdict = finding.verdict
+    matters = relevance(finding, location)
     absent = {"reason": "no held-out record can be predicted, so that nothing can be proved"}
     return {
         "schema_version": SCHEMA_VERSION,
@@ -54,6 +56,7 @@ def verdict_document(
         "status": verdict.status,
         "sentence": sentence(verdict),
         "effects": _effects(verdict),
+        "relevance": None if matters is None else matters.as_dict(),
         "alternatives": _alternatives(verdict),
         "base": {
             "chi_square": verdict.base.chi_square,

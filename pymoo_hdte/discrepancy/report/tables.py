@@ -11,14 +11,16 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
+from pymoo_hdte.discrepancy.drive.gap import Gap
 from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
-from pymoo_hdte.discrepancy.drive.proof import Gap, Proof
+from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     adequate,
     unexplained,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.effects.sentences import in_words
 from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
@@ -93,7 +95,7 @@ def certainty(finding: DriveFinding) -> str:
             f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. "
             "An effect too small for these records may still be there."
         )
-    share = _percent(verdict.chosen.explained)
+    share = percent(verdict.chosen.explained)
     if not verdict.chosen.listed:
         return (
             f"No effect of the list is as likely: this explains {share} of the misfit. An error of "
@@ -138,37 +140,15 @@ def _evidence(verdict: Verdict, chosen: Hypothesis, share: str) -> list[str]:
         and len(hypothesis.candidates) == len(chosen.candidates)
     ]
     if verdict.equivalent:
-        shares = ", ".join(_percent(hypothesis.explained) for hypothesis in verdict.equivalent)
+        shares = ", ".join(percent(hypothesis.explained) for hypothesis in verdict.equivalent)
         words.append(f"What these data cannot tell from it explains {shares}.")
     elif hypotheses:
         best = min(hypotheses, key=lambda hypothesis: hypothesis.bic)
-        words.append(f"The next best, {in_words(best.label)}, explains {_percent(best.explained)}.")
+        words.append(f"The next best, {in_words(best.label)}, explains {percent(best.explained)}.")
     if chosen.fit.at_bounds:
         names = ", ".join(name.replace("_", " ") for name in chosen.fit.at_bounds)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
     return words
-
-
-def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
-    """Return how much the gap shrank on held-out records, in words."""
-    if proof is None:
-        return "No record was held out, so nothing can be said about conditions not fitted."
-    gap, error = proof.channels[proof.leading], proof.channels["transmission_error"]
-    where = f"{len(proof.records)} held-out records, {proof.leading.replace('_', ' ')}"
-    noise = f"noise alone {gap.noise_floor:.3g} {gap.unit}"
-    if not finding.verdict.accepted.candidates:
-        return f"Nothing was added. On {where}: off by {gap.before:.3g} {gap.unit}, {noise}."
-    words = f"On {where}: off by {gap.before:.3g} before, {gap.after:.3g} after, {noise}"
-    if gap.after > gap.before or proof.overall.after > proof.overall.before:
-        return f"{words}. The revised model is worse there: do not use it."
-    if gap.shrinkage is not None:
-        words += f"; {_percent(min(gap.shrinkage, 1.0))} of what the noise does not explain is gone"
-    if error is not gap:
-        words += f". Transmission error: {error.before:.3g} before, {error.after:.3g} after, "
-        words += f"noise alone {error.noise_floor:.3g} {error.unit}"
-    if error.after > max(error.before, 1.5 * error.noise_floor):
-        words += ". So the transmission error is met less well than before"
-    return f"{words}."
 
 
 def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
@@ -201,7 +181,7 @@ def hypothesis_rows(verdict: Verdict) -> list[HypothesisRow]:
             in_words(hypothesis.label),
             _role(verdict, hypothesis),
             hypothesis.fit.chi_square,
-            _percent(hypothesis.explained),
+            percent(hypothesis.explained),
             hypothesis.bic - best,
             ", ".join(name.replace("_", " ") for name in hypothesis.fit.at_bounds) or "none",
         )
@@ -298,8 +278,3 @@ def _role(verdict: Verdict, hypothesis: Hypothesis) -> str:
 
 def _names(hypothesis: Hypothesis) -> set[str]:
     return {candidate.name for candidate in hypothesis.candidates}
-
-
-def _percent(share: float) -> str:
-    """Return a share in per cent, rounded down, so that only a full share becomes 100 %."""
-    return f"{np.floor(1000.0 * share + 1e-9) / 10.0:g} %"

@@ -27,12 +27,12 @@ from pymoo_hdte.discrepancy.report.figures import (
     optimum_fronts,
     overlay,
 )
+from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
 from pymoo_hdte.discrepancy.report.tables import (
     STATUSES,
     certainty,
     effect_rows,
-    gap_sentence,
     hypothesis_rows,
     metric_rows,
     parameter_rows,

@@ -115,6 +115,33 @@ def test_what_is_written_is_read_back(campaign, folder):
                 np.testing.assert_allclose(value, expected, rtol=1e-11, atol=close)
 
 
+def test_what_is_good_enough_is_read_in_its_units(campaign, folder, tmp_path):
+    assert (campaign.good_enough_error, campaign.good_enough_torque) == (None, None)
+    assert "good_enough" not in (folder / "campaign.toml").read_text()
+    edit(folder / "campaign.toml", "title", "good_enough_arcsec = 2\ngood_enough_N_m = 0.05\ntitle")
+    found = read_campaign(folder)
+    assert found.good_enough_error == pytest.approx(2.0 * ARCSEC)
+    assert found.good_enough_torque == 0.05
+    write_campaign(found, tmp_path / "again")
+    again = read_campaign(tmp_path / "again")
+    assert again.good_enough_error == pytest.approx(found.good_enough_error, rel=1e-11)
+    assert again.good_enough_torque == found.good_enough_torque
+
+
+@pytest.mark.parametrize("key", ["good_enough_arcsec", "good_enough_N_m"])
+@pytest.mark.parametrize("value", ["0", "-1.0", "nan", '"small"'])
+def test_good_enough_is_above_zero(folder, key, value):
+    edit(folder / "campaign.toml", "title", f"{key} = {value}\ntitle")
+    with pytest.raises(InvalidInput, match=rf"line 1.*{key}|{key}.*line 1"):
+        read_campaign(folder)
+
+
+@pytest.mark.parametrize("field", ["good_enough_error", "good_enough_torque"])
+def test_good_enough_is_checked_in_python_too(campaign, field):
+    with pytest.raises(InvalidInput, match=field):
+        replace(campaign, **{field: -1.0})
+
+
 def test_writing_again_gives_the_same_bytes(folder, tmp_path):
     write_campaign(read_campaign(folder), tmp_path / "again")
     files = sorted(path.name for path in folder.iterdir())

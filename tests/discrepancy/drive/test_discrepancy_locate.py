@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_features import analysed, known_data, listed, measured
+from planted_features import analysed, known_data, listed, measured, with_sweep
 from scipy.stats import chi2
 
-from pymoo_hdte.discrepancy.drive.misfit.location import locate, refit_clean
+from pymoo_hdte.discrepancy.drive.misfit.location import groups_within_noise, locate, refit_clean
 from pymoo_hdte.discrepancy.drive.misfit.map import benjamini_hochberg
 from pymoo_hdte.discrepancy.drive.observations import cell_chi_square, cell_degrees_of_freedom
-from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.candidate import Layout, out_of_tolerance
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.units import ARCSEC
 
@@ -106,3 +106,109 @@ def test_a_named_line_flags_the_cells_that_it_moves():
     assert "order 3" in found.sentence
     assert found.named
     assert len(found.summary()["flagged"]) == found.flagged.sum()
+
+
+UNLISTED = {
+    "line of one torque": (1, 5, lambda speed, load: load >= 0.0, 1e-3),
+    "line of the error under load": (0, 4, lambda speed, load: load > 15.0, 0.5 * ARCSEC),
+    "mean of the torque at one condition": (
+        1, -1, lambda speed, load: (speed < 100.0) & (load == 20.0), -3e-3,
+    ),
+    "line of the output at one condition": (
+        2, 0, lambda speed, load: (speed > 100.0) & (load == 20.0), 0.1,
+    ),
+}  # fmt: skip
+"""Channel, line (-1 for the mean), records and size of misfits that no effect explains."""
+
+
+@pytest.mark.parametrize("case", UNLISTED)
+def test_an_unlisted_effect_flags_the_cells_where_it_is_and_no_other(case):
+    channel, line, where, size = UNLISTED[case]
+    data, _ = measured(rng=np.random.default_rng(11), stiffness=1.03)
+    speed = data.features.conditions.input_speed
+    records = np.flatnonzero(where(speed, data.features.conditions.output_torque))
+    place = channel if line < 0 else data.features.places(channel)[line][0]
+    values = data.features.values.copy()
+    values[records, place] += size
+    found = locate(analysed(replace(data, features=replace(data.features, values=values))))
+    wanted = np.zeros(found.flagged.shape, dtype=bool)
+    wanted[records, channel, 1 + line] = True
+    assert np.argwhere(found.flagged).tolist() == np.argwhere(wanted).tolist()
+    assert not found.named
+    # What is flagged is not trusted, and the rest is.
+    assert not found.within_noise.channels[channel]
+    assert found.within_noise.channels.sum() == 3
+    assert not found.within_noise.orders[1 + line]
+    assert found.within_noise.orders.sum() == len(found.orders) - 1
+
+
+def located_with_stiffness(factor):
+    """Locate what a drive of another stiffness misses, which is freed where out of tolerance."""
+    rng = np.random.default_rng(12)
+    data, truth = measured(rng=rng, stiffness=factor)
+    data = with_sweep(data, (), rng, stiffness=factor)
+    freed = out_of_tolerance("stiffness", "stiffness")
+    if factor == 1.05:
+        return data, truth, locate(analysed(data, "adequate"))
+    return data, truth, locate(analysed(data, "parameter", freed))
+
+
+def test_a_freed_value_flags_the_cells_that_it_moves_and_is_not_trusted_there():
+    data, truth, found = located_with_stiffness(1.3)
+    believed = truth.copy()
+    believed[0] *= 1.1 / 1.3
+    moved = (data.predict(truth[None], ()) - data.predict(believed[None], ()))[0]
+    truly = cell_chi_square(data, moved) > cell_degrees_of_freedom(data)
+    both = np.sum(truly & found.flagged)
+    assert 2.0 * both / (truly.sum() + found.flagged.sum()) > 0.95
+    loaded = data.features.conditions.output_torque > 0.0
+    assert found.flagged[loaded, 0, 0].all()
+    assert "wherever it was measured" not in found.trusted
+    assert "transmission error" not in found.trusted
+    assert "grows with load" in found.sentence
+    # With the input locked the torsion is the same.
+    assert found.sweep_flagged
+    assert "the sweep with the input locked shows it" in found.sentence
+
+
+def test_a_value_within_its_tolerance_is_trusted():
+    _, _, found = located_with_stiffness(1.05)
+    assert not found.flagged.any()
+    assert not found.sweep_flagged
+    assert "wherever it was measured" in found.trusted
+
+
+def test_a_friction_proportional_to_load_grows_with_it():
+    """A fit takes a part of it for a zero of the sensor: then it would vanish at half load."""
+    data, _ = measured(rng=np.random.default_rng(13))
+    load = data.features.conditions.output_torque
+    values = data.features.values.copy()
+    values[:, 1] += 1.3e-3 * load
+    found = locate(analysed(replace(data, features=replace(data.features, values=values))))
+    assert "hardly changes with speed and grows with load" in found.sentence
+    assert found.misfit[:, 1, 0].real == pytest.approx(1.3e-3 * load, abs=4e-3)
+    assert np.flatnonzero(found.flagged[:, 1, 0]).tolist() == np.flatnonzero(load).tolist()
+    assert "in all records without load" in found.trusted
+
+
+def test_cells_that_are_off_by_less_than_their_noise_are_seen_together():
+    data, _ = measured()
+    difference = np.zeros(data.features.values.shape)
+    assert groups_within_noise(data, difference).everywhere
+    places = data.features.places(3).ravel()
+    difference[:, places] = 1.5 * np.sqrt(data.covariance[:, places, places])
+    assert np.nanmax(cell_chi_square(data, difference)) < 6.0
+    found = groups_within_noise(data, difference)
+    assert found.channels.tolist() == [True, True, True, False]
+    assert not found.everywhere
+
+
+def test_groups_of_noise_are_within_it():
+    data, rng = known_data(), np.random.default_rng(14)
+    apart = 0
+    for _ in range(100):
+        noise = rng.standard_normal(data.features.values.shape)
+        found = groups_within_noise(data, np.einsum("rij,rj->ri", data.whiteners, noise))
+        apart += not found.everywhere
+    # Twenty-one groups, each at four standard deviations: a chance of some 1e-3 each.
+    assert apart <= 7

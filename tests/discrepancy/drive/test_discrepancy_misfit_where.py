@@ -9,7 +9,7 @@ from planted_features import known_data
 from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
-from pymoo_hdte.discrepancy.drive.misfit.map import Location
+from pymoo_hdte.discrepancy.drive.misfit.map import Location, WithinNoise
 from pymoo_hdte.discrepancy.drive.misfit.nature import StrayLines, stray_lines
 from pymoo_hdte.discrepancy.drive.misfit.where import sentences
 from pymoo_hdte.discrepancy.engine.rules import RULES
@@ -37,10 +37,13 @@ def planted(lines):
         load_torque=LOAD,
         orders=ORDERS,
         misfit=misfit,
+        change=np.zeros(misfit.shape, dtype=complex),
+        noise=np.broadcast_to(NOISE[:, None], misfit.shape),
         chi_square=chi_square,
         p_value=np.where(flagged, 0.0, 1.0),
         moved=np.zeros(chi_square.shape),
         flagged=flagged,
+        within_noise=WithinNoise(*(~flagged.any(axis=axes) for axes in ((0, 2), (0, 1), (1, 2)))),
         sweep_p_value=None,
         sweep_flagged=False,
         named=False,
@@ -66,7 +69,7 @@ def test_a_torque_of_the_load_is_no_compliance():
 def test_a_torque_on_the_input_leaves_the_output_alone():
     where, trusted = said({(1, 4): np.full(12, 0.02), (3, 4): 1e-3 / SPEED})
     assert "At order 6 in the input torque and input angle." in where
-    assert "is the same at all speeds and loads" in where
+    assert "is nearly the same at all speeds and loads" in where
     assert "torque-like and acts on the input" in where
     assert "in the transmission error and output torque" in trusted
 
@@ -88,7 +91,7 @@ def test_friction_of_the_output_needs_torque_that_does_not_arrive():
 def test_an_encoder_s_line_is_kinematic():
     where, trusted = said({(0, 1): np.full(12, 3.0 * ARCSEC)})
     assert "At order 0.05941 (6 per output turn) in the transmission error." in where
-    assert "is the same at all speeds and loads" in where
+    assert "is nearly the same at all speeds and loads" in where
     assert "kinematic" in where
     assert "at all orders but order 0.05941" in trusted
 
@@ -213,3 +216,126 @@ def test_bursts_fill_a_broad_band():
 )
 def test_labels_become_words(label, words):
     assert in_words(label) == words
+
+
+def shown(torsion=0.0, on_input=0.0, on_output=0.0):
+    """Return the words for misfits at order 6, in N.m of the output, in every record."""
+    sizes = torsion / BELIEVED.stiffness, on_input / BELIEVED.ratio, on_output
+    lines = {(channel, 4): np.full(12, size) for channel, size in enumerate(sizes) if size}
+    return said(lines)[0]
+
+
+PAIRS = {
+    # Of each sentence: misfits for which it is true, and nearly the same for which it is not.
+    "acts on the input": ({"on_input": 1.0}, {"on_input": 1.0, "torsion": 1.0}),
+    "the torsion behind it hardly shows it": (
+        {"on_input": 1.0, "torsion": 0.1},
+        {"on_input": 1.0, "torsion": 1.0, "on_output": 1.0},
+    ),
+    "in the output torque alone": ({"on_output": 1.0}, {"on_output": 1.0, "torsion": 1.0}),
+    "in both torques, but the torsion": (
+        {"on_input": 1.0, "on_output": 1.0},
+        {"on_input": 1.0, "on_output": 1.0, "torsion": 1.0},
+    ),
+    "comes from the load": (
+        {"on_input": 1.0, "on_output": 1.0, "torsion": 1.0},
+        {"on_input": 1.0, "torsion": 1.0},
+    ),
+    "acts on the output of the drive": (
+        {"on_input": 1.0, "torsion": 1.0},
+        {"on_input": 1.0, "torsion": 1.0, "on_output": 1.0},
+    ),
+    "no torque goes with it": ({"torsion": 1.0}, {"torsion": 1.0, "on_input": 1.0}),
+}
+
+
+@pytest.mark.parametrize("words", PAIRS)
+def test_a_nature_is_said_where_the_torques_say_it_and_nowhere_else(words):
+    true, false = PAIRS[words]
+    assert words in shown(**true)
+    assert words not in shown(**false)
+
+
+OF_THE_ERROR = {
+    "It is kinematic": lambda load: 1.0 + 0.0 * load,
+    "It is a compliance": lambda load: load / 40.0,
+    "the load makes it smaller": lambda load: 1.0 - 0.9 * load / 40.0,
+    "which these records do not tell": lambda load: 1.0 + 0.8 * np.cos(9.0 * np.arange(len(load))),
+}
+
+
+@pytest.mark.parametrize("words", OF_THE_ERROR)
+def test_what_the_load_does_to_an_error_says_what_it_is(words):
+    for other, change in OF_THE_ERROR.items():
+        where, _ = said({(0, 4): 20.0 * ARCSEC * change(LOAD)})
+        assert (words in where) == (other == words)
+    one_load = said({(0, 4): np.full(12, 20.0 * ARCSEC)}, load_torque=np.full(12, 40.0))[0]
+    assert ("which these records do not tell" in one_load) == ("do not tell" in words) or (
+        words not in one_load
+    )
+    assert "do not tell" in one_load
+
+
+def test_what_shows_at_speed_only_is_not_there_at_rest():
+    fast = np.where(SPEED > 1500.0, 1.0, 0.0)
+    assert "shows at speed only" in said({(1, 4): fast})[0]
+    assert "shows at speed only" not in said({(1, 4): fast + 0.3})[0]
+
+
+def test_one_fast_record_that_is_off_is_no_inertia():
+    one = np.where((SPEED > 1500.0) & (LOAD == 10.0), 20.0 * ARCSEC, 0.0)
+    where, trusted = said({(0, 4): one})
+    assert "shows at speed only" not in where
+    assert "differs from record to record" in where
+    assert "in 11 of 12 records" in trusted
+
+
+def test_the_growth_of_a_broad_band_is_that_of_all_its_lines(monkeypatch):
+    monkeypatch.setattr(
+        "pymoo_hdte.discrepancy.drive.misfit.where.stray_lines",
+        lambda *_: StrayLines(None, ("input_torque",)),
+    )
+    lines = {(1, place): 0.02 * np.exp(1j * place) * (1.0 + LOAD) for place in (1, 2, 3)}
+    assert "hardly changes with speed and grows with load" in said(lines)[0]
+    lines = {(1, place): np.full(12, 0.02) for place in (1, 2, 3)}
+    assert "is nearly the same at all speeds and loads" in said(lines)[0]
+
+
+def within(**groups):
+    """Return groups within the noise, but for the places named."""
+    sizes = {"channels": 4, "orders": len(ORDERS), "records": len(SPEED)}
+    flags = {name: np.ones(size, dtype=bool) for name, size in sizes.items()}
+    for name, places in groups.items():
+        flags[name][places] = False
+    return WithinNoise(**flags)
+
+
+def test_trust_needs_the_gap_of_all_cells_together_to_be_noise():
+    assert "wherever it was measured" in said({}, within_noise=within())[1]
+    where, trusted = said({}, within_noise=within(channels=[1], records=[3]))
+    assert "wherever" not in trusted
+    assert "in the transmission error, output torque and input angle" in trusted
+    assert "in 11 of 12 records" in trusted
+    assert "together they do: in the input torque" in where
+    where, trusted = said({}, within_noise=within(records=[3]))
+    assert "in 1 of 12 records" in where
+    assert "all orders but" not in trusted
+    where, trusted = said({}, within_noise=within(orders=[2, 3]))
+    assert "at all orders but order 1 and order 2" in trusted
+    assert "together they do: in order 1 and order 2" in where
+    # All records are met as a whole, which says nothing of any one of them.
+    assert "record" not in trusted
+    nothing = within(channels=range(4), orders=range(len(ORDERS)), records=range(len(SPEED)))
+    assert "No channel, order or record" in said({}, within_noise=nothing)[1]
+
+
+@pytest.mark.parametrize("channel", range(4))
+@pytest.mark.parametrize("place", range(1, len(ORDERS)))
+def test_what_is_flagged_is_never_trusted(channel, place):
+    size = 100.0 * NOISE[channel]
+    _, trusted = said({(channel, place): np.where(LOAD > 0.0, size, 0.0)}, within_noise=within())
+    in_channels = trusted.split(";")[0]
+    names = ["transmission error", "input torque", "output torque", "input angle"]
+    assert [name in in_channels for name in names] == [k != channel for k in range(4)]
+    assert f"at all orders but order {ORDERS[place]:.4g}" in trusted
+    assert "in all records without load" in trusted

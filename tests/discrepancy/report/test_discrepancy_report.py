@@ -17,8 +17,9 @@ from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import drive_model, revised_model
 from pymoo_hdte.discrepancy.report import write as report
+from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
-from pymoo_hdte.discrepancy.report.tables import certainty, gap_sentence, parameter_rows
+from pymoo_hdte.discrepancy.report.tables import certainty, parameter_rows
 from pymoo_hdte.discrepancy.report.write import FOLDER, write_report
 from pymoo_hdte.discrepancy.robust_optimum import optimum_shift
 from pymoo_hdte.drive import (

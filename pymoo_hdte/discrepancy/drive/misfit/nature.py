@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, residual_spectrum
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.drive.misfit.map import Location
+from pymoo_hdte.discrepancy.drive.misfit.map import Flags, Location
+from pymoo_hdte.discrepancy.drive.misfit.trend import strongest, trends
 from pymoo_hdte.discrepancy.engine.rules import Rules
 
 Values = NDArray[np.float64]
@@ -31,65 +32,80 @@ def sizes(location: Location) -> Values:
     return np.where(location.flagged, np.sqrt(size), 0.0)
 
 
-def growth(power: Values, condition: Values) -> float | None:
-    """Return the ratio of amplitudes in the upper half of a condition to the lower, or None.
-
-    None stands for a condition that was not varied.
-    """
-    condition = np.abs(condition)
-    upper = condition > (condition.min() + condition.max()) / 2.0
-    if upper.all() or not upper.any() or np.ptp(condition) < 0.05 * condition.max():
-        return None
-    return float(np.sqrt(power[upper].mean() / max(power[~upper].mean(), 1e-300)))
-
-
-def changes(ratio: float | None, name: str, rules: Rules) -> str:
-    """Return in words how a misfit changes with a condition."""
-    if ratio is None:
-        return f"was seen at one {name} only"
-    if ratio > rules.growth_ratio:
-        return f"grows with {name}" + (f" ({ratio:.2g}-fold)" if ratio < 100.0 else "")
-    if ratio < 1.0 / rules.growth_ratio:
-        return f"falls with {name}" + (f" ({1.0 / ratio:.2g}-fold)" if ratio > 0.01 else "")
-    return f"hardly changes with {name}"
-
-
 def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
     """Return in words what kind of misfit it is."""
     rules, speed = location.rules, np.abs(location.speed_rpm)
     slow = speed <= np.median(speed)
     size = sizes(location)[:, :3].sum(axis=(1, 2))
     if size[slow].sum() <= rules.slow_share * size.sum():
-        return "It shows at speed only, as a torque of inertia or damping does"
+        if _kind(location, range(3), "speed") == "grows":
+            return "It shows at speed only, as a torque of inertia or damping does"
+        # No more than some records have it, which happen to be fast ones.
+        slow = np.ones_like(slow)
     misfit = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)[slow]
     # Torques divided by the stiffness, to compare them with the torsion.
     error = misfit[:, 0]
     from_input = misfit[:, 1] * believed.ratio / believed.stiffness
     from_output = misfit[:, 2] / believed.stiffness
     if _power(error) <= rules.caused_share * max(_power(from_input), _power(from_output)):
-        return _torque(from_input, from_output, rules)
+        return _torque_alone(from_input, from_output, rules)
     seen = location.flagged[slow, 0]
     if _power((error - from_output)[seen]) <= rules.caused_share * _power(error):
-        return _torque(from_input, from_output, rules)
+        return _torque_with_torsion(from_input, from_output, rules)
     if _power((error - from_input)[seen]) <= rules.caused_share * _power(error):
         return "It is torque-like and acts on the output of the drive: the input has to supply it"
     if location.sweep_flagged:
         return "It is in the torsion: the sweep with the input locked shows it, too"
-    ratio = growth(np.sum(np.abs(error) ** 2, axis=1), location.load_torque[slow])
-    if ratio is not None and ratio > rules.growth_ratio:
-        return "It is a compliance: the torsion under load is not what the stiffness says"
-    return "It is kinematic: no torque goes with it, as for an error of teeth or encoders"
+    kind = _kind(location, [0], "load", slow)
+    # Fast records are near resonances, but more records may say what the slow ones leave open.
+    return _WITHOUT_TORQUE[_kind(location, [0], "load") if kind == "unknown" else kind]
 
 
-def _torque(
+_WITHOUT_TORQUE = {
+    "grows": "It is a compliance: the torsion under load is not what the stiffness says",
+    "turns": "It is a compliance: the torsion under load is not what the stiffness says",
+    "falls": "It is in the mesh: no torque goes with it, and the load makes it smaller",
+    "steady": "It is kinematic: no torque goes with it, as for an error of teeth or encoders",
+    "unknown": "No torque goes with it: it is kinematic, as an error of teeth or encoders, or a "
+    "compliance, if it should grow with load, which these records do not tell",
+}
+
+
+def _kind(
+    location: Location, channels: Sequence[int], name: str, records: Flags | None = None
+) -> str:
+    """Return how the strongest misfit of some channels changes with ``speed`` or ``load``."""
+    channel, order = strongest(sizes(location).sum(axis=0), channels)
+    records = np.ones(len(location.records), dtype=bool) if records is None else records
+    misfit, noise = (
+        location.misfit[records, channel, order],
+        location.noise[records, channel, order],
+    )
+    conditions = location.speed_rpm[records], location.load_torque[records]
+    trend = trends(misfit, noise, *conditions, location.rules).get(name)
+    return "unknown" if trend is None else trend.kind
+
+
+def _torque_alone(
     from_input: NDArray[np.complex128], from_output: NDArray[np.complex128], rules: Rules
 ) -> str:
-    """Return the words for a torque, with the side on which it acts.
+    """Return the words for a misfit of torques that the torsion hardly shows."""
+    if _power(from_output) < rules.caused_share * _power(from_input):
+        return "It is torque-like and acts on the input: the torsion behind it hardly shows it"
+    if _power(from_input) < rules.caused_share * _power(from_output):
+        return "It is in the output torque alone: neither the torsion nor the input follows it"
+    return "It is in both torques, but the torsion hardly follows them"
+
+
+def _torque_with_torsion(
+    from_input: NDArray[np.complex128], from_output: NDArray[np.complex128], rules: Rules
+) -> str:
+    """Return the words for a misfit of the output torque that the torsion follows.
 
     A torque on the output is transmitted through the drive and shows on both sides.
     """
     if _power(from_output) < rules.caused_share * _power(from_input):
-        return "It is torque-like and acts on the input: the output torque hardly shows it"
+        return "It is torque-like and acts on the input: the torsion behind it hardly shows it"
     return "It is torque-like and comes from the load: the torsion merely follows it"
 
 

@@ -11,12 +11,11 @@ from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.misfit.map import Flags, Location, Values
 from pymoo_hdte.discrepancy.drive.misfit.nature import (
     StrayLines,
-    changes,
-    growth,
     nature_of_misfit,
     sizes,
     stray_lines,
 )
+from pymoo_hdte.discrepancy.drive.misfit.trend import broad_band, in_words, strongest, trends
 
 _WORDS = [name.replace("_", " ") for name in CHANNELS]
 # Length of the lists in sentences; thresholds of flagging and of statements are in `Rules`.
@@ -47,6 +46,11 @@ def sentences(location: Location, data: Data, unexpected: Sequence[float]) -> tu
             parts.append(f"{_growth(location, bool(stray.broad))}.")
         kind = nature_of_misfit(location, believed)
         parts.append(f"{kind}.")
+    elif not location.within_noise.everywhere:
+        parts.append(
+            "No single mean or order line stands out of the noise, but together they do: in "
+            f"{_beyond(location, believed.ratio)}."
+        )
     elif location.named:
         parts.append("The named effect moves no mean and no order line by more than its noise.")
     else:
@@ -125,52 +129,57 @@ def _channels(size: Values) -> str:
 def _growth(location: Location, broad: bool) -> str:
     """Return how the strongest line, or a whole broad band, changes with speed and load."""
     size = sizes(location).sum(axis=0)
-    if size[:3].any():
-        size = size[:3]
-    channel, order = np.unravel_index(int(np.argmax(size)), size.shape)
-    degrees_of_freedom = 1.0 if order == 0 else 2.0
-    chi_square = location.chi_square[:, channel]
-    # The mean contribution of noise to the square of an amplitude is subtracted.
-    real = np.clip(1.0 - degrees_of_freedom / np.maximum(chi_square, 1e-12), 0.0, 1.0)
-    power = np.abs(location.misfit[:, channel]) ** 2 * real
-    chosen = np.nansum(power[:, 1:], axis=1) if broad else power[:, order]
-    found = [
-        changes(growth(chosen, condition), name, location.rules)
-        for condition, name in ((location.speed_rpm, "speed"), (location.load_torque, "load"))
-    ]
-    steady = found == ["hardly changes with speed", "hardly changes with load"]
-    how = "is the same at all speeds and loads" if steady else " and ".join(found)
-    line = f"The {_WORDS[channel]} there"
-    if not broad:
-        what = "mean" if order == 0 else f"line of order {location.orders[order]:.4g}"
-        line = f"The misfit of the {_WORDS[channel]} ({what})"
-    return f"{line} {how}"
+    channel, order = strongest(size, range(3) if size[:3].any() else range(4))
+    conditions = location.speed_rpm, location.load_torque
+    if broad:
+        lines = location.misfit[:, channel, 1:], location.noise[:, channel, 1:]
+        found = trends(*broad_band(*lines), *conditions, location.rules)
+        return f"The {_WORDS[channel]} there {in_words(found)}"
+    cell = location.misfit[:, channel, order], location.noise[:, channel, order]
+    what = "mean" if order == 0 else f"line of order {location.orders[order]:.4g}"
+    found = trends(*cell, *conditions, location.rules)
+    return f"The misfit of the {_WORDS[channel]} ({what}) {in_words(found)}"
+
+
+def _beyond(location: Location, ratio: float) -> str:
+    """Return the channels, orders and records whose cells together exceed the noise."""
+    within = location.within_noise
+    parts = [f"the {_WORDS[k]}" for k in np.flatnonzero(~within.channels)]
+    places = np.flatnonzero(~within.orders).tolist()
+    parts += [_order(location, place, ratio) for place in places[:_SHOWN]]
+    if not parts:
+        parts = [f"{np.sum(~within.records)} of {len(within.records)} records"]
+    return _listed(parts)
 
 
 def _trusted(location: Location, ratio: float) -> str:
-    """Return channels, orders and records in which nothing is flagged."""
-    flagged = location.flagged
-    if not flagged.any():
+    """Return channels, orders and records that the believed model meets within the noise.
+
+    Nothing is flagged in them, and the gaps of their cells together are those of noise.
+    """
+    flagged, within = location.flagged, location.within_noise
+    if not flagged.any() and within.everywhere:
         if location.sweep_flagged:
             return (
                 "The model may be trusted as it is in the running records, but not in the torsion "
                 "sweep."
             )
         return "The model may be trusted as it is wherever it was measured."
-    channels = [_WORDS[k] for k in range(len(CHANNELS)) if not flagged[:, k].any()]
-    wrong = np.asarray(flagged.any(axis=(0, 1)))
+    met = within.channels & ~flagged.any(axis=(0, 2))
+    channels = [_WORDS[k] for k in np.flatnonzero(met)]
+    wrong = np.asarray(flagged.any(axis=(0, 1)) | ~within.orders)
     parts = []
     if channels:
         parts.append(f"in the {_listed(channels)}")
-    if not wrong.all():
+    if wrong.any() and not wrong.all():
         places = np.flatnonzero(wrong).tolist()
         names = _listed([_order(location, place, ratio) for place in places])
         few = len(places) <= _SHOWN
         parts.append(
             f"at all orders but {names}" if few else f"at {np.sum(~wrong)} of {len(wrong)} orders"
         )
-    clean = np.asarray(~flagged.any(axis=(1, 2)))
-    if clean.any():
+    clean = np.asarray(within.records & ~flagged.any(axis=(1, 2)))
+    if clean.any() and not clean.all():
         parts.append(_conditions(location, clean))
     if not parts:
         return "No channel, order or record as a whole may be trusted as it is."

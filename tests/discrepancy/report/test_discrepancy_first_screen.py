@@ -1,0 +1,180 @@
+"""Sentences of a report's first screen on the proof and on what is good enough, true and false."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pymoo_hdte.discrepancy.drive.gap import Gap
+from pymoo_hdte.discrepancy.drive.misfit.relevance import Relevance, largest_change, relevance
+from pymoo_hdte.discrepancy.drive.proof import Proof
+from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
+from pymoo_hdte.units import ARCSEC
+
+NAMED = SimpleNamespace(
+    verdict=SimpleNamespace(accepted=SimpleNamespace(candidates=("something",)))
+)
+NOTHING = SimpleNamespace(verdict=SimpleNamespace(accepted=SimpleNamespace(candidates=())))
+GAPS = {
+    "transmission_error": Gap(8.2, 0.43, 0.42, "arcsec"),
+    "input_torque": Gap(0.21, 0.2, 0.2, "mN.m"),
+    "output_torque": Gap(19.4, 17.3, 19.8, "mN.m"),
+}
+
+
+def proof(overall=(4.7, 1.02), records=(1.0, 1.0), **after):
+    """Return gaps on held-out records, with those of channels ``after`` and of two records."""
+    channels = {name: replace(gap, after=after.get(name, gap.after)) for name, gap in GAPS.items()}
+    return Proof(
+        records=("run_a", "run_b"),
+        channels=channels,
+        overall=Gap(*overall, 1.0, "standard deviations of the noise"),
+        by_record=tuple(Gap(1.0, one, 0.4, "arcsec") for one in records),
+        orders=np.zeros(1),
+        by_order=(),
+        dte=np.zeros((3, 2)),
+        metrics=None,
+        leading="transmission_error",
+        worst="run_a",
+        overlays=(),
+    )
+
+
+def test_a_gap_that_shrinks_everywhere_is_not_called_worse():
+    said = gap_sentence(NAMED, proof())
+    assert "off by 8.2 before, 0.43 after" in said
+    assert "% of what the noise does not explain is gone" in said
+    assert "orse" not in said
+    assert proof().worse == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words", "names"),
+    [
+        ({"transmission_error": 9.0}, "worse there: do not use it", ("transmission_error",)),
+        ({"overall": (4.7, 4.9)}, "worse in all channels together: do not use it", ("overall",)),
+        ({"output_torque": 23.0}, "Worse than before: output torque 19.4 before, 23 after",
+         ("output_torque",)),
+        ({"input_torque": 0.23}, "Worse than before: input torque 0.21 before, 0.23 after",
+         ("input_torque",)),
+        ({"records": (0.5, 1.1)}, "Worse than before: transmission error of run_b.", ("run_b",)),
+    ],
+)  # fmt: skip
+def test_what_gets_worse_is_said(changes, words, names):
+    assert words not in gap_sentence(NAMED, proof())
+    found = proof(**changes)
+    assert words in gap_sentence(NAMED, found)
+    assert found.worse == names
+    # One channel that is worse does not condemn a model that is better.
+    assert ("do not use it" in gap_sentence(NAMED, found)) == ("do not use it" in words)
+
+
+def test_a_gap_within_the_noise_is_not_called_worse():
+    assert proof(output_torque=21.0, input_torque=0.21).worse == ()
+
+
+def test_without_an_effect_or_a_record_nothing_is_claimed():
+    assert gap_sentence(NOTHING, proof()).startswith("Nothing was added.")
+    assert gap_sentence(NAMED, None).startswith("No record was held out")
+
+
+@given(st.floats(0.0, 1e3), st.floats(0.0, 1e3), st.floats(1e-3, 1e3))
+def test_worse_is_larger_by_more_than_the_rule_says(before, after, floor):
+    gap = Gap(before, after, floor, "arcsec", least_share=0.1, worse_share=0.05)
+    assert gap.worse == (after - before > 0.05 * floor and after > 1.1 * floor)
+    assert not (gap.worse and gap.shrinkage is not None and gap.shrinkage > 0.0)
+
+
+def matters(error=0.2, torque=0.01, enough=(1.0, 0.05), whole=True):
+    """Return the relevance of changes in arcsec and N.m against what is good enough."""
+    limit = None if enough[0] is None else enough[0] * ARCSEC
+    return Relevance(error * ARCSEC, torque, limit, enough[1], whole)
+
+
+def test_an_effect_below_what_is_good_enough_is_real_and_irrelevant():
+    said = matters().sentence
+    assert said.startswith("Real and irrelevant at the stated size")
+    assert "transmission error by at most 0.2 arcsec (1 arcsec is good enough)" in said
+    assert "torques by at most 0.01 N.m (0.05 N.m is good enough)" in said
+    assert "not counted" not in said
+    assert "What is left beyond the noise is not counted" in matters(whole=False).sentence
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"error": 2.0}, "transmission error by up to 2 arcsec (1 arcsec is good enough)"),
+        ({"torque": 0.1}, "torques by up to 0.1 N.m (0.05 N.m is good enough)"),
+    ],
+)
+def test_an_effect_above_it_is_not(changes, words):
+    found = matters(**changes)
+    assert not found.irrelevant
+    assert "irrelevant" not in found.sentence
+    assert found.sentence == f"It changes {'' if 'torques' in words else 'the '}{words}."
+
+
+def test_only_what_the_campaign_states_is_compared():
+    found = matters(torque=5.0, enough=(1.0, None))
+    assert found.irrelevant
+    assert "torque" not in found.sentence
+    assert matters(error=50.0, enough=(None, 0.05)).irrelevant
+    assert not matters(enough=(None, None)).irrelevant
+
+
+@given(*[st.floats(1e-3, 1e3)] * 4)
+def test_irrelevant_is_below_both(error, torque, most_error, most_torque):
+    found = matters(error, torque, (most_error, most_torque))
+    below = error * ARCSEC < most_error * ARCSEC and torque < most_torque
+    assert found.irrelevant == below
+    assert ("irrelevant" in found.sentence) == below
+    assert found.as_dict()["irrelevant"] == below
+
+
+def finding(enough, status="named", more=False):
+    return SimpleNamespace(
+        campaign=SimpleNamespace(good_enough_error=enough[0], good_enough_torque=enough[1]),
+        verdict=SimpleNamespace(status=status, leaves_more_than_noise=more),
+    )
+
+
+def changed(named=True):
+    """A change of mean and two lines in the second of two records."""
+    change = np.zeros((2, 4, 3), dtype=complex)
+    change[1, 0] = 1.0, 2.0j, -3.0
+    change[1, 1] = 0.1, 0.0, 0.0
+    change[0, 2] = np.nan, 0.2, 0.0
+    change[0, 3] = np.nan, 50.0, 0.0
+    return SimpleNamespace(change=change, named=named)
+
+
+def test_the_largest_change_is_that_of_mean_and_lines_together():
+    assert largest_change(changed()).tolist() == pytest.approx([6.0, 0.1, 0.2, 50.0])
+    found = relevance(finding((7.0, 0.3)), changed())
+    assert (found.error, found.torque) == pytest.approx((6.0, 0.2))
+    assert found.irrelevant
+    assert found.whole
+
+
+@given(st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5))
+def test_no_signal_exceeds_the_largest_change(parts):
+    change = np.zeros((1, 4, 3), dtype=complex)
+    change[0, 0] = parts[0], complex(*parts[1:3]), complex(*parts[3:5])
+    angle = np.linspace(0.0, 60.0, 2000)
+    waves = change[0, 0, 1:, None] * np.exp(1j * np.outer([1.0, 2.02], angle))
+    signal = parts[0] + waves.sum(axis=0).real
+    found = largest_change(SimpleNamespace(change=change))
+    assert np.abs(signal).max() <= found[0] * (1.0 + 1e-9) + 1e-12
+
+
+def test_nothing_named_or_nothing_stated_is_not_compared():
+    assert relevance(finding((7.0, 0.3)), changed(named=False)) is None
+    assert relevance(finding((None, None)), changed()) is None
+
+
+@pytest.mark.parametrize(("status", "more"), [("partial", False), ("named", True)])
+def test_what_is_left_is_not_counted_as_irrelevant(status, more):
+    assert not relevance(finding((7.0, 0.3), status, more), changed()).whole
