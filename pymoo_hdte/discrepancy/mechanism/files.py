@@ -45,6 +45,7 @@ the records have units of their own::
     role = "train"                                 # or "held_out"
     name = "trapezoids"                            # optional: without it the name of the file
     sha256 = "6cf6814ae14618"                      # optional: first 8 or more digits
+    zero = { q = 12.5 }                            # optional: readings at zero, unit of the column
     [records.table]                                # optional: a layout of its own
     ...
 """
@@ -62,7 +63,8 @@ from pymoo_hdte.discrepancy.mechanism.models import (
     read_mechanism_model,
 )
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.tables import TableLayout, check_sha256, layout_from_fields, read_table
+from pymoo_hdte.io.layout import TableLayout, layout_from_fields, with_zeros
+from pymoo_hdte.io.tables import check_sha256, read_table
 from pymoo_hdte.io.toml import toml_with_lines
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.records import ROLES
@@ -197,6 +199,8 @@ def _record(
     layout = layout_from_fields(entry.table("table")) if entry.has("table") else shared
     if layout is None:
         raise InvalidInput(f"{place}.table", None, "a layout here, or [table] for all records")
+    if entry.has("zero"):
+        layout = with_zeros(entry.table("zero"), layout)
     expected = entry.text("sha256") if entry.has("sha256") else None
     entry.finish()
     if expected is not None:
