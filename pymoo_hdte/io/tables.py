@@ -38,12 +38,15 @@ class Columns:
         By title, or by number in a plain table.
     text : TextTable or None
         None for a MATLAB file.
+    length : int
+        Number of rows.
     """
 
     path: Path
     layout: TableLayout
     raw: dict[Any, NDArray[np.float64]]
     text: TextTable | None
+    length: int
 
     def si(self, channel: Channel, rows: slice = slice(None)) -> NDArray[np.float64]:
         """Return a channel in SI, shape (n,); what is not finite is interpolated."""
@@ -69,7 +72,7 @@ class Columns:
         if self.text:
             return f"{self.path.name}, lines {self.text.lines[0]} to {self.text.lines[-1]}"
         first = self.layout.skip_rows + 1
-        last = self.layout.skip_rows + len(next(iter(self.raw.values())))
+        last = self.layout.skip_rows + self.length
         return f"{self.path.name}, rows {first} to {last}"
 
 
@@ -167,11 +170,11 @@ def read_columns(
         If the file cannot be read.
     """
     mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
-    names = list(dict.fromkeys(channel.column for channel in mapped))
+    names: list[Any] = list(dict.fromkeys(channel.column for channel in mapped))
     if layout.format == "matlab":
         vectors = read_vectors(path, names)
         raw = {name: vectors[name][layout.skip_rows :] for name in names}
-        read = Columns(path, layout, raw, None)
+        read = Columns(path, layout, raw, None, len(raw[names[0]]))
         for name in names if not gaps else ():
             for row in np.flatnonzero(~np.isfinite(raw[name]))[:1]:
                 place = read.place(int(row), column_label(name))
@@ -189,7 +192,8 @@ def read_columns(
     )
     for channel in mapped:
         _check_unit(table, channel)
-    return Columns(path, layout, table.numbers(names, gaps=gaps), table)
+    raw = table.numbers(names, gaps=gaps)
+    return Columns(path, layout, raw, table, len(raw[names[0]]))
 
 
 def _check_unit(table: TextTable, channel: Channel) -> None:

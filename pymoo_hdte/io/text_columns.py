@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import repeat
 from typing import Any, cast
 
 import numpy as np
@@ -79,7 +80,7 @@ class TextTable:
             the titles, text in the place of a number, or a gap.
         """
         found: list[NDArray[np.float64]] = []
-        decimal = "." if self.mark == "," else self.decimal
+        decimal = self.decimal or ("." if self.mark == "," else None)
         for lines, rows in self.blocks():
             if not found:
                 self.require(names)
@@ -128,18 +129,19 @@ class TextTable:
         self, rows: list[Row], names: Sequence[Any], decimal: str | None
     ) -> NDArray[np.float64] | None:
         """Return columns, shape (n_rows, n_names), or None if any of their cells is no number."""
-        if not all(isinstance(row, str) for row in rows) or not rows[0]:
+        if not isinstance(rows[0], str) or not rows[0]:
             return None
         texts = cast("list[str]", rows)
         if decimal == ",":
-            if any("." in row for row in texts):
+            # A comma may only be before decimals, and a point would be one of thousands.
+            if self.mark == "," or any("." in row for row in texts):
                 return None
             texts = [row.replace(",", ".") for row in texts]
         places = self._places(names)
         read = None
-        if self.mark is not None and self._titled:
+        if self.mark is not None and self._titled and len(places) < len(self.titles):
             # The other columns may be text, but their number has to be right.
-            if any(row.count(self.mark) != len(self.titles) - 1 for row in texts):
+            if set(map(str.count, texts, repeat(self.mark))) != {len(self.titles) - 1}:
                 return None
             read = places
         try:

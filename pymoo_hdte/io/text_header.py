@@ -95,7 +95,8 @@ def _marks(text: str, delimiter: str | None) -> list[str | None]:
     """Return what may separate the cells of a line, the likeliest first."""
     if delimiter is not None:
         return [DELIMITERS[delimiter]]
-    return sorted(",;\t", key=lambda mark: -text.count(mark))
+    counts: dict[str | None, int] = {mark: text.count(mark) for mark in ",;\t"}
+    return sorted(counts, key=lambda mark: -counts[mark])
 
 
 def _units(header: Header, below: str, wanted: Sequence[str], file: str) -> dict[str, str]:

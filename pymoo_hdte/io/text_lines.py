@@ -12,6 +12,7 @@ import re
 import zlib
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import repeat
 from pathlib import Path
 from typing import BinaryIO, cast
 
@@ -19,6 +20,9 @@ from pymoo_hdte.checks import InvalidInput
 
 BLOCK = 1 << 22
 """Characters of a block."""
+
+FIRST_LINES = 1 << 16
+"""Characters of a block in which titles are looked for."""
 
 Lines = tuple[Sequence[int], list[str]]
 """Lines with their numbers, from 1."""
@@ -33,7 +37,9 @@ _NO_TEXT = re.compile("[\0\udc80-\udcff]")
 """NUL, or a byte that is no UTF-8, as Python hands it on."""
 
 
-def line_blocks(path: Path, kind: str, seen: Seen | None = None) -> Iterator[Lines]:
+def line_blocks(
+    path: Path, kind: str, seen: Seen | None = None, size: int = BLOCK
+) -> Iterator[Lines]:
     """Yield lines without their ends, with their numbers; no blank lines at the end.
 
     Parameters
@@ -44,6 +50,8 @@ def line_blocks(path: Path, kind: str, seen: Seen | None = None) -> Iterator[Lin
         Of text that it should be, for errors.
     seen : callable, optional
         Called after each block.
+    size : int
+        Characters of a block, or more where lines are longer.
 
     Raises
     ------
@@ -55,7 +63,7 @@ def line_blocks(path: Path, kind: str, seen: Seen | None = None) -> Iterator[Lin
     with path.open("rb") as raw:
         blank: list[str] = []
         start, done = 1, 0
-        for lines in _lines(path, kind, raw):
+        for lines in _lines(path, kind, raw, size):
             lines = blank + lines
             kept = len(lines)
             while kept and not lines[kept - 1].strip():
@@ -81,7 +89,7 @@ def lines_below(blocks: Iterable[Lines], line: int, skip: int) -> Iterator[Lines
 def unquoted_rows(file: str, blocks: Iterator[Lines], mark: str) -> Iterator[Block]:
     """Yield rows, cut into cells in blocks with quotes; a quoted cell may have several lines."""
     for numbers, lines in blocks:
-        quotes = sum(line.count('"') for line in lines)
+        quotes = _quotes(lines)
         if not quotes:
             yield numbers, cast("list[Row]", lines)
             continue
@@ -90,18 +98,22 @@ def unquoted_rows(file: str, blocks: Iterator[Lines], mark: str) -> Iterator[Blo
         while quotes % 2 and (further := next(blocks, None)):
             numbers += further[0]
             lines += further[1]
-            quotes += sum(line.count('"') for line in further[1])
+            quotes += _quotes(further[1])
         yield _cut(file, numbers, lines, mark)
 
 
-def _lines(path: Path, kind: str, raw: BinaryIO) -> Iterator[list[str]]:
+def _quotes(lines: list[str]) -> int:
+    return sum(map(str.count, lines, repeat('"')))
+
+
+def _lines(path: Path, kind: str, raw: BinaryIO, size: int) -> Iterator[list[str]]:
     packed = path.suffix == ".gz"
     binary = cast("BinaryIO", gzip.GzipFile(fileobj=raw)) if packed else raw
     # With the surrogates of bytes that are no text, so that their line can be told.
     text = io.TextIOWrapper(binary, "utf-8-sig", "surrogateescape")
     rest, done = "", 0
     try:
-        while found := text.read(BLOCK):
+        while found := text.read(size):
             whole, end, rest = (rest + found).rpartition("\n")
             if end:
                 _check(path, kind, whole, done)
@@ -117,7 +129,8 @@ def _lines(path: Path, kind: str, raw: BinaryIO) -> Iterator[list[str]]:
 
 def _check(path: Path, kind: str, text: str, done: int) -> None:
     """Raise `InvalidInput` for what is no text, below so many lines."""
-    bad = _NO_TEXT.search(text)
+    # Most files are of ASCII, which is faster to tell.
+    bad = None if text.isascii() and "\0" not in text else _NO_TEXT.search(text)
     if bad is None:
         return
     above = text.count("\n", 0, bad.start())

@@ -20,7 +20,16 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.io.text_columns import DECIMALS, TextTable
 from pymoo_hdte.io.text_header import plain_header, titled_header
-from pymoo_hdte.io.text_lines import Block, Lines, Seen, line_blocks, lines_below, unquoted_rows
+from pymoo_hdte.io.text_lines import (
+    BLOCK,
+    FIRST_LINES,
+    Block,
+    Lines,
+    Seen,
+    line_blocks,
+    lines_below,
+    unquoted_rows,
+)
 
 LARGEST = 1e15
 """In any unit: a double beyond it no longer holds tenths, so it marks a fault; nobody measured it,
@@ -73,8 +82,8 @@ def read_text_table(
     """
     kind = "CSV text" if titled else "text"
 
-    def lines(told: Seen | None = None) -> Iterator[Lines]:
-        for numbers, block in line_blocks(path, kind, told):
+    def lines(size: int = FIRST_LINES, told: Seen | None = None) -> Iterator[Lines]:
+        for numbers, block in line_blocks(path, kind, told, size):
             if numbers[0] == 1 and origin and block[0].startswith(origin):
                 numbers, block = numbers[1:], block[1:]
             if by_hand:
@@ -92,7 +101,7 @@ def read_text_table(
         header = plain_header(*top, delimiter, skip_rows)
 
     def blocks() -> Iterator[Block]:
-        below = lines_below(lines(seen), header.line if titled else 0, header.skip)
+        below = lines_below(lines(BLOCK, seen), header.line if titled else 0, header.skip)
         if titled and header.mark is not None:
             return unquoted_rows(path.name, below, header.mark)
         return cast("Iterator[Block]", below)

@@ -47,6 +47,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from pymoo_hdte.io.layout import Channel, TableLayout
 from pymoo_hdte.units import factor_of_name
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -102,6 +103,12 @@ RUNNING = _named(
     elapsed="elapsed_s",
 )
 
+RANGES = {
+    "input_speed_range_rpm": ("input_speed", "speed_range"),
+    "load_torque_range_Nm": ("load_torque", "load_range"),
+}
+"""Fields that may stand in the place of a condition, in its unit: the lowest and highest mean."""
+
 TORSION = _named(sample_rate="sample_rate_Hz")
 
 # Numbers of decimals, chosen far below the noise of any sensor.
@@ -112,6 +119,24 @@ COLUMNS = {
     "input_torque": ("input_torque_Nm", 6),
     "output_torque": ("output_torque_Nm", 5),
 }
+
+LAYOUT = TableLayout(
+    format="csv",
+    channels={
+        channel: Channel(column, unit)
+        for channel, unit in (
+            ("input_angle", "rad"),
+            ("output_angle", "rad"),
+            ("input_torque", "N.m"),
+            ("output_torque", "N.m"),
+        )
+        for column, _ in (COLUMNS[channel],)
+    },
+    time=Channel(COLUMNS["time"][0], "s"),
+    sample_rate=None,
+    skip_rows=0,
+)
+"""The columns of a file for which the campaign states none."""
 
 CONTROL = re.compile(
     r"\bT\s*=\s*(\S+?)\s*\*\s*\(w_set - w\)\s*\+\s*(\S+?)\s*\*\s*integral\(w_set - w\)"
