@@ -160,7 +160,7 @@ def read_columns(
     gaps : bool
         Whether values may be missing or not finite.
     seen : callable, optional
-        Is told how many further bytes of a file of text have been read.
+        Is told how many further bytes have been read.
 
     Raises
     ------
@@ -173,6 +173,8 @@ def read_columns(
     names: list[Any] = list(dict.fromkeys(channel.column for channel in mapped))
     if layout.format == "matlab":
         vectors = read_vectors(path, names)
+        if seen:
+            seen(path.stat().st_size)
         raw = {name: vectors[name][layout.skip_rows :] for name in names}
         read = Columns(path, layout, raw, None, len(raw[names[0]]))
         for name in names if not gaps else ():

@@ -32,9 +32,25 @@ Block = tuple[Sequence[int], list[Row]]
 """The numbers of the lines on which rows begin, and the rows."""
 Seen = Callable[[int], None]
 """Is told how many further bytes of a file have been read."""
+Progress = Callable[[int, int], None]
+"""Is told how many bytes of all files have been read, and how many there are."""
 
 _NO_TEXT = re.compile("[\0\udc80-\udcff]")
 """NUL, or a byte that is no UTF-8, as Python hands it on."""
+
+
+def told(progress: Progress | None, paths: Sequence[Path]) -> Seen | None:
+    """Return what adds up the bytes that are read and tells them, with those of all files."""
+    if progress is None:
+        return None
+    total, done = sum(path.stat().st_size for path in paths), 0
+
+    def seen(further: int) -> None:
+        nonlocal done
+        done += further
+        progress(done, total)
+
+    return seen
 
 
 def line_blocks(

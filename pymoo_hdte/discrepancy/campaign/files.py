@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +32,9 @@ from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.layout import layout_from_fields
-from pymoo_hdte.io.text_lines import Seen
+from pymoo_hdte.io.text_lines import Progress, told
 from pymoo_hdte.io.text_table import write_columns
 from pymoo_hdte.io.toml import toml_text, toml_with_lines
-
-Progress = Callable[[int, int], None]
-"""Is told how many bytes of the records have been read, and how many there are."""
 
 
 def read_campaign(
@@ -79,7 +76,7 @@ def read_campaign(
         places = [f"{CAMPAIGN_FILE}.record[{index}]" for index in range(len(entries))]
         pairs = list(zip(entries, places, strict=True))
         paths = [record_path(entry, place, folder) for entry, place in pairs]
-        seen = _told(progress, paths)
+        seen = told(progress, paths)
         files = [
             read_record(entry, place, path, believed.ratio, shared, seen)
             for (entry, place), path in zip(pairs, paths, strict=True)
@@ -170,20 +167,6 @@ def _rig(table: Fields) -> Rig:
         allowed = "'... T = P*(w_set - w) + I*integral(w_set - w) ...' with two numbers"
         raise InvalidInput(f"{place}.control", sentence, allowed) from None
     return build(Rig, RIG, table, place, proportional=proportional, integral=integral)
-
-
-def _told(progress: Progress | None, paths: Sequence[Path]) -> Seen | None:
-    """Return what adds up the bytes that are read and tells them, with those of all files."""
-    if progress is None:
-        return None
-    total, done = sum(path.stat().st_size for path in paths), 0
-
-    def seen(further: int) -> None:
-        nonlocal done
-        done += further
-        progress(done, total)
-
-    return seen
 
 
 def _placed_in_files(error: InvalidInput, files: Sequence[FileOfRecord]) -> InvalidInput:
