@@ -15,7 +15,12 @@ UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3},
     "angle": {"rad": 1.0, "deg": DEGREE, "arcsec": ARCSEC, "rev": 2.0 * math.pi},
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
-    "speed": {"rad/s": 1.0, "deg/s": DEGREE, "r/min": REVOLUTION_PER_MINUTE},
+    "speed": {
+        "rad/s": 1.0,
+        "deg/s": DEGREE,
+        "r/min": REVOLUTION_PER_MINUTE,
+        "rpm": REVOLUTION_PER_MINUTE,
+    },
     "angle rate": {"rad/s": 1.0},
     "linear speed": {"m/s": 1.0, "mm/s": 1e-3},
     "acceleration": {"rad/s2": 1.0},

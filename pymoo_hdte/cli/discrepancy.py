@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -44,19 +46,19 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
     believed = options.believed, options.sheet
-    document = _analysed(options.campaign, options.out, options.data, believed, say)
+    document = _analysed(options, believed, say)
     return Outcome(document, _summary(document, options.out))
 
 
-def _analysed(
-    folder: Path, out: Path, data: Path | None, believed: ModelFiles, say: Say
-) -> dict[str, Any]:
+def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> dict[str, Any]:
     """Analyse a campaign or a rig and write its report; return the verdict's document."""
+    from pymoo_hdte.cli.reading_bar import ReadingBar
     from pymoo_hdte.discrepancy import analyse, check_report_folder
 
-    check_report_folder(out)
+    check_report_folder(options.out)
     say("reading the records")
-    measured = _believing(_measured(folder, data), *believed)
+    with closing(ReadingBar(options.quiet)) as bar:
+        measured = _believing(_measured(options.campaign, options.data, bar), *believed)
     say("looking for what is missing")
     analysis = analyse(measured)
     say("locating the misfit")
@@ -64,23 +66,23 @@ def _analysed(
     say("proving it on the records that were held out")
     analysis.prove()
     say("choosing the next test and writing the report")
-    return analysis.report(out)
+    return analysis.report(options.out)
 
 
-def _measured(folder: Path, data: Path | None) -> Any:
+def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], None]) -> Any:
     """Read a campaign of a drive, or a rig of any other mechanism."""
     from pymoo_hdte.discrepancy import read_campaign, read_rig
     from pymoo_hdte.discrepancy.campaign.format import CAMPAIGN_FILE
     from pymoo_hdte.discrepancy.mechanism.files import RIG_FILE
 
     if (folder / RIG_FILE).is_file() or folder.suffix == ".toml":
-        return read_rig(folder, data)
+        return read_rig(folder, data, progress)
     if data is not None:
         raise InvalidInput("--data", str(data), f"none without a {RIG_FILE}")
     if folder.is_dir() and not (folder / CAMPAIGN_FILE).is_file():
         allowed = f"a folder with {CAMPAIGN_FILE}, of a harmonic drive, or {RIG_FILE}, of another"
         raise InvalidInput("CAMPAIGN", str(folder), allowed)
-    return read_campaign(folder)
+    return read_campaign(folder, progress=progress)
 
 
 def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:

@@ -13,7 +13,8 @@ from pymoo_hdte.discrepancy.campaign.campaign import (
     TorsionRecord,
 )
 from pymoo_hdte.discrepancy.campaign.files import read_campaign, write_campaign
-from pymoo_hdte.discrepancy.campaign.line_fit import OrderLines, order_lines, residual_spectrum
+from pymoo_hdte.discrepancy.campaign.line_fit import OrderLines, order_lines
+from pymoo_hdte.discrepancy.campaign.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel, read_mechanism_model
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,56 +11,69 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.io.layout import CHANNEL_UNITS, Channel, TableLayout, layout_from_fields
 from pymoo_hdte.io.matlab import read_vectors
-from pymoo_hdte.io.text_table import LARGEST, column_label, line_of_row, read_text_table
-from pymoo_hdte.units import UNITS
+from pymoo_hdte.io.text_columns import TextTable, column_label
+from pymoo_hdte.io.text_lines import Seen
+from pymoo_hdte.io.text_table import LARGEST, read_text_table
 
-MEASURED = (
-    *("time", "angle", "length", "speed", "linear speed", "acceleration", "linear acceleration"),
-    *("force", "torque", "current", "voltage", "ratio"),
-)
-"""Quantities, among those of `pymoo_hdte.units`, that a channel may hold."""
-CHANNEL_UNITS = {unit: size for one in MEASURED for unit, size in UNITS[one].items()}
-"""Every unit a channel may have, with its factor to SI."""
+__all__ = ["CHANNEL_UNITS", "LARGEST", "Channel", "TableLayout", "layout_from_fields"]
 
 FEWEST_ROWS = 16
 STEP_SPREAD = 0.01  # Relative, of a time step from the median step.
 ROWS_PER_FILLED = 100  # Interpolated values may stand in fewer than one row in this many.
 LONGEST_GAP = 2  # Rows: across more of them a straight line is no motion.
-RawColumns = dict[Any, NDArray[np.float64]]
 
 
-@dataclass(frozen=True)
-class Channel:
-    """A column (in a plain table its number from 0) and its unit, one of `CHANNEL_UNITS`.
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Mapped columns as they stand in a file, without the rows to be skipped.
 
-    Another unit raises `InvalidInput`. ``scale`` is a factor after the unit; ``unwrap`` is for
-    angles that jump by a turn.
+    Attributes
+    ----------
+    path : Path
+    layout : TableLayout
+    raw : dict of str or int to ndarray, shape (n,)
+        By title, or by number in a plain table.
+    text : TextTable or None
+        None for a MATLAB file.
+    length : int
+        Number of rows.
     """
 
-    column: str | int
-    unit: str
-    scale: float = 1.0
-    unwrap: bool = False
+    path: Path
+    layout: TableLayout
+    raw: dict[Any, NDArray[np.float64]]
+    text: TextTable | None
+    length: int
 
-    def __post_init__(self) -> None:
-        one_of("unit", self.unit, UNITS["angle"] if self.unwrap else CHANNEL_UNITS)
+    def si(self, channel: Channel, rows: slice = slice(None)) -> NDArray[np.float64]:
+        """Return a channel in SI, shape (n,); what is not finite is interpolated."""
+        raw = self.raw[channel.column][rows]
+        at = np.flatnonzero(np.isfinite(raw))
+        # Unwrapped before interpolation, which is invalid across a jump of the angle.
+        values = raw if at.size == raw.size else raw[at]
+        if channel.wraps is not None:
+            values = np.unwrap(values, period=channel.wraps)
+        values = (values - channel.zero if channel.zero else values) * channel.factor
+        values = (np.unwrap(values) if channel.unwrap else values) * channel.scale
+        return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
 
+    def place(self, row: int, what: str | None = None) -> str:
+        """Return where in the file a row stands, for errors about it or about one of its cells."""
+        row_of_file = row + self.layout.skip_rows + 1
+        place = f"line {self.text.lines[row]}" if self.text else f"row {row_of_file}"
+        return f"{self.path.name}, {place}" + ("" if what is None else f": {what}")
 
-@dataclass(frozen=True)
-class TableLayout:
-    """What `layout_from_fields` reads: a time column or a sample rate in Hz, never both.
-
-    ``skip_rows`` rows at the start are left out unread: a start-up, or remarks in a plain table.
-    """
-
-    format: str
-    channels: dict[str, Channel]
-    time: Channel | None
-    sample_rate: float | None
-    skip_rows: int
+    @property
+    def span(self) -> str:
+        """Where all rows stand."""
+        if self.text:
+            return f"{self.path.name}, lines {self.text.lines[0]} to {self.text.lines[-1]}"
+        first = self.layout.skip_rows + 1
+        last = self.layout.skip_rows + self.length
+        return f"{self.path.name}, rows {first} to {last}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,49 +89,18 @@ class Table:
     dropped: int
 
 
-def layout_from_fields(table: Fields) -> TableLayout:
-    """Return the layout in ``[table]`` of a rig's file, or raise `InvalidInput` with the field."""
-    form = table.choice("format", ("matlab", "csv", "plain"))
-    channels = table.table("channels")
-    # Fields does not tell its names, because its other users know theirs beforehand.
-    names = list(channels.names())
-    if not names:
-        raise InvalidInput(table._name("channels"), {}, "at least one channel")
-    mapped = {name: _channel(channels.table(name), form, CHANNEL_UNITS) for name in names}
-    time = _channel(table.table("time"), form, UNITS["time"]) if table.has("time") else None
-    if time and table.has("sample_rate"):
-        raise InvalidInput(table._name("time"), time.column, "absent if sample_rate is given")
-    rate = None if time else table.number("sample_rate", at_least=1e-3, at_most=1e9)
-    skip_rows = table.whole("skip_rows", 0) if table.has("skip_rows") else 0
-    table.finish()
-    return TableLayout(form, mapped, time, rate, skip_rows)
-
-
-def _channel(table: Fields, form: str, units: Collection[str]) -> Channel:
-    column = table.whole("column", 0) if form == "plain" else table.text("column")
-    unwrap = table.take("unwrap", "") if table.has("unwrap") else False
-    if not isinstance(unwrap, bool):
-        raise InvalidInput(table._name("unwrap"), unwrap, "true or false")
-    unit = table.choice("unit", UNITS["angle"] if unwrap else units)
-    has_scale = table.has("scale")
-    scale = table.number("scale", at_least=-LARGEST, at_most=LARGEST) if has_scale else 1.0
-    table.finish()
-    return Channel(column, unit, scale, unwrap)
-
-
-def read_table(path: Path, layout: TableLayout) -> Table:
+def read_table(path: Path, layout: TableLayout, seen: Seen | None = None) -> Table:
     """Read the mapped columns; a constant one is allowed, since the caller knows which must vary.
 
     Raises `OSError` if the file cannot be read and `InvalidInput`, with file and line (MATLAB:
     row), if it is damaged, a column is missing, ragged or holds text or a huge number, too few
     rows are finite or too many at a time are not, or time does not rise in equal steps.
     """
-    mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
-    names = list(dict.fromkeys(channel.column for channel in mapped))
-    columns = _columns(path, layout, names)
+    read = read_columns(path, layout, gaps=True, seen=seen)
+    columns = read.raw
 
     def refuse(row: int, column: str | int, allowed: str) -> InvalidInput:
-        field = _place(path, layout, row, column_label(column))
+        field = read.place(row, column_label(column))
         return InvalidInput(field, float(columns[column][row]), allowed)
 
     for column, raw in columns.items():
@@ -143,9 +124,9 @@ def read_table(path: Path, layout: TableLayout) -> Table:
     for at in np.flatnonzero(gaps > LONGEST_GAP)[:1]:
         allowed = f"gaps of at most {LONGEST_GAP} rows; here are {gaps[at]}"
         raise missing(int(whole[at]) + 1, allowed)
-    kept = {name: raw[start:stop] for name, raw in columns.items()}
+    kept = slice(start, stop)
     if layout.time:
-        time = _si(layout.time, kept)
+        time = read.si(layout.time, kept)
         steps = np.diff(time)
         step = float(np.median(steps))
         for row in start + 1 + np.flatnonzero(np.abs(steps - step) >= STEP_SPREAD * step)[:1]:
@@ -154,7 +135,7 @@ def read_table(path: Path, layout: TableLayout) -> Table:
     else:
         rate = real_number("sample_rate", layout.sample_rate, above=0.0)
         time = (layout.skip_rows + np.arange(start, stop)) / rate
-    channels = {name: _si(channel, kept) for name, channel in layout.channels.items()}
+    channels = {name: read.si(channel, kept) for name, channel in layout.channels.items()}
     return Table(time, channels, int(np.count_nonzero(~finite)))
 
 
@@ -167,26 +148,59 @@ def check_sha256(path: Path, expected: str) -> None:
         raise InvalidInput(f"{path.name}: sha256", actual, f"one that begins with {expected}")
 
 
-def _columns(path: Path, layout: TableLayout, names: list[Any]) -> RawColumns:
-    """Return columns as they stand in the file, without the rows to be skipped."""
+def read_columns(
+    path: Path, layout: TableLayout, *, gaps: bool = False, seen: Seen | None = None
+) -> Columns:
+    """Read the mapped columns.
+
+    Parameters
+    ----------
+    path : Path
+    layout : TableLayout
+    gaps : bool
+        Whether values may be missing or not finite.
+    seen : callable, optional
+        Is told how many further bytes have been read.
+
+    Raises
+    ------
+    InvalidInput
+        As `read_table`, but for what it says of values, of rows and of time.
+    OSError
+        If the file cannot be read.
+    """
+    mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
+    names: list[Any] = list(dict.fromkeys(channel.column for channel in mapped))
     if layout.format == "matlab":
-        found = read_vectors(path, names)
-        return {name: found[name][layout.skip_rows :] for name in names}
-    csv = layout.format == "csv"
-    table = read_text_table(path, titled=csv, skip_rows=layout.skip_rows)
-    return table.numbers(names, gaps=True)
+        vectors = read_vectors(path, names)
+        if seen:
+            seen(path.stat().st_size)
+        raw = {name: vectors[name][layout.skip_rows :] for name in names}
+        read = Columns(path, layout, raw, None, len(raw[names[0]]))
+        for name in names if not gaps else ():
+            for row in np.flatnonzero(~np.isfinite(raw[name]))[:1]:
+                place = read.place(int(row), column_label(name))
+                raise InvalidInput(place, float(raw[name][row]), "a finite number")
+        return read
+    titled = layout.format == "csv"
+    table = read_text_table(
+        path,
+        titled=titled,
+        skip_rows=layout.skip_rows,
+        wanted=[str(name) for name in names] if titled else (),
+        delimiter=layout.delimiter,
+        decimal=layout.decimal,
+        seen=seen,
+    )
+    for channel in mapped:
+        _check_unit(table, channel)
+    raw = table.numbers(names, gaps=gaps)
+    return Columns(path, layout, raw, table, len(raw[names[0]]))
 
 
-def _si(channel: Channel, kept: Mapping[str | int, NDArray[np.float64]]) -> NDArray[np.float64]:
-    raw = kept[channel.column]
-    at = np.flatnonzero(np.isfinite(raw))
-    values = raw[at] * CHANNEL_UNITS[channel.unit]
-    # Unwrapped before interpolation, which is invalid across a jump of the angle.
-    values = (np.unwrap(values) if channel.unwrap else values) * channel.scale
-    return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
-
-
-def _place(path: Path, layout: TableLayout, row: int, what: str) -> str:
-    row += layout.skip_rows
-    number = line_of_row(row) if layout.format == "csv" else row + 1
-    return f"{path.name}, {'row' if layout.format == 'matlab' else 'line'} {number}: {what}"
+def _check_unit(table: TextTable, channel: Channel) -> None:
+    """Refuse a channel whose unit is another than the file has in its row of units."""
+    unit = table.units.get(str(channel.column), "").strip("[]() ")
+    if unit in CHANNEL_UNITS and CHANNEL_UNITS[unit] != channel.factor:
+        field = f"{table.file}, line {table.title_line + 1}: unit of {channel.column}"
+        raise InvalidInput(field, unit, f"{channel.unit}, as the layout says")

@@ -79,6 +79,7 @@ def test_all_numbers_of_matlab_in_rows_and_columns(tmp_path):
 def test_every_unit_is_converted(tmp_path):
     path = write(tmp_path, "csv", {"a": np.arange(20.0)})
     known = {"um": 1e-6, "rev": 2 * math.pi, "arcsec": math.pi / 648000, "r/min": math.pi / 30}
+    known |= {"rpm": math.pi / 30}
     known |= dict.fromkeys(("ms", "mm", "mm/s", "N.mm", "mN.m", "mA", "mV"), 1e-3)
     known |= dict.fromkeys(("deg", "deg/s"), math.pi / 180)
     si = {"s", "m", "rad", "rad/s", "m/s", "N", "N.m", "A", "V", "m/s2", "rad/s2", "1"}

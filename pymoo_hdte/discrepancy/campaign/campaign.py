@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -137,7 +138,8 @@ class Campaign:
                 raise InvalidInput("name of a record", record.name, "each name once")
             names.add(record.name)
             # A copy of a training record among the held-out ones would confirm any fit to it.
-            twin = measurements.setdefault(record.output_angle.tobytes(), record.name)
+            digest = hashlib.sha256(record.output_angle.tobytes()).digest()
+            twin = measurements.setdefault(digest, record.name)
             if twin != record.name:
                 allowed = f"each measurement once; it repeats {twin}"
                 raise InvalidInput("record", record.name, allowed)

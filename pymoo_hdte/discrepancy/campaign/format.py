@@ -1,47 +1,9 @@
-"""Names of the campaign format: ``campaign.toml`` and one ``.csv.gz`` or ``.csv`` file per record.
+"""Names of the campaign format: ``campaign.toml`` and a file for each record.
 
-=========================  ===================================================================
-table                      fields; those with ``=`` may be left out
-=========================  ===================================================================
-top                        ``title``, ``drive``; what is good enough, for effects that are real
-                           but do not matter: ``good_enough_arcsec`` of transmission error,
-                           ``good_enough_N_m`` of torque, both optional
-``[believed]``             ``ratio``, ``stiffness_Nm_per_rad``, ``damping_output_Nms_per_rad``,
-                           ``input_inertia_kgm2``, ``input_damping_Nms_per_rad``,
-                           ``output_damping_Nms_per_rad``, ``output_inertia_kgm2``,
-                           ``load_inertia_kgm2``, ``static_error_orders``,
-                           ``static_error_amplitudes_arcsec``, ``tolerance = 0.1``,
-                           ``static_error_tolerance = 0.3``; ``[believed.tolerances]`` of single
-                           values and ``[[believed.effect]]`` as in a model file, both optional
-top, instead of it         ``model``, a drive model such as ``revised_model.toml``, and ``sheet``,
-                           its data sheet (without it ``MODEL_sheet.toml``), relative to the folder
-``[tolerance]``            of a model's values: ``default = 0.1``, ``static_error = 0.3``, and
-                           ``stiffness``, ``damping``, ``input_inertia``, ``input_damping``,
-                           ``output_damping``, ``load_inertia`` as ``default`` says
-``[rig]``                  ``proportional_Nms_per_rad`` and ``integral_Nm_per_rad``, or the
-                           sentence ``control`` with both numbers; ``angle_noise_arcsec``,
-                           ``angle_quantisation_arcsec = 0.3``, ``input_torque_noise_Nm``,
-                           ``input_torque_gain = 0.005``, ``input_torque_zero_Nm = 0.003``,
-                           ``output_torque_noise_Nm``, ``output_torque_gain = 0.005``,
-                           ``output_torque_zero_Nm = 0.1``, ``repeatability_arcsec``,
-                           ``torsion_angle_noise_arcsec``
-``[[record]]``, running    ``file``, ``test = "running"``, ``input_speed_rpm``,
-                           ``load_torque_Nm``, ``sample_rate_Hz``, ``samples_averaged``,
-                           ``elapsed_s``, ``role``
-``[[record]]``, torsion    ``file``, ``test = "torsion"``, ``sample_rate_Hz``, ``role``
-=========================  ===================================================================
-
-Columns of a running record: ``time_s, input_angle_rad, output_angle_rad, input_torque_Nm,
-output_torque_Nm``; of a torsion record: ``time_s, output_angle_rad, output_torque_Nm``.
-
-The believed drive is a model: values, each with the relative tolerance that a fit keeps, and
-effects whose values are kept. The inertia of the load and the damping of the torsion are values,
-also where a model file has them as effects. The phases of the static error are fitted anew; those
-of effects are kept, so that the input encoder must have the same zero as for the model.
-
-The ``role`` of a running record is ``"train"``, to be fitted, or ``"held_out"``, to judge the
-result; a torsion record is always ``"train"``. ``time_s`` may have any origin: ``elapsed_s`` says
-when in the session a record began.
+What they mean, with units and signs, stands in ``docs/campaign_format.md``. The believed drive is a
+model: values, each with the relative tolerance that a fit keeps, and effects whose values are kept.
+The inertia of the load and the damping of the torsion are values, also where a model file has them
+as effects.
 """
 
 from __future__ import annotations
@@ -49,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from pymoo_hdte.io.layout import Channel, TableLayout
 from pymoo_hdte.units import factor_of_name
 
 CAMPAIGN_FILE = "campaign.toml"
@@ -109,6 +72,12 @@ RUNNING = _named(
     elapsed="elapsed_s",
 )
 
+RANGES = {
+    "input_speed_range_rpm": ("input_speed", "speed_range"),
+    "load_torque_range_Nm": ("load_torque", "load_range"),
+}
+"""Fields that may stand in the place of a condition, in its unit: the lowest and highest mean."""
+
 TORSION = _named(sample_rate="sample_rate_Hz")
 
 # Numbers of decimals, chosen far below the noise of any sensor.
@@ -119,6 +88,24 @@ COLUMNS = {
     "input_torque": ("input_torque_Nm", 6),
     "output_torque": ("output_torque_Nm", 5),
 }
+
+LAYOUT = TableLayout(
+    format="csv",
+    channels={
+        channel: Channel(column, unit)
+        for channel, unit in (
+            ("input_angle", "rad"),
+            ("output_angle", "rad"),
+            ("input_torque", "N.m"),
+            ("output_torque", "N.m"),
+        )
+        for column, _ in (COLUMNS[channel],)
+    },
+    time=Channel(COLUMNS["time"][0], "s"),
+    sample_rate=None,
+    skip_rows=0,
+)
+"""The columns of a file for which the campaign states none."""
 
 CONTROL = re.compile(
     r"\bT\s*=\s*(\S+?)\s*\*\s*\(w_set - w\)\s*\+\s*(\S+?)\s*\*\s*integral\(w_set - w\)"

@@ -11,18 +11,18 @@ it, and each one through the slope of its lines, as order x |phasor| x N x angle
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property, reduce
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import solve_triangular
 from scipy.special import factorial
 
 from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 from pymoo_hdte.discrepancy.campaign.believed import Rig
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
-from pymoo_hdte.discrepancy.engine.rules import RULES
 
 CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
 
@@ -30,11 +30,8 @@ CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle"
 LARGEST_CONDITION = 1e3
 """Largest condition number of the fit; beyond it the noise of the lines grows a thousandfold."""
 
-LEAST_SEPARATION = 0.1
-"""Least share of a line's power that is independent of the fitted lines."""
-
-BLOCK = 64
-"""Lines of the residual spectrum worked on at once, to bound the memory."""
+ROWS_A_BLOCK = 1 << 15
+"""Rows worked on at once, to bound the memory."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +103,10 @@ def order_lines(
     InvalidInput
         For orders out of range or closer together than the record can tell apart.
     """
-    fit = _Fit.of(record, ratio, orders)
-    gains = averaging_gain(fit.orders, record)
+    fit = LineFit.of(record, ratio, orders)
+    gains, coefficients = averaging_gain(fit.orders, record), fit.coefficients
     m = len(gains)
-    real, imaginary = fit.coefficients[2 : 2 + m].T, fit.coefficients[2 + m :].T
+    real, imaginary = coefficients[2 : 2 + m].T, coefficients[2 + m :].T
     inverse = np.linalg.inv(fit.triangle)
     kept = np.r_[0, 2 : 2 + 2 * m]
     scales = 1.0 / np.concatenate([[1.0], gains, gains])
@@ -119,12 +116,12 @@ def order_lines(
     # The noise of the angle also enters the exponent, where a line is steep; it is nearly white.
     steepness = fit.orders * phasors
     noise = noise + 0.5 * (steepness @ steepness.conj().T).real * noise[3, 3]
-    bends = inverse @ (fit.basis.T @ _bent(record))
+    bends = inverse @ fit.projections[1]
     lines = (bends[2 : 2 + m] + 1j * bends[2 + m :]).T / gains
     return OrderLines(
         orders=fit.orders,
-        mean=fit.coefficients[0],
-        slope=fit.coefficients[1],
+        mean=coefficients[0],
+        slope=coefficients[1],
         phasors=phasors,
         covariance=np.diag(noise)[:, None, None] * unit,
         row_covariance=noise,
@@ -157,139 +154,111 @@ def row_covariance(rig: Rig, ratio: float, samples_averaged: int) -> NDArray[np.
     return covariance / samples_averaged
 
 
-def residual_spectrum(
-    record: RunningRecord,
-    rig: Rig,
-    ratio: float,
-    orders: ArrayLike | Sequence[float],
-    highest_order: float = RULES.highest_order,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the residual of the order lines, at multiples of 1/N and of 1, in units of the noise.
-
-    Errors of the output repeat every output turn and errors of the input every input turn; unless
-    the ratio is a whole number, their orders differ.
-
-    Each line is made orthogonal to the fitted lines before it is fitted to the residual, so that
-    these do not leak into it. Orders too close to a fitted line are left out. Under noise alone the
-    power is exponential (Scargle, Astrophysical Journal 263, 1982).
-
-    Parameters
-    ----------
-    record, rig, ratio, orders
-        As in `order_lines`.
-    highest_order : float
-        Cycles per input turn.
-
-    Returns
-    -------
-    orders : ndarray, shape (k,)
-        Cycles per input turn, up to ``highest_order`` or the Nyquist order.
-    amplitudes : ndarray, shape (4, k)
-        Dimensionless, by channel as in `OrderLines`: divided by their root mean square under noise
-        alone. The square is then exponential with mean 1: a line exceeds x by chance with
-        probability exp(-x**2).
-
-    Raises
-    ------
-    InvalidInput
-        As `order_lines`.
-    """
-    fit = _Fit.of(record, ratio, orders)
-    highest = min(highest_order, _nyquist_order(record))
-    multiples = np.arange(1, int(np.ceil(highest * ratio - 1e-9)))
-    whole = ratio * np.arange(1, int(np.ceil(highest - 1e-9)))
-    whole = whole[np.abs(whole - whole.round()) > 1e-9]
-    sigma = np.sqrt(np.diag(row_covariance(rig, ratio, record.samples_averaged)))
-    residual = (fit.values - fit.basis @ (fit.basis.T @ fit.values)) / sigma
-    rows = np.hstack([fit.basis, residual]).T
-    angle = record.input_angle[:, None] / ratio
-    found, amplitudes = [], []
-    for block, waves in _waves(angle, multiples, whole):
-        # As real numbers: a product of real and complex matrices would copy the real one.
-        products = (rows @ waves.view(float)).view(complex)
-        separate, amplitude = _amplitudes(waves, *np.split(products, [fit.basis.shape[1]]))
-        found.append(block[separate] / ratio)
-        amplitudes.append(amplitude)
-    searched = np.concatenate(found)
-    rising = np.argsort(searched)
-    return searched[rising], np.concatenate(amplitudes, axis=1)[:, rising]
-
-
-def _waves(
-    angle: NDArray[np.float64], multiples: NDArray[np.int_], others: NDArray[np.floating[Any]]
-) -> Iterator[tuple[NDArray[Any], NDArray[np.complex128]]]:
-    """Yield consecutive multiples in blocks, then others, with their waves over angles (n, 1)."""
-    powers = np.exp(1j * angle * np.arange(BLOCK))
-    for block in np.split(multiples, range(BLOCK, len(multiples), BLOCK)):
-        yield block, powers[:, : len(block)] * np.exp(1j * angle * block[0])
-    yield others, np.exp(1j * angle * others)
-
-
-def _amplitudes(
-    waves: NDArray[np.complex128],
-    shared: NDArray[np.complex128],
-    products: NDArray[np.complex128],
-) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Fit cosine and sine of each wave, orthogonal to the basis, to residuals of unit variance.
-
-    ``waves`` has shape (n, k), ``shared``, their part in the basis, (p, k), and ``products`` with
-    the residuals (4, k).
-    """
-    power = len(waves) - np.sum(np.abs(shared) ** 2, axis=0)
-    square = np.einsum("nk,nk->k", waves, waves) - np.sum(shared**2, axis=0)
-    separate = power - np.abs(square) > LEAST_SEPARATION * len(waves)
-    power, square, products = power[separate], square[separate], products[:, separate]
-    # Normal equations of the two columns: c'c = (power + Re square)/2, s's = (power - Re square)/2,
-    # c's = Im square / 2; their chi-square of two degrees of freedom has mean 2.
-    chi_square = 2.0 * (np.abs(products) ** 2 * power - np.real(products**2 * np.conj(square)))
-    chi_square /= power**2 - np.abs(square) ** 2
-    return separate, np.sqrt(chi_square / 2.0)
-
-
 @dataclass(frozen=True, eq=False)
-class _Fit:
-    """Least squares by QR: ``values = basis @ triangle @ coefficients + residual``."""
+class LineFit:
+    """Least squares by QR: ``values = basis @ triangle @ coefficients + residual``.
 
+    Block by block, so that a record of millions of rows takes the memory of a block: the triangle
+    of all rows is that of the triangle of those before and of a block (Golub and Van Loan, Matrix
+    Computations, 2013, 5.2.9), and a block of the basis follows from the triangle.
+
+    Attributes
+    ----------
+    record, ratio, orders
+        As in `order_lines`.
+    parts : tuple of slice
+        Rows of each block.
+    whole : ndarray, shape (n, 2 + 2 m), or None
+        The basis of a record of one block.
+    triangle : ndarray, shape (2 + 2 m, 2 + 2 m)
+    """
+
+    record: RunningRecord
+    ratio: float
     orders: NDArray[np.float64]
-    values: NDArray[np.float64]
-    basis: NDArray[np.float64]
+    parts: tuple[slice, ...]
+    whole: NDArray[np.float64] | None
     triangle: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
 
     @classmethod
-    def of(cls, record: RunningRecord, ratio: float, orders: ArrayLike) -> _Fit:
+    def of(cls, record: RunningRecord, ratio: float, orders: ArrayLike) -> LineFit:
+        """Fit lines; the arguments and errors are those of `order_lines`."""
         checked = finite_array("orders", orders, (None,))
         for order in checked:
-            real_number("orders", float(order), above=0.0, below=_nyquist_order(record))
-        angle = np.outer(record.input_angle, checked)
-        time = _centred(record)
-        design = np.column_stack([np.ones_like(time), time, np.cos(angle), -np.sin(angle)])
+            real_number("orders", float(order), above=0.0, below=nyquist_order(record))
+        starts = range(0, len(record.time), ROWS_A_BLOCK)
+        parts = tuple(slice(start, start + ROWS_A_BLOCK) for start in starts)
+        design = _design(record, checked, parts[0])
         scale = np.linalg.norm(design, axis=0)
         basis, triangle = np.linalg.qr(design / scale)
-        if design.shape[0] <= design.shape[1] or np.linalg.cond(triangle) > LARGEST_CONDITION:
+        for part in parts[1:]:
+            rows = np.vstack([triangle, _design(record, checked, part) / scale])
+            triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+        unit = triangle / np.linalg.norm(triangle, axis=0)
+        if len(record.time) <= len(scale) or np.linalg.cond(unit) > LARGEST_CONDITION:
             allowed = "orders that a record of this length can tell apart"
             raise InvalidInput("orders", checked.tolist(), allowed)
-        values = np.column_stack(
+        whole = basis if len(parts) == 1 else None
+        return cls(record, ratio, checked, parts, whole, triangle * scale)
+
+    @cached_property
+    def projections(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Parts in the basis of the channels, shape (2 + 2 m, 4), and of the bends, (2 + 2 m, 3).
+
+        The bends are (t - t_mid)^k / k! for k = 2, 3, 4.
+        """
+        channels, bends = zip(*map(self._project, self.parts), strict=True)
+        return np.asarray(reduce(np.add, channels)), np.asarray(reduce(np.add, bends))
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """Of the straight line and of cosines and sines of each channel, shape (2 + 2 m, 4)."""
+        return np.asarray(np.linalg.solve(self.triangle, self.projections[0]))
+
+    def basis(self, part: slice) -> NDArray[np.float64]:
+        """Return the orthonormal columns that the lines span, of some rows, shape (b, 2 + 2 m)."""
+        if self.whole is not None:
+            return self.whole
+        design = _design(self.record, self.orders, part)
+        return solve_triangular(self.triangle, design.T, trans="T", check_finite=False).T
+
+    def values(self, part: slice) -> NDArray[np.float64]:
+        """Return the channels in some rows, shape (b, 4)."""
+        record = self.record
+        return np.column_stack(
             [
-                record.transmission_error(ratio),
-                record.input_torque,
-                record.output_torque,
-                record.input_angle,
+                record.input_angle[part] / self.ratio - record.output_angle[part],
+                record.input_torque[part],
+                record.output_torque[part],
+                record.input_angle[part],
             ]
         )
-        triangle = triangle * scale
-        coefficients = np.linalg.solve(triangle, basis.T @ values)
-        return cls(checked, values, basis, triangle, coefficients)
+
+    def residual(self, part: slice, basis: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what the lines leave of the channels in some rows, shape (b, 4)."""
+        return self.values(part) - basis @ self.projections[0]
+
+    def _project(self, part: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what some rows add to the parts in the basis of the channels and of bends."""
+        basis = self.basis(part)
+        return basis.T @ self.values(part), basis.T @ _bent(self.record, part)
 
 
-def _centred(record: RunningRecord) -> NDArray[np.float64]:
-    return np.asarray(record.time - (record.time[0] + record.time[-1]) / 2.0)
+def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
+    """Return the columns of the fit in some rows: a straight line, cosines and sines."""
+    angle = np.outer(record.input_angle[part], orders)
+    time = _centred(record, part)
+    return np.column_stack([np.ones_like(time), time, np.cos(angle), -np.sin(angle)])
 
 
-def _bent(record: RunningRecord) -> NDArray[np.float64]:
-    """Return (t - t_mid)^k / k! for k = 2, 3, 4, shape (n, 3)."""
+def _centred(record: RunningRecord, part: slice) -> NDArray[np.float64]:
+    return np.asarray(record.time[part] - (record.time[0] + record.time[-1]) / 2.0)
+
+
+def _bent(record: RunningRecord, part: slice) -> NDArray[np.float64]:
+    """Return (t - t_mid)^k / k! for k = 2, 3, 4 in some rows, shape (b, 3)."""
     powers = np.arange(2, 5)
-    return np.asarray(_centred(record)[:, None] ** powers / factorial(powers))
+    return np.asarray(_centred(record, part)[:, None] ** powers / factorial(powers))
 
 
 def _speed(record: RunningRecord) -> float:
@@ -297,6 +266,6 @@ def _speed(record: RunningRecord) -> float:
     return abs(float(travel / (record.time[-1] - record.time[0])))
 
 
-def _nyquist_order(record: RunningRecord) -> float:
+def nyquist_order(record: RunningRecord) -> float:
     """Return the order at half the rate of the rows, in cycles per input turn."""
     return float(np.pi * record.sample_rate / _speed(record))

@@ -164,7 +164,12 @@ def check_torsion(record: TorsionRecord, believed: BelievedDrive, rules: Rules) 
 def _check_travel(record: RunningRecord, ratio: float, rules: Rules) -> None:
     travel = float(record.input_angle[-1] - record.input_angle[0])
     speed = travel / float(record.time[-1] - record.time[0])
-    if not abs(speed - record.input_speed) <= rules.speed_mismatch * abs(record.input_speed):
+    if record.speed_range:
+        lowest, highest = record.speed_range
+        if not lowest <= speed <= highest:
+            allowed = f"{lowest:g} to {highest:g} rad/s, the range of the record"
+            raise InvalidInput("mean speed of input_angle", speed, allowed)
+    elif not abs(speed - record.input_speed) <= rules.speed_mismatch * abs(record.input_speed):
         within = f"{100.0 * rules.speed_mismatch:g} %"
         allowed = f"{record.input_speed:g} rad/s within {within}, the input speed of the record"
         raise InvalidInput("mean speed of input_angle", speed, allowed)
@@ -183,7 +188,13 @@ def _check_torques(
     # A single outlier moves the mean, but not the middle 95 %.
     spread = float(np.ptp(np.quantile(record.output_torque, (0.025, 0.975))))
     slack = multiple * rig.output_torque_zero + spread
-    if not abs(measured - load) <= rules.load_mismatch * abs(load) + slack:
+    if record.load_range:
+        lowest, highest = record.load_range
+        zero = rig.output_torque_zero
+        if not lowest - zero <= measured <= highest + zero:
+            allowed = f"{lowest:g} to {highest:g} N.m, the range of the record, or the zero beside"
+            raise InvalidInput("mean of output_torque", measured, allowed)
+    elif not abs(measured - load) <= rules.load_mismatch * abs(load) + slack:
         raise InvalidInput("mean of output_torque", measured, f"near the load of {load:g} N.m")
     motor = float(np.mean(record.input_torque))
     slack = multiple * rig.input_torque_zero

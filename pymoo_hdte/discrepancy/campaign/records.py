@@ -45,6 +45,9 @@ class RunningRecord:
         rad, absolute and unwrapped, with one common zero over a campaign.
     input_torque, output_torque : ndarray, shape (n,)
         On the input shaft from the motor, and between drive and load inertia, N.m.
+    speed_range, load_range : tuple of float, length 2 or 0
+        Lowest and highest mean speed, rad/s, and mean load torque, N.m, that the record may have.
+        Without them both are near the values set, within shares that `Rules` has.
 
     Raises
     ------
@@ -65,8 +68,12 @@ class RunningRecord:
     output_angle: NDArray[np.float64]
     input_torque: NDArray[np.float64]
     output_torque: NDArray[np.float64]
+    speed_range: tuple[float, ...] = ()
+    load_range: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        for name, inside in (("speed_range", self.input_speed), ("load_range", self.load_torque)):
+            _check_range(name, getattr(self, name), real_number(name, inside))
         if real_number("input_speed", self.input_speed) == 0.0:
             raise InvalidInput("input_speed", self.input_speed, "a speed other than zero")
         real_number("load_torque", self.load_torque)
@@ -119,6 +126,13 @@ class TorsionRecord:
         if self.role == "held_out":
             allowed = "'train' for a torsion sweep: only running records can judge the result"
             raise InvalidInput("role", self.role, allowed)
+
+
+def _check_range(name: str, limits: Any, inside: float) -> None:
+    if not isinstance(limits, tuple) or len(limits) not in (0, 2):
+        raise InvalidInput(name, limits, "a tuple of two numbers, or an empty one")
+    if limits and not real_number(name, limits[0]) <= inside <= real_number(name, limits[1]):
+        raise InvalidInput(name, limits, f"lowest and highest, with {inside:g} between them")
 
 
 def _check_record(record: Any, channels: tuple[str, ...]) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.discrepancy.campaign.believed import Rig
-from pymoo_hdte.discrepancy.campaign.line_fit import residual_spectrum
+from pymoo_hdte.discrepancy.campaign.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.engine.candidate import Candidate

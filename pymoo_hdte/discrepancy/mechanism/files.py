@@ -45,6 +45,7 @@ the records have units of their own::
     role = "train"                                 # or "held_out"
     name = "trapezoids"                            # optional: without it the name of the file
     sha256 = "6cf6814ae14618"                      # optional: first 8 or more digits
+    zero = { q = 12.5 }                            # optional: readings at zero, unit of the column
     [records.table]                                # optional: a layout of its own
     ...
 """
@@ -62,7 +63,9 @@ from pymoo_hdte.discrepancy.mechanism.models import (
     read_mechanism_model,
 )
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.tables import TableLayout, check_sha256, layout_from_fields, read_table
+from pymoo_hdte.io.layout import TableLayout, layout_from_fields, with_zeros
+from pymoo_hdte.io.tables import check_sha256, read_table
+from pymoo_hdte.io.text_lines import Progress, Seen, told
 from pymoo_hdte.io.toml import toml_with_lines
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.records import ROLES
@@ -125,7 +128,9 @@ class MeasuredMechanism:
         return replace(self, mechanism=model.mechanism, effects=model.effects, cutoff=cutoff)
 
 
-def read_rig(folder: str | Path, data: str | Path | None = None) -> MeasuredMechanism:
+def read_rig(
+    folder: str | Path, data: str | Path | None = None, progress: Progress | None = None
+) -> MeasuredMechanism:
     """Read and check a rig.
 
     Parameters
@@ -134,6 +139,8 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> MeasuredMech
         Where `RIG_FILE` is, or the path of a file like it.
     data : str or Path, optional
         Folder of the files of the records; by default the folder of the rig's file.
+    progress : callable, optional
+        Is told how many bytes of the records have been read, and how many there are.
 
     Raises
     ------
@@ -154,8 +161,12 @@ def read_rig(folder: str | Path, data: str | Path | None = None) -> MeasuredMech
         entries = top.tables("records")
         top.finish()
         records: dict[str, Record] = {}
-        for index, entry in enumerate(entries):
-            record = _record(entry, f"{path.name}.records[{index}]", files, shared, records, noise)
+        places = [f"{path.name}.records[{index}]" for index in range(len(entries))]
+        pairs = list(zip(entries, places, strict=True))
+        paths = [_path(entry, place, files) for entry, place in pairs]
+        seen = told(progress, paths)
+        for (entry, place), of_record in zip(pairs, paths, strict=True):
+            record = _record(entry, place, of_record, shared, records, noise, seen)
             records[record.name] = record
         _check_noise(noise, records, path.name)
     return MeasuredMechanism(
@@ -177,31 +188,38 @@ def _model(top: Fields, path: Path) -> MechanismModel:
     return replace(model, title=top.text("title"), cutoff=cutoff)
 
 
-def _record(
-    entry: Fields,
-    place: str,
-    folder: Path,
-    shared: TableLayout | None,
-    taken: Collection[str],
-    noise: Mapping[str, float],
-) -> Record:
+def _path(entry: Fields, place: str, folder: Path) -> Path:
     file = entry.text("file")
     # As a Windows path, which accepts both separators and drive letters.
     parts = PureWindowsPath(file)
     if parts.anchor or ".." in parts.parts or not (folder / file).is_file():
         raise InvalidInput(f"{place}.file", file, f"a file inside {folder}")
-    path, role = folder / file, entry.choice("role", ROLES)
+    return folder / file
+
+
+def _record(
+    entry: Fields,
+    place: str,
+    path: Path,
+    shared: TableLayout | None,
+    taken: Collection[str],
+    noise: Mapping[str, float],
+    seen: Seen | None,
+) -> Record:
+    role = entry.choice("role", ROLES)
     name = entry.text("name") if entry.has("name") else path.stem
     if name in taken:
         raise InvalidInput(f"{place}.name", name, "a name of its own for each record")
     layout = layout_from_fields(entry.table("table")) if entry.has("table") else shared
     if layout is None:
         raise InvalidInput(f"{place}.table", None, "a layout here, or [table] for all records")
+    if entry.has("zero"):
+        layout = with_zeros(entry.table("zero"), layout)
     expected = entry.text("sha256") if entry.has("sha256") else None
     entry.finish()
     if expected is not None:
         _check_sha256(path, expected, place)
-    table = read_table(path, layout)
+    table = read_table(path, layout, seen)
     try:
         of_channels = {one: noise[one] for one in noise if one in table.channels}
         return Record(name, role, table.time, table.channels, of_channels, table.dropped)

@@ -1,6 +1,6 @@
 """Order lines: planted lines come back, with the scatter that the covariance says."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from scipy.stats import chi2, kstest
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import Rig, RunningRecord, order_lines, residual_spectrum
+from pymoo_hdte.discrepancy.campaign import line_fit
 from pymoo_hdte.discrepancy.campaign.line_fit import averaging_gain, row_covariance
 from pymoo_hdte.units import ARCSEC
 
@@ -205,3 +206,22 @@ def test_residual_spectrum_looks_at_whole_orders_of_the_input_and_of_the_output(
 def test_orders_out_of_reach_are_refused(orders, rng):
     with pytest.raises(InvalidInput, match="orders"):
         order_lines(noisy(rng), RIG, RATIO, orders)
+
+
+def test_blocks_of_rows_give_the_lines_and_spectrum_of_all_rows(monkeypatch):
+    rng = np.random.default_rng(8)
+    whole = noisy(rng, 4)
+    fits = [order_lines(whole, RIG, RATIO, ORDERS)]
+    spectra = [residual_spectrum(whole, RIG, RATIO, ORDERS)]
+    # The last block has fewer rows than the fit has columns.
+    monkeypatch.setattr(line_fit, "ROWS_A_BLOCK", (len(whole.time) - 3) // 4)
+    fits.append(order_lines(whole, RIG, RATIO, ORDERS))
+    spectra.append(residual_spectrum(whole, RIG, RATIO, ORDERS))
+    # Rounding is relative to the rows, of which the input angle is many radians.
+    largest = np.abs(fits[0].mean) + np.abs(fits[0].slope) * np.ptp(whole.time)
+    for field in fields(fits[0]):
+        one, other = (getattr(fit, field.name) for fit in fits)
+        size = largest[:, None] if field.name == "phasors" else np.abs(one).max()
+        assert np.all(np.abs(other - one) <= 1e-12 * size)
+    np.testing.assert_array_equal(spectra[1][0], spectra[0][0])
+    np.testing.assert_allclose(spectra[1][1], spectra[0][1], rtol=1e-8, atol=1e-9)

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
-from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, residual_spectrum
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
+from pymoo_hdte.discrepancy.campaign.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.misfit.map import Flags, Location
 from pymoo_hdte.discrepancy.drive.misfit.trend import strongest, trends

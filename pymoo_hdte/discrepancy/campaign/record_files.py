@@ -1,0 +1,185 @@
+"""Records of a campaign on disk: the columns of a file become channels in SI, and back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.campaign.fields_of_files import build, in_units
+from pymoo_hdte.discrepancy.campaign.format import (
+    CAMPAIGN_FILE,
+    ENDING,
+    LAYOUT,
+    PLAIN_ENDING,
+    RANGES,
+    RUNNING,
+    TORSION,
+)
+from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.io.layout import TableLayout, layout_from_fields, with_zeros
+from pymoo_hdte.io.tables import Columns, read_columns
+from pymoo_hdte.io.text_lines import Seen
+
+Channels = dict[str, NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class FileOfRecord:
+    """A record with its file, ``span`` being where its rows stand, found when it is called."""
+
+    record: RunningRecord | TorsionRecord
+    file: str
+    span: Callable[[], str]
+
+
+def record_path(entry: Fields, place: str, folder: Path) -> Path:
+    """Take the path of a record's file out of its table.
+
+    Raises
+    ------
+    InvalidInput
+        For a name that a record cannot have, or no such file in the folder.
+    """
+    file = entry.text("file")
+    if not _name_of(file):
+        allowed = (
+            f"letters, digits, '.', '-' and '_', ending in {ENDING}, {PLAIN_ENDING}, .txt or .mat"
+        )
+        raise InvalidInput(f"{place}.file", file, allowed)
+    if not (folder / file).is_file():
+        raise InvalidInput(f"{place}.file", file, f"a file in {folder}")
+    return folder / file
+
+
+def read_record(
+    entry: Fields,
+    place: str,
+    path: Path,
+    ratio: float,
+    shared: TableLayout = LAYOUT,
+    seen: Seen | None = None,
+) -> FileOfRecord:
+    """Read the record of a table ``[[record]]``.
+
+    Parameters
+    ----------
+    entry : Fields
+        Without its file.
+    place : str
+        Where the table stands.
+    path : Path
+        From `record_path`.
+    ratio : float
+        Transmission ratio N, for angles that wrap.
+    shared : TableLayout
+        Layout of the campaign's files, which the record may change.
+    seen : callable, optional
+        Is told how many further bytes have been read.
+
+    Raises
+    ------
+    InvalidInput
+        With file and line, for a field or a value that is missing, unknown or impossible.
+    OSError
+        If the file cannot be read.
+    """
+    role = entry.choice("role", ROLES)
+    running = entry.choice("test", ("running", "torsion")) == "running"
+    kind: type[RunningRecord | TorsionRecord] = RunningRecord if running else TorsionRecord
+    names = RUNNING if running else TORSION
+    layout = layout_from_fields(entry.table("table"), shared) if entry.has("table") else shared
+    layout = with_zeros(entry.table("zero"), layout) if entry.has("zero") else layout
+    needed = [field.name for field in fields(kind) if field.name in layout.channels]
+    layout = replace(layout, channels={name: layout.channels[name] for name in needed})
+    known = _ranges(entry, place) if running else {}
+    columns = read_columns(path, layout, seen=seen)
+    measured = _in_si(columns, ratio)
+    with _placed(columns, place):
+        record: RunningRecord | TorsionRecord = build(
+            kind, names, entry, place, name=_name_of(path.name), role=role, **known, **measured
+        )
+    # Without the numbers as they stood in the file, which the record has in SI.
+    empty = replace(columns, raw={})
+    return FileOfRecord(record, path.name, lambda: empty.span)
+
+
+def record_table(record: RunningRecord | TorsionRecord) -> dict[str, Any]:
+    """Return the table ``[[record]]`` of a record, without any layout."""
+    running = isinstance(record, RunningRecord)
+    table = in_units(record, RUNNING if running else TORSION)
+    for name, (nominal, spread) in RANGES.items() if running else ():
+        if getattr(record, spread):
+            del table[RUNNING[nominal][0]]
+            table |= in_units(record, {spread: (name, RUNNING[nominal][1])})
+    test = "running" if running else "torsion"
+    return {"file": f"{record.name}{ENDING}", "test": test} | table | {"role": record.role}
+
+
+def _name_of(file: str) -> str:
+    """Return the name of the record in a file, empty if it cannot be one."""
+    endings = "|".join(map(re.escape, (ENDING, PLAIN_ENDING, ".txt.gz", ".txt", ".mat")))
+    named = re.fullmatch(rf"(\w[\w.-]*?)({endings})", file, re.ASCII)
+    return named[1] if named else ""
+
+
+def _ranges(entry: Fields, place: str) -> dict[str, Any]:
+    """Take ranges of speed and load out of a record's table, with their middles as conditions."""
+    known: dict[str, Any] = {}
+    for name, (nominal, spread) in RANGES.items():
+        if not entry.has(name):
+            continue
+        key, factor = RUNNING[nominal]
+        if entry.has(key):
+            raise InvalidInput(f"{place}.{name}", entry.numbers(name), f"absent beside {key}")
+        limits = entry.numbers(name)
+        crosses = nominal == "input_speed" and len(limits) == 2 and limits[0] * limits[1] <= 0.0
+        if len(limits) != 2 or not limits[0] < limits[1] or crosses:
+            allowed = "[lowest, highest]" + (", without zero" if nominal == "input_speed" else "")
+            raise InvalidInput(f"{place}.{name}", limits, allowed)
+        known[spread] = (limits[0] * factor, limits[1] * factor)
+        known[nominal] = sum(known[spread]) / 2.0
+    return known
+
+
+def _in_si(columns: Columns, ratio: float) -> Channels:
+    """Return time and channels of a file in SI; angles that wrap are on one turn with the other."""
+    layout = columns.layout
+    measured = {name: columns.si(channel) for name, channel in layout.channels.items()}
+    if layout.time is not None:
+        measured["time"] = columns.si(layout.time)
+    elif layout.sample_rate is not None:
+        measured["time"] = (layout.skip_rows + np.arange(columns.length)) / layout.sample_rate
+    if "input_angle" not in measured:
+        return measured
+    # The turns before the first row are not known, but the transmission error is far below one.
+    error = float(np.median(measured["input_angle"] / ratio - measured["output_angle"]))
+    period = layout.channels["input_angle"].period
+    if period is not None:
+        measured["input_angle"] -= period * round(error * ratio / period)
+    elif (period := layout.channels["output_angle"].period) is not None:
+        measured["output_angle"] += period * round(error / period)
+    return measured
+
+
+@contextmanager
+def _placed(columns: Columns, place: str) -> Iterator[None]:
+    """Raise errors about the channels of a record as errors about its file."""
+    try:
+        yield
+    except InvalidInput as error:
+        if error.field.startswith(CAMPAIGN_FILE):
+            raise
+        if error.field == "role":
+            raise InvalidInput(f"{place}.role", error.value, error.allowed) from None
+        row = re.search(r"\[(\d+)]$", error.field)
+        where = columns.place(int(row[1])) if row else columns.span
+        raise InvalidInput(f"{where}: {error.field}", error.value, error.allowed) from None

@@ -1,0 +1,128 @@
+"""What order lines leave of a record: the spectrum of the residual, in units of the noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pymoo_hdte.discrepancy.campaign.believed import Rig
+from pymoo_hdte.discrepancy.campaign.line_fit import LineFit, nyquist_order, row_covariance
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.engine.rules import RULES
+
+# Numerical limits of a linear fit; the verdict does not depend on them.
+LEAST_SEPARATION = 0.1
+"""Least share of a line's power that is independent of the fitted lines."""
+
+BLOCK = 64
+"""Lines of the residual spectrum worked on at once, to bound the memory."""
+
+
+def residual_spectrum(
+    record: RunningRecord,
+    rig: Rig,
+    ratio: float,
+    orders: ArrayLike | Sequence[float],
+    highest_order: float = RULES.highest_order,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the residual of the order lines, at multiples of 1/N and of 1, in units of the noise.
+
+    Errors of the output repeat every output turn and errors of the input every input turn; unless
+    the ratio is a whole number, their orders differ.
+
+    Each line is made orthogonal to the fitted lines before it is fitted to the residual, so that
+    these do not leak into it. Orders too close to a fitted line are left out. Under noise alone the
+    power is exponential (Scargle, Astrophysical Journal 263, 1982).
+
+    Parameters
+    ----------
+    record, rig, ratio, orders
+        As in `order_lines`.
+    highest_order : float
+        Cycles per input turn.
+
+    Returns
+    -------
+    orders : ndarray, shape (k,)
+        Cycles per input turn, up to ``highest_order`` or the Nyquist order.
+    amplitudes : ndarray, shape (4, k)
+        Dimensionless, by channel as in `OrderLines`: divided by their root mean square under noise
+        alone. The square is then exponential with mean 1: a line exceeds x by chance with
+        probability exp(-x**2).
+
+    Raises
+    ------
+    InvalidInput
+        As `order_lines`.
+    """
+    fit = LineFit.of(record, ratio, orders)
+    highest = min(highest_order, nyquist_order(record))
+    multiples = np.arange(1, int(np.ceil(highest * ratio - 1e-9)))
+    whole = ratio * np.arange(1, int(np.ceil(highest - 1e-9)))
+    whole = whole[np.abs(whole - whole.round()) > 1e-9]
+    sigma = np.sqrt(np.diag(row_covariance(rig, ratio, record.samples_averaged)))
+    sums: list[_Sums] = []
+    for part in fit.parts:
+        basis = fit.basis(part)
+        rows = np.hstack([basis, fit.residual(part, basis) / sigma]).T
+        angle = record.input_angle[part, None] / ratio
+        found = [_Sums.of(rows, block, waves) for block, waves in _waves(angle, multiples, whole)]
+        sums = [one.plus(more) for one, more in zip(sums, found, strict=True)] if sums else found
+    searched, amplitudes = zip(*(one.amplitudes(len(record.time)) for one in sums), strict=True)
+    searched = np.concatenate(searched) / ratio
+    rising = np.argsort(searched)
+    return searched[rising], np.concatenate(amplitudes, axis=1)[:, rising]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Sums over rows for k waves: of waves times each row of products, and of waves squared.
+
+    ``products`` has shape (p + 4, k): with the basis, then with the residuals.
+    """
+
+    lines: NDArray[Any]
+    products: NDArray[np.complex128]
+    squares: NDArray[np.complex128]
+
+    @classmethod
+    def of(
+        cls, rows: NDArray[np.float64], lines: NDArray[Any], waves: NDArray[np.complex128]
+    ) -> _Sums:
+        # As real numbers: a product of real and complex matrices would copy the real one.
+        products = (rows @ waves.view(float)).view(complex)
+        return cls(lines, products, np.einsum("nk,nk->k", waves, waves))
+
+    def plus(self, more: _Sums) -> _Sums:
+        """Return the sums over the rows of both."""
+        return _Sums(self.lines, self.products + more.products, self.squares + more.squares)
+
+    def amplitudes(self, n: int) -> tuple[NDArray[Any], NDArray[np.float64]]:
+        """Fit cosine and sine of each wave, orthogonal to the basis, to residuals of variance 1.
+
+        Returns the lines that are separate enough, and their amplitudes (4, k), for n rows.
+        """
+        shared, products = self.products[:-4], self.products[-4:]
+        power = n - np.sum(np.abs(shared) ** 2, axis=0)
+        square = self.squares - np.sum(shared**2, axis=0)
+        separate = power - np.abs(square) > LEAST_SEPARATION * n
+        power, square, products = power[separate], square[separate], products[:, separate]
+        # Normal equations of the two columns: c'c = (power + Re square)/2, s's = (power - Re
+        # square)/2, c's = Im square / 2; their chi-square of two degrees of freedom has mean 2.
+        chi_square = 2.0 * (np.abs(products) ** 2 * power - np.real(products**2 * square.conj()))
+        chi_square /= power**2 - np.abs(square) ** 2
+        return self.lines[separate], np.sqrt(chi_square / 2.0)
+
+
+def _waves(
+    angle: NDArray[np.float64], multiples: NDArray[np.int_], others: NDArray[np.floating[Any]]
+) -> Iterator[tuple[NDArray[Any], NDArray[np.complex128]]]:
+    """Yield consecutive multiples in blocks, then others, with their waves over angles (n, 1)."""
+    powers = np.exp(1j * angle * np.arange(BLOCK))
+    for block in np.split(multiples, range(BLOCK, len(multiples), BLOCK)):
+        yield block, powers[:, : len(block)] * np.exp(1j * angle * block[0])
+    yield others, np.exp(1j * angle * others)

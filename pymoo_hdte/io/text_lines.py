@@ -1,0 +1,173 @@
+"""Lines of a text file in blocks, so that a file of any length takes the memory of a block.
+
+The text is in UTF-8, compressed by gzip or plain, with any kind of line end.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import re
+import zlib
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import repeat
+from pathlib import Path
+from typing import BinaryIO, cast
+
+from pymoo_hdte.checks import InvalidInput
+
+BLOCK = 1 << 22
+"""Characters of a block."""
+
+FIRST_LINES = 1 << 16
+"""Characters of a block in which titles are looked for."""
+
+Lines = tuple[Sequence[int], list[str]]
+"""Lines with their numbers, from 1."""
+Row = str | list[str]
+"""A row as it stands, or cut into cells where any is quoted."""
+Block = tuple[Sequence[int], list[Row]]
+"""The numbers of the lines on which rows begin, and the rows."""
+Seen = Callable[[int], None]
+"""Is told how many further bytes of a file have been read."""
+Progress = Callable[[int, int], None]
+"""Is told how many bytes of all files have been read, and how many there are."""
+
+_NO_TEXT = re.compile("[\0\udc80-\udcff]")
+"""NUL, or a byte that is no UTF-8, as Python hands it on."""
+
+
+def told(progress: Progress | None, paths: Sequence[Path]) -> Seen | None:
+    """Return what adds up the bytes that are read and tells them, with those of all files."""
+    if progress is None:
+        return None
+    total, done = sum(path.stat().st_size for path in paths), 0
+
+    def seen(further: int) -> None:
+        nonlocal done
+        done += further
+        progress(done, total)
+
+    return seen
+
+
+def line_blocks(
+    path: Path, kind: str, seen: Seen | None = None, size: int = BLOCK
+) -> Iterator[Lines]:
+    """Yield lines without their ends, with their numbers; no blank lines at the end.
+
+    Parameters
+    ----------
+    path : Path
+        Of a file that is compressed if its name ends in ``.gz``.
+    kind : str
+        Of text that it should be, for errors.
+    seen : callable, optional
+        Called after each block.
+    size : int
+        Characters of a block, or more where lines are longer.
+
+    Raises
+    ------
+    InvalidInput
+        For a file that is no such text, or not compressed as its name says.
+    OSError
+        If it cannot be read.
+    """
+    with path.open("rb") as raw:
+        blank: list[str] = []
+        start, done = 1, 0
+        for lines in _lines(path, kind, raw, size):
+            lines = blank + lines
+            kept = len(lines)
+            while kept and not lines[kept - 1].strip():
+                kept -= 1
+            blank = lines[kept:]
+            if seen:
+                seen(raw.tell() - done)
+                done = raw.tell()
+            if kept:
+                yield range(start, start + kept), lines[:kept]
+                start += kept
+
+
+def lines_below(blocks: Iterable[Lines], line: int, skip: int) -> Iterator[Lines]:
+    """Yield the lines below a line, without the first so many of them."""
+    for numbers, lines in blocks:
+        first = bisect_right(numbers, line)
+        first, skip = min(first + skip, len(lines)), max(skip - (len(lines) - first), 0)
+        if first < len(lines):
+            yield numbers[first:], lines[first:]
+
+
+def unquoted_rows(file: str, blocks: Iterator[Lines], mark: str) -> Iterator[Block]:
+    """Yield rows, cut into cells in blocks with quotes; a quoted cell may have several lines."""
+    for numbers, lines in blocks:
+        quotes = _quotes(lines)
+        if not quotes:
+            yield numbers, cast("list[Row]", lines)
+            continue
+        numbers, lines = list(numbers), list(lines)
+        # A cell that begins in this block may end in another.
+        while quotes % 2 and (further := next(blocks, None)):
+            numbers += further[0]
+            lines += further[1]
+            quotes += _quotes(further[1])
+        yield _cut(file, numbers, lines, mark)
+
+
+def _quotes(lines: list[str]) -> int:
+    return sum(map(str.count, lines, repeat('"')))
+
+
+def _lines(path: Path, kind: str, raw: BinaryIO, size: int) -> Iterator[list[str]]:
+    packed = path.suffix == ".gz"
+    binary = cast("BinaryIO", gzip.GzipFile(fileobj=raw)) if packed else raw
+    # With the surrogates of bytes that are no text, so that their line can be told.
+    text = io.TextIOWrapper(binary, "utf-8-sig", "surrogateescape")
+    rest, done = "", 0
+    try:
+        while found := text.read(size):
+            whole, end, rest = (rest + found).rpartition("\n")
+            if end:
+                _check(path, kind, whole, done)
+                done += whole.count("\n") + 1
+                yield whole.split("\n")
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise InvalidInput(path.name, str(error), f"gzip-compressed {kind} in UTF-8") from None
+    finally:
+        text.detach()
+    _check(path, kind, rest, done)
+    yield [rest]
+
+
+def _check(path: Path, kind: str, text: str, done: int) -> None:
+    """Raise `InvalidInput` for what is no text, below so many lines."""
+    # Most files are of ASCII, which is faster to tell.
+    bad = None if text.isascii() and "\0" not in text else _NO_TEXT.search(text)
+    if bad is None:
+        return
+    above = text.count("\n", 0, bad.start())
+    line = done + above
+    # A file whose first line is no text is refused as a whole.
+    field = f"{path.name}, line {line + 1}" if line else path.name
+    shown = text.split("\n")[above].encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    raise InvalidInput(field, shown, f"{kind} in UTF-8 without NUL bytes")
+
+
+def _cut(file: str, numbers: Sequence[int], rows: list[str], mark: str) -> Block:
+    """Return the line where each row begins, and the cells of rows of which some are quoted."""
+    reader = csv.reader((f"{row}\n" for row in rows), delimiter=mark, skipinitialspace=True)
+    found: list[Row] = []
+    lines, start = [], 0
+    try:
+        for cells in reader:
+            found.append(cells)
+            lines.append(numbers[start])
+            start = reader.line_num
+    except csv.Error as error:
+        allowed = "quoted cells that end, separated by commas, semicolons or tabs"
+        raise InvalidInput(f"{file}, line {numbers[start]}", str(error), allowed) from None
+    return lines, found
