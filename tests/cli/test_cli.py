@@ -132,7 +132,7 @@ def test_help_has_an_example_and_the_exit_codes(command, capsys):
 
 
 def test_progress_goes_to_a_terminal_alone(monkeypatch, capsys):
-    def tells(campaign, out, data, believed, say):
+    def tells(options, believed, say):
         say("reading the records")
         return DOCUMENT
 

@@ -57,6 +57,9 @@ def known_data(conditions=CONDITIONS, orders=ORDERS):
         rig=RIG,
         train=records,
         running=records,
+        held_out=(),
+        good_enough_error=None,
+        good_enough_torque=None,
         title="planted",
         torque_scale=1.0,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,14 +44,10 @@ class DriveFinding:
     verdict: Verdict
     unexpected: tuple[float, ...]
 
-    @cached_property
+    @property
     def held_out(self) -> Data | None:
-        """Features of the held-out records, or None without such records.
-
-        If records with rattling were left out of the fit, they are left out here, too.
-        """
-        held_out = self.data.held_out
-        return None if held_out is None else self.data.beside(held_out)
+        """Features of the held-out records: see `Data.held_out`."""
+        return self.data.held_out
 
 
 def expected_orders(campaign: Campaign, rules: Rules = RULES) -> list[float]:
@@ -100,18 +95,15 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     if unexpected:
         orders = _apart(unexpected, campaign, expected, rules)
         features = measure(campaign, campaign.train, orders)
-    held_out = None
-    if campaign.held_out:
-        held_out = measure(campaign, campaign.held_out, features.orders.tolist())
-    data = training_data(campaign, features, rules, held_out)
+    data = training_data(campaign, features, rules)
     if any(effect_named(effect.name).rattles for effect in campaign.believed.effects):
-        data = _loaded(data)
+        data = data.loaded
     _check_steady(data)
     base = fit(data)
     listed = _candidates(data, base)
     leading = leading_sweep_effect(data, base, listed)
     if leading is not None and effect_named(leading).rattles:
-        data = _loaded(data)
+        data = data.loaded
         base = fit(data)
         listed = _candidates(data, base)
     verdict = judge(data, base, listed)
@@ -165,31 +157,6 @@ def _candidates(data: Data, base: Fit) -> list[Candidate]:
     return drive_candidates(
         port_sizes(believed, orders, seen, scales_of(data, base)), believed.effects
     )
-
-
-def _loaded(data: Data) -> Data:
-    """Return the data without records whose load does not hold the tooth flanks together.
-
-    With a clearance such a drive rattles and has no steady state that could be fitted.
-    """
-    scale, rules = data.campaign.torque_scale, data.rules
-    held = _flanks_held(data.features, scale, rules)
-    if np.all(held) or held.sum() < rules.fewest_records:
-        return data
-    kept = data.held_out
-    if kept is not None:
-        loaded = np.flatnonzero(_flanks_held(kept, scale, rules))
-        kept = kept.rows(loaded) if len(loaded) else None
-    return replace(data, features=data.features.rows(np.flatnonzero(held)), held_out=kept)
-
-
-def _flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:
-    """Return which records have a load above the amplitude of their torque, shape (r,)."""
-    m = len(features.orders)
-    lines = features.values[:, features.places(2)].reshape(len(features.records), m, 2)
-    swing = np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)
-    load = np.abs(features.conditions.output_torque)
-    return np.asarray(load > np.maximum(swing, torque_scale * rules.least_held_load))
 
 
 def highest_order(campaign: Campaign, rules: Rules) -> float:

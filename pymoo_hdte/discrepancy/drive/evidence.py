@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy.drive.features import MEANS, Features
+from pymoo_hdte.discrepancy.drive.features import MEANS, Features, measure
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.drive.observations import (
     Observations,
@@ -41,12 +42,9 @@ class Data(Observations):
     ----------
     rules : Rules
         Thresholds of the verdict.
-    held_out : Features or None
-        Of the records that are kept out of the fit.
     """
 
     rules: Rules = RULES
-    held_out: Features | None = None
 
     @property
     def remainder(self) -> float:
@@ -112,25 +110,51 @@ class Data(Observations):
 
     def held_out_chi_square(self, fitted: Fit) -> float | None:
         """Return chi-square of the held-out records; None where there are none."""
-        if self.held_out is None:
+        data = self.held_out
+        if data is None:
             return None
-        data = self.beside(self.held_out)
         difference = data.predict(fitted.values[None, : len(self.base)], fitted.effects)[0]
         white = data.whiten(difference - data.features.values)
         return float(white @ white)
 
-    def beside(self, features: Features) -> Data:
-        """Return other records of the campaign as data, at the same reference."""
-        return replace(self, features=features, torsion=(), held_out=None)
+    @cached_property
+    def held_out(self) -> Data | None:
+        """Features of the records kept out of the fit, or None without such records.
+
+        If records with rattling were left out of the fit, they are left out here, too.
+        """
+        records = self.campaign.held_out
+        if not records:
+            return None
+        features = measure(self.campaign, records, self.features.orders.tolist())
+        if len(self.features.records) < len(self.campaign.train):
+            held = flanks_held(features, self.campaign.torque_scale, self.rules)
+            features = features.rows(np.flatnonzero(held))
+        return replace(self, features=features, torsion=()) if features.records else None
+
+    @property
+    def loaded(self) -> Data:
+        """The data without records whose load does not hold the tooth flanks together.
+
+        With a clearance such a drive rattles and has no steady state that could be fitted.
+        """
+        held = flanks_held(self.features, self.campaign.torque_scale, self.rules)
+        if np.all(held) or held.sum() < self.rules.fewest_records:
+            return self
+        return replace(self, features=self.features.rows(np.flatnonzero(held)))
 
 
-def training_data(
-    campaign: Campaign,
-    features: Features,
-    rules: Rules = RULES,
-    held_out: Features | None = None,
-) -> Data:
-    """Return features of training records with first guesses, the sweeps, and held-out features."""
+def flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:
+    """Return which records have a load above the amplitude of their torque, shape (r,)."""
+    m = len(features.orders)
+    lines = features.values[:, features.places(2)].reshape(len(features.records), m, 2)
+    swing = np.hypot(lines[..., 0], lines[..., 1]).sum(axis=1)
+    load = np.abs(features.conditions.output_torque)
+    return np.asarray(load > np.maximum(swing, torque_scale * rules.least_held_load))
+
+
+def training_data(campaign: Campaign, features: Features, rules: Rules = RULES) -> Data:
+    """Return features of training records with first guesses, and the sweeps."""
     points = tuple(torsion_points(record, campaign.rig) for record in campaign.torsion)
     return Data(
         campaign,
@@ -138,7 +162,6 @@ def training_data(
         start_parameters(campaign, features),
         points,
         rules=rules,
-        held_out=held_out,
     )
 
 

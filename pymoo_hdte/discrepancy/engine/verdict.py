@@ -115,7 +115,7 @@ def judge(
         equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
         chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
     doubts = doubts_of(search, chosen)
-    status = _status(search, chosen, equivalent, doubts)
+    status = _status(chosen, _explains(search, chosen), equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()
     return Verdict(
         status, base, chosen, tuple(others), rivals, degrees_of_freedom, rules, tuple(doubts)
@@ -208,11 +208,10 @@ def strength_is_certain(
 
 
 def _status(
-    search: Search, chosen: Hypothesis, equivalent: Sequence[Hypothesis], doubts: Sequence[str]
+    chosen: Hypothesis, explains: bool, equivalent: Sequence[Hypothesis], doubts: Sequence[str]
 ) -> str:
     """Return the status of the best set: what it may be called."""
-    explained = _explains(search, chosen)
-    if not chosen.listed or not explained or NOT_PROVEN in doubts:
+    if not chosen.listed or not explains or NOT_PROVEN in doubts:
         return "unlisted"
     if equivalent:
         return "class"

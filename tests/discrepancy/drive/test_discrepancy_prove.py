@@ -34,9 +34,7 @@ def at_start(*chosen):
     parameters = (*base, *(parameter for one in chosen for parameter in one.parameters))
     starts = [start for one in chosen for start in one.starts[-1]]
     values = np.array([*(parameter.start for parameter in base), *starts])
-    return Fit(
-        chosen, parameters, values, np.zeros(1), np.zeros((1, len(values))), np.zeros((0, 0, 0))
-    )
+    return Fit(chosen, parameters, values, np.zeros(1), np.zeros((1, len(values))))
 
 
 @pytest.mark.parametrize("candidate", LISTED, ids=lambda one: one.label)

@@ -12,8 +12,9 @@ from quick_campaigns import quick_campaign
 from virtual_rig_cases import BELIEVED, effect
 
 from pymoo_hdte.discrepancy.campaign.campaign import RATED_TORQUE, torque_scale
-from pymoo_hdte.discrepancy.drive.analysis import _flanks_held, examine_drive
+from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
+from pymoo_hdte.discrepancy.drive.evidence import flanks_held
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.discrepancy.engine.rules import RULES
 
@@ -147,5 +148,5 @@ def test_a_soft_drive_has_the_size_of_its_loads():
 def test_a_load_that_holds_the_flanks_together_is_one_of_its_drive():
     data = known_data([(1000.0, load) for load in (0.0, 0.1, 0.3)])
     still = replace(data.features, values=np.zeros_like(data.features.values))
-    assert _flanks_held(still, 1.0, RULES).tolist() == [False, False, False]
-    assert _flanks_held(still, 0.25, RULES).tolist() == [False, False, True]
+    assert flanks_held(still, 1.0, RULES).tolist() == [False, False, False]
+    assert flanks_held(still, 0.25, RULES).tolist() == [False, False, True]

@@ -8,9 +8,7 @@ from quick_campaigns import quick_analysis, quick_campaign
 
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.engine import hypothesis
-from pymoo_hdte.discrepancy.engine import selection as second_effect
-from pymoo_hdte.discrepancy.engine import verdict as naming
+from pymoo_hdte.discrepancy.engine import search
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
 
@@ -29,12 +27,11 @@ def clean(seed):
 def unsearched(monkeypatch):
     """Leave the candidates as screened: to fit them only names what the alarm is already about."""
 
-    def as_screened(data, candidates, start, _=0, slopes=None):
-        return fit(data, candidates, start, 1, slopes)
+    def as_screened(data, candidates, start, **settings):
+        return fit(data, candidates, start, 1)
 
-    for module in (naming, hypothesis, second_effect):
-        monkeypatch.setattr(module, "fit", as_screened)
-    return replace(RULES, most_fitted=1)
+    monkeypatch.setattr(search, "fit", as_screened)
+    return replace(RULES, most_fitted=1, most_effects=1)
 
 
 def test_a_clean_drive_is_adequate(seed):

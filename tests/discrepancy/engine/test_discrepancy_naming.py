@@ -9,8 +9,7 @@ from planted_features import CONDITIONS, known_data, library, measured, with_swe
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.drive.objective import Objective
-from pymoo_hdte.discrepancy.engine import hypothesis
-from pymoo_hdte.discrepancy.engine import selection as second_effect
+from pymoo_hdte.discrepancy.engine import hypothesis, search
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
@@ -170,7 +169,7 @@ def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():
 def test_a_parameter_out_of_tolerance_does_not_hide_an_effect_beside_it():
     def status(*names):
         candidates = [SimpleNamespace(name=name) for name in names]
-        return naming._status(SimpleNamespace(listed=True, candidates=candidates), ())
+        return naming._status(SimpleNamespace(listed=True, candidates=candidates), True, (), ())
 
     assert status("parameter") == "parameter"
     assert status("parameter", "parameter") == "parameter"
@@ -365,7 +364,7 @@ def test_a_second_effect_is_looked_for_in_the_sweep_alone(monkeypatch):
     assert labels_of(verdict) == {DRAG, OUTPUT_FRICTION}
     excess = data.excess(verdict.base)
     assert excess.degrees_of_freedom[-1].tolist() == [0.0] * 4 + [len(data.torsion[0].angle) - 1]
-    monkeypatch.setattr(second_effect, "_ill_explained", lambda *_: [])
+    monkeypatch.setattr(search, "ill_explained", lambda *_: [])
     assert labels_of(judge(data, fit(data), [drag, friction])) == {DRAG}
 
 

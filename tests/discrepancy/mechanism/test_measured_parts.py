@@ -163,7 +163,7 @@ def line(n):
 
 def spread_of(frequency, slopes, residuals):
     parameters = tuple(Parameter(f"p{k}", 0.0, -1e9, 1e9, 1.0) for k in range(slopes.shape[1]))
-    fitted = Fit((), parameters, np.zeros(len(parameters)), residuals, slopes, slopes.T)
+    fitted = Fit((), parameters, np.zeros(len(parameters)), residuals, slopes)
     rows = [np.arange(len(frequency))]
     return Spread(SimpleNamespace(frequency=frequency, rows_of_parts=lambda: rows), fitted)
 

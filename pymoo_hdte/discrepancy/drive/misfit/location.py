@@ -201,7 +201,7 @@ def _robust_loss(data: Data, fitted: Fit) -> float:
     """Return Cauchy's loss of all cells, with the squares of the priors."""
     scale = _CAUCHY * cell_degrees_of_freedom(data)
     chi_square, _ = _misfit(data, fitted)
-    priors = Objective(data, fitted.candidates, fitted.slopes).priors(fitted.values)
+    priors = Objective(data, fitted.candidates).priors(fitted.values)
     return float(np.nansum(scale * np.log1p(chi_square / scale)) + priors @ priors)
 
 
