@@ -19,16 +19,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import factorial
 
-from pymoo_hdte.checks import InvalidInput, finite_array, real_number
 from pymoo_hdte.discrepancy.campaign.believed import Rig
+from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, centred, mean_speed, nyquist_order
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.engine.rules import RULES
 
 CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
 
-# Numerical limits of a linear fit; the verdict does not depend on them.
-LARGEST_CONDITION = 1e3
-"""Largest condition number of the fit; beyond it the noise of the lines grows a thousandfold."""
+_READ = {"output_angle": (0, False), "input_angle": (0, True), "input_torque": (1, False),
+         "output_torque": (2, False)}  # fmt: skip
+"""Place in `CHANNELS` of the mean that a jump makes uncertain; whether divided by the ratio."""
 
 LEAST_SEPARATION = 0.1
 """Least share of a line's power that is independent of the fitted lines."""
@@ -106,10 +106,10 @@ def order_lines(
     InvalidInput
         For orders out of range or closer together than the record can tell apart.
     """
-    fit = _Fit.of(record, ratio, orders)
+    fit = LineFit.of(record, ratio, orders)
     gains = averaging_gain(fit.orders, record)
     m = len(gains)
-    real, imaginary = fit.coefficients[2 : 2 + m].T, fit.coefficients[2 + m :].T
+    real, imaginary = fit.coefficients[2 : 2 + m].T, fit.coefficients[2 + m : 2 + 2 * m].T
     inverse = np.linalg.inv(fit.triangle)
     kept = np.r_[0, 2 : 2 + 2 * m]
     scales = 1.0 / np.concatenate([[1.0], gains, gains])
@@ -120,13 +120,17 @@ def order_lines(
     steepness = fit.orders * phasors
     noise = noise + 0.5 * (steepness @ steepness.conj().T).real * noise[3, 3]
     bends = inverse @ (fit.basis.T @ _bent(record))
-    lines = (bends[2 : 2 + m] + 1j * bends[2 + m :]).T / gains
+    lines = (bends[2 : 2 + m] + 1j * bends[2 + m : 2 + 2 * m]).T / gains
+    covariance = np.diag(noise)[:, None, None] * unit
+    for jump in record.jumps:
+        channel, share = _READ[jump.channel]
+        covariance[channel, 0, 0] += (jump.size / (ratio if share else 1.0)) ** 2
     return OrderLines(
         orders=fit.orders,
         mean=fit.coefficients[0],
         slope=fit.coefficients[1],
         phasors=phasors,
-        covariance=np.diag(noise)[:, None, None] * unit,
+        covariance=covariance,
         row_covariance=noise,
         bends=np.column_stack([bends[0], lines]),
     )
@@ -139,7 +143,7 @@ def averaging_gain(orders: ArrayLike, record: RunningRecord) -> NDArray[np.float
     ``sin(n w Delta / 2) / (n sin(w Delta / 2))``, with w = order x mean input speed.
     """
     n = record.samples_averaged
-    half = np.asarray(orders) * _speed(record) / (2.0 * n * record.sample_rate)
+    half = np.asarray(orders) * mean_speed(record) / (2.0 * n * record.sample_rate)
     return np.sin(n * half) / (n * np.sin(half))
 
 
@@ -194,8 +198,8 @@ def residual_spectrum(
     InvalidInput
         As `order_lines`.
     """
-    fit = _Fit.of(record, ratio, orders)
-    highest = min(highest_order, _nyquist_order(record))
+    fit = LineFit.of(record, ratio, orders)
+    highest = min(highest_order, nyquist_order(record))
     multiples = np.arange(1, int(np.ceil(highest * ratio - 1e-9)))
     whole = ratio * np.arange(1, int(np.ceil(highest - 1e-9)))
     whole = whole[np.abs(whole - whole.round()) > 1e-9]
@@ -246,57 +250,7 @@ def _amplitudes(
     return separate, np.sqrt(chi_square / 2.0)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Least squares by QR: ``values = basis @ triangle @ coefficients + residual``."""
-
-    orders: NDArray[np.float64]
-    values: NDArray[np.float64]
-    basis: NDArray[np.float64]
-    triangle: NDArray[np.float64]
-    coefficients: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, record: RunningRecord, ratio: float, orders: ArrayLike) -> _Fit:
-        checked = finite_array("orders", orders, (None,))
-        for order in checked:
-            real_number("orders", float(order), above=0.0, below=_nyquist_order(record))
-        angle = np.outer(record.input_angle, checked)
-        time = _centred(record)
-        design = np.column_stack([np.ones_like(time), time, np.cos(angle), -np.sin(angle)])
-        scale = np.linalg.norm(design, axis=0)
-        basis, triangle = np.linalg.qr(design / scale)
-        if design.shape[0] <= design.shape[1] or np.linalg.cond(triangle) > LARGEST_CONDITION:
-            allowed = "orders that a record of this length can tell apart"
-            raise InvalidInput("orders", checked.tolist(), allowed)
-        values = np.column_stack(
-            [
-                record.transmission_error(ratio),
-                record.input_torque,
-                record.output_torque,
-                record.input_angle,
-            ]
-        )
-        triangle = triangle * scale
-        coefficients = np.linalg.solve(triangle, basis.T @ values)
-        return cls(checked, values, basis, triangle, coefficients)
-
-
-def _centred(record: RunningRecord) -> NDArray[np.float64]:
-    return np.asarray(record.time - (record.time[0] + record.time[-1]) / 2.0)
-
-
 def _bent(record: RunningRecord) -> NDArray[np.float64]:
     """Return (t - t_mid)^k / k! for k = 2, 3, 4, shape (n, 3)."""
     powers = np.arange(2, 5)
-    return np.asarray(_centred(record)[:, None] ** powers / factorial(powers))
-
-
-def _speed(record: RunningRecord) -> float:
-    travel = record.input_angle[-1] - record.input_angle[0]
-    return abs(float(travel / (record.time[-1] - record.time[0])))
-
-
-def _nyquist_order(record: RunningRecord) -> float:
-    """Return the order at half the rate of the rows, in cycles per input turn."""
-    return float(np.pi * record.sample_rate / _speed(record))
+    return np.asarray(centred(record)[:, None] ** powers / factorial(powers))

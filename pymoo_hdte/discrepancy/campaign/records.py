@@ -18,6 +18,28 @@ FEWEST_SAMPLES = 8
 """Least number of rows of a record."""
 
 
+@dataclass(frozen=True)
+class Jump:
+    """A jump of a sensor within a record, which its rows no longer show.
+
+    How large it is, is fitted again together with the lines; whether the rows before or after it
+    were right, nobody knows, so that the mean of the channel counts as uncertain by ``size``.
+
+    Attributes
+    ----------
+    time : float
+        Of the first row after it, s.
+    channel : str
+        Attribute of the record.
+    size : float
+        What was subtracted from this row on, rad or N.m.
+    """
+
+    time: float
+    channel: str
+    size: float
+
+
 @dataclass(frozen=True, eq=False)
 class RunningRecord:
     """The drive at constant speed and load, over one output turn or more.
@@ -45,6 +67,8 @@ class RunningRecord:
         rad, absolute and unwrapped, with one common zero over a campaign.
     input_torque, output_torque : ndarray, shape (n,)
         On the input shaft from the motor, and between drive and load inertia, N.m.
+    jumps : tuple of Jump
+        Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
 
     Raises
     ------
@@ -65,6 +89,7 @@ class RunningRecord:
     output_angle: NDArray[np.float64]
     input_torque: NDArray[np.float64]
     output_torque: NDArray[np.float64]
+    jumps: tuple[Jump, ...] = ()
 
     def __post_init__(self) -> None:
         if real_number("input_speed", self.input_speed) == 0.0:

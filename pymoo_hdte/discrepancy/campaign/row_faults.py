@@ -1,0 +1,194 @@
+"""Spikes and jumps in one channel: rows that depart from their neighbours as no motion does.
+
+What is looked at is the residual of the order lines. It may hold motion that the lines do not
+describe, such as a vibration of fixed frequency; so a fault has to stand out of whatever else the
+residual does, not only of the noise.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from pymoo_hdte.discrepancy.engine.rules import Rules
+
+Rows = NDArray[np.float64]
+
+# Shapes of the statistics; what they are compared with are rules.
+_BESIDE = 5
+"""Rows on either side of a row whose median it is compared with; a spike may have two of them."""
+
+WINDOWS = (4, 16, 64)
+"""Rows before and after a jump that are compared: for jumps down to 5, 2.3, and 1.1 deviations."""
+
+_WINDOWS_IN_RECORD = 30
+"""Least number of windows (before and after) in a record, for the scatter of the comparison."""
+
+_DEVIATION = 1.4826
+"""Standard deviation of a normal variable over the median of its absolute value."""
+
+
+class Step(NamedTuple):
+    """A jump that may be one: its first row, its size, and how far it stands out."""
+
+    row: int
+    size: float
+    deviations: float
+
+
+def scatter(rows: Rows) -> float:
+    """Return the standard deviation of the noise of rows (n,) by their differences, robustly."""
+    return float(_DEVIATION / np.sqrt(2.0) * np.median(np.abs(np.diff(rows))))
+
+
+def spikes(residual: Rows, deviations: float, rules: Rules) -> NDArray[np.bool_]:
+    """Return which rows are spikes, shape (n,).
+
+    A spike departs to the same side from the medians of the rows before and of those after it: the
+    rows on both sides of a jump are no spikes.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+    deviations : float
+        Least departure, in standard deviations of the usual one.
+    rules : Rules
+    """
+    median = median_filter(residual, _BESIDE, mode="nearest")
+    far = _BESIDE // 2 + 1
+    after, before = residual.copy(), residual.copy()
+    after[:-far] -= median[far:]
+    before[far:] -= median[:-far]
+    return _outstanding(before, after, deviations, rules)
+
+
+def spikes_on_course(values: Rows, deviations: float, rules: Rules) -> NDArray[np.bool_]:
+    """Return which rows of a channel that rises and falls are spikes, shape (n,).
+
+    As `spikes`, but compared with straight lines through the rows before and after: the row of a
+    turning point lies on both.
+    """
+    place = np.arange(-_BESIDE, 0.0)
+    middle = place.mean()
+    weights = 1.0 / _BESIDE - middle * (place - middle) / np.sum((place - middle) ** 2)
+    before, after = values.copy(), values.copy()
+    before[_BESIDE:] -= np.correlate(values, weights, mode="valid")[:-1]
+    after[:-_BESIDE] -= np.correlate(values, weights[::-1], mode="valid")[1:]
+    return _outstanding(before, after, deviations, rules)
+
+
+def _outstanding(before: Rows, after: Rows, deviations: float, rules: Rules) -> NDArray[np.bool_]:
+    """Return which rows depart to the same side from those before and from those after them."""
+    # At the ends there are rows on one side only.
+    after[-_BESIDE:], before[:_BESIDE] = before[-_BESIDE:], after[:_BESIDE]
+    departs = np.where(after * before > 0.0, np.minimum(np.abs(after), np.abs(before)), 0.0)
+    usual = _DEVIATION * float(np.median(np.abs(before)))
+    most = max(1, int(rules.spike_share * len(departs)))
+    common = float(np.partition(departs, -1 - most)[-1 - most])
+    found = departs > max(deviations * usual, rules.fault_prominence * common)
+    return found & (usual > 0.0) & (_run_lengths(found) <= rules.longest_spike)
+
+
+def _run_lengths(flags: NDArray[np.bool_]) -> NDArray[np.int_]:
+    """Return for each row the number of equal flags in a row that it belongs to."""
+    first = np.flatnonzero(np.r_[True, flags[1:] != flags[:-1]])
+    lengths = np.diff(np.r_[first, len(flags)])
+    return np.repeat(lengths, lengths)
+
+
+def step(residual: Rows, basis: Rows, deviations: float, rules: Rules) -> Step | None:
+    """Return the clearest jump, or None.
+
+    Rows before and after are compared in windows, beside a straight line, and in the whole record,
+    beside everything that the lines could make of the jump.
+
+    Parameters
+    ----------
+    residual : ndarray, shape (n,)
+    basis : ndarray, shape (n, p)
+        Orthonormal, of the lines that were taken out.
+    deviations : float
+        Least size in standard deviations of its own.
+    rules : Rules
+    """
+    if scatter(residual) == 0.0:
+        return None
+    found = [_step_in_windows(residual, half, deviations, rules) for half in WINDOWS]
+    found.append(_step_in_record(residual, basis, deviations, rules))
+    return max((one for one in found if one), key=lambda one: one.deviations, default=None)
+
+
+def _step_in_windows(residual: Rows, half: int, deviations: float, rules: Rules) -> Step | None:
+    """Return the clearest jump in windows of ``half`` rows before and as many after."""
+    if len(residual) < 2 * half * _WINDOWS_IN_RECORD:
+        return None
+    place = np.arange(2 * half) - (half - 0.5)
+    sides = np.sign(place)
+    contrast = sides - place * (sides @ place) / (place @ place)
+    power = float(contrast @ contrast)
+    sizes = np.correlate(residual, contrast, mode="valid") * 2.0 / power
+    deviation = 2.0 * scatter(residual) / np.sqrt(power)
+    usual = max(deviation, _DEVIATION * float(np.median(np.abs(sizes))))
+    peaks = _peaks(np.abs(sizes), rules.most_jumps + 1, 2 * half)
+    common = float(np.abs(sizes[peaks[-1]])) if len(peaks) > rules.most_jumps else 0.0
+    size = float(sizes[peaks[0]])
+    if not abs(size) > max(deviations * usual, rules.fault_prominence * common):
+        return None
+    row = int(peaks[0]) + half
+    if half > WINDOWS[0] and not _abrupt(residual, row, size):
+        return None
+    return Step(row, size, abs(size) / usual)
+
+
+def _peaks(heights: Rows, number: int, apart: int) -> list[int]:
+    """Return the places of the highest values, each further than ``apart`` from those before."""
+    left, found = heights.copy(), list[int]()
+    while len(found) < number and np.isfinite(top := left.max()) and top >= 0.0:
+        place = int(np.argmax(left))
+        found.append(place)
+        left[max(place - apart, 0) : place + apart + 1] = -np.inf
+    return found
+
+
+def _abrupt(residual: Rows, row: int, size: float) -> bool:
+    """Return whether most of a jump happens from one row to the next, as far as noise shows it."""
+    near = WINDOWS[0]
+    before, after = residual[row - near : row], residual[row : row + near]
+    noise = scatter(residual) * np.sqrt(2.0 / near)
+    return bool(abs(after.mean() - before.mean() - size) < 0.5 * abs(size) + 3.0 * noise)
+
+
+def _step_in_record(residual: Rows, basis: Rows, deviations: float, rules: Rules) -> Step | None:
+    """Return the jump that explains most of a residual, if hardly anything else is left then."""
+    noise = scatter(residual)
+    shares = np.cumsum(basis[::-1], axis=0)[::-1]
+    # What the lines cannot make of a step at each row: its length, beside the part they can.
+    lengths = np.arange(len(residual), 0, -1) - np.sum(shares**2, axis=1)
+    known = lengths > 1.0
+    known[: WINDOWS[0]] = known[-WINDOWS[0] :] = False
+    if not known.any():
+        return None
+    strength = _strength(residual, lengths, known) / noise
+    row = int(np.argmax(np.abs(strength)))
+    size = float(strength[row] * noise / np.sqrt(lengths[row]))
+    stepped = -shares[row] @ basis.T
+    stepped[row:] += 1.0
+    left = float(np.abs(_strength(residual - size * stepped, lengths, known)).max()) / noise
+    clear = abs(float(strength[row]))
+    if clear > max(deviations, rules.fault_prominence * left) and _abrupt_in(residual, row, size):
+        return Step(row, size, clear)
+    return None
+
+
+def _strength(residual: Rows, lengths: Rows, known: NDArray[np.bool_]) -> Rows:
+    """Return how strongly a residual speaks for a step at each row; white noise gives its own."""
+    sums = np.cumsum(residual[::-1])[::-1]
+    return np.where(known, sums, 0.0) / np.sqrt(np.where(known, lengths, 1.0))
+
+
+def _abrupt_in(residual: Rows, row: int, size: float) -> bool:
+    near = WINDOWS[0]
+    return near <= row <= len(residual) - near and _abrupt(residual, row, size)

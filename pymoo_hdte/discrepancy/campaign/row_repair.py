@@ -1,0 +1,285 @@
+"""One record without its faulty rows, and a list of what was wrong with it.
+
+Spikes and repeated rows are left out: the order lines are fitted over the measured angle and do not
+need evenly spaced rows. A jump of a sensor is taken out of the rows after it and fitted again with
+the lines (`records.Jump`). Where both encoders jump alike, the drive has moved on while the time
+has not: rows are missing, and the time is set right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.campaign.line_basis import LineFit
+from pymoo_hdte.discrepancy.campaign.records import (
+    FEWEST_SAMPLES,
+    Jump,
+    RunningRecord,
+    TorsionRecord,
+)
+from pymoo_hdte.discrepancy.campaign.row_faults import WINDOWS, Step, spikes, spikes_on_course, step
+from pymoo_hdte.discrepancy.campaign.row_findings import RowFault
+from pymoo_hdte.discrepancy.engine.rules import Rules
+
+Rows = NDArray[np.float64]
+Record = TypeVar("Record", RunningRecord, TorsionRecord)
+
+RUNNING = ("input_angle", "output_angle", "input_torque", "output_torque")
+SWEPT = ("output_angle", "output_torque")
+
+_ROUNDS = 20
+"""Most rounds of a search, each of which removes what hides smaller faults."""
+
+_SMOOTHED = 11
+"""Rows of the running median from which the size of a spike is measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repaired:
+    """A record without its faults.
+
+    Attributes
+    ----------
+    record : RunningRecord or TorsionRecord
+    faults : tuple of RowFault
+    residual : ndarray, shape (n, 4), or None
+        Of the order lines, by channel as in `LineFit`; None for a sweep, or where the lines cannot
+        be fitted.
+    usable : bool
+        False if several channels jump at once: not a sensor has changed then, but the test.
+    """
+
+    record: RunningRecord | TorsionRecord
+    faults: tuple[RowFault, ...]
+    residual: Rows | None = None
+    usable: bool = True
+
+
+def repaired_run(
+    record: RunningRecord, ratio: float, orders: Sequence[float], deviations: float, rules: Rules
+) -> Repaired:
+    """Return a running record without spikes, jumps and repeated rows.
+
+    Parameters
+    ----------
+    record : RunningRecord
+    ratio : float
+        Transmission ratio N, dimensionless.
+    orders : sequence of float
+        Lines that are taken out first, cycles per input turn.
+    deviations : float
+        Least size of a fault, in standard deviations.
+    rules : Rules
+    """
+    search = _Search(record, ratio, deviations, rules)
+    search.take_repeated(RUNNING)
+    search.note_gaps()
+    try:
+        residual = search.run(orders)
+    except InvalidInput:
+        # A record that cannot tell these lines apart is judged, and refused, where it is measured.
+        return Repaired(record, ())
+    return Repaired(search.record, tuple(search.faults), residual, not search.changed_as_a_whole)
+
+
+def repaired_sweep(record: TorsionRecord, deviations: float, rules: Rules) -> Repaired:
+    """Return a torsion sweep without spikes and repeated rows.
+
+    Its jumps stay: a drive with a clearance jumps where the torque changes sign.
+    """
+    search = _Search(record, 1.0, deviations, rules)
+    search.take_repeated(SWEPT)
+    search.note_gaps()
+    for channel in SWEPT:
+        values = getattr(search.record, channel)
+        flags = spikes_on_course(values, deviations, rules)
+        if flags.any():
+            departures = values - median_filter(values, _SMOOTHED, mode="nearest")
+            search.take_spikes([(channel, flags, departures)])
+    return Repaired(search.record, tuple(search.faults))
+
+
+class _Search:
+    """A record on the way to its repair; rows keep their numbers in the file."""
+
+    def __init__(
+        self, record: RunningRecord | TorsionRecord, ratio: float, deviations: float, rules: Rules
+    ) -> None:
+        self.record, self.ratio, self.deviations, self.rules = record, ratio, deviations, rules
+        self.rows = np.arange(len(record.time))
+        self.faults: list[RowFault] = []
+
+    @property
+    def changed_as_a_whole(self) -> bool:
+        """Whether angles and torques jump together."""
+        jumps = [fault for fault in self.faults if fault.kind == "jump" and fault.channel != "time"]
+        kinds = [(fault.row, fault.channel.replace("input_a", "output_a")) for fault in jumps]
+        return any(
+            abs(one[0] - other[0]) <= WINDOWS[1] and one[1] != other[1]
+            for place, one in enumerate(kinds)
+            for other in kinds[:place]
+        )
+
+    def take_repeated(self, channels: Sequence[str]) -> None:
+        """Leave out rows that are equal in all channels to the one before."""
+        table = np.column_stack([getattr(self.record, channel) for channel in channels])
+        again = np.r_[False, np.all(table[1:] == table[:-1], axis=1)]
+        if again.any() and np.count_nonzero(~again) >= FEWEST_SAMPLES:
+            for first, last in _runs(again):
+                length = float(self.record.time[last] - self.record.time[first - 1])
+                self._note("repeated", "rows", first, last - first + 1, length, "left out")
+            self._keep(~again)
+
+    def note_gaps(self) -> None:
+        """Note where the time runs on without rows."""
+        steps = np.diff(self.record.time) * self.record.sample_rate
+        for place in np.flatnonzero(steps > self.rules.gap_of_rows):
+            lost = round(float(steps[place])) - 1 - int(np.diff(self.rows)[place] - 1)
+            if lost > 0:
+                length = lost / self.record.sample_rate
+                self._note("gap", "rows", int(place) + 1, lost, length, "none needed")
+
+    def run(self, orders: Sequence[float]) -> Rows:
+        """Take out spikes and jumps until there are none; return the residual of the lines.
+
+        Where jumps do not end, they are a motion, and none is taken out.
+        """
+        rough: tuple[RunningRecord, NDArray[np.int_], list[RowFault]] | None = None
+        for taken in range(self.rules.most_jumps + 1):
+            fit = self._without_spikes(orders)
+            found = self._clearest_step(fit)
+            if found is None:
+                return fit.residual
+            rough = rough or (self.record, self.rows, list(self.faults))
+            if taken == self.rules.most_jumps or not self._take_step(*found, fit, orders):
+                break
+        if rough is not None:
+            self.record, self.rows, self.faults = rough
+        return LineFit.of(self.record, self.ratio, orders).residual
+
+    def _without_spikes(self, orders: Sequence[float]) -> LineFit:
+        """Leave out spikes, the small ones once the large ones are gone, and return the fit."""
+        for _ in range(_ROUNDS):
+            fit = LineFit.of(self.record, self.ratio, orders)
+            found = self._spikes(fit.residual)
+            if not found:
+                break
+            self.take_spikes(found)
+        return fit
+
+    def _spikes(self, residual: Rows) -> list[tuple[str, NDArray[np.bool_], Rows]]:
+        """Return channels with spikes, which rows they are, and the departures there."""
+        departures = residual - median_filter(residual, (_SMOOTHED, 1), mode="nearest")
+        flags = [spikes(one, self.deviations, self.rules) for one in residual.T]
+        found = [
+            (name, flags[place], departures[:, place])
+            for name, place in (("input_torque", 1), ("output_torque", 2))
+        ]
+        read_in = departures[:, 3] / self.ratio
+        read_out = read_in - departures[:, 0]
+        angle = flags[0] | flags[3]
+        together = angle & (np.abs(departures[:, 0]) < 0.5 * np.abs(read_in))
+        of_input = angle & ~together & (np.abs(read_in) > np.abs(read_out))
+        found.append(("time", together, departures[:, 3] / self.record.input_speed))
+        found.append(("input_angle", of_input, departures[:, 3]))
+        found.append(("output_angle", angle & ~together & ~of_input, read_out))
+        return [one for one in found if one[1].any()]
+
+    def take_spikes(self, found: Sequence[tuple[str, NDArray[np.bool_], Rows]]) -> None:
+        """Leave out the rows of spikes: name of the channel, rows, and how far they depart."""
+        for channel, flags, departures in found:
+            for first, last in _runs(flags):
+                run = departures[first : last + 1]
+                size = float(run[np.argmax(np.abs(run))])
+                self._note("spike", channel, first, last - first + 1, size, "left out")
+        self._keep(~np.any([flags for _, flags, _ in found], axis=0))
+
+    def _clearest_step(self, fit: LineFit) -> tuple[int, Step] | None:
+        """Return the channel, by its place in `LineFit`, and the jump that stands out most."""
+        residual = fit.residual
+        steps = [
+            (channel, step(residual[:, channel], fit.basis, self.deviations, self.rules))
+            for channel in range(residual.shape[1])
+        ]
+        found = [(channel, one) for channel, one in steps if one is not None]
+        return max(found, key=lambda one: one[1].deviations, default=None)
+
+    def _take_step(self, place: int, found: Step, fit: LineFit, orders: Sequence[float]) -> bool:
+        """Take a jump out of the rows; return whether that was possible."""
+        channel, size = self._jumped(place, found, fit.residual)
+        rows = len(self.rows) - found.row
+        if channel == "time":
+            time = self.record.time.copy()
+            time[found.row :] += size
+            if not time[found.row] > time[found.row - 1]:
+                return False
+            self.record = replace(self.record, time=time)
+        else:
+            jump = Jump(float(self.record.time[found.row]), channel, 0.0)
+            self.record = replace(self.record, jumps=(*self.record.jumps, jump))
+            self._shift(len(self.record.jumps) - 1, size)
+            size = self._refined(orders)
+        self._note("jump", channel, found.row, rows, size, "modelled")
+        return True
+
+    def _jumped(self, place: int, found: Step, residual: Rows) -> tuple[str, float]:
+        """Return which channel of the record jumps at a step, and by how much."""
+        if place in (1, 2):
+            return RUNNING[place + 1], found.size
+        near = min(WINDOWS[1], found.row, len(residual) - found.row)
+        before, after = residual[found.row - near : found.row], residual[found.row :][:near]
+        error, read_in = (np.median(after, axis=0) - np.median(before, axis=0))[[0, 3]]
+        if place == 3:
+            read_in = found.size
+        else:
+            error = found.size
+        if abs(error) < 0.5 * abs(read_in) / self.ratio:
+            return "time", read_in / self.record.input_speed
+        if abs(read_in) > 0.5 * abs(error) * self.ratio:
+            return "input_angle", error * self.ratio
+        return "output_angle", -error
+
+    def _refined(self, orders: Sequence[float]) -> float:
+        """Return the size of the last jump, fitted with the lines of the shifted rows."""
+        last = len(self.record.jumps) - 1
+        for _ in range(2):
+            jump = self.record.jumps[last]
+            left = LineFit.of(self.record, self.ratio, orders).coefficients[-1]
+            sizes = {"input_angle": self.ratio * left[0], "output_angle": -left[0],
+                     "input_torque": left[1], "output_torque": left[2]}  # fmt: skip
+            self._shift(last, float(sizes[jump.channel]))
+        return self.record.jumps[last].size
+
+    def _shift(self, place: int, size: float) -> None:
+        """Take so much more of a jump out of the rows."""
+        jumps = list(self.record.jumps)
+        jump = jumps[place]
+        jumps[place] = replace(jump, size=jump.size + size)
+        values = getattr(self.record, jump.channel).copy()
+        values[self.record.time >= jump.time] -= size
+        self.record = replace(self.record, jumps=tuple(jumps), **{jump.channel: values})
+
+    def _note(
+        self, kind: str, channel: str, first: int, rows: int, size: float, treatment: str
+    ) -> None:
+        row = int(self.rows[first])
+        self.faults.append(RowFault(self.record.name, kind, channel, row, rows, size, treatment))
+
+    def _keep(self, kept: NDArray[np.bool_]) -> None:
+        names = SWEPT if isinstance(self.record, TorsionRecord) else RUNNING
+        columns = {name: getattr(self.record, name)[kept] for name in ("time", *names)}
+        self.record = replace(self.record, **columns)
+        self.rows = self.rows[kept]
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return the first and the last place of every run of flags."""
+    edges = np.flatnonzero(np.diff(np.r_[False, flags, False]))
+    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
