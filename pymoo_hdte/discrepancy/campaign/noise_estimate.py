@@ -41,7 +41,7 @@ _THIRD_DIFFERENCES = np.sqrt(20.0)
 
 def running_noise(
     records: Sequence[RunningRecord],
-    residuals: Sequence[Rows],
+    residuals: Sequence[Rows | None],
     rig: Rig,
     ratio: float,
     rules: Rules,
@@ -53,19 +53,20 @@ def running_noise(
     Parameters
     ----------
     records : sequence of RunningRecord
-    residuals : sequence of ndarray, shape (n, 4)
-        Of their order lines, by channel as in `LineFit`.
+    residuals : sequence of ndarray, shape (n, 4), or None
+        Of their order lines, by channel as in `LineFit`; None where they are not known.
     rig : Rig
         What is stated.
     ratio : float
         Transmission ratio N, dimensionless.
     rules : Rules
     """
-    known = [
+    shown = [
         _powers(record, residual, rig, ratio, rules)
         for record, residual in zip(records, residuals, strict=True)
+        if residual is not None
     ]
-    known = [one for one in known if one is not None]
+    known = [one for one in shown if one is not None]
     if not known:
         reason = "the records are too short to show it"
         names = ("angle_noise", "input_torque_noise", "output_torque_noise")

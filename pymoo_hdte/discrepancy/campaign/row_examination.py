@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from scipy.stats import norm
 
@@ -14,12 +15,12 @@ from pymoo_hdte.discrepancy.campaign.noise_estimate import (
     sweep_noise,
     with_noise,
 )
-from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
+from pymoo_hdte.discrepancy.campaign.records import TorsionRecord
 from pymoo_hdte.discrepancy.campaign.row_faults import WINDOWS
-from pymoo_hdte.discrepancy.campaign.row_findings import RowFault, RowFindings
+from pymoo_hdte.discrepancy.campaign.row_findings import NoiseFinding, RowFault, RowFindings
 from pymoo_hdte.discrepancy.campaign.row_repair import (
     RUNNING,
-    Repaired,
+    RepairedRun,
     repaired_run,
     repaired_sweep,
 )
@@ -44,7 +45,8 @@ def examined_rows(
         The same object if nothing was found.
     findings : RowFindings
     """
-    n_rows = sum(len(record.time) for record in (*campaign.running, *campaign.torsion))
+    n_rows = sum(len(one.time) for one in campaign.running)
+    n_rows += sum(len(one.time) for one in campaign.torsion)
     # Every row is compared as a spike, and as a jump in each window and in the whole record.
     tests = n_rows * len(RUNNING) * (2 + len(WINDOWS))
     deviations = float(norm.isf(rules.row_fault_chance / tests / 2.0))
@@ -53,44 +55,50 @@ def examined_rows(
     sweeps = [repaired_sweep(one, deviations, rules) for one in campaign.torsion]
     left_out = _left_out(runs, rules)
     kept = [one for one in runs if one.record.name not in left_out]
-    repaired = _with_records(campaign, kept, sweeps, rules)
-    fitted = [one for one in kept if one.residual is not None]
-    noise = (
-        *running_noise(
-            [one.record for one in fitted],
-            [one.residual for one in fitted],
-            campaign.rig,
-            ratio,
-            rules,
-        ),
-        *sweep_noise(repaired.torsion, campaign.rig, rules),
-        repeatability(repaired.running, campaign.believed, campaign.rig, rules),
+    noise = _noise(campaign, kept, [record for record, _ in sweeps], rules)
+    changed: dict[str, Any] = {
+        "running": tuple(one.record for one in kept),
+        "torsion": tuple(record for record, _ in sweeps),
+        "rig": with_noise(campaign.rig, noise),
+    }
+    if any(not _same(getattr(campaign, name), value) for name, value in changed.items()):
+        campaign = replace(campaign, **changed, rules=rules)
+    faults = [fault for one in runs for fault in one.faults]
+    faults += [fault for _, found in sweeps for fault in found]
+    final = tuple(_final(fault, left_out) for fault in faults)
+    return campaign, RowFindings(n_rows, final, left_out, noise)
+
+
+def _same(old: object, new: object) -> bool:
+    """Return whether nothing was replaced in a tuple of records, or in a rig."""
+    if isinstance(old, tuple) and isinstance(new, tuple):
+        return len(old) == len(new) and all(a is b for a, b in zip(old, new, strict=True))
+    return old is new
+
+
+def _noise(
+    campaign: Campaign,
+    runs: Sequence[RepairedRun],
+    sweeps: Sequence[TorsionRecord],
+    rules: Rules,
+) -> tuple[NoiseFinding, ...]:
+    rig, believed = campaign.rig, campaign.believed
+    records = [one.record for one in runs]
+    residuals = [one.residual for one in runs]
+    return (
+        *running_noise(records, residuals, rig, believed.ratio, rules),
+        *sweep_noise(sweeps, rig, rules),
+        repeatability(records, believed, rig, rules),
     )
-    rig = with_noise(campaign.rig, noise)
-    if rig is not campaign.rig:
-        repaired = replace(repaired, rig=rig, rules=rules)
-    faults = [_final(fault, left_out) for one in (*runs, *sweeps) for fault in one.faults]
-    return repaired, RowFindings(n_rows, tuple(faults), left_out, noise)
 
 
-def _left_out(runs: Sequence[Repaired], rules: Rules) -> tuple[str, ...]:
+def _left_out(runs: Sequence[RepairedRun], rules: Rules) -> tuple[str, ...]:
     """Return the records that cannot be repaired, unless too few would be left to fit."""
     lost = [one.record for one in runs if not one.usable]
     train = [one.record for one in runs if one.record.role == "train"]
     if len(train) - sum(one.role == "train" for one in lost) < rules.fewest_records:
         lost = [one for one in lost if one.role != "train"]
     return tuple(one.name for one in lost)
-
-
-def _with_records(
-    campaign: Campaign, runs: Sequence[Repaired], sweeps: Sequence[Repaired], rules: Rules
-) -> Campaign:
-    running: tuple[RunningRecord, ...] = tuple(one.record for one in runs)
-    torsion: tuple[TorsionRecord, ...] = tuple(one.record for one in sweeps)
-    before, after = (*campaign.running, *campaign.torsion), (*running, *torsion)
-    if len(before) == len(after) and all(a is b for a, b in zip(before, after, strict=True)):
-        return campaign
-    return replace(campaign, running=running, torsion=torsion, rules=rules)
 
 
 def _final(fault: RowFault, left_out: Sequence[str]) -> RowFault:

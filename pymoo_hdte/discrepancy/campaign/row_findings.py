@@ -85,10 +85,14 @@ class NoiseFinding:
         """Whether the stated value was replaced."""
         return self.used != self.stated
 
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        return "N.m" if "torque" in self.name else "rad"
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain values with their unit."""
-        unit = "N.m" if "torque" in self.name else "rad"
-        return asdict(self) | {"unit": unit, "replaced": self.replaced}
+        return asdict(self) | {"unit": self.unit, "replaced": self.replaced}
 
 
 @dataclass(frozen=True)

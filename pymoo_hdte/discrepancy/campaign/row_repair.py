@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +17,11 @@ from scipy.ndimage import median_filter
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.line_basis import LineFit
-from pymoo_hdte.discrepancy.campaign.records import (
-    FEWEST_SAMPLES,
-    Jump,
-    RunningRecord,
-    TorsionRecord,
-)
+from pymoo_hdte.discrepancy.campaign.records import Jump, RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.campaign.row_faults import WINDOWS, Step, spikes, spikes_on_course, step
 from pymoo_hdte.discrepancy.campaign.row_findings import RowFault
+from pymoo_hdte.discrepancy.campaign.row_search import Rows, RowSearch, Spikes
 from pymoo_hdte.discrepancy.engine.rules import Rules
-
-Rows = NDArray[np.float64]
-Record = TypeVar("Record", RunningRecord, TorsionRecord)
 
 RUNNING = ("input_angle", "output_angle", "input_torque", "output_torque")
 SWEPT = ("output_angle", "output_torque")
@@ -42,29 +34,28 @@ _SMOOTHED = 11
 
 
 @dataclass(frozen=True, eq=False)
-class Repaired:
-    """A record without its faults.
+class RepairedRun:
+    """A running record without its faults.
 
     Attributes
     ----------
-    record : RunningRecord or TorsionRecord
+    record : RunningRecord
     faults : tuple of RowFault
     residual : ndarray, shape (n, 4), or None
-        Of the order lines, by channel as in `LineFit`; None for a sweep, or where the lines cannot
-        be fitted.
+        Of the order lines, by channel as in `LineFit`; None where they cannot be fitted.
     usable : bool
         False if several channels jump at once: not a sensor has changed then, but the test.
     """
 
-    record: RunningRecord | TorsionRecord
+    record: RunningRecord
     faults: tuple[RowFault, ...]
-    residual: Rows | None = None
-    usable: bool = True
+    residual: Rows | None
+    usable: bool
 
 
 def repaired_run(
     record: RunningRecord, ratio: float, orders: Sequence[float], deviations: float, rules: Rules
-) -> Repaired:
+) -> RepairedRun:
     """Return a running record without spikes, jumps and repeated rows.
 
     Parameters
@@ -78,24 +69,27 @@ def repaired_run(
         Least size of a fault, in standard deviations.
     rules : Rules
     """
-    search = _Search(record, ratio, deviations, rules)
-    search.take_repeated(RUNNING)
+    search = _RunSearch(record, ratio, deviations, rules)
+    search.take_repeated()
     search.note_gaps()
     try:
         residual = search.run(orders)
     except InvalidInput:
         # A record that cannot tell these lines apart is judged, and refused, where it is measured.
-        return Repaired(record, ())
-    return Repaired(search.record, tuple(search.faults), residual, not search.changed_as_a_whole)
+        return RepairedRun(record, (), None, True)
+    usable = not search.changed_as_a_whole
+    return RepairedRun(search.record, tuple(search.faults), residual, usable)
 
 
-def repaired_sweep(record: TorsionRecord, deviations: float, rules: Rules) -> Repaired:
-    """Return a torsion sweep without spikes and repeated rows.
+def repaired_sweep(
+    record: TorsionRecord, deviations: float, rules: Rules
+) -> tuple[TorsionRecord, tuple[RowFault, ...]]:
+    """Return a torsion sweep without spikes and repeated rows, and what was wrong with it.
 
     Its jumps stay: a drive with a clearance jumps where the torque changes sign.
     """
-    search = _Search(record, 1.0, deviations, rules)
-    search.take_repeated(SWEPT)
+    search = RowSearch[TorsionRecord](record, SWEPT, deviations, rules)
+    search.take_repeated()
     search.note_gaps()
     for channel in SWEPT:
         values = getattr(search.record, channel)
@@ -103,18 +97,17 @@ def repaired_sweep(record: TorsionRecord, deviations: float, rules: Rules) -> Re
         if flags.any():
             departures = values - median_filter(values, _SMOOTHED, mode="nearest")
             search.take_spikes([(channel, flags, departures)])
-    return Repaired(search.record, tuple(search.faults))
+    return search.record, tuple(search.faults)
 
 
-class _Search:
-    """A record on the way to its repair; rows keep their numbers in the file."""
+class _RunSearch(RowSearch[RunningRecord]):
+    """The same for a running record, by what its order lines leave."""
 
     def __init__(
-        self, record: RunningRecord | TorsionRecord, ratio: float, deviations: float, rules: Rules
+        self, record: RunningRecord, ratio: float, deviations: float, rules: Rules
     ) -> None:
-        self.record, self.ratio, self.deviations, self.rules = record, ratio, deviations, rules
-        self.rows = np.arange(len(record.time))
-        self.faults: list[RowFault] = []
+        super().__init__(record, RUNNING, deviations, rules)
+        self.ratio = ratio
 
     @property
     def changed_as_a_whole(self) -> bool:
@@ -126,25 +119,6 @@ class _Search:
             for place, one in enumerate(kinds)
             for other in kinds[:place]
         )
-
-    def take_repeated(self, channels: Sequence[str]) -> None:
-        """Leave out rows that are equal in all channels to the one before."""
-        table = np.column_stack([getattr(self.record, channel) for channel in channels])
-        again = np.r_[False, np.all(table[1:] == table[:-1], axis=1)]
-        if again.any() and np.count_nonzero(~again) >= FEWEST_SAMPLES:
-            for first, last in _runs(again):
-                length = float(self.record.time[last] - self.record.time[first - 1])
-                self._note("repeated", "rows", first, last - first + 1, length, "left out")
-            self._keep(~again)
-
-    def note_gaps(self) -> None:
-        """Note where the time runs on without rows."""
-        steps = np.diff(self.record.time) * self.record.sample_rate
-        for place in np.flatnonzero(steps > self.rules.gap_of_rows):
-            lost = round(float(steps[place])) - 1 - int(np.diff(self.rows)[place] - 1)
-            if lost > 0:
-                length = lost / self.record.sample_rate
-                self._note("gap", "rows", int(place) + 1, lost, length, "none needed")
 
     def run(self, orders: Sequence[float]) -> Rows:
         """Take out spikes and jumps until there are none; return the residual of the lines.
@@ -174,7 +148,7 @@ class _Search:
             self.take_spikes(found)
         return fit
 
-    def _spikes(self, residual: Rows) -> list[tuple[str, NDArray[np.bool_], Rows]]:
+    def _spikes(self, residual: Rows) -> list[Spikes]:
         """Return channels with spikes, which rows they are, and the departures there."""
         departures = residual - median_filter(residual, (_SMOOTHED, 1), mode="nearest")
         flags = [spikes(one, self.deviations, self.rules) for one in residual.T]
@@ -191,15 +165,6 @@ class _Search:
         found.append(("input_angle", of_input, departures[:, 3]))
         found.append(("output_angle", angle & ~together & ~of_input, read_out))
         return [one for one in found if one[1].any()]
-
-    def take_spikes(self, found: Sequence[tuple[str, NDArray[np.bool_], Rows]]) -> None:
-        """Leave out the rows of spikes: name of the channel, rows, and how far they depart."""
-        for channel, flags, departures in found:
-            for first, last in _runs(flags):
-                run = departures[first : last + 1]
-                size = float(run[np.argmax(np.abs(run))])
-                self._note("spike", channel, first, last - first + 1, size, "left out")
-        self._keep(~np.any([flags for _, flags, _ in found], axis=0))
 
     def _clearest_step(self, fit: LineFit) -> tuple[int, Step] | None:
         """Return the channel, by its place in `LineFit`, and the jump that stands out most."""
@@ -226,7 +191,7 @@ class _Search:
             self.record = replace(self.record, jumps=(*self.record.jumps, jump))
             self._shift(len(self.record.jumps) - 1, size)
             size = self._refined(orders)
-        self._note("jump", channel, found.row, rows, size, "modelled")
+        self.note("jump", channel, found.row, rows, size, "modelled")
         return True
 
     def _jumped(self, place: int, found: Step, residual: Rows) -> tuple[str, float]:
@@ -265,21 +230,3 @@ class _Search:
         values = getattr(self.record, jump.channel).copy()
         values[self.record.time >= jump.time] -= size
         self.record = replace(self.record, jumps=tuple(jumps), **{jump.channel: values})
-
-    def _note(
-        self, kind: str, channel: str, first: int, rows: int, size: float, treatment: str
-    ) -> None:
-        row = int(self.rows[first])
-        self.faults.append(RowFault(self.record.name, kind, channel, row, rows, size, treatment))
-
-    def _keep(self, kept: NDArray[np.bool_]) -> None:
-        names = SWEPT if isinstance(self.record, TorsionRecord) else RUNNING
-        columns = {name: getattr(self.record, name)[kept] for name in ("time", *names)}
-        self.record = replace(self.record, **columns)
-        self.rows = self.rows[kept]
-
-
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return the first and the last place of every run of flags."""
-    edges = np.flatnonzero(np.diff(np.r_[False, flags, False]))
-    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))

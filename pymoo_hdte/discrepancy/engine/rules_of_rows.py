@@ -43,8 +43,8 @@ class RowRules(RuleSet):
         3,
         "rows",
         "A spike has no more rows than this.",
-        f"{BY_HAND}: a false reading of a sensor lasts one sample, which a filter spreads a little; "
-        "a motion lasts longer.",
+        f"{BY_HAND}: a false reading lasts one sample, which a filter spreads a little; a motion "
+        "lasts longer.",
     )
     most_jumps: int = rule(
         3,
@@ -64,7 +64,7 @@ class RowRules(RuleSet):
         "ratio of standard deviations",
         "The noise that the rows show replaces the stated one if their ratio is larger, or smaller "
         "than the inverse, and differs from 1 significantly.",
-        f"{BY_HAND}: up to here chi-square is off by at most 10 %, which takes an adequate model of "
-        "1400 degrees of freedom no further than two thirds of the way to a false alarm.",
+        f"{BY_HAND}: up to here chi-square is off by at most 10 %, which takes an adequate model "
+        "of 1400 degrees of freedom no further than two thirds of the way to a false alarm.",
         at_least=1.0,
     )
