@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,7 +49,7 @@ class DriveFinding:
     data: Data
     verdict: Verdict
     unexpected: tuple[float, ...]
-    rows: RowFindings = RowFindings()
+    rows: RowFindings = field(default_factory=RowFindings)
 
     @cached_property
     def held_out(self) -> Data | None:
