@@ -24,6 +24,9 @@ _BESIDE = 5
 WINDOWS = (4, 16, 64)
 """Rows before and after a jump that are compared: for jumps down to 5, 2.3, and 1.1 deviations."""
 
+_LEAST_ROWS = 16
+"""Least number of rows before and after a jump."""
+
 _WINDOWS_IN_RECORD = 30
 """Least number of windows (before and after) in a record, for the scatter of the comparison."""
 
@@ -69,7 +72,7 @@ def spikes_on_course(values: Rows, deviations: float, rules: Rules) -> NDArray[n
     """Return which rows of a channel that rises and falls are spikes, shape (n,).
 
     As `spikes`, but compared with straight lines through the rows before and after: the row of a
-    turning point lies on both.
+    turning point lies on both. Not at the ends, where a clearance may begin or end.
     """
     place = np.arange(-_BESIDE, 0.0)
     middle = place.mean()
@@ -77,19 +80,31 @@ def spikes_on_course(values: Rows, deviations: float, rules: Rules) -> NDArray[n
     before, after = values.copy(), values.copy()
     before[_BESIDE:] -= np.correlate(values, weights, mode="valid")[:-1]
     after[:-_BESIDE] -= np.correlate(values, weights[::-1], mode="valid")[1:]
-    return _outstanding(before, after, deviations, rules)
+    found = _outstanding(before, after, deviations, rules)
+    found[:_BESIDE] = found[-_BESIDE:] = False
+    return found
 
 
 def _outstanding(before: Rows, after: Rows, deviations: float, rules: Rules) -> NDArray[np.bool_]:
-    """Return which rows depart to the same side from those before and from those after them."""
-    # At the ends there are rows on one side only.
-    after[-_BESIDE:], before[:_BESIDE] = before[-_BESIDE:], after[:_BESIDE]
-    departs = np.where(after * before > 0.0, np.minimum(np.abs(after), np.abs(before)), 0.0)
+    """Return which rows depart to the same side from those before and from those after them.
+
+    At the ends there are rows on one side only; there a spike has to stand out of all departures
+    from the rows before.
+    """
     usual = _DEVIATION * float(np.median(np.abs(before)))
-    most = max(1, int(rules.spike_share * len(departs)))
-    common = float(np.partition(departs, -1 - most)[-1 - most])
-    found = departs > max(deviations * usual, rules.fault_prominence * common)
+    departs = np.where(after * before > 0.0, np.minimum(np.abs(after), np.abs(before)), 0.0)
+    limits = np.full(len(departs), max(deviations * usual, _common(departs, rules)))
+    ends = np.r_[:_BESIDE, len(departs) - _BESIDE : len(departs)]
+    departs[:_BESIDE], departs[-_BESIDE:] = np.abs(after[:_BESIDE]), np.abs(before[-_BESIDE:])
+    limits[ends] = max(deviations * usual, _common(np.abs(before[_BESIDE:]), rules))
+    found = departs > limits
     return found & (usual > 0.0) & (_run_lengths(found) <= rules.longest_spike)
+
+
+def _common(departs: Rows, rules: Rules) -> float:
+    """Return what a spike has to exceed beside as many departures as are no spikes any more."""
+    most = max(1, int(rules.spike_share * len(departs)))
+    return rules.fault_prominence * float(np.partition(departs, -1 - most)[-1 - most])
 
 
 def _run_lengths(flags: NDArray[np.bool_]) -> NDArray[np.int_]:
@@ -130,6 +145,9 @@ def _step_in_windows(residual: Rows, half: int, deviations: float, rules: Rules)
     contrast = sides - place * (sides @ place) / (place @ place)
     power = float(contrast @ contrast)
     sizes = np.correlate(residual, contrast, mode="valid") * 2.0 / power
+    # Nearer to an end than this there are too few rows to tell a jump from a disturbance.
+    edge = max(_LEAST_ROWS - half, 0)
+    sizes[:edge] = sizes[len(sizes) - edge :] = 0.0
     deviation = 2.0 * scatter(residual) / np.sqrt(power)
     usual = max(deviation, _DEVIATION * float(np.median(np.abs(sizes))))
     peaks = _peaks(np.abs(sizes), rules.most_jumps + 1, 2 * half)
@@ -168,7 +186,7 @@ def _step_in_record(residual: Rows, basis: Rows, deviations: float, rules: Rules
     # What the lines cannot make of a step at each row: its length, beside the part they can.
     lengths = np.arange(len(residual), 0, -1) - np.sum(shares**2, axis=1)
     known = lengths > 1.0
-    known[: WINDOWS[0]] = known[-WINDOWS[0] :] = False
+    known[:_LEAST_ROWS] = known[len(known) - _LEAST_ROWS + 1 :] = False
     if not known.any():
         return None
     strength = _strength(residual, lengths, known) / noise
@@ -178,7 +196,7 @@ def _step_in_record(residual: Rows, basis: Rows, deviations: float, rules: Rules
     stepped[row:] += 1.0
     left = float(np.abs(_strength(residual - size * stepped, lengths, known)).max()) / noise
     clear = abs(float(strength[row]))
-    if clear > max(deviations, rules.fault_prominence * left) and _abrupt_in(residual, row, size):
+    if clear > max(deviations, rules.fault_prominence * left) and _abrupt(residual, row, size):
         return Step(row, size, clear)
     return None
 
@@ -187,8 +205,3 @@ def _strength(residual: Rows, lengths: Rows, known: NDArray[np.bool_]) -> Rows:
     """Return how strongly a residual speaks for a step at each row; white noise gives its own."""
     sums = np.cumsum(residual[::-1])[::-1]
     return np.where(known, sums, 0.0) / np.sqrt(np.where(known, lengths, 1.0))
-
-
-def _abrupt_in(residual: Rows, row: int, size: float) -> bool:
-    near = WINDOWS[0]
-    return near <= row <= len(residual) - near and _abrupt(residual, row, size)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,7 +133,7 @@ class _RunSearch(RowSearch[RunningRecord]):
             if found is None:
                 return fit.residual
             rough = rough or (self.record, self.rows, list(self.faults))
-            if taken == self.rules.most_jumps or not self._take_step(*found, fit, orders):
+            if taken == self.rules.most_jumps or not self._take_step(*found, orders):
                 break
         if rough is not None:
             self.record, self.rows, self.faults = rough
@@ -160,25 +161,34 @@ class _RunSearch(RowSearch[RunningRecord]):
         read_out = read_in - departures[:, 0]
         angle = flags[0] | flags[3]
         together = angle & (np.abs(departures[:, 0]) < 0.5 * np.abs(read_in))
+        lost = departures[:, 3] / self.record.input_speed
+        # A drive whose angles depart by less than a row's way has moved so.
+        angle &= ~together | self._is_of_rows(lost)
+        together &= angle
         of_input = angle & ~together & (np.abs(read_in) > np.abs(read_out))
-        found.append(("time", together, departures[:, 3] / self.record.input_speed))
+        found.append(("time", together, lost))
         found.append(("input_angle", of_input, departures[:, 3]))
         found.append(("output_angle", angle & ~together & ~of_input, read_out))
         return [one for one in found if one[1].any()]
 
-    def _clearest_step(self, fit: LineFit) -> tuple[int, Step] | None:
-        """Return the channel, by its place in `LineFit`, and the jump that stands out most."""
-        residual = fit.residual
-        steps = [
-            (channel, step(residual[:, channel], fit.basis, self.deviations, self.rules))
-            for channel in range(residual.shape[1])
-        ]
-        found = [(channel, one) for channel, one in steps if one is not None]
-        return max(found, key=lambda one: one[1].deviations, default=None)
+    def _is_of_rows(self, time: Any) -> Any:
+        """Return whether a time is that of lost or repeated rows, not of a motion."""
+        return np.abs(time) * self.record.sample_rate > self.rules.gap_of_rows - 1.0
 
-    def _take_step(self, place: int, found: Step, fit: LineFit, orders: Sequence[float]) -> bool:
+    def _clearest_step(self, fit: LineFit) -> tuple[Step, str, float] | None:
+        """Return the jump that stands out most, the channel that jumps, and by how much."""
+        residual, found = fit.residual, list[tuple[Step, str, float]]()
+        for place in range(residual.shape[1]):
+            one = step(residual[:, place], fit.basis, self.deviations, self.rules)
+            if one is None:
+                continue
+            channel, size = self._jumped(place, one, residual)
+            if channel != "time" or self._is_of_rows(size):
+                found.append((one, channel, size))
+        return max(found, key=lambda one: one[0].deviations, default=None)
+
+    def _take_step(self, found: Step, channel: str, size: float, orders: Sequence[float]) -> bool:
         """Take a jump out of the rows; return whether that was possible."""
-        channel, size = self._jumped(place, found, fit.residual)
         rows = len(self.rows) - found.row
         if channel == "time":
             time = self.record.time.copy()
