@@ -42,6 +42,25 @@ class Step(NamedTuple):
     deviations: float
 
 
+class Lines(NamedTuple):
+    """What order lines make of a step of one from a row to the end, for every row.
+
+    ``basis`` (n, p) is orthonormal, ``shares`` (n, p) the step's part in it, and ``lengths`` (n,)
+    the square of the length of the rest.
+    """
+
+    basis: Rows
+    shares: Rows
+    lengths: Rows
+
+    @classmethod
+    def of(cls, basis: Rows) -> Lines:
+        """Return that of an orthonormal basis."""
+        shares = np.cumsum(basis[::-1], axis=0)[::-1]
+        rest = np.arange(len(basis), 0.0, -1.0) - np.einsum("np,np->n", shares, shares)
+        return cls(basis, shares, rest)
+
+
 def scatter(rows: Rows) -> float:
     """Return the standard deviation of the noise of rows (n,) by their differences, robustly."""
     return float(_DEVIATION / np.sqrt(2.0) * np.median(np.abs(np.diff(rows))))
@@ -114,7 +133,7 @@ def _run_lengths(flags: NDArray[np.bool_]) -> NDArray[np.int_]:
     return np.repeat(lengths, lengths)
 
 
-def step(residual: Rows, basis: Rows, deviations: float, rules: Rules) -> Step | None:
+def step(residual: Rows, lines: Lines, deviations: float, rules: Rules) -> Step | None:
     """Return the clearest jump, or None.
 
     Rows before and after are compared in windows, beside a straight line, and in the whole record,
@@ -123,8 +142,8 @@ def step(residual: Rows, basis: Rows, deviations: float, rules: Rules) -> Step |
     Parameters
     ----------
     residual : ndarray, shape (n,)
-    basis : ndarray, shape (n, p)
-        Orthonormal, of the lines that were taken out.
+    lines : Lines
+        That were taken out.
     deviations : float
         Least size in standard deviations of its own.
     rules : Rules
@@ -132,7 +151,7 @@ def step(residual: Rows, basis: Rows, deviations: float, rules: Rules) -> Step |
     if scatter(residual) == 0.0:
         return None
     found = [_step_in_windows(residual, half, deviations, rules) for half in WINDOWS]
-    found.append(_step_in_record(residual, basis, deviations, rules))
+    found.append(_step_in_record(residual, lines, deviations, rules))
     return max((one for one in found if one), key=lambda one: one.deviations, default=None)
 
 
@@ -179,12 +198,10 @@ def _abrupt(residual: Rows, row: int, size: float) -> bool:
     return bool(abs(after.mean() - before.mean() - size) < 0.5 * abs(size) + 3.0 * noise)
 
 
-def _step_in_record(residual: Rows, basis: Rows, deviations: float, rules: Rules) -> Step | None:
+def _step_in_record(residual: Rows, lines: Lines, deviations: float, rules: Rules) -> Step | None:
     """Return the jump that explains most of a residual, if hardly anything else is left then."""
     noise = scatter(residual)
-    shares = np.cumsum(basis[::-1], axis=0)[::-1]
-    # What the lines cannot make of a step at each row: its length, beside the part they can.
-    lengths = np.arange(len(residual), 0, -1) - np.sum(shares**2, axis=1)
+    basis, shares, lengths = lines
     known = lengths > 1.0
     known[:_LEAST_ROWS] = known[len(known) - _LEAST_ROWS + 1 :] = False
     if not known.any():

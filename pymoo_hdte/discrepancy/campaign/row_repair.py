@@ -19,7 +19,14 @@ from scipy.ndimage import median_filter
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.line_basis import LineFit
 from pymoo_hdte.discrepancy.campaign.records import Jump, RunningRecord, TorsionRecord
-from pymoo_hdte.discrepancy.campaign.row_faults import WINDOWS, Step, spikes, spikes_on_course, step
+from pymoo_hdte.discrepancy.campaign.row_faults import (
+    WINDOWS,
+    Lines,
+    Step,
+    spikes,
+    spikes_on_course,
+    step,
+)
 from pymoo_hdte.discrepancy.campaign.row_findings import RowFault
 from pymoo_hdte.discrepancy.campaign.row_search import Rows, RowSearch, Spikes
 from pymoo_hdte.discrepancy.engine.rules import Rules
@@ -78,8 +85,7 @@ def repaired_run(
     except InvalidInput:
         # A record that cannot tell these lines apart is judged, and refused, where it is measured.
         return RepairedRun(record, (), None, True)
-    usable = not search.changed_as_a_whole
-    return RepairedRun(search.record, tuple(search.faults), residual, usable)
+    return RepairedRun(search.record, tuple(search.faults), residual, search.usable)
 
 
 def repaired_sweep(
@@ -96,7 +102,7 @@ def repaired_sweep(
         values = getattr(search.record, channel)
         flags = spikes_on_course(values, deviations, rules)
         if flags.any():
-            departures = values - median_filter(values, _SMOOTHED, mode="nearest")
+            departures = values - median_filter(values, _SMOOTHED, mode="mirror")
             search.take_spikes([(channel, flags, departures)])
     return search.record, tuple(search.faults)
 
@@ -109,17 +115,7 @@ class _RunSearch(RowSearch[RunningRecord]):
     ) -> None:
         super().__init__(record, RUNNING, deviations, rules)
         self.ratio = ratio
-
-    @property
-    def changed_as_a_whole(self) -> bool:
-        """Whether angles and torques jump together."""
-        jumps = [fault for fault in self.faults if fault.kind == "jump" and fault.channel != "time"]
-        kinds = [(fault.row, fault.channel.replace("input_a", "output_a")) for fault in jumps]
-        return any(
-            abs(one[0] - other[0]) <= WINDOWS[1] and one[1] != other[1]
-            for place, one in enumerate(kinds)
-            for other in kinds[:place]
-        )
+        self.usable = True
 
     def run(self, orders: Sequence[float]) -> Rows:
         """Take out spikes and jumps until there are none; return the residual of the lines.
@@ -151,8 +147,10 @@ class _RunSearch(RowSearch[RunningRecord]):
 
     def _spikes(self, residual: Rows) -> list[Spikes]:
         """Return channels with spikes, which rows they are, and the departures there."""
-        departures = residual - median_filter(residual, (_SMOOTHED, 1), mode="nearest")
         flags = [spikes(one, self.deviations, self.rules) for one in residual.T]
+        if not np.any(flags):
+            return []
+        departures = residual - median_filter(residual, (_SMOOTHED, 1), mode="mirror")
         found = [
             (name, flags[place], departures[:, place])
             for name, place in (("input_torque", 1), ("output_torque", 2))
@@ -178,14 +176,29 @@ class _RunSearch(RowSearch[RunningRecord]):
     def _clearest_step(self, fit: LineFit) -> tuple[Step, str, float] | None:
         """Return the jump that stands out most, the channel that jumps, and by how much."""
         residual, found = fit.residual, list[tuple[Step, str, float]]()
+        lines = Lines.of(fit.basis)
         for place in range(residual.shape[1]):
-            one = step(residual[:, place], fit.basis, self.deviations, self.rules)
+            one = step(residual[:, place], lines, self.deviations, self.rules)
             if one is None:
                 continue
             channel, size = self._jumped(place, one, residual)
             if channel != "time" or self._is_of_rows(size):
                 found.append((one, channel, size))
-        return max(found, key=lambda one: one[0].deviations, default=None)
+        best = max(found, key=lambda one: one[0].deviations, default=None)
+        if best is not None:
+            self._compare(best, found)
+        return best
+
+    def _compare(
+        self, best: tuple[Step, str, float], found: Sequence[tuple[Step, str, float]]
+    ) -> None:
+        """Note jumps of further channels at the row of one: the record is of two tests then."""
+        angles = ("time", "input_angle", "output_angle")
+        for one, channel, size in found:
+            both_angles = channel in angles and best[1] in angles
+            if channel != best[1] and not both_angles and abs(one.row - best[0].row) <= WINDOWS[1]:
+                self.note("jump", channel, one.row, len(self.rows) - one.row, size, "modelled")
+                self.usable = False
 
     def _take_step(self, found: Step, channel: str, size: float, orders: Sequence[float]) -> bool:
         """Take a jump out of the rows; return whether that was possible."""
