@@ -24,6 +24,9 @@ _BESIDE = 5
 WINDOWS = (4, 16, 64)
 """Rows before and after a jump that are compared: for jumps down to 5, 2.3, and 1.1 deviations."""
 
+_WIDE = 256
+"""Rows before and after what may be a jump in the whole record: a ramp is none."""
+
 _LEAST_ROWS = 16
 """Least number of rows before and after a jump."""
 
@@ -159,23 +162,19 @@ def _step_in_windows(residual: Rows, half: int, deviations: float, rules: Rules)
     """Return the clearest jump in windows of ``half`` rows before and as many after."""
     if len(residual) < 2 * half * _WINDOWS_IN_RECORD:
         return None
-    place = np.arange(2 * half) - (half - 0.5)
-    sides = np.sign(place)
-    contrast = sides - place * (sides @ place) / (place @ place)
-    power = float(contrast @ contrast)
-    sizes = np.correlate(residual, contrast, mode="valid") * 2.0 / power
+    contrast, deviation = _contrast(half)
+    sizes = np.correlate(residual, contrast, mode="valid")
     # Nearer to an end than this there are too few rows to tell a jump from a disturbance.
     edge = max(_LEAST_ROWS - half, 0)
     sizes[:edge] = sizes[len(sizes) - edge :] = 0.0
-    deviation = 2.0 * scatter(residual) / np.sqrt(power)
-    usual = max(deviation, _DEVIATION * float(np.median(np.abs(sizes))))
+    usual = max(deviation * scatter(residual), _DEVIATION * float(np.median(np.abs(sizes))))
     peaks = _peaks(np.abs(sizes), rules.most_jumps + 1, 2 * half)
     common = float(np.abs(sizes[peaks[-1]])) if len(peaks) > rules.most_jumps else 0.0
     size = float(sizes[peaks[0]])
     if not abs(size) > max(deviations * usual, rules.fault_prominence * common):
         return None
     row = int(peaks[0]) + half
-    if half > WINDOWS[0] and not _abrupt(residual, row, size):
+    if not _abrupt(residual, row, size, half):
         return None
     return Step(row, size, abs(size) / usual)
 
@@ -190,12 +189,29 @@ def _peaks(heights: Rows, number: int, apart: int) -> list[int]:
     return found
 
 
-def _abrupt(residual: Rows, row: int, size: float) -> bool:
+def _abrupt(residual: Rows, row: int, size: float, widest: int) -> bool:
     """Return whether most of a jump happens from one row to the next, as far as noise shows it."""
-    near = WINDOWS[0]
-    before, after = residual[row - near : row], residual[row : row + near]
-    noise = scatter(residual) * np.sqrt(2.0 / near)
-    return bool(abs(after.mean() - before.mean() - size) < 0.5 * abs(size) + 3.0 * noise)
+    noise = scatter(residual)
+    most = min(widest, row, len(residual) - row)
+    for half in {min(one, most) for one in (*WINDOWS, _WIDE)}:
+        contrast, deviation = _contrast(half)
+        near = float(contrast @ residual[row - half : row + half])
+        if abs(near - size) > 0.5 * abs(size) + 3.0 * deviation * noise:
+            return False
+    return True
+
+
+def _contrast(half: int) -> tuple[Rows, float]:
+    """Return weights of ``half`` rows before and after a step that give its size.
+
+    Straight lines give zero. The second value is the standard deviation that white noise of one
+    gives to the size.
+    """
+    place = np.arange(2 * half) - (half - 0.5)
+    sides = np.sign(place)
+    rest = sides - place * (sides @ place) / (place @ place)
+    power = float(rest @ rest)
+    return 2.0 * rest / power, 2.0 / np.sqrt(power)
 
 
 def _step_in_record(residual: Rows, lines: Lines, deviations: float, rules: Rules) -> Step | None:
@@ -213,7 +229,9 @@ def _step_in_record(residual: Rows, lines: Lines, deviations: float, rules: Rule
     stepped[row:] += 1.0
     left = float(np.abs(_strength(residual - size * stepped, lengths, known)).max()) / noise
     clear = abs(float(strength[row]))
-    if clear > max(deviations, rules.fault_prominence * left) and _abrupt(residual, row, size):
+    if clear > max(deviations, rules.fault_prominence * left) and _abrupt(
+        residual, row, size, _WIDE
+    ):
         return Step(row, size, clear)
     return None
 

@@ -151,10 +151,6 @@ class _RunSearch(RowSearch[RunningRecord]):
         if not np.any(flags):
             return []
         departures = residual - median_filter(residual, (_SMOOTHED, 1), mode="mirror")
-        found = [
-            (name, flags[place], departures[:, place])
-            for name, place in (("input_torque", 1), ("output_torque", 2))
-        ]
         read_in = departures[:, 3] / self.ratio
         read_out = read_in - departures[:, 0]
         angle = flags[0] | flags[3]
@@ -164,9 +160,14 @@ class _RunSearch(RowSearch[RunningRecord]):
         angle &= ~together | self._is_of_rows(lost)
         together &= angle
         of_input = angle & ~together & (np.abs(read_in) > np.abs(read_out))
-        found.append(("time", together, lost))
-        found.append(("input_angle", of_input, departures[:, 3]))
-        found.append(("output_angle", angle & ~together & ~of_input, read_out))
+        found = [
+            ("time", together, lost),
+            ("input_angle", of_input, departures[:, 3]),
+            ("output_angle", angle & ~together & ~of_input, read_out),
+            # Where the input angle is wrong, so is what the lines say about the torques.
+            ("input_torque", flags[1] & ~of_input, departures[:, 1]),
+            ("output_torque", flags[2] & ~of_input, departures[:, 2]),
+        ]
         return [one for one in found if one[1].any()]
 
     def _is_of_rows(self, time: Any) -> Any:
