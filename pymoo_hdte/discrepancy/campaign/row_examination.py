@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy.campaign.row_repair import (
     repaired_run,
     repaired_sweep,
 )
+from pymoo_hdte.discrepancy.campaign.session_zero import with_one_zero
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
 
@@ -56,17 +57,20 @@ def examined_rows(
     left_out = _left_out(runs, rules)
     kept = [one for one in runs if one.record.name not in left_out]
     noise = _noise(campaign, kept, [record for record, _ in sweeps], rules)
+    rig = with_noise(campaign.rig, noise)
+    records = [one.record for one in kept]
+    running, new_zero = with_one_zero(records, campaign.believed, rig, rules)
     changed: dict[str, Any] = {
-        "running": tuple(one.record for one in kept),
+        "running": running,
         "torsion": tuple(record for record, _ in sweeps),
-        "rig": with_noise(campaign.rig, noise),
+        "rig": rig,
     }
     if any(not _same(getattr(campaign, name), value) for name, value in changed.items()):
         campaign = replace(campaign, **changed, rules=rules)
     faults = [fault for one in runs for fault in one.faults]
     faults += [fault for _, found in sweeps for fault in found]
-    final = tuple(_final(fault, left_out) for fault in faults)
-    return campaign, RowFindings(n_rows, final, left_out, noise)
+    final = [_final(fault, left_out) for fault in faults]
+    return campaign, RowFindings(n_rows, (*final, *new_zero), left_out, noise)
 
 
 def _same(old: object, new: object) -> bool:

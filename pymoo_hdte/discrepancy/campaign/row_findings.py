@@ -26,16 +26,17 @@ class RowFault:
     ----------
     record : str
         Name of the record.
-    kind : {"spike", "jump", "gap", "repeated"}
+    kind : {"spike", "jump", "gap", "repeated", "new zero"}
         One to a few rows that depart from both sides; a constant offset from a row on; rows that
-        are missing; rows that repeat the one before.
+        are missing; rows that repeat the one before; a constant offset from this record on.
     channel : str
         ``"input_angle"``, ``"output_angle"``, ``"input_torque"``, ``"output_torque"``; ``"time"``
         where both encoders agree that the time of the rows is wrong; ``"rows"`` for all of them.
     row : int
         First row concerned, from 0 in the file.
     rows : int
-        How many; of a gap, how many are missing; of a jump, all rows to the end of the record.
+        How many; of a gap, how many are missing; of a jump, all rows to the end of the record, of a
+        new zero, to the end of the session.
     size : float
         Largest departure, the offset, or the length of a gap, in `UNITS` of the channel.
     treatment : {"left out", "modelled", "none needed"}

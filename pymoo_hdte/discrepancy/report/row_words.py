@@ -19,6 +19,7 @@ _MOST_FAULTS = 50
 _NOUNS = {
     "spike": ("spike", "spikes"),
     "jump": ("jump", "jumps"),
+    "new zero": ("new zero of an encoder", "new zeros of an encoder"),
     "gap": ("gap", "gaps"),
     "repeated": ("run of repeated rows", "runs of repeated rows"),
 }
@@ -75,8 +76,11 @@ def _treatment(findings: RowFindings) -> str:
     done = []
     if findings.rows_left_out:
         done.append(f"{findings.rows_left_out} of {findings.n_rows} rows are left out")
-    if any(fault.treatment == "modelled" for fault in findings.faults):
+    modelled = {fault.kind for fault in findings.faults if fault.treatment == "modelled"}
+    if "jump" in modelled:
         done.append("jumps are fitted with the order lines")
+    if "new zero" in modelled:
+        done.append("the records after a new zero are shifted back")
     if findings.left_out:
         done.append(f"left out as a whole: {_listed(list(findings.left_out))}")
     return "; ".join(done) or "nothing had to be left out"
