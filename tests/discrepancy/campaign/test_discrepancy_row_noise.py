@@ -139,6 +139,43 @@ def test_a_record_of_two_loads_is_left_out_and_said(clean):
     assert clean.running[6].name in rows_sentence(found)
 
 
+def in_session(campaign, change):
+    """Change the output angle of each record by its place in the session, from 0 to 1."""
+    last = max(record.elapsed for record in campaign.running)
+    running = tuple(
+        replace(one, output_angle=one.output_angle + change(one.elapsed / last))
+        for one in campaign.running
+    )
+    return replace(campaign, running=running)
+
+
+@pytest.mark.parametrize("channel", ["input_angle", "output_angle"])
+def test_a_new_zero_between_two_records_is_found_and_taken_out(clean, channel):
+    ordered = sorted(clean.running, key=lambda one: one.elapsed)
+    size = 200.0 * ARCSEC * (clean.believed.ratio if channel == "input_angle" else 1.0)
+    late = {one.name for one in ordered[5:]}
+    running = tuple(
+        replace(one, **{channel: getattr(one, channel) + size}) if one.name in late else one
+        for one in clean.running
+    )
+    changed, found = examined(replace(clean, running=running))
+    (fault,) = found.faults
+    assert (fault.kind, fault.record, fault.channel) == ("new zero", ordered[5].name, channel)
+    assert fault.size == pytest.approx(size, rel=0.01)
+    for one, before in zip(changed.running, clean.running, strict=True):
+        apart = getattr(one, channel) - getattr(before, channel)
+        np.testing.assert_allclose(apart, 0.0, atol=0.01 * size)
+
+
+@pytest.mark.parametrize(
+    "course",
+    [lambda t: t, lambda t: -np.expm1(-t / 0.2), lambda t: -np.expm1(-t / 0.05), lambda t: t**2],
+)
+def test_a_drift_over_the_session_is_no_new_zero(clean, course):
+    _, found = examined(in_session(clean, lambda t: 40.0 * ARCSEC * course(t)))
+    assert found.faults == ()
+
+
 @pytest.mark.skipif(not CASES.is_dir(), reason="the shared cases are not here")
 @pytest.mark.parametrize(
     ("case", "faults", "replaced"),
