@@ -18,6 +18,7 @@ LOWEST_FIRST = (
     *(
         "discrepancy.engine",
         "discrepancy.campaign",
+        "discrepancy.campaign.rows",
         "discrepancy.drive",
         "discrepancy.drive.misfit",
         "discrepancy.mechanism",

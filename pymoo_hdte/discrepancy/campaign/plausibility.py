@@ -126,7 +126,9 @@ def check_running(
     """
     with np.errstate(over="ignore", invalid="ignore"):
         _check_travel(record, believed.ratio, rules)
-        largest = float(np.max(np.abs(record.transmission_error(believed.ratio))))
+        # All but the outermost hundredth: rows that an encoder read wrongly are left out later.
+        errors = np.abs(record.transmission_error(believed.ratio))
+        largest = float(np.quantile(errors, 1.0 - rules.spike_share))
         most = rules.largest_transmission_error
         if not largest <= most:
             allowed = (

@@ -18,6 +18,28 @@ FEWEST_SAMPLES = 8
 """Least number of rows of a record."""
 
 
+@dataclass(frozen=True)
+class Jump:
+    """A jump of a sensor within a record, which its rows no longer show.
+
+    How large it is, is fitted again together with the lines; whether the rows before or after it
+    were right, nobody knows, so that the mean of the channel counts as uncertain by ``size``.
+
+    Attributes
+    ----------
+    time : float
+        Of the first row after it, s.
+    channel : str
+        Attribute of the record.
+    size : float
+        What was subtracted from this row on, rad or N.m.
+    """
+
+    time: float
+    channel: str
+    size: float
+
+
 @dataclass(frozen=True, eq=False)
 class RunningRecord:
     """The drive at constant speed and load, over one output turn or more.
@@ -48,6 +70,8 @@ class RunningRecord:
     speed_range, load_range : tuple of float, length 2 or 0
         Lowest and highest mean speed, rad/s, and mean load torque, N.m, that the record may have.
         Without them both are near the values set, within shares that `Rules` has.
+    jumps : tuple of Jump
+        Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
 
     Raises
     ------
@@ -70,6 +94,7 @@ class RunningRecord:
     output_torque: NDArray[np.float64]
     speed_range: tuple[float, ...] = ()
     load_range: tuple[float, ...] = ()
+    jumps: tuple[Jump, ...] = ()
 
     def __post_init__(self) -> None:
         for name, inside in (("speed_range", self.input_speed), ("load_range", self.load_torque)):

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import Rig
-from pymoo_hdte.discrepancy.campaign.line_fit import LineFit, nyquist_order, row_covariance
+from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, nyquist_order
+from pymoo_hdte.discrepancy.campaign.line_fit import row_covariance
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.engine.rules import RULES
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ from threadpoolctl import threadpool_limits
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.campaign.rows.examination import examined_rows
+from pymoo_hdte.discrepancy.campaign.rows.findings import RowFindings
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
@@ -32,17 +34,21 @@ class DriveFinding:
     Attributes
     ----------
     campaign : Campaign
+        Without the faulty rows, and with the noise that was found.
     data : Data
         Features of the training records.
     verdict : Verdict
     unexpected : tuple of float
         Orders beyond the expected ones with significant lines.
+    rows : RowFindings
+        Faulty rows, and the noise of the records beside the stated one.
     """
 
     campaign: Campaign
     data: Data
     verdict: Verdict
     unexpected: tuple[float, ...]
+    rows: RowFindings = field(default_factory=RowFindings)
 
     @property
     def held_out(self) -> Data | None:
@@ -90,6 +96,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         raise InvalidInput("number of train records", len(campaign.train), allowed)
     ratio = campaign.believed.ratio
     expected = expected_orders(campaign, rules)
+    campaign, rows = examined_rows(campaign, expected, rules)
     features = measure(campaign, campaign.train, expected)
     unexpected = unexpected_orders(features, ratio, campaign.rig, rules)
     if unexpected:
@@ -108,7 +115,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         listed = _candidates(data, base)
     verdict = judge(data, base, listed)
     data, verdict = _with_noise_of(verdict, data, listed)
-    return DriveFinding(campaign, data, verdict, tuple(unexpected))
+    return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
 
 
 def _check_steady(data: Data) -> None:

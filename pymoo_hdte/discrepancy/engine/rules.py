@@ -1,8 +1,9 @@
 """All thresholds of the verdict in one place: `Rules`, each with its meaning, unit and derivation.
 
 The rules for adequacy, false alarms and names are here. Requirements on records, and thresholds at
-which a line counts as seen, are in `rules_of_records`; what a report flags and shows as certain in
-`rules_of_report`. `Rules` has them all.
+which a line counts as seen, are in `rules_of_records`; what makes a row faulty or a stated noise
+wrong in `rules_of_rows`; what a report flags and shows as certain in `rules_of_report`. `Rules` has
+them all.
 
 Steps of difference quotients, orders of filters and tolerances of solvers are no rules. They are
 kept beside the code that needs them, since finer ones change the digits of a result but not the
@@ -16,10 +17,11 @@ from dataclasses import dataclass
 from pymoo_hdte.discrepancy.engine.rule_fields import BY_HAND, rule
 from pymoo_hdte.discrepancy.engine.rules_of_records import RecordRules
 from pymoo_hdte.discrepancy.engine.rules_of_report import ReportRules
+from pymoo_hdte.discrepancy.engine.rules_of_rows import RowRules
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rules(ReportRules, RecordRules):
+class Rules(ReportRules, RecordRules, RowRules):
     """Every threshold that decides what is named, refused, flagged or shown as certain.
 
     ``analyse(..., rules=...)`` takes one, by default `RULES`. `explained` returns all of them in

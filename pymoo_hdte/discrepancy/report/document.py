@@ -67,6 +67,7 @@ def verdict_document(
         "held_out": absent if held_out is None else dict(held_out),
         "next_experiment": proposal.as_dict(),
         "location": location.summary(),
+        **finding.rows.as_dict(),
         "versions": {
             "python": platform.python_version(),
             **{name: version(name) for name in ("pymoo-hdte", "numpy", "scipy", "numba")},

@@ -29,6 +29,7 @@ from pymoo_hdte.discrepancy.report.figures import (
 )
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
+from pymoo_hdte.discrepancy.report.row_words import fault_rows, noise_rows, rows_sentence
 from pymoo_hdte.discrepancy.report.tables import (
     STATUSES,
     certainty,
@@ -170,6 +171,9 @@ def _page(
         parameters=parameter_rows(finding),
         metrics=metric_rows(proof),
         records=record_rows(finding.campaign, proof),
+        rows_found=rows_sentence(finding.rows),
+        faults=fault_rows(finding.rows),
+        noise=noise_rows(finding.rows),
         shift=shift,
         believed_effects=believed_in_words(document),
     )

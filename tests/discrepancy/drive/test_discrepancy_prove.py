@@ -228,13 +228,14 @@ class _With:
 
 def test_without_held_out_records_there_is_no_proof(clean):
     campaign = replace(clean.campaign, running=clean.campaign.train)
-    assert prove(replace(clean, campaign=campaign)) is None
+    assert prove(replace(clean, data=replace(clean.data, campaign=campaign))) is None
 
 
 def test_one_held_out_record_has_gaps_but_no_statistics(ripple):
     campaign = ripple.campaign
     running = (*campaign.train, campaign.held_out[0])
-    proof = prove(replace(ripple, campaign=replace(campaign, running=running)))
+    fewer = replace(campaign, running=running)
+    proof = prove(replace(ripple, data=replace(ripple.data, campaign=fewer)))
     assert proof.metrics is None
     assert proof.channels["input_torque"].shrinkage > 0.9
 

@@ -1,0 +1,154 @@
+"""The least squares behind order lines: a straight line in time, waves over the angle, jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, reduce
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import solve_triangular
+from scipy.special import factorial
+
+from pymoo_hdte.checks import InvalidInput, finite_array, real_number
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+
+# A numerical limit of a linear fit; the verdict does not depend on it.
+LARGEST_CONDITION = 1e3
+"""Largest condition number of the fit; beyond it the noise of the lines grows a thousandfold."""
+
+ROWS_A_BLOCK = 1 << 15
+"""Rows worked on at once, to bound the memory."""
+
+
+@dataclass(frozen=True, eq=False)
+class LineFit:
+    """Least squares by QR: ``values = basis @ triangle @ coefficients + residual``.
+
+    Block by block, so that a record of millions of rows takes the memory of a block: the triangle
+    of all rows is that of the triangle of those before and of a block (Golub and Van Loan, Matrix
+    Computations, 2013, 5.2.9), and a block of the basis follows from the triangle.
+
+    Columns are 1, the time from the middle of the record, the cosines, minus the sines, and a step
+    of one at each of the record's jumps: p = 2 + 2 m + number of jumps.
+
+    Attributes
+    ----------
+    record, ratio, orders
+        As in `order_lines`.
+    parts : tuple of slice
+        Rows of each block.
+    whole : ndarray, shape (n, 2 + 2 m), or None
+        The basis of a record of one block.
+    triangle : ndarray, shape (p, p)
+    """
+
+    record: RunningRecord
+    ratio: float
+    orders: NDArray[np.float64]
+    parts: tuple[slice, ...]
+    whole: NDArray[np.float64] | None
+    triangle: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, record: RunningRecord, ratio: float, orders: ArrayLike) -> LineFit:
+        """Fit lines; the arguments and errors are those of `order_lines`."""
+        checked = finite_array("orders", orders, (None,))
+        for order in checked:
+            real_number("orders", float(order), above=0.0, below=nyquist_order(record))
+        starts = range(0, len(record.time), ROWS_A_BLOCK)
+        parts = tuple(slice(start, start + ROWS_A_BLOCK) for start in starts)
+        design = _design(record, checked, parts[0])
+        scale = np.linalg.norm(design, axis=0)
+        basis, triangle = np.linalg.qr(design / scale)
+        for part in parts[1:]:
+            rows = np.vstack([triangle, _design(record, checked, part) / scale])
+            triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+        unit = triangle / np.linalg.norm(triangle, axis=0)
+        if len(record.time) <= len(scale) or np.linalg.cond(unit) > LARGEST_CONDITION:
+            allowed = "orders that a record of this length can tell apart"
+            raise InvalidInput("orders", checked.tolist(), allowed)
+        whole = basis if len(parts) == 1 else None
+        return cls(record, ratio, checked, parts, whole, triangle * scale)
+
+    @cached_property
+    def projections(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Parts in the basis of the channels, shape (p, 4), and of the bends, (p, 3).
+
+        The bends are (t - t_mid)^k / k! for k = 2, 3, 4.
+        """
+        channels, bends = zip(*map(self._project, self.parts), strict=True)
+        return np.asarray(reduce(np.add, channels)), np.asarray(reduce(np.add, bends))
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """Of the columns, for each channel; the last are what the repair of jumps left, (p, 4)."""
+        return np.asarray(np.linalg.solve(self.triangle, self.projections[0]))
+
+    def basis(self, part: slice) -> NDArray[np.float64]:
+        """Return the orthonormal columns that the lines span, of some rows, shape (b, p)."""
+        if self.whole is not None:
+            return self.whole
+        design = _design(self.record, self.orders, part)
+        return solve_triangular(self.triangle, design.T, trans="T", check_finite=False).T
+
+    def values(self, part: slice) -> NDArray[np.float64]:
+        """Return the channels in some rows, shape (b, 4)."""
+        record = self.record
+        return np.column_stack(
+            [
+                record.input_angle[part] / self.ratio - record.output_angle[part],
+                record.input_torque[part],
+                record.output_torque[part],
+                record.input_angle[part],
+            ]
+        )
+
+    def residual(self, part: slice, basis: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what the lines leave of the channels in some rows, shape (b, 4)."""
+        return self.values(part) - basis @ self.projections[0]
+
+    @property
+    def whole_basis(self) -> NDArray[np.float64]:
+        """The orthonormal columns in all rows, shape (n, p)."""
+        return np.vstack([self.basis(part) for part in self.parts])
+
+    @property
+    def whole_residual(self) -> NDArray[np.float64]:
+        """What the lines leave of the channels in all rows, shape (n, 4)."""
+        return np.vstack([self.residual(part, self.basis(part)) for part in self.parts])
+
+    def _project(self, part: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what some rows add to the parts in the basis of the channels and of bends."""
+        basis = self.basis(part)
+        return basis.T @ self.values(part), basis.T @ _bent(self.record, part)
+
+
+def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
+    """Return the columns of the fit in some rows: a straight line, cosines, sines and jumps."""
+    angle = np.outer(record.input_angle[part], orders)
+    time = centred(record, part)
+    steps = [record.time[part] >= jump.time for jump in record.jumps]
+    return np.column_stack([np.ones_like(time), time, np.cos(angle), -np.sin(angle), *steps])
+
+
+def centred(record: RunningRecord, part: slice) -> NDArray[np.float64]:
+    """Return the time of some rows from the middle of a record, s, shape (b,)."""
+    return np.asarray(record.time[part] - (record.time[0] + record.time[-1]) / 2.0)
+
+
+def _bent(record: RunningRecord, part: slice) -> NDArray[np.float64]:
+    """Return (t - t_mid)^k / k! for k = 2, 3, 4 in some rows, shape (b, 3)."""
+    powers = np.arange(2, 5)
+    return np.asarray(centred(record, part)[:, None] ** powers / factorial(powers))
+
+
+def mean_speed(record: RunningRecord) -> float:
+    """Return the mean speed of the input, without its sign, rad/s."""
+    travel = record.input_angle[-1] - record.input_angle[0]
+    return abs(float(travel / (record.time[-1] - record.time[0])))
+
+
+def nyquist_order(record: RunningRecord) -> float:
+    """Return the order at half the rate of the rows, in cycles per input turn."""
+    return float(np.pi * record.sample_rate / mean_speed(record))

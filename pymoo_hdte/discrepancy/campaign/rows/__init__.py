@@ -1,0 +1,1 @@
+"""Faulty rows of records, and their noise: found, repaired or left out, and counted."""

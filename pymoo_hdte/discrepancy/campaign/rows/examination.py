@@ -1,0 +1,109 @@
+"""A campaign without faulty rows and with the noise that its records show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from scipy.stats import norm
+
+from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.campaign.records import TorsionRecord
+from pymoo_hdte.discrepancy.campaign.rows.faults import WINDOWS
+from pymoo_hdte.discrepancy.campaign.rows.findings import NoiseFinding, RowFault, RowFindings
+from pymoo_hdte.discrepancy.campaign.rows.noise_estimate import (
+    repeatability,
+    running_noise,
+    sweep_noise,
+    with_noise,
+)
+from pymoo_hdte.discrepancy.campaign.rows.repair import (
+    RUNNING,
+    RepairedRun,
+    repaired_run,
+    repaired_sweep,
+)
+from pymoo_hdte.discrepancy.campaign.rows.session_zero import with_one_zero
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
+
+
+def examined_rows(
+    campaign: Campaign, orders: Sequence[float], rules: Rules = RULES
+) -> tuple[Campaign, RowFindings]:
+    """Return a campaign that can be believed row by row, and what was wrong with it.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    orders : sequence of float
+        Lines that are taken out of the running records first, cycles per input turn.
+    rules : Rules
+
+    Returns
+    -------
+    campaign : Campaign
+        The same object if nothing was found.
+    findings : RowFindings
+    """
+    n_rows = sum(len(one.time) for one in campaign.running)
+    n_rows += sum(len(one.time) for one in campaign.torsion)
+    # Every row is compared as a spike, and as a jump in each window and in the whole record.
+    tests = n_rows * len(RUNNING) * (2 + len(WINDOWS))
+    deviations = float(norm.isf(rules.row_fault_chance / tests / 2.0))
+    ratio = campaign.believed.ratio
+    runs = [repaired_run(one, ratio, orders, deviations, rules) for one in campaign.running]
+    sweeps = [repaired_sweep(one, deviations, rules) for one in campaign.torsion]
+    left_out = _left_out(runs, rules)
+    kept = [one for one in runs if one.record.name not in left_out]
+    noise = _noise(campaign, kept, [record for record, _ in sweeps], rules)
+    rig = with_noise(campaign.rig, noise)
+    records = [one.record for one in kept]
+    running, new_zero = with_one_zero(records, campaign.believed, rig, rules)
+    changed: dict[str, Any] = {
+        "running": running,
+        "torsion": tuple(record for record, _ in sweeps),
+        "rig": rig,
+    }
+    if any(not _same(getattr(campaign, name), value) for name, value in changed.items()):
+        campaign = replace(campaign, **changed, rules=rules)
+    faults = [fault for one in runs for fault in one.faults]
+    faults += [fault for _, found in sweeps for fault in found]
+    final = [_final(fault, left_out) for fault in faults]
+    return campaign, RowFindings(n_rows, (*final, *new_zero), left_out, noise)
+
+
+def _same(old: object, new: object) -> bool:
+    """Return whether nothing was replaced in a tuple of records, or in a rig."""
+    if isinstance(old, tuple) and isinstance(new, tuple):
+        return len(old) == len(new) and all(a is b for a, b in zip(old, new, strict=True))
+    return old is new
+
+
+def _noise(
+    campaign: Campaign,
+    runs: Sequence[RepairedRun],
+    sweeps: Sequence[TorsionRecord],
+    rules: Rules,
+) -> tuple[NoiseFinding, ...]:
+    rig, believed = campaign.rig, campaign.believed
+    records = [one.record for one in runs]
+    residuals = [one.residual for one in runs]
+    return (
+        *running_noise(records, residuals, rig, believed.ratio, rules),
+        *sweep_noise(sweeps, rig, rules),
+        repeatability(records, believed, rig, rules),
+    )
+
+
+def _left_out(runs: Sequence[RepairedRun], rules: Rules) -> tuple[str, ...]:
+    """Return the records that cannot be repaired, unless too few would be left to fit."""
+    lost = [one.record for one in runs if not one.usable]
+    train = [one.record for one in runs if one.record.role == "train"]
+    if len(train) - sum(one.role == "train" for one in lost) < rules.fewest_records:
+        lost = [one for one in lost if one.role != "train"]
+    return tuple(one.name for one in lost)
+
+
+def _final(fault: RowFault, left_out: Sequence[str]) -> RowFault:
+    return replace(fault, treatment="left out") if fault.record in left_out else fault

@@ -1,0 +1,133 @@
+"""What the rows of a campaign showed: faulty rows, and noise other than stated."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+UNITS = {
+    "time": "s",
+    "input_angle": "rad",
+    "output_angle": "rad",
+    "input_torque": "N.m",
+    "output_torque": "N.m",
+    "rows": "s",
+}
+"""Unit of the size of a fault by its channel."""
+
+
+@dataclass(frozen=True)
+class RowFault:
+    """A fault in the rows of one record.
+
+    Attributes
+    ----------
+    record : str
+        Name of the record.
+    kind : {"spike", "jump", "gap", "repeated", "new zero"}
+        One to a few rows that depart from both sides; a constant offset from a row on; rows that
+        are missing; rows that repeat the one before; a constant offset from this record on.
+    channel : str
+        ``"input_angle"``, ``"output_angle"``, ``"input_torque"``, ``"output_torque"``; ``"time"``
+        where both encoders agree that the time of the rows is wrong; ``"rows"`` for all of them.
+    row : int
+        First row concerned, from 0 in the file.
+    rows : int
+        How many; of a gap, how many are missing; of a jump, all rows to the end of the record, of a
+        new zero, to the end of the session.
+    size : float
+        Largest departure, the offset, or the length of a gap, in `UNITS` of the channel.
+    treatment : {"left out", "modelled", "none needed"}
+        What became of the rows; where a record is left out, that of its faults is ``"left out"``.
+    """
+
+    record: str
+    kind: str
+    channel: str
+    row: int
+    rows: int
+    size: float
+    treatment: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values, with the row counted from 1 below any header and the size's unit."""
+        return asdict(self) | {"row": self.row + 1, "unit": UNITS[self.channel]}
+
+
+@dataclass(frozen=True)
+class NoiseFinding:
+    """A stated noise beside what the records show.
+
+    Attributes
+    ----------
+    name : str
+        Field of `Rig`.
+    stated : float
+        rad or N.m, of one raw sample.
+    found : float or None
+        The same from the records; None where they cannot tell.
+    used : float
+        What the covariance is made of: ``found`` where it differs significantly and by more than
+        `Rules.noise_mismatch`, otherwise ``stated``.
+    reason : str
+        What it was found from, or why it was not.
+    """
+
+    name: str
+    stated: float
+    found: float | None
+    used: float
+    reason: str
+
+    @property
+    def replaced(self) -> bool:
+        """Whether the stated value was replaced."""
+        return self.used != self.stated
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        return "N.m" if "torque" in self.name else "rad"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values with their unit."""
+        return asdict(self) | {"unit": self.unit, "replaced": self.replaced}
+
+
+@dataclass(frozen=True)
+class RowFindings:
+    """What the rows of a campaign showed.
+
+    Attributes
+    ----------
+    n_rows : int
+        Rows of all records.
+    faults : tuple of RowFault
+    left_out : tuple of str
+        Records that cannot be repaired.
+    noise : tuple of NoiseFinding
+    """
+
+    n_rows: int = 0
+    faults: tuple[RowFault, ...] = ()
+    left_out: tuple[str, ...] = ()
+    noise: tuple[NoiseFinding, ...] = ()
+
+    @property
+    def rows_left_out(self) -> int:
+        """Number of rows that were left out of records that were kept."""
+        return sum(
+            fault.rows
+            for fault in self.faults
+            if fault.treatment == "left out" and fault.record not in self.left_out
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entries ``rows`` and ``noise`` of the verdict as plain values."""
+        rows = {
+            "examined": self.n_rows,
+            "left_out": self.rows_left_out,
+            "records_left_out": list(self.left_out),
+            "faults": [fault.as_dict() for fault in self.faults],
+        }
+        return {"rows": rows, "noise": [one.as_dict() for one in self.noise]}

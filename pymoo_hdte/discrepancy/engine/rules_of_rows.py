@@ -1,0 +1,70 @@
+"""Rules for rows of a record that are faulty, and for a stated noise that the rows contradict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pymoo_hdte.discrepancy.engine.rule_fields import BY_HAND, RuleSet, rule
+
+
+@dataclass(frozen=True, kw_only=True)
+class RowRules(RuleSet):
+    """Thresholds for spikes, jumps, lost rows and the noise of the sensors.
+
+    See `rules.Rules`, which has them all.
+    """
+
+    row_fault_chance: float = rule(
+        1e-3,
+        "probability",
+        "Chance that noise alone shows any spike or jump in a whole campaign, or a wrong noise.",
+        "Test level by the normal distribution: all rows of all channels share the chance "
+        "(Bonferroni), which takes 6.4 standard deviations at 100,000 rows.",
+        at_most=1.0,
+    )
+    fault_prominence: float = rule(
+        2.0,
+        "ratio",
+        "A spike or a jump stands out of the largest similar changes of its record, those that are "
+        "too many to be faults, by this factor.",
+        f"{BY_HAND}: a motion that is rough in some rows, as rattling is, is rough in many. The "
+        "hundredth row of normal noise lies at 2.6 standard deviations, so that pure noise never "
+        "comes into question.",
+        at_least=1.0,
+    )
+    spike_share: float = rule(
+        0.01,
+        "share of the rows",
+        "Most rows of a record that may be spikes; more are a motion.",
+        f"{BY_HAND}: a drive that hits a stop once an input turn does so in one of 30 to 200 rows.",
+        at_most=0.5,
+    )
+    longest_spike: int = rule(
+        3,
+        "rows",
+        "A spike has no more rows than this.",
+        f"{BY_HAND}: a false reading lasts one sample, which a filter spreads a little; a motion "
+        "lasts longer.",
+    )
+    most_jumps: int = rule(
+        3,
+        "1",
+        "Most jumps of a sensor in one record; more are a motion.",
+        f"{BY_HAND}: a sensor that jumps more often has to be repaired first.",
+    )
+    gap_of_rows: float = rule(
+        1.5,
+        "time steps",
+        "A longer step of time from one row to the next is a gap.",
+        "Resolution: halfway between no row lost and one.",
+        at_least=1.0,
+    )
+    noise_mismatch: float = rule(
+        1.05,
+        "ratio of standard deviations",
+        "The noise that the rows show replaces the stated one if their ratio is larger, or smaller "
+        "than the inverse, and differs from 1 significantly.",
+        f"{BY_HAND}: up to here chi-square is off by at most 10 %, which takes an adequate model "
+        "of 1400 degrees of freedom no further than two thirds of the way to a false alarm.",
+        at_least=1.0,
+    )

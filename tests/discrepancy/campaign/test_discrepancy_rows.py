@@ -1,0 +1,235 @@
+"""Rows of records: planted faults are found, named and repaired; motions are no faults."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pymoo_hdte.discrepancy import Rig, RunningRecord, TorsionRecord, order_lines
+from pymoo_hdte.discrepancy.campaign.records import Jump
+from pymoo_hdte.discrepancy.campaign.rows.repair import RUNNING, repaired_run, repaired_sweep
+from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.units import ARCSEC
+
+RATIO = 101.0
+ORDERS = [1.0 / RATIO, 1.0, 2.0, 2.02, 4.0]
+RIG = Rig(0.02, 0.5, 0.7 * ARCSEC, 0.003, 0.2, 0.3 * ARCSEC, 0.2 * ARCSEC, angle_quantisation=0.0)
+SPEED = 1000.0 * np.pi / 30.0
+RATE = 500.0
+N_ROWS = int(RATIO * 2.0 * np.pi / SPEED * RATE) + 1
+TIME = np.arange(N_ROWS) / RATE
+ERROR = 9.0 * ARCSEC
+DEVIATIONS = 6.5
+NOISE = dict(zip(RUNNING, (RATIO * RIG.angle_noise, RIG.angle_noise, 0.003, 0.2), strict=True))
+
+
+def run(rng, motion=0.0, name="run"):
+    """A record of three lines and noise; ``motion`` is one more of the output (n,), rad."""
+    angle = 40.0 + SPEED * TIME + 1e-3 * np.sin(SPEED * TIME)
+    error = ERROR * (np.sin(angle) + np.sin(2.0 * angle + 1.0)) + motion
+    noise = {one: size * rng.standard_normal(N_ROWS) for one, size in NOISE.items()}
+    true = {
+        "input_angle": angle,
+        "output_angle": angle / RATIO - error,
+        "input_torque": 0.2 + 0.01 * np.sin(2.0 * angle),
+        "output_torque": 20.0 + np.sin(2.0 * angle),
+    }
+    channels = {one: true[one] + noise[one] for one in RUNNING}
+    return RunningRecord(name, "train", SPEED, 20.0, RATE, 1, 0.0, TIME, **channels)
+
+
+def changed(record, channel, rows, size):
+    values = getattr(record, channel).copy()
+    values[rows] += size
+    return replace(record, **{channel: values})
+
+
+def repaired(record):
+    return repaired_run(record, RATIO, ORDERS, DEVIATIONS, RULES)
+
+
+def without(record, kept):
+    columns = {one: getattr(record, one)[kept] for one in ("time", *RUNNING)}
+    return replace(record, **columns)
+
+
+def assert_lines_as_of(record, untouched, deviations=4.0):
+    """The lines of a repaired record differ from those before the fault by their noise at most."""
+    found, true = (order_lines(one, RIG, RATIO, ORDERS) for one in (record, untouched))
+    variance = np.diagonal(found.covariance, axis1=1, axis2=2)[:, 1:]
+    apart = found.phasors - true.phasors
+    parts = np.concatenate([apart.real, apart.imag], axis=1)
+    assert np.all(parts**2 < deviations**2 * variance)
+
+
+def test_a_sound_record_stays_the_same_object(rng):
+    for _ in range(5):
+        record = run(rng)
+        result = repaired(record)
+        assert result.record is record
+        assert result.faults == ()
+        assert result.usable
+
+
+@pytest.mark.parametrize("channel", RUNNING)
+@pytest.mark.parametrize("size", [12.0, -3000.0])
+def test_spikes_are_found_in_their_channel_and_left_out(rng, channel, size):
+    untouched = run(rng)
+    rows = [0, 700, 1900, 1901, N_ROWS - 1]
+    result = repaired(changed(untouched, channel, rows, size * NOISE[channel]))
+    assert {(fault.kind, fault.channel) for fault in result.faults} == {("spike", channel)}
+    found = sorted(row for one in result.faults for row in range(one.row, one.row + one.rows))
+    assert found == rows
+    sizes = np.array([fault.size for fault in result.faults])
+    tolerances = {"rtol": 0.02, "atol": 6.0 * NOISE[channel]}
+    np.testing.assert_allclose(sizes, size * NOISE[channel], **tolerances)
+    assert len(result.record.time) == N_ROWS - len(rows)
+    assert_lines_as_of(result.record, untouched)
+
+
+@pytest.mark.parametrize("channel", RUNNING)
+@pytest.mark.parametrize("size", [3.0, -25.0, 2500.0])
+def test_a_jump_is_found_with_row_channel_and_size_and_taken_out(rng, channel, size):
+    untouched = run(rng)
+    broken = changed(untouched, channel, slice(1000, None), size * NOISE[channel])
+    result = repaired(broken)
+    (fault,) = result.faults
+    assert (fault.kind, fault.channel, fault.treatment) == ("jump", channel, "modelled")
+    assert abs(fault.row - 1000) <= 3
+    assert fault.size == pytest.approx(size * NOISE[channel], abs=0.5 * NOISE[channel])
+    assert result.usable
+    assert_lines_as_of(result.record, untouched)
+
+
+def test_the_mean_of_a_channel_that_jumps_is_uncertain_by_the_jump(rng):
+    size = 30.0 * ARCSEC
+    record = repaired(changed(run(rng), "output_angle", slice(1000, None), size)).record
+    lines = order_lines(record, RIG, RATIO, ORDERS)
+    assert np.sqrt(lines.covariance[0, 0, 0]) == pytest.approx(size, rel=0.05)
+    # Not the other channels, and not the lines.
+    others = np.sqrt(np.diagonal(lines.covariance[1:3], axis1=1, axis2=2)[:, 0])
+    assert np.all(others < 0.1 * np.array([NOISE["input_torque"], NOISE["output_torque"]]))
+
+
+@settings(max_examples=10, deadline=None)
+@given(row=st.integers(200, N_ROWS - 200), seed=st.integers(0, 2**32 - 1))
+def test_lines_beside_a_jump_scatter_as_their_covariance_says(row, seed):
+    rng = np.random.default_rng(seed)
+    record = run(rng)
+    jump = Jump(float(record.time[row]), "output_angle", 0.0)
+    jumped = replace(changed(record, "output_angle", slice(row, None), ERROR), jumps=(jump,))
+    plain = order_lines(record, RIG, RATIO, ORDERS)
+    beside = order_lines(jumped, RIG, RATIO, ORDERS)
+    np.testing.assert_array_less(
+        np.diagonal(plain.covariance, axis1=1, axis2=2)[:, 1:],
+        np.diagonal(beside.covariance, axis1=1, axis2=2)[:, 1:] * (1.0 + 1e-9),
+    )
+    apart = beside.phasors[0] - np.array([0.0, -1j, -1j * np.exp(1j), 0.0, 0.0]) * ERROR
+    parts = np.concatenate([apart.real, apart.imag])
+    assert np.all(parts**2 < 5.0**2 * np.diag(beside.covariance[0])[1:])
+
+
+def test_a_jump_forth_and_back_and_spikes_beside_it_are_told_apart(rng):
+    untouched = run(rng)
+    broken = changed(untouched, "output_angle", slice(700, 1500), 15.0 * ARCSEC)
+    broken = changed(broken, "output_angle", [30, 701, 2000], -900.0 * ARCSEC)
+    result = repaired(broken)
+    kinds = sorted((fault.kind, fault.row) for fault in result.faults)
+    assert kinds == [("jump", 700), ("jump", 1500), ("spike", 30), ("spike", 701), ("spike", 2000)]
+    assert_lines_as_of(result.record, untouched)
+
+
+@pytest.mark.parametrize("lost", [1, 7])
+def test_rows_lost_under_a_running_time_are_found_and_the_time_is_set_right(rng, lost):
+    untouched = run(rng)
+    kept = np.r_[:1200, 1200 + lost : N_ROWS]
+    broken = replace(without(untouched, kept), time=TIME[: len(kept)])
+    (fault,) = repaired(broken).faults
+    assert (fault.kind, fault.channel) == ("jump", "time")
+    assert abs(fault.row - 1200) <= 1
+    assert fault.size == pytest.approx(lost / RATE, rel=0.1)
+    np.testing.assert_allclose(repaired(broken).record.time, TIME[kept], atol=0.2 / RATE)
+
+
+def test_a_gap_of_time_is_counted_and_needs_nothing(rng):
+    record = without(run(rng), np.r_[:1000, 1250:N_ROWS])
+    result = repaired(record)
+    (fault,) = result.faults
+    assert (fault.kind, fault.row, fault.rows) == ("gap", 1000, 250)
+    assert fault.size == pytest.approx(250 / RATE)
+    assert fault.treatment == "none needed"
+    assert result.record is record
+
+
+def test_repeated_rows_are_left_out(rng):
+    record = run(rng)
+    frozen = np.arange(N_ROWS)
+    frozen[500:505] = 499
+    broken = replace(record, **{one: getattr(record, one)[frozen] for one in RUNNING})
+    (fault,) = repaired(broken).faults
+    assert (fault.kind, fault.row, fault.rows, fault.treatment) == ("repeated", 500, 5, "left out")
+
+
+def test_a_record_of_two_loads_is_not_usable(rng):
+    record = run(rng)
+    for channel, size in (("output_torque", 2.0), ("input_torque", 0.02), ("output_angle", -8e-5)):
+        record = changed(record, channel, slice(1500, None), size)
+    result = repaired(record)
+    assert not result.usable
+    assert {fault.channel for fault in result.faults} == {
+        "output_torque", "input_torque", "output_angle"
+    }  # fmt: skip
+
+
+def _rattle(rng):
+    """Flanks that change sides now and then, each time within some rows."""
+    sides = np.cumsum(rng.random(N_ROWS) < 0.01) % 2
+    return 20.0 * ARCSEC * np.convolve(sides, np.ones(12) / 12.0, mode="same")
+
+
+MOTIONS = {
+    "vibration of fixed frequency": lambda rng: 30.0 * ARCSEC * np.sin(2.0 * np.pi * 61.7 * TIME),
+    "eccentricity": lambda rng: 60.0 * ARCSEC * np.sin(SPEED / RATIO * TIME + 0.3),
+    "ripple": lambda rng: 5.0 * ARCSEC * np.sin(6.3 * SPEED * TIME),
+    "drift": lambda rng: 20.0 * ARCSEC * -np.expm1(-TIME / 2.0),
+    "slow drift": lambda rng: 5.0 * ARCSEC * -np.expm1(-TIME / 6.0),
+    "wave of the output": lambda rng: 3.0 * ARCSEC * np.sin(2.5 * SPEED / RATIO * TIME),
+    "knock once a turn": lambda rng: 30.0 * ARCSEC * (np.sin(SPEED * TIME) > 0.995),
+    "rattling": _rattle,
+    "ramp": lambda rng: 20.0 * ARCSEC * np.clip((TIME - 3.0) / 0.1, 0.0, 1.0),
+    "stick-slip": lambda rng: 20.0 * ARCSEC * ((TIME * 7.3) % 1.0),
+}
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_a_motion_is_no_fault(rng, kind):
+    record = run(rng, MOTIONS[kind](rng))
+    assert repaired(record).faults == ()
+
+
+def sweep(rng, motion=0.0):
+    time = np.arange(1200) / 10.0
+    torque = 40.0 * np.abs((time / 20.0 + 1.0) % 4.0 - 2.0) - 40.0
+    angle = -torque / 2.6e4 + motion * np.sign(torque) + 0.2 * ARCSEC * rng.standard_normal(1200)
+    noisy = torque + 0.2 * rng.standard_normal(1200)
+    return TorsionRecord("sweep", "train", 10.0, time, angle, noisy)
+
+
+@pytest.mark.parametrize("clearance", [0.0, 30.0 * ARCSEC])
+def test_a_sweep_with_turning_points_and_clearance_is_sound(rng, clearance):
+    record = sweep(rng, clearance)
+    same, faults = repaired_sweep(record, DEVIATIONS, RULES)
+    assert same is record
+    assert faults == ()
+
+
+def test_spikes_of_a_sweep_are_left_out(rng):
+    record = changed(sweep(rng, 30.0 * ARCSEC), "output_angle", [100, 777], 20.0 * ARCSEC)
+    record = changed(record, "output_torque", [300], -30.0)
+    shorter, faults = repaired_sweep(record, DEVIATIONS, RULES)
+    assert [(one.channel, one.row) for one in faults] == [
+        ("output_angle", 100), ("output_angle", 777), ("output_torque", 300)
+    ]  # fmt: skip
+    assert len(shorter.time) == 1197
