@@ -189,9 +189,14 @@ class Search:
             return
         if len(needed) > 1:
             needed = self._pruned(self._fit(needed, values))
-        alone = self.data.out_of_tolerance([str(one.frees) for one in needed])
-        for one in alone:
-            self._fit((one,), values)
+        alone = {one.frees for one in self.data.out_of_tolerance([str(one.frees) for one in freed])}
+        for one in needed:
+            if one.frees in alone:
+                self._fit((one,), values)
+        for one in freed:
+            if one.frees not in alone:
+                # An effect covers it under another name.
+                self._by_label.pop(_label((one,)), None)
 
     def _outside(self, one: Candidate, values: Vector) -> bool:
         """Tell whether a base parameter lies outside its tolerance."""

@@ -106,13 +106,13 @@ def test_repeatability_is_the_rms_of_the_change_of_the_static_error():
 
 @pytest.fixture(scope="module")
 def repeated():
-    """Thirty campaigns on drives whose torque sensors err as they are said to: (truth, fit)."""
+    """Sixty campaigns on drives whose torque sensors err as they are said to: (truth, fit)."""
     data, rng = known_data(FEW), np.random.default_rng(12)
     layout = Layout(data.base)
     drawn = np.array(["_torque_" in parameter.name for parameter in data.base])
     prior = np.where(drawn, layout.array("prior"), 0.0)
     found = []
-    for _ in range(30):
+    for _ in range(60):
         truth = layout.array("start") + prior * rng.standard_normal(len(layout))
         truth[layout.index("stiffness")] *= rng.uniform(0.95, 1.05)
         values = data.predict(truth[None], ())[0]
