@@ -10,7 +10,7 @@ from scipy.stats import chi2, kstest
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import Rig, RunningRecord, order_lines, residual_spectrum
-from pymoo_hdte.discrepancy.campaign import line_fit
+from pymoo_hdte.discrepancy.campaign import line_basis
 from pymoo_hdte.discrepancy.campaign.line_fit import averaging_gain, row_covariance
 from pymoo_hdte.units import ARCSEC
 
@@ -214,7 +214,7 @@ def test_blocks_of_rows_give_the_lines_and_spectrum_of_all_rows(monkeypatch):
     fits = [order_lines(whole, RIG, RATIO, ORDERS)]
     spectra = [residual_spectrum(whole, RIG, RATIO, ORDERS)]
     # The last block has fewer rows than the fit has columns.
-    monkeypatch.setattr(line_fit, "ROWS_A_BLOCK", (len(whole.time) - 3) // 4)
+    monkeypatch.setattr(line_basis, "ROWS_A_BLOCK", (len(whole.time) - 3) // 4)
     fits.append(order_lines(whole, RIG, RATIO, ORDERS))
     spectra.append(residual_spectrum(whole, RIG, RATIO, ORDERS))
     # Rounding is relative to the rows, of which the input angle is many radians.
