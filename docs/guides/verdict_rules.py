@@ -170,13 +170,17 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #    * - ``adequate``
 #      - The base passes the limit, and no candidate would gain enough.
 #    * - ``unlisted``
-#      - It does not, and the best set does not explain the misfit either.
+#      - It does not, and the best set does not explain the misfit either, or the error on records
+#        kept out of the fit does not shrink with it.
 #    * - ``class``
 #      - A set explains it, and another set of as many effects that explains it too lies within the
 #        distances above. Where even the chosen form leaves more than noise, that of the evidence is
 #        stretched by :math:`\chi^2 / \nu`.
 #    * - ``named``
-#      - A set explains it, and no other comes near.
+#      - A set explains it, and no other comes near. A law that contains the named one is no other.
+#    * - ``partial``
+#      - As before, but one of its values ended at a bound, the interval of a strength contains
+#        nothing, or more than three times the noise is left.
 #    * - ``parameter``
 #      - The set that explains it is no effect but a base parameter beyond its tolerance.
 
