@@ -57,10 +57,33 @@ class Hypothesis:
         """Their labels in one word."""
         return "+".join(candidate.label for candidate in self.candidates)
 
+    @property
+    def members(self) -> list[tuple[Candidate, ...]]:
+        """The effects one by one; base parameters out of tolerance are one member together."""
+        freed = tuple(each for each in self.candidates if each.frees is not None)
+        effects = [(each,) for each in self.candidates if each.frees is None]
+        return effects + ([freed] if freed else [])
+
+    def values_of(self, kept: Sequence[Candidate]) -> NDArray[np.float64]:
+        """Return the fitted values of the base and of some of the effects, in their order here."""
+        start = len(self.fit.values) - count(self.candidates)
+        parts = [self.fit.values[:start]]
+        for candidate in self.candidates:
+            end = start + len(candidate.parameters)
+            if candidate in kept:
+                parts.append(self.fit.values[start:end])
+            start = end
+        return np.concatenate(parts)
+
     @cached_property
     def names(self) -> frozenset[tuple[str, str]]:
         """Name and port of each."""
         return frozenset((candidate.name, candidate.port) for candidate in self.candidates)
+
+
+def label_of(effects: Sequence[Candidate]) -> frozenset[str]:
+    """Return what tells a set of effects from others, whatever their order."""
+    return frozenset(one.label for one in effects)
 
 
 def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:

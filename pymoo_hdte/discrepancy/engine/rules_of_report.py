@@ -67,6 +67,14 @@ class ReportRules(RuleSet):
         f"{BY_HAND}: the resolution of a record of fifty periods.",
         at_most=1.0,
     )
+    fixed_frequency_range: float = rule(
+        0.1,
+        "share of the largest speed",
+        "Least range of the speeds at which a line of one frequency is told from one of an order.",
+        f"{BY_HAND}: five times `fixed_frequency_width`, within which both look alike.",
+        at_least=0.0,
+        at_most=1.0,
+    )
     fixed_frequency_records: int = rule(
         3,
         "1",

@@ -7,17 +7,18 @@ compared with what is left of them if a member is removed: each member has to be
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, count, fit
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     down_to_noise,
     hypothesis_of,
+    label_of,
     varied,
 )
 from pymoo_hdte.discrepancy.engine.membership import ill_explained, is_earned
@@ -92,7 +93,7 @@ class Search:
         """Fit sets that another search has found, from their values."""
         for one in known:
             self._fit(one.candidates, one.fit.values)
-        for size in {len(_true(one)) for one in known}:
+        for size in {len(one.members) for one in known}:
             self._finish_near(size)
 
     def enough(self, one: Hypothesis) -> bool:
@@ -104,7 +105,7 @@ class Search:
 
         Base parameters out of tolerance are values and no effects, and count as one member.
         """
-        members = _true(one)
+        members = one.members
         if len(members) == 1:
             return True
         return all(
@@ -115,15 +116,15 @@ class Search:
     def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
         """Return a set without one of its members, fitted to the end."""
         kept = tuple(other for other in one.candidates if other not in member)
-        return self._finish(self._fit(kept, _values(one, kept)))
+        return self._finish(self._fit(kept, one.values_of(kept)))
 
     def _of_size(self, size: int) -> list[Hypothesis]:
         """Return the sets of a number of members, by rising BIC."""
-        return [one for one in self.found if len(_true(one)) == size]
+        return [one for one in self.found if len(one.members) == size]
 
     def _fit(self, effects: Effects, start: Vector) -> Hypothesis:
         """Return a set fitted from a start so far as to rank it, unless it is known already."""
-        label = _label(effects)
+        label = label_of(effects)
         known = self._by_label.get(label)
         if known is not None:
             return known
@@ -134,7 +135,7 @@ class Search:
 
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end from its last values, and from other starts."""
-        label = _label(one.candidates)
+        label = label_of(one.candidates)
         if label not in self._finished or starts:
             fits = [fit(self.data, one.candidates, start) for start in (one.fit.values, *starts)]
             best = min(fits, key=lambda each: each.chi_square)
@@ -160,7 +161,7 @@ class Search:
         decrease steadily on the way there; and values of the base that hide an effect lie far off.
         """
         believed = np.array([parameter.start for parameter in self.data.base])
-        starts = [np.append(believed, _values(one, one.candidates)[len(believed) :])]
+        starts = [np.append(believed, one.values_of(one.candidates)[len(believed) :])]
         (*others, last) = one.candidates
         if not others and len(last.starts) > 1 and not last.linear:
             starts += [np.append(self.base.values, start) for start in last.starts]
@@ -198,7 +199,7 @@ class Search:
         for one in freed:
             if one.frees not in alone:
                 # An effect covers it under another name.
-                self._by_label.pop(_label((one,)), None)
+                self._by_label.pop(label_of((one,)), None)
 
     def _outside(self, one: Candidate, values: Vector) -> bool:
         """Tell whether a base parameter lies outside its tolerance."""
@@ -225,7 +226,7 @@ class Search:
 
     def _extend(self, one: Hypothesis, by_part: bool = True) -> None:
         """Fit a set with each of the effects that would remove most of what it leaves."""
-        label = _label(one.candidates)
+        label = label_of(one.candidates)
         if label in self._extended:
             return
         self._extended.add(label)
@@ -260,7 +261,7 @@ class Search:
 
     def _exchange(self, one: Hypothesis) -> None:
         """Fit sets in which one member is replaced by what would do as much beside the others."""
-        for member in _true(one):
+        for member in one.members:
             self._extend(self.without(one, member), by_part=False)
 
     def _special_cases(self, one: Hypothesis) -> None:
@@ -271,32 +272,5 @@ class Search:
                     continue
                 kept = tuple(each for each in one.candidates if each is not member)
                 if all(other.goes_with(each) for each in kept):
-                    start = np.append(_values(one, kept), other.starts[0])
+                    start = np.append(one.values_of(kept), other.starts[0])
                     self._fit((*kept, other), start)
-
-
-def _label(effects: Effects) -> frozenset[str]:
-    return frozenset(one.label for one in effects)
-
-
-def _true(one: Hypothesis) -> list[Effects]:
-    """Return the members of a set; base parameters out of tolerance are one together."""
-    freed = tuple(each for each in one.candidates if each.frees is not None)
-    return [(each,) for each in one.candidates if each.frees is None] + ([freed] if freed else [])
-
-
-def _values(one: Hypothesis, kept: Sequence[Candidate]) -> Vector:
-    """Return the values of the base and of some members of a set."""
-    n_base = len(one.fit.values) - count(one.candidates)
-    parts = [one.fit.values[:n_base]]
-    for candidate, values in _by_member(one, n_base):
-        if candidate in kept:
-            parts.append(values)
-    return np.concatenate(parts)
-
-
-def _by_member(one: Hypothesis, start: int) -> Iterator[tuple[Candidate, Vector]]:
-    for candidate in one.candidates:
-        end = start + len(candidate.parameters)
-        yield candidate, one.fit.values[start:end]
-        start = end

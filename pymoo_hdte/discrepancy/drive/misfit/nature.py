@@ -171,6 +171,6 @@ def _shared(peaks: NDArray[np.float64], rules: Rules) -> float | None:
     for frequency in frequencies:
         same = np.abs(frequencies / frequency - 1.0) < rules.fixed_frequency_width
         enough = same.sum() >= rules.fixed_frequency_records
-        if enough and np.ptp(speeds[same]) > 0.1 * speeds[same].max():
+        if enough and np.ptp(speeds[same]) > rules.fixed_frequency_range * speeds[same].max():
             return float(np.median(frequencies[same]))
     return None
