@@ -221,7 +221,12 @@ def analysed():
 
 
 @pytest.mark.parametrize(
-    ("module", "stage"), [(report, "_page"), (report, "_revision"), (reports_folder, "_write_all")]
+    ("module", "stage"),
+    [
+        (report, "_page"),
+        pytest.param(report, "_revision", marks=pytest.mark.nightly),
+        (reports_folder, "_write_all"),
+    ],
 )
 def test_an_interrupted_run_leaves_nothing(
     module, stage, folder, analysed, tmp_path, monkeypatch, capsys

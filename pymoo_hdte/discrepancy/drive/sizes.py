@@ -1,8 +1,8 @@
 """Sizes of the ports of a drive, from which effects are guessed: see `pymoo_hdte.effects.guess`.
 
 They come from the records and the believed drive: its speeds and loads, and the residual of the
-base in each channel. `LARGEST` and the orders of shafts are the only constants. All ports of a drive
-share the stiffness and the travel of its mesh, whose speed is counted at the input.
+base in each channel. `LARGEST` and the orders of shafts are the only constants. All ports of a
+drive share the stiffness and the travel of its mesh, whose speed is counted at the input.
 """
 
 from __future__ import annotations

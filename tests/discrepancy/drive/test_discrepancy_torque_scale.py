@@ -68,9 +68,8 @@ def rubbing_verdict():
     return examine_drive(rubbing_campaign()).verdict
 
 
-@pytest.mark.parametrize(
-    "factor", [EXACT_FACTORS[0], pytest.param(EXACT_FACTORS[1], marks=pytest.mark.nightly)]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("factor", EXACT_FACTORS)
 def test_a_verdict_does_not_depend_on_the_size_of_the_drive(factor):
     verdict = rubbing_verdict()
     found = examine_drive(scaled_campaign(rubbing_campaign(), factor)).verdict

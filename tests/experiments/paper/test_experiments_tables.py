@@ -102,6 +102,7 @@ def test_workers_and_repetition_do_not_change_a_byte(extent, seeds, tmp_path):
     assert {"table7/quality.csv", "table7/fronts.png", "table7/result.json"} <= set(one)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("extent", EXTENTS)
 def test_ctrl_c_leaves_a_readable_report_and_code_130(extent, tmp_path):
     arguments = ["table7", "--workers", "2", "--out", str(tmp_path)]
