@@ -29,6 +29,8 @@ def _unproven(finding: DriveFinding) -> list[str]:
     found = []
     if not finding.campaign.held_out:
         found.append("No record was held out: nothing is proven about conditions not fitted.")
+    if finding.verdict.status in EXPLAINED and not finding.verdict.shown_in_held_out:
+        found.append("The records kept out of the fit do not show what is named.")
     fitted = {record.name for record in finding.data.features.records}
     if finding.campaign.held_out and (held_out := finding.held_out) is None:
         found.append("All held-out records rattle: nothing is proven about conditions not fitted.")

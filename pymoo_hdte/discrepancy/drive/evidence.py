@@ -23,7 +23,7 @@ from pymoo_hdte.discrepancy.drive.parameters import base_parameters
 from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.excess import Excess
-from pymoo_hdte.discrepancy.engine.fitting import Fit, Response
+from pymoo_hdte.discrepancy.engine.fitting import Fit, Response, Vote
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.drive import DriveEffect
 from pymoo_hdte.effects.unknowns import Parameter
@@ -108,14 +108,20 @@ class Data(Observations):
         lines = self.campaign.believed.error_orders
         return out_of_tolerance(self.base, at_bounds, lines, together)
 
-    def held_out_chi_square(self, fitted: Fit) -> float | None:
-        """Return chi-square of the held-out records; None where there are none."""
+    def held_out_vote(self, base: Fit, fitted: Fit) -> Vote | None:
+        """Return what the records kept out of the fit say of two fits; None without any."""
         data = self.held_out
         if data is None:
             return None
-        difference = data.predict(fitted.values[None, : len(self.base)], fitted.effects)[0]
-        white = data.whiten(difference - data.features.values)
-        return float(white @ white)
+        before, after = (
+            data.whiten(
+                data.predict(one.values[None, : len(self.base)], one.effects)[0]
+                - data.features.values
+            )
+            for one in (base, fitted)
+        )
+        change = after - before
+        return Vote(float(before @ before), float(after @ after), float(change @ change))
 
     @cached_property
     def held_out(self) -> Data | None:

@@ -132,6 +132,28 @@ def fit(
     return Fit(objective.candidates, objective.parameters, values, residuals, jacobian)
 
 
+@dataclass(frozen=True)
+class Vote:
+    """What records kept out of a fit say of a change of the model.
+
+    Attributes
+    ----------
+    before, after : float
+        Their chi-square without and with it.
+    change : float
+        Square of the change of their whitened prediction: what a true change removes of chi-square,
+        with a standard deviation of twice its root.
+    """
+
+    before: float
+    after: float
+    change: float
+
+    def counts(self, rules: Rules) -> bool:
+        """Tell whether the change is large enough in these records to be seen."""
+        return self.change >= rules.vote_change
+
+
 class Residuals(Protocol):
     """Whitened residuals of a model with candidates, and their derivatives."""
 
@@ -202,8 +224,8 @@ class Evidence(Protocol):
         """
         ...
 
-    def held_out_chi_square(self, fitted: Fit) -> float | None:
-        """Return chi-square on the records kept out of the fit; None where it is not known."""
+    def held_out_vote(self, base: Fit, fitted: Fit) -> Vote | None:
+        """Return what the records kept out of the fit say of two fits; None without any."""
         ...
 
 

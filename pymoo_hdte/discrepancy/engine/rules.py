@@ -145,8 +145,7 @@ class Rules(ReportRules, RecordRules, RowRules):
         2,
         "1",
         "Most of the fitted candidates that have one name.",
-        f"{BY_HAND}: two forms or orders of one effect leave three places to others, so that a law "
-        "does not crowd out the special case of itself.",
+        f"{BY_HAND}: two forms or orders of one effect leave three places to others.",
     )
     fit_evaluations: int = rule(
         25,
@@ -219,21 +218,28 @@ class Rules(ReportRules, RecordRules, RowRules):
         3,
         "1",
         "Most effects of one set, base parameters out of tolerance counted as one.",
-        f"{BY_HAND}: each further effect has to be earned beside all others; a campaign of a dozen "
-        "records seldom tells four apart.",
+        f"{BY_HAND}: a campaign of a dozen records seldom tells four apart.",
     )
     most_firsts: int = rule(
         2,
         "1",
         "Sets of one size that are extended by a further effect, and that are fitted from other "
         "starts.",
-        f"{BY_HAND} as a budget of time: the better of two effects alone need not be one of both.",
+        f"{BY_HAND}: the better of two effects alone need not be one of both.",
     )
     most_freed_rounds: int = rule(
         3,
         "1",
         "Rounds in which base parameters that reach a bound are freed.",
         f"{BY_HAND}: freeing the ones at bounds may carry others to theirs.",
+    )
+    vote_change: float = rule(
+        16.0,
+        "chi-square",
+        "Least change of the prediction for the records kept out of the fit with which they have a "
+        "vote against a name: an error that does not shrink.",
+        "Test level: a true change of this size fails to shrink the error with a chance of 2.3 %, "
+        "that of a normal value below minus half its root.",
     )
     certain_deviations: float = rule(
         1.959964,

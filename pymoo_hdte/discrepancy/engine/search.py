@@ -81,7 +81,10 @@ class Search:
             for one in grown:
                 if not self._could_count(one):
                     return
-                self._extend(one)
+                if one is not grown[0] and self._leaves_the_same(one, grown[0]):
+                    self._extend_like(one, grown[0])
+                else:
+                    self._extend(one)
             self._finish_near(size + 1)
             for one in self._of_size(size + 1)[:1]:
                 if size == 1:
@@ -249,6 +252,24 @@ class Search:
             chosen += [each for each in of_part if each not in chosen]
         for more in chosen:
             self._fit((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
+
+    def _leaves_the_same(self, one: Hypothesis, other: Hypothesis) -> bool:
+        """Tell whether two sets explain the data so nearly alike that the same must be missing."""
+        difference = abs(one.fit.chi_square - other.fit.chi_square)
+        return difference <= self.data.rules.trial_gain * other.fit.chi_square
+
+    def _extend_like(self, one: Hypothesis, other: Hypothesis) -> None:
+        """Fit a set with each of the effects by which another one was extended.
+
+        Screening takes longest where an effect has lines that beat with those of the error.
+        """
+        shorter = label_of(other.candidates)
+        for longer in self._of_size(len(other.members) + 1):
+            more = [each for each in longer.candidates if each.label not in shorter]
+            fits = shorter < label_of(longer.candidates)
+            if fits and all(more[0].goes_with(each) for each in one.candidates):
+                start = longer.values_of(more)[len(self.base.values) :]
+                self._fit((*one.candidates, *more), np.append(one.fit.values, start))
 
     def _hopeful(
         self, screened: Sequence[Screened], reductions: Sequence[float], left: float

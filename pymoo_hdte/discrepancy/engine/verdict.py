@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     alike,
@@ -56,6 +56,8 @@ class Verdict:
     doubts : tuple of str
         What forbids to name the chosen effects plainly; with ``"partial"`` they are certain as far
         as they go.
+    shown_in_held_out : bool
+        Whether the records kept out of the fit, if there are any, show what is chosen.
     """
 
     status: str
@@ -66,6 +68,7 @@ class Verdict:
     degrees_of_freedom: int
     rules: Rules = RULES
     doubts: tuple[str, ...] = ()
+    shown_in_held_out: bool = True
 
     @property
     def accepted(self) -> Fit:
@@ -114,11 +117,13 @@ def judge(
     if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
         equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
         chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
-    doubts = doubts_of(search, chosen)
+    vote = data.held_out_vote(base, chosen.fit)
+    shown = vote is None or vote.counts(rules)
+    doubts = doubts_of(search, chosen, vote if shown else None)
     status = _status(chosen, _explains(search, chosen), equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()
     return Verdict(
-        status, base, chosen, tuple(others), rivals, degrees_of_freedom, rules, tuple(doubts)
+        status, base, chosen, tuple(others), rivals, degrees_of_freedom, rules, tuple(doubts), shown
     )
 
 
@@ -142,35 +147,43 @@ def _explains(search: Search, one: Hypothesis) -> bool:
 def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
     """Tell whether a set explains the data as well as the chosen one by something else.
 
-    A law that contains the chosen one and fits no better is not a different explanation.
+    A law that contains the chosen one and ends at its bound is the chosen one. Where its further
+    unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
     return (
         alike(one, chosen, search.degrees_of_freedom, search.data.rules)
-        and not contains(one, chosen)
+        and not (contains(one, chosen) and any(bounded for _, bounded in bounded_unknowns(one.fit)))
         and _explains(search, one)
         and search.earned(one)
     )
 
 
-def doubts_of(search: Search, chosen: Hypothesis) -> list[str]:
+def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
     """Return what forbids to name a set plainly, in words; nothing if it may be named."""
     found, fitted = [], chosen.fit
-    for candidate, rows in rows_of(fitted):
-        bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
+    for (candidate, bounded), (_, rows) in zip(
+        bounded_unknowns(fitted), rows_of(fitted), strict=True
+    ):
         if bounded:
             found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
         elif not strength_is_certain(fitted, candidate, rows, search.data.rules):
             found.append(f"the interval of {candidate.label} contains nothing")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
-    before = search.data.held_out_chi_square(search.base)
-    after = search.data.held_out_chi_square(fitted)
-    if before is not None and after is not None and after >= before:
+    if vote is not None and vote.after >= vote.before:
         found.append(NOT_PROVEN)
     per_degree = fitted.chi_square / search.degrees_of_freedom
     if per_degree > search.data.rules.contradicting_chi_square:
         found.append(f"what is left is {np.sqrt(per_degree):.3g} times the noise")
     return found
+
+
+def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
+    """Return for each candidate of a fit which of its unknowns ended at a bound."""
+    return [
+        (candidate, [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0])
+        for candidate, rows in rows_of(fitted)
+    ]
 
 
 def rows_of(fitted: Fit) -> list[tuple[Candidate, NDArray[np.int_]]]:

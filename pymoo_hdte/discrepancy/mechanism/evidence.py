@@ -160,7 +160,7 @@ class MeasuredData:
             out_of_tolerance(name, name) for name in at_bounds if name in self.mechanism.quantities
         ]
 
-    def held_out_chi_square(self, fitted: Fit) -> None:
+    def held_out_vote(self, base: Fit, fitted: Fit) -> None:
         """Return None: held-out records of a mechanism are simulated, once the verdict stands."""
         return
 
