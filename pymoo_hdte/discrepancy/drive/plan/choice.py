@@ -67,7 +67,8 @@ def smallest_set(aims: Aims, most: int) -> Counts:
 
     Tests are added by what they contribute to the aims, and taken away again as long as every aim
     that was reached still is. Aims that all tests, each made ``most`` times, do not reach are left
-    aside: no set of ``most`` tests reaches them.
+    aside: no set of ``most`` tests reaches them. Nor are effects told from others at the cost of
+    tests, if the tests do not even show them.
 
     Parameters
     ----------
@@ -79,43 +80,50 @@ def smallest_set(aims: Aims, most: int) -> Counts:
     -------
     ndarray of int, shape (n_tests,)
     """
-    n_tests = len(aims.signatures.grams)
+    n_tests, n_effects = len(aims.signatures.grams), len(aims.signatures.effects)
+    owners = np.append(np.arange(n_effects), np.nonzero(aims.pairs)[0])
     possible = aims.shares(np.full(n_tests, most)) >= 1.0
+    while True:
+        pursued = possible & possible[:n_effects][owners]
+        counts = _set_for(aims, most, pursued)
+        seen = aims.shares(counts)[:n_effects] >= 1.0
+        if not np.any(pursued[:n_effects] & ~seen):
+            return counts
+        possible[:n_effects] &= seen
+
+
+def _set_for(aims: Aims, most: int, pursued: NDArray[np.bool_]) -> Counts:
+    """Return a small set of tests for the aims that are ``pursued``, shape (n_aims,)."""
+    n_tests = len(aims.signatures.grams)
     grown = np.zeros(n_tests, dtype=int)
-    whole = np.ones(n_tests, dtype=int)
-    if not possible.any():
-        return grown
-    while grown.sum() < most:
-        here = aims.shares(grown)[possible].sum()
-        if here >= possible.sum():
-            break
-        gains = [
-            aims.shares(grown + one)[possible].sum() - here for one in np.eye(n_tests, dtype=int)
-        ]
+    while grown.sum() < most and not _reached(aims, grown, pursued).all():
+        here = aims.shares(grown)[pursued].sum()
+        one_more = grown + np.eye(n_tests, dtype=int)
+        gains = [aims.shares(counts)[pursued].sum() - here for counts in one_more]
         if max(gains) <= _GAIN:
             break
-        grown[int(np.argmax(gains))] += 1
-    found = [_pruned(aims, grown, possible)]
-    if not _reached(aims, found[0], possible).all():
+        grown = one_more[int(np.argmax(gains))]
+    found = [_pruned(aims, grown, pursued)]
+    if not _reached(aims, found[0], pursued).all():
         # Where tests help only together, adding one by one does not find them.
-        found.append(_pruned(aims, whole, possible))
+        found.append(_pruned(aims, np.ones(n_tests, dtype=int), pursued))
     allowed = [one for one in found if one.sum() <= most]
-    return max(allowed, key=lambda one: (_reached(aims, one, possible).sum(), -one.sum()))
+    return max(allowed, key=lambda one: (_reached(aims, one, pursued).sum(), -one.sum()))
 
 
-def _reached(aims: Aims, counts: Counts, possible: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    return (aims.shares(counts) >= 1.0)[possible]
+def _reached(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return (aims.shares(counts) >= 1.0)[pursued]
 
 
-def _pruned(aims: Aims, counts: Counts, possible: NDArray[np.bool_]) -> Counts:
+def _pruned(aims: Aims, counts: Counts, pursued: NDArray[np.bool_]) -> Counts:
     """Take tests away, the most dispensable first, while all that was reached still is."""
-    counts, reached = counts.copy(), _reached(aims, counts, possible)
+    counts, reached = counts.copy(), _reached(aims, counts, pursued)
     while counts.any():
         left: dict[int, float] = {}
         for test in np.flatnonzero(counts):
             fewer = counts - np.eye(len(counts), dtype=int)[test]
             alone, beside = aims.signatures.noncentralities(fewer)
-            if np.all(_reached(aims, fewer, possible) >= reached):
+            if np.all(_reached(aims, fewer, pursued) >= reached):
                 left[int(test)] = float(np.log1p(alone).sum() + np.log1p(beside).sum())
         if not left:
             return counts

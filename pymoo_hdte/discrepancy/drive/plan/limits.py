@@ -29,9 +29,9 @@ class PlanLimits:
     ----------
     rig : Rig
         Speed loop and noise of the sensors.
-    speeds : tuple of float
+    speeds : tuple of float, any length n
         Of the input, rad/s, above zero.
-    loads : tuple of float
+    loads : tuple of float, any length n
         N.m at the output; positive ones brake the motion, negative ones drive it, in either
         direction.
     sample_rate : float
@@ -40,7 +40,7 @@ class PlanLimits:
         Most tests of the plan: those to be fitted, sweeps among them, and those held out.
     directions : tuple of str
         Of `DIRECTIONS`.
-    sweeps : tuple of float
+    sweeps : tuple of float, any length n
         Largest torques of possible torsion sweeps, N.m.
     output_turns : int
         Length of a running record.
@@ -51,7 +51,7 @@ class PlanLimits:
     held_out : int
         Number of running records that are kept out of the fit to prove its result.
     power : float
-        Wanted chance to detect an effect, and to tell it from each other one.
+        Wanted probability to detect an effect, and to tell it from each other one.
     share : float
         Size of the effects that are not in ``effects``: the share of the largest wind-up and
         torques that a fit without them leaves unexplained.
@@ -117,7 +117,17 @@ class PlanLimits:
 
 
 def read_limits(path: str | Path) -> PlanLimits:
-    """Read a file of limits, as ``docs/command_line.md`` describes it.
+    """Read a file of limits.
+
+    Parameters
+    ----------
+    path : str or Path
+        TOML, as ``docs/command_line.md`` describes it.
+
+    Returns
+    -------
+    PlanLimits
+        SI units.
 
     Raises
     ------

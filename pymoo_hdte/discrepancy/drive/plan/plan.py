@@ -55,9 +55,12 @@ class Plan:
         To be fitted, in the order to make them.
     held_out : tuple of PlannedTest
         Running tests of other conditions, where there are any, to prove what the fit names.
-    detected, separated : tuple of Chance
+    detected : tuple of Chance
+        One of each effect to be found.
+    separated : tuple of Chance
+        Of the effects that are detected from each other one.
     wanted : float
-        Power that was wanted.
+        Probability that was wanted as power.
     """
 
     tests: tuple[PlannedTest, ...]
@@ -70,13 +73,13 @@ class Plan:
     def missed(self) -> list[str]:
         """A sentence for each effect that is not detected, or not told from others.
 
-        What is not detected is not told from anything either, which need not be said again.
+        What is not detected is not told from anything either, and not in `separated`.
         """
         unseen = {one.effect: one for one in self.detected if one.power < self.wanted}
         found = [_missed([one], self.wanted) for one in unseen.values()]
         confused: dict[tuple[str, bool], list[Chance]] = {}
         for one in self.separated:
-            if one.power < self.wanted and not {one.effect, one.rival} & set(unseen):
+            if one.power < self.wanted:
                 key = one.effect, one.possible < self.wanted
                 confused.setdefault(key, []).append(one)
         return found + [_missed(ones, self.wanted) for ones in confused.values()]
@@ -157,7 +160,7 @@ def _chances(
     found: dict[frozenset[str], Chance] = {}
     for k, effect in enumerate(signatures.effects):
         for j, rival in enumerate(signatures.rivals):
-            if not pairs[k, j]:
+            if not pairs[k, j] or alone[k] < aims.power:
                 continue
             one = Chance(effect, rival, float(beside[k, j]), float(best_beside[k, j]))
             known = found.setdefault(frozenset((effect, rival)), one)
