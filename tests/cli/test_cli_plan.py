@@ -1,4 +1,4 @@
-"""``pymoo-hdte plan`` as a user calls it, with the file of limits of the documentation, at fewer speeds and loads."""
+"""``pymoo-hdte plan`` as a user calls it, with the documented file of limits, at fewer speeds."""
 
 import json
 import re

@@ -93,6 +93,23 @@ def test_of_several_forms_the_best_imitation_counts():
     assert made([effect], [forms]).noncentralities(counts(1))[1] == pytest.approx(np.array([[9.0]]))
 
 
+def test_where_the_drive_rattles_nothing_tells_a_clearance_from_others():
+    """Effect b has a clearance: of tests 0 and 1 only the second, which is loaded, counts for it."""
+    one, other = np.array([[3.0, 0.0], [1.0, 0.0]]), np.array([[0.0, 3.0], [0.0, 2.0]])
+    rivals = [[([one], True)], [([other], True)]]
+    found = Signatures.of(
+        ["a:p", "b:p"],
+        [one, other],
+        [("a:p", rivals[0]), ("b:p", rivals[1])],
+        np.zeros((0, 2, 2)),
+        np.zeros(0),
+    )
+    held = replace(found, held=np.array([False, True]), rattling=frozenset(["b:p"]))
+    alone, beside = held.noncentralities(counts(1, 1))
+    assert alone == pytest.approx([10.0, 4.0])
+    assert [beside[0, 1], beside[1, 0]] == pytest.approx([1.0, 4.0])
+
+
 def random_signatures(rng, n_tests=4, size=3):
     def array():
         return rng.normal(scale=3.0, size=(n_tests, size))

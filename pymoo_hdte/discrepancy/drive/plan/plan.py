@@ -225,13 +225,12 @@ def _missed(ones: Sequence[Chance], wanted: float) -> str:
         asked = f"tells {effect} from {rivals}" if rivals else f"shows {effect}"
         best = max(one.possible for one in ones)
         return f"No test within the limits {asked} at this size: the power is at most {best:.2f}."
-    asked = (
-        f"to tell {effect} from {rivals.replace(', nor', ' and')}"
-        if rivals
-        else f"to show {effect}"
-    )
     least = min(one.power for one in ones)
-    return f"More records are needed {asked}: these give a power of {least:.2f}."
+    asked = f"tell {effect} from {rivals.replace(', nor', ' and')}" if rivals else f"show {effect}"
+    return (
+        f"To {asked} at this size takes more records than the limits allow: these give a power of "
+        f"{least:.2f}."
+    )
 
 
 def _test(role: str, one: PlannedTest) -> dict[str, Any]:
