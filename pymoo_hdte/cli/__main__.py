@@ -14,9 +14,10 @@ from pymoo_hdte.cli.discrepancy import DISCREPANCY
 from pymoo_hdte.cli.identify import IDENTIFY
 from pymoo_hdte.cli.optimise import OPTIMISE
 from pymoo_hdte.cli.parser import MISTAKE, OneLineParser
+from pymoo_hdte.cli.plan import PLAN
 from pymoo_hdte.cli.simulate import SIMULATE
 
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, DISCREPANCY)
+COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY)
 """In the order of the help."""
 INTERRUPTED = 130
 """Exit code that a shell expects of a program ended by Ctrl-C."""

@@ -83,6 +83,13 @@ class Fields:
             real_number(f"{self._name(field)}[{index}]", value) for index, value in enumerate(raw)
         )
 
+    def texts(self, field: str) -> tuple[str, ...]:
+        """Return a list of non-empty strings."""
+        raw = self.take(field, "a list of strings")
+        if not isinstance(raw, list) or not all(isinstance(one, str) and one for one in raw):
+            raise InvalidInput(self._name(field), raw, "a list of non-empty strings")
+        return tuple(raw)
+
     def quantity(self, field: str, kind: str, **limits: float) -> float:
         """Return a quantity in SI units, given as ``{ value = ..., unit = "..." }``.
 

@@ -21,6 +21,7 @@ LOWEST_FIRST = (
         "discrepancy.campaign.rows",
         "discrepancy.drive",
         "discrepancy.drive.misfit",
+        "discrepancy.drive.plan",
         "discrepancy.mechanism",
     ),
     *("discrepancy.report", "virtual"),

@@ -120,6 +120,11 @@ def believed_from_fields(top: Fields, folder: Path) -> BelievedDrive:
     """
     sheet = folder / top.text("sheet") if top.has("sheet") else None
     model = read_drive_model(folder / top.text("model"), sheet)
+    return believed_of_model(model, *tolerances_of_fields(top))
+
+
+def tolerances_of_fields(top: Fields) -> tuple[float, float, dict[str, float]]:
+    """Take ``[tolerance]``: of all values, of the static error, and of single values."""
     limits: dict[str, float] = {}
     if top.has("tolerance"):
         table = top.table("tolerance")
@@ -128,4 +133,4 @@ def believed_from_fields(top: Fields, folder: Path) -> BelievedDrive:
                 limits[name] = table.number(name, at_least=0.0, below=1.0)
         table.finish()
     default, error = limits.pop("default", 0.1), limits.pop("static_error", 0.3)
-    return believed_of_model(model, default, error, limits)
+    return default, error, limits

@@ -69,7 +69,7 @@ def read_campaign(
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
         title, drive = top.text("title"), top.text("drive")
         believed = believed_from_fields(top, folder) if top.has("model") else _believed(top)
-        rig = _rig(top.table("rig"))
+        rig = rig_from_fields(top.table("rig"), f"{CAMPAIGN_FILE}.rig")
         enough = {
             name: top.number(key, above=0.0) * factor
             for name, (key, factor) in GOOD_ENOUGH.items()
@@ -163,8 +163,8 @@ def _believed(top: Fields) -> BelievedDrive:
     return build(BelievedDrive, BELIEVED, table, place, effects=effects, tolerances=tolerances)
 
 
-def _rig(table: Fields) -> Rig:
-    place = f"{CAMPAIGN_FILE}.rig"
+def rig_from_fields(table: Fields, place: str) -> Rig:
+    """Return the rig of the table ``[rig]``, which stands at ``place``; errors name its field."""
     if not table.has("control"):
         return build(Rig, RIG, table, place)
     sentence = table.text("control")

@@ -2,17 +2,20 @@
 
 Two models that fit all measurements are compared in tests within the range of measured conditions,
 both new conditions and repeats of records, which still average the noise. Their difference is
-weighted by the noise and by the uncertainty of both predictions, after Hunter and Reiner
-(Technometrics 1965) and Box and Hill (Technometrics 1967). Where nothing is missing, the record
-with the most uncertain prediction is the most informative one.
+weighted by the noise and by the uncertainty of both predictions: see `separation`, with which
+campaigns are planned, too, and Box and Hill (Technometrics 1967). A test that leaves the answer to
+chance is not proposed. Where nothing is missing, the record with the most uncertain prediction is
+the most informative one.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
@@ -22,7 +25,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive.effects import ENCODER_LINE
 
-TESTS = ("running", "torsion_sweep", "reclocked_encoder")
+TESTS = ("running", "torsion_sweep", "reclocked_encoder", "none")
 
 _RIVALS = 2
 OF_ENCODER = ("eccentricity", ENCODER_LINE)
@@ -39,13 +42,14 @@ class Proposal:
     description : str
         For the report.
     test : str
-        One of `TESTS`.
+        One of `TESTS`; "none" where no test within the limits separates the two models.
     speed_rpm, load_torque : float or None
-        r/min of the input, negative in reverse, and N.m; None for a sweep.
+        r/min of the input, negative in reverse, and N.m; None for a sweep or no test.
     separates : tuple of str, or None
         Labels of the two models; None where the aim is a less uncertain prediction.
     expected_separation : float
-        Expected chi-square between the two models, or of the uncertain prediction.
+        Expected chi-square between the two models, or of the uncertain prediction; without a test
+        the largest of all.
     """
 
     description: str
@@ -73,17 +77,47 @@ def next_experiment(finding: DriveFinding) -> Proposal:
         return _most_uncertain(grid, grid.model(verdict.base))
     chosen = verdict.chosen.fit
     twin = _encoder_twin(grid, chosen) or _zero_twin(grid, finding, chosen)
-    if twin is not None and verdict.status != "unlisted":
+    least = verdict.rules.separated_chi_square
+    if twin is not None and verdict.status != "unlisted" and twin.expected_separation >= least:
         return twin
     model = grid.model(chosen)
     hypotheses = [grid.model(fitted) for fitted in nearest_rivals(verdict)]
     if not hypotheses:
         return _most_uncertain(grid, model)
     separations = np.array([separation(model, hypothesis) for hypothesis in hypotheses])
-    test = int(np.argmax(separations.min(axis=0)))
-    closest = int(np.argmin(separations[:, test]))
+    told = np.flatnonzero(separations.max(axis=1) >= least)
+    if not len(told):
+        return _no_test(model.label, hypotheses, separations, verdict)
+    # One test for all rivals where there is one, or else for the nearest that a test separates.
+    together = separations[told].min(axis=0)
+    if together.max() < least:
+        told = told[:1]
+        together = separations[told[0]]
+    test = int(np.argmax(together))
+    closest = int(told[np.argmin(separations[told, test])])
     labels = model.label, hypotheses[closest].label
-    return _proposal(grid, test, labels, float(separations[closest, test]), verdict)
+    proposed = _proposal(grid, test, labels, float(separations[closest, test]), verdict)
+    never = [k for k in range(len(hypotheses)) if separations[k].max() < least]
+    if not never:
+        return proposed
+    left_over = _inseparable(model.label, [hypotheses[k] for k in never])
+    return replace(proposed, description=f"{proposed.description} {left_over}")
+
+
+def _inseparable(label: str, rivals: Sequence[Model]) -> str:
+    others = " or from ".join(rival.label for rival in rivals)
+    return f"What separates {label} from {others}? No test within the limits does."
+
+
+def _no_test(
+    label: str, rivals: Sequence[Model], separations: NDArray[np.float64], verdict: Verdict
+) -> Proposal:
+    """Say that all tests leave it to chance which of the models is right."""
+    said = _inseparable(label, rivals)
+    if verdict.status == "unlisted":
+        said = f"Neither {label} nor {rivals[0].label} explains the data. {said}"
+    labels = label, rivals[0].label
+    return Proposal(said, "none", None, None, labels, float(separations[0].max()))
 
 
 def nearest_rivals(verdict: Verdict) -> list[Fit]:
@@ -111,8 +145,6 @@ def _proposal(
     what, speed, load, kind = grid.condition(test)
     if verdict.status == "unlisted":
         said = f"Neither {one} nor {other} explains the data; they differ most in"
-    elif expected < verdict.rules.separated_chi_square:
-        said = f"{one} and {other} predict nearly the same in every test; they differ most in"
     elif verdict.equivalent:
         said = f"The data cannot tell {one} from {other}; what can is"
     else:

@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.drive.prediction import Conditions
+from pymoo_hdte.discrepancy.drive.separation import unimitated
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit
@@ -133,12 +134,11 @@ class Grid:
 
 def separation(one: Model, other: Model) -> Values:
     """Return the chi-square of the difference in every test, shape (n_tests,)."""
-    difference = other.predicted - one.predicted
-    spread = np.broadcast_to(np.eye(difference.shape[1]), (*difference.shape, difference.shape[1]))
-    for model in (one, other):
-        spread = spread + model.influence @ np.swapaxes(model.influence, 1, 2)
-    solved = np.linalg.solve(spread, difference[..., None])[..., 0]
-    return np.asarray(np.sum(difference * solved, axis=1))
+    difference = (other.predicted - one.predicted)[..., None]
+    columns = np.concatenate([difference, one.influence, other.influence], axis=2)
+    # The unknowns of both models are known to their own uncertainty, the unit of the influence.
+    known = np.diag(np.r_[0.0, np.ones(columns.shape[2] - 1)])
+    return unimitated(np.swapaxes(columns, 1, 2) @ columns + known, 1)[:, 0, 0]
 
 
 def _sweep(reach: float, noise: float) -> TorsionPoints:

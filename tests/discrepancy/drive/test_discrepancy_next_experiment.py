@@ -81,17 +81,36 @@ def test_a_rival_is_told_apart_by_a_record_that_the_two_predict_apart():
 
 
 def test_the_test_to_make_tells_the_chosen_effect_from_its_nearest_rival(monkeypatch):
-    """Of the least separations 1, 0.5 and 3 the last is largest, though 9 stands elsewhere."""
+    """Of the least separations 10, 5 and 30 the last is largest, though 90 stands elsewhere."""
     data = known_data()
     ripple, line = listed(data, "torque_ripple", [6.0]), listed(data, "kinematic_error", [6.0])
     drag = listed(data, "nonlinear_drag")
     data, _ = measured(ripple.build((0.005, 0.0)), np.random.default_rng(7))
     chosen, *others = (hypothesis_of(data, one, one.starts[0]) for one in (ripple, line, drag))
-    separations = iter([np.array([1.0, 9.0, 4.0]), np.array([8.0, 0.5, 3.0])])
-    monkeypatch.setitem(next_experiment.__globals__, "separation", lambda *_: next(separations))
-    proposal = next_experiment(judged(data, chosen, *others))
-    assert proposal.expected_separation == 3.0
+    finding = judged(data, chosen, *others)
+
+    def proposed(*separations):
+        given = iter(np.array(separations))
+        monkeypatch.setitem(next_experiment.__globals__, "separation", lambda *_: next(given))
+        return next_experiment(finding)
+
+    proposal = proposed([10.0, 90.0, 40.0], [80.0, 5.0, 30.0])
+    assert proposal.expected_separation == 30.0
     assert proposal.separates == (chosen.label, others[1].label)
+    # No test tells the first rival: the best one is for the second.
+    proposal = proposed([1.0, 8.0, 4.0], [80.0, 5.0, 30.0])
+    assert proposal.expected_separation == 80.0
+    assert proposal.separates == (chosen.label, others[1].label)
+    assert f"from {others[0].label}? No test within the limits does." in proposal.description
+    # No test tells both at once: the best one is for the nearer.
+    proposal = proposed([10.0, 90.0, 4.0], [8.0, 5.0, 30.0])
+    assert proposal.expected_separation == 90.0
+    assert proposal.separates == (chosen.label, others[0].label)
+    # No test tells either from the chosen one.
+    proposal = proposed([1.0, 8.0, 4.0], [7.0, 5.0, 3.0])
+    assert (proposal.test, proposal.speed_rpm, proposal.load_torque) == ("none", None, None)
+    assert proposal.description.endswith("No test within the limits does.")
+    assert proposal.expected_separation == 8.0
 
 
 def test_an_adequate_model_asks_for_its_least_certain_record():

@@ -1,0 +1,71 @@
+"""The files of a plan, and its table on the terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte.cli.command import heading
+from pymoo_hdte.discrepancy.drive.plan.plan import Plan
+from pymoo_hdte.io.toml import toml_text
+from pymoo_hdte.reports.folder import PAGE_FILE, ReportFolder
+from pymoo_hdte.reports.html import page
+
+PLAN_FILE = "plan.toml"
+FOLDER = ReportFolder("plan.json", (PLAN_FILE,))
+
+
+def write_plan(plan: Plan, model: str, out: Path) -> dict[str, Any]:
+    """Write a plan and return its document; errors as `ReportFolder.write`.
+
+    ``model`` is the name of the model.
+    """
+    found = plan.as_dict()
+    fitted = sum(one["role"] == "train" for one in found["test"])
+    held_out = len(found["test"]) - fitted
+    reached = sum(one["power"] >= plan.wanted for one in found["effect"])
+    apart = sum(one["power"] >= plan.wanted for one in found["pair"])
+    sentences = [
+        f"{fitted} tests to fit and {held_out} to hold out: with a power of {plan.wanted:g} or "
+        f"more they show {reached} of {len(found['effect'])} effects and separate {apart} of "
+        f"{len(found['pair'])} pairs."
+    ]
+    document = heading("plan", sentences, plan.missed) | {"model": model} | found
+    del document["not_reached"]
+    rows = {"weakest": weakest(document), "document": document}
+    FOLDER.write(out, page("pymoo_hdte.cli", "plan.html.j2", **rows), document,
+                 {PLAN_FILE: toml_text(document)})  # fmt: skip
+    return document
+
+
+def weakest(document: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return for each effect its power, and the rival from which it is hardest to tell."""
+    found = []
+    for one in document["effect"]:
+        name, power = one["effect"], one["power"]
+        pairs = [pair for pair in document["pair"] if name in (pair["effect"], pair["rival"])]
+        nearest = min(pairs, key=lambda pair: pair["power"], default=None)
+        rival, apart = "", None
+        if nearest is not None:
+            rival = nearest["rival"] if nearest["effect"] == name else nearest["effect"]
+            apart = nearest["power"]
+        found.append({"effect": name, "power": power, "rival": rival, "apart": apart})
+    return found
+
+
+def plan_table(document: dict[str, Any], out: Path) -> list[str]:
+    """Return the lines for the terminal: tests, powers, and what is not reached."""
+    lines = [*document["sentences"], "", f"{'role':9} {'r/min':>8} {'N.m':>8} {'s':>7}  test"]
+    for one in document["test"]:
+        if one["test"] == "running":
+            condition = f"{one['input_speed_rpm']:8.5g} {one['load_torque_Nm']:8.4g}"
+            lines.append(f"{one['role']:9} {condition} {one['elapsed_s']:7.5g}  {one['direction']}")
+        else:
+            torque = one["largest_torque_Nm"]
+            lines.append(f"{one['role']:9} {'':8} {torque:8.4g} {'':7}  torsion sweep")
+    widest = max((len(one["effect"]) for one in document["effect"]), default=6)
+    lines += ["", f"{'effect':{widest}}  shown  apart  from"]
+    for row in weakest(document):
+        apart = f"{'':5}" if row["apart"] is None else f"{row['apart']:5.2f}"
+        lines.append(f"{row['effect']:{widest}}  {row['power']:5.2f}  {apart}  {row['rival']}")
+    return [*lines, "", *document["limits"], f"Report: {out / PAGE_FILE}"]
