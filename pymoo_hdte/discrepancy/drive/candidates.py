@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
+from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL, words_of
 from pymoo_hdte.discrepancy.engine import candidate
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, candidate_of
 from pymoo_hdte.drive.effects import DriveEffect, DriveSizes, LawAtPort, drive_effects
@@ -50,11 +50,10 @@ def out_of_tolerance(
     What an effect covers under another name is one only ``together`` with others.
     """
     believed = {parameter.name: parameter.start for parameter in base}
-    words = {name: name.replace("_", " ") for name in MECHANICAL}
-    for line, order in enumerate(error_orders):
-        words[f"error_amplitude_{line}"] = f"amplitude of order {order:.4g} of the static error"
     return [
-        candidate.out_of_tolerance(name, words[name])
+        candidate.out_of_tolerance(name, words_of(name, error_orders))
         for name in at_bounds
-        if name in words and believed[name] > 0.0 and (together or name not in _OF_THEIR_OWN)
+        if (name in MECHANICAL or name.startswith("error_amplitude_"))
+        and believed[name] > 0.0
+        and (together or name not in _OF_THEIR_OWN)
     ]

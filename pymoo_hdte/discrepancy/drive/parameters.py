@@ -42,6 +42,21 @@ BASE_UNITS = {
 """SI units of the base parameters, by name; those of lines without their number."""
 
 
+def words_of(name: str, error_orders: Sequence[float]) -> str:
+    """Return a base parameter in physical words: the line of an order, not its number.
+
+    Examples
+    --------
+    >>> words_of("error_amplitude_1", (1.0, 2.0))
+    'amplitude of order 2 of the static error'
+    """
+    kind, _, line = name.rpartition("_")
+    if kind in ("error_amplitude", "error_phase"):
+        part = kind.removeprefix("error_")
+        return f"{part} of order {error_orders[int(line)]:.4g} of the static error"
+    return name.replace("_", " ")
+
+
 def base_parameters(
     believed: BelievedDrive, rig: Rig, phases: Sequence[float], offset: float
 ) -> tuple[Parameter, ...]:

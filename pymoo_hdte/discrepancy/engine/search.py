@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, count, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
@@ -21,7 +20,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     hypothesis_of,
     varied,
 )
-from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.discrepancy.engine.membership import ill_explained, is_earned
 from pymoo_hdte.discrepancy.engine.screening import Screened, screen
 from pymoo_hdte.effects.effect import is_contained
 
@@ -108,7 +107,10 @@ class Search:
         members = _true(one)
         if len(members) == 1:
             return True
-        return all(self._earned(one, self.without(one, member), member) for member in members)
+        return all(
+            is_earned(self.data, self.base, one, self.without(one, member), member)
+            for member in members
+        )
 
     def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
         """Return a set without one of its members, fitted to the end."""
@@ -271,46 +273,6 @@ class Search:
                 if all(other.goes_with(each) for each in kept):
                     start = np.append(_values(one, kept), other.starts[0])
                     self._fit((*kept, other), start)
-
-    def _earned(self, one: Hypothesis, rest: Hypothesis, member: Effects) -> bool:
-        """Tell whether a set explains most of what is left without one of its members.
-
-        What a law without exact form leaves may be an error of its form: unless the whole set
-        explains the data down to the noise, a member must also be large relative to the base's
-        excess at the port of another, and relative to the model's own error elsewhere.
-        """
-        rules = self.data.rules
-        if self.enough(rest):
-            return False
-        left = rest.fit.chi_square - self.degrees_of_freedom
-        removed = rest.fit.chi_square - one.fit.chi_square
-        if rest.exact:
-            return left > 0.0 and removed >= rules.explained_share * left
-        per_degree = rest.fit.chi_square / self.degrees_of_freedom
-        if per_degree > rules.contradicting_chi_square and self.enough(one):
-            return True
-        before, alone, both = (self.data.excess(each) for each in (self.base, rest.fit, one.fit))
-        parts = ill_explained(before, alone, rules)
-        if not parts:
-            return False
-        same_port = any(a.port == b.port for a in member for b in rest.candidates)
-        least = rules.second_form_share if same_port else self.data.remainder
-        for part in (slice(None), parts[0]):
-            whole, residual, after = (np.sum(each.of_parts[part]) for each in (before, alone, both))
-            if residual - after >= max(rules.second_share * residual, least * whole):
-                return True
-        return False
-
-
-def ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
-    """Return the parts of the data that contradict both a base and a fit, the worst first.
-
-    The worst one, and all others that the fit explains by no more than half.
-    """
-    wrong = np.flatnonzero(before.significant(rules) & after.significant(rules))
-    residual = after.of_parts[wrong] / before.of_parts[wrong]
-    ranked = wrong[np.argsort(-residual)].tolist()
-    return ranked[: max(1, int(np.sum(residual > 1.0 - rules.explained_part_share)))]
 
 
 def _label(effects: Effects) -> frozenset[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.misfit.relevance import relevance
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
@@ -55,6 +56,7 @@ def verdict_document(
         "campaign": finding.campaign.title,
         "status": verdict.status,
         "sentence": sentence(verdict),
+        "doubts": [in_words(one) for one in verdict.doubts],
         "effects": _effects(verdict),
         "relevance": None if matters is None else matters.as_dict(),
         "alternatives": _alternatives(verdict),
@@ -63,6 +65,7 @@ def verdict_document(
             "degrees_of_freedom": verdict.degrees_of_freedom,
             "parameters": base_parameters(verdict.accepted, verdict.rules),
         },
+        "residual_over_noise": residual_of_parts(finding),
         **with_believed_effects([one.to_dict() for one in finding.campaign.believed.effects]),
         "held_out": absent if held_out is None else dict(held_out),
         "next_experiment": proposal.as_dict(),
@@ -112,7 +115,29 @@ def sentence(verdict: Verdict) -> str:
     if verdict.status == "class":
         others = "; or ".join(in_words(hypothesis.label) for hypothesis in verdict.equivalent)
         return f"{what} Or, which these data cannot tell from it: {others}."
+    if verdict.status == "partial":
+        return f"{what} That is not all, or not quite right: {in_words('; '.join(verdict.doubts))}."
     return what
+
+
+def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
+    """Return for each part of the data how large misfits are, in multiples of the noise.
+
+    Root mean squares of the residuals of the believed drive and of the accepted model; the noise
+    is that of the sensors and of the repeatability of the static error.
+    """
+    found = {}
+    fits = {"before": finding.verdict.base, "after": finding.verdict.accepted}
+    sizes = {}
+    for when, fitted in fits.items():
+        excess = finding.data.excess(fitted)
+        degrees_of_freedom = excess.degrees_of_freedom.sum(axis=0)
+        ratio = excess.of_parts / np.maximum(degrees_of_freedom, 1.0) + 1.0
+        sizes[when] = np.where(degrees_of_freedom > 0.0, np.sqrt(np.maximum(ratio, 0.0)), np.nan)
+    for place, part in enumerate(PARTS):
+        if np.isfinite(sizes["before"][place]):
+            found[part] = {when: float(size[place]) for when, size in sizes.items()}
+    return found
 
 
 def _effects(verdict: Verdict) -> list[dict[str, Any]]:

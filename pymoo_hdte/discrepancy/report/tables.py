@@ -12,11 +12,12 @@ from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.gap import Gap
-from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
+from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS, words_of
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     adequate,
+    explains,
     unexplained,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
@@ -40,6 +41,7 @@ STATUSES = {
     "class": "one of several",
     "parameter": "believed value wrong",
     "unlisted": "unknown effect",
+    "partial": "found in part",
 }
 """Words for the status of a verdict."""
 
@@ -105,8 +107,9 @@ def certainty(finding: DriveFinding) -> str:
         return (
             "That something is missing is certain; what it is, is not. The nearest known effect "
             f"explains {share} of the misfit, {_too_little(finding, verdict.chosen)}."
+            + "".join(f" Against it: {in_words(one)}." for one in verdict.doubts)
         )
-    return " ".join(_evidence(verdict, verdict.chosen, share))
+    return " ".join(_evidence(finding, verdict.chosen, share))
 
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
@@ -118,11 +121,14 @@ def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
         ]
         return f"but not what shows in {' and '.join(f'the {part}' for part in parts)}"
     rules = finding.verdict.rules
+    if explains(finding.data, nearest, finding.verdict.base, finding.verdict.degrees_of_freedom):
+        return "but a name needs more than that"
     share = rules.exact_share if nearest.exact else rules.explained_share
     return f"where a name takes {100.0 * share:g} %, or what is left to be noise"
 
 
-def _evidence(verdict: Verdict, chosen: Hypothesis, share: str) -> list[str]:
+def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str]:
+    verdict = finding.verdict
     after = chosen.fit.chi_square / verdict.degrees_of_freedom
     words = [
         f"It explains {share} of the misfit that is not noise; what is left has {after:.3g} times "
@@ -146,7 +152,8 @@ def _evidence(verdict: Verdict, chosen: Hypothesis, share: str) -> list[str]:
         best = min(hypotheses, key=lambda hypothesis: hypothesis.bic)
         words.append(f"The next best, {in_words(best.label)}, explains {percent(best.explained)}.")
     if chosen.fit.at_bounds:
-        names = ", ".join(name.replace("_", " ") for name in chosen.fit.at_bounds)
+        orders = finding.campaign.believed.error_orders
+        names = ", ".join(words_of(name, orders) for name in chosen.fit.at_bounds)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
     return words
 

@@ -9,7 +9,7 @@ from planted_features import CONDITIONS, known_data, library, measured, with_swe
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.drive.objective import Objective
-from pymoo_hdte.discrepancy.engine import hypothesis, search
+from pymoo_hdte.discrepancy.engine import hypothesis, membership, search
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
@@ -366,7 +366,8 @@ def test_a_second_effect_is_looked_for_in_the_sweep_alone(monkeypatch):
     assert labels_of(verdict) == {DRAG, OUTPUT_FRICTION}
     excess = data.excess(verdict.base)
     assert excess.degrees_of_freedom[-1].tolist() == [0.0] * 4 + [len(data.torsion[0].angle) - 1]
-    monkeypatch.setattr(search, "ill_explained", lambda *_: [])
+    for module in (search, membership):
+        monkeypatch.setattr(module, "ill_explained", lambda *_: [])
     assert labels_of(judge(data, fit(data), [drag, friction])) == {DRAG}
 
 
