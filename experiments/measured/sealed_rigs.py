@@ -34,6 +34,7 @@ COLUMNS = (
     Column("status"),
     Column("effects"),
     Column("or"),
+    Column("doubts"),
     Column("before", digits=4, group="chi-square per degree of freedom"),
     Column("after", digits=4, group="chi-square per degree of freedom"),
     Column("before", "noise", 4, "held-out gap"),
@@ -52,9 +53,9 @@ SETTING = (
     "shows verdicts, and does not say whether they are right. Believed values are up to 10 % off."
 )
 NOTE = (
-    "Before: the believed model, fitted within its tolerances. Of an unlisted effect it stands "
-    "after, too. The held-out gap is over all features in standard deviations of the noise, 1 for "
-    "a perfect model."
+    "Before: the believed model, fitted within its tolerances; if nothing is named it stands "
+    "after, too. Doubts are what forbids to name the best set plainly. The held-out gap is over "
+    "all features in standard deviations of the noise, 1 for a perfect model."
 )
 
 Rows = list[list[str]]
@@ -88,12 +89,13 @@ def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:
     effects = "" if accepted is verdict.base else _labels(accepted.candidates)
     rivals = " or ".join(_labels(one.candidates) for one in verdict.equivalent)
     fits = [one.chi_square / verdict.degrees_of_freedom for one in (verdict.base, accepted)]
+    words = [name, verdict.status, effects, rivals, "; ".join(verdict.doubts)]
     gaps = [float("nan")] * 5
     if proof is not None:
         error = proof.channels["transmission_error"]
         gaps = [proof.overall.before, proof.overall.after]
         gaps += [error.before, error.after, error.noise_floor]
-    return [name, verdict.status, effects, rivals, *(f"{one:.5g}" for one in (*fits, *gaps))]
+    return [*words, *(f"{one:.5g}" for one in (*fits, *gaps))]
 
 
 def _labels(candidates: Sequence[Candidate]) -> str:
