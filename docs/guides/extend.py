@@ -158,6 +158,13 @@ analysis = analyse(with_effects(campaign, rig, [lubricant]))
 print(f"{analysis.verdict.status}: {analysis.revised_model().effects[-1]}")
 
 # %%
+# From the command line, the file goes with the campaign or rig; nothing has to be registered:
+#
+# .. code-block:: sh
+#
+#    pymoo-hdte discrepancy my_campaign --effects eyring_drag.py --out report
+
+# %%
 # What is no law at a port, such as an inertia or an error of a sensor, is a subclass of
 # ``pymoo_hdte.drive.DriveEffect``, registered as the ``change`` of an ``Effect``: see the files in
 # ``pymoo_hdte/drive/effects``.

@@ -161,6 +161,12 @@ EXPERIMENTS = (
         reads_outcome=True,
     ),
     Experiment(
+        "sealed_rigs",
+        "measured.sealed_rigs",
+        "Verdicts on fourteen rigs whose truth is not known here",
+        reads_outcome=True,
+    ),
+    Experiment(
         "emps", "measured.emps", "EMPS: friction of a positioning system, measured by others"
     ),
     Experiment(

@@ -10,6 +10,7 @@ from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import Command, Outcome, Say
+from pymoo_hdte.cli.own_effects import OPTION, own_effects
 from pymoo_hdte.reports.folder import PAGE_FILE
 
 ModelFiles = tuple[Path | None, Path | None]
@@ -18,6 +19,7 @@ ModelFiles = tuple[Path | None, Path | None]
 _DETAILS = """example:
   pymoo-hdte discrepancy campaigns/rig-01 --out reports/rig-01
   pymoo-hdte discrepancy campaigns/rig-01 --believed reports/rig-01/revised_model.toml --out again
+  pymoo-hdte discrepancy campaigns/rig-01 --effects my_effects.py --out reports/mine
 
 The campaign is a folder with campaign.toml and its records, of a harmonic drive, or with rig.toml
 and its records, of any other mechanism. DIR gets verdict.json, revised_model.toml and report.html;
@@ -42,11 +44,23 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SHEET.toml",
         help="data sheet of a drive's model; by default MODEL_sheet.toml beside it",
     )
+    parser.add_argument(
+        OPTION,
+        type=Path,
+        metavar="FILE.py",
+        help="Python file with effects of your own, which may be missing, too; the file is run",
+    )
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
+    from pymoo_hdte.effects import register, registered
+
     believed = options.believed, options.sheet
-    document = _analysed(options, believed, say)
+    # A file may register its effects itself; and a believed model may have them.
+    with registered():
+        for effect in () if options.effects is None else own_effects(options.effects):
+            register(effect)
+        document = _analysed(options, believed, say)
     return Outcome(document, _summary(document, options.out))
 
 

@@ -82,14 +82,14 @@ def analyse(
     ['torque_ripple:input@2']
     >>> problem = RobustDTE(model=analysis.revised_model())
     """
+    if not isinstance(measured, Campaign | MeasuredMechanism):
+        raise InvalidInput("measured", type(measured).__name__, "a Campaign or a MeasuredMechanism")
     for effect in effects:
         register(effect)
     if isinstance(measured, Campaign):
         return DriveAnalysis(examine_drive(measured, rules))
-    if isinstance(measured, MeasuredMechanism):
-        believed = measured.mechanism, measured.records, measured.cutoff, measured.effects
-        return MechanismAnalysis(measured, examine_mechanism(*believed, rules))
-    raise InvalidInput("measured", type(measured).__name__, "a Campaign or a MeasuredMechanism")
+    believed = measured.mechanism, measured.records, measured.cutoff, measured.effects
+    return MechanismAnalysis(measured, examine_mechanism(*believed, rules))
 
 
 class DriveAnalysis:

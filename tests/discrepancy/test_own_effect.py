@@ -1,15 +1,14 @@
 """An effect of a user's own, defined in one file, goes everywhere an effect of the package goes."""
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from eyring_rotor import EYRING_DRAG, OF_ROTOR, ROTOR, EyringDrag, rotor_record
 from kept_results import kept
-from places import DOCS
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
@@ -25,25 +24,13 @@ from pymoo_hdte.drive import (
     simulate_drive,
 )
 from pymoo_hdte.effects import known_effects, register, registered
-from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.simulation import simulate_mechanism
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.virtual.own_effects import with_effects
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
 
-sys.path.insert(0, str(DOCS / "examples"))
-
-from eyring_drag import EYRING_DRAG, EyringDrag
-
 PLANTED = EyringDrag(level=0.03, knee=30.0)
-OF_ROTOR = EyringDrag(level=0.03, knee=8.0)
 SLOW = tuple(Condition(speed, 20.0, 500.0, 2, "train") for speed in (300.0, 400.0, 800.0))
-ROTOR = Mechanism(
-    {"angle": BelievedValue(0.01)},
-    [Port("bearing", {"angle": 1.0})],
-    [Input("torque", {"angle": 1.0})],
-)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -184,22 +171,6 @@ def test_mechanism_is_slowed_down_and_names_it(tmp_path):
     assert analyse(measured.believing(model)).verdict.status == "adequate"
 
 
-def rotor_record(seed, role):
-    """A rotor that is driven to and fro, simulated with the drag, and noise of its sensors."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 10.0, 0.004)
-    lines = np.arange(1, 20) / 10.0
-    phases = rng.uniform(0.0, 2.0 * np.pi, len(lines))
-    torque = 0.03 * np.cos(2.0 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
-    plan = Record(f"{role} {seed}", role, time, {"torque": torque})
-    course = simulate_mechanism(ROTOR, plan, [LawAt("eyring_drag", "bearing", OF_ROTOR)])
-    channels = {
-        "angle": course.position["angle"] + 1e-5 * rng.standard_normal(len(time)),
-        "torque": torque + 1e-4 * rng.standard_normal(len(time)),
-    }
-    return Record(f"{role} {seed}", role, time, channels)
-
-
 def test_name_belongs_to_one_effect_and_only_inside_its_block():
     with pytest.raises(InvalidInput, match="no other effect has"):
         register(replace(EYRING_DRAG, sentence="Another."))
@@ -207,6 +178,13 @@ def test_name_belongs_to_one_effect_and_only_inside_its_block():
     with registered(replace(EYRING_DRAG, name="own_drag")):
         assert [one.name for one in known_effects()] == [*names, "own_drag"]
     assert [one.name for one in known_effects()] == names
+
+
+def test_nothing_stays_registered_if_there_is_nothing_to_analyse():
+    other = replace(EYRING_DRAG, name="own_drag")
+    with pytest.raises(InvalidInput, match="measured"):
+        analyse("a campaign", effects=[other])
+    assert other not in known_effects()
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,8 @@ class Spread:
         spread = (influence * power[band]) @ influence.T + inverse @ bounds @ inverse
         self.covariance = spread * np.outer(scale, scale)
         shares = np.array([np.bincount(band, row**2) * power for row in influence])
+        # A mechanism of which every value is certain leaves none to be fitted.
+        shares = shares.reshape(len(influence), len(power))
         uncertain = np.sum(shares**2 / degrees_of_freedom, axis=1)
         # A variance that only the bounds determine is exact: infinite degrees of freedom.
         with np.errstate(divide="ignore"):

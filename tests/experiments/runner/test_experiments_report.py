@@ -140,7 +140,7 @@ def test_whatever_reads_a_stored_outcome_says_so(experiment):
 def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["table5", "--full", "--out", str(tmp_path / "out")])
-    assert "--full is for calibration, blind, peers" in capsys.readouterr().err
+    assert "--full is for calibration, blind, sealed_rigs, peers" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda one: one.name)
