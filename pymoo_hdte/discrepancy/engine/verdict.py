@@ -179,11 +179,19 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
 
 
 def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
-    """Return for each candidate of a fit which of its unknowns ended at a bound."""
-    return [
-        (candidate, [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0])
-        for candidate, rows in rows_of(fitted)
-    ]
+    """Return for each candidate of a fit which of its unknowns ended at a bound.
+
+    A level that ended at zero is a part that the effect does not have.
+    """
+    found = []
+    for candidate, rows in rows_of(fitted):
+        names = []
+        for row, parameter in zip(rows, candidate.parameters, strict=True):
+            none = parameter.linear and parameter.lower == 0.0 and fitted.bound_sides[row] < 0.0
+            if fitted.bound_sides[row] != 0.0 and not none:
+                names.append(parameter.name)
+        found.append((candidate, names))
+    return found
 
 
 def rows_of(fitted: Fit) -> list[tuple[Candidate, NDArray[np.int_]]]:
@@ -202,22 +210,23 @@ def strength_is_certain(
 ) -> bool:
     """Tell whether the strength of an effect differs from nothing, by its own interval.
 
-    The strength is the first unknown, or the largest of the lines that the effect has.
+    Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
+    friction that falls with speed may have no level. Shapes, which are not zero, do not count.
     """
     if not len(rows):
         return True
-    names = [parameter.name for parameter in candidate.parameters]
-    lines = [row for row, name in zip(rows, names, strict=True) if name.endswith("_cosine")]
-    if not lines:
-        deviation = np.sqrt(fitted.covariance[rows[0], rows[0]])
-        return bool(abs(fitted.values[rows[0]]) > rules.certain_deviations * deviation)
     limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
-    sizes = []
-    for row in lines:
-        pair = np.array([row, row + 1])
-        block = fitted.covariance[np.ix_(pair, pair)]
-        sizes.append(fitted.values[pair] @ np.linalg.solve(block, fitted.values[pair]))
-    return bool(max(sizes) > limit)
+    for row, parameter in zip(rows, candidate.parameters, strict=True):
+        if parameter.name.endswith("_cosine"):
+            pair = np.array([row, row + 1])
+            block = fitted.covariance[np.ix_(pair, pair)]
+            if fitted.values[pair] @ np.linalg.solve(block, fitted.values[pair]) > limit:
+                return True
+        elif parameter.lower <= 0.0 and not parameter.name.endswith("_sine"):
+            deviation = np.sqrt(fitted.covariance[row, row])
+            if abs(fitted.values[row]) > rules.certain_deviations * deviation:
+                return True
+    return all(parameter.lower > 0.0 for parameter in candidate.parameters)
 
 
 def _status(

@@ -149,6 +149,20 @@ def test_the_same_data_give_the_same_verdict_to_the_last_bit(ripple):
     assert [one.label for one in again.alternatives] == [one.label for one in verdict.alternatives]
 
 
+@pytest.mark.parametrize(
+    ("label", "values"),
+    [
+        ("stribeck_friction:input", (0.0, 0.02, 16.0)),
+        ("position_dependent_friction:input@5", (0.01, 0.0, 0.0)),
+    ],
+)
+def test_a_part_that_an_effect_does_not_have_speaks_not_against_it(label, values):
+    """Friction that falls with speed without a level, or varies about a mean of zero."""
+    verdict = verdict_on(planted({label: values}), [label, RIPPLE, "coulomb_friction:input"])
+    assert labels_of(verdict) == {label}
+    assert (verdict.status, verdict.doubts) == ("named", ())
+
+
 def test_two_effects_are_both_named():
     data = planted({RIPPLE: (0.003, 0.0), LINE: (1.0 * ARCSEC, 0.0)})
     verdict = verdict_on(data, FEW)
