@@ -152,8 +152,8 @@ def test_the_same_data_give_the_same_verdict_to_the_last_bit(ripple):
 @pytest.mark.parametrize(
     ("label", "values"),
     [
-        ("stribeck_friction:input", (0.0, 0.02, 16.0)),
-        ("position_dependent_friction:input@5", (0.01, 0.0, 0.0)),
+        ("stribeck_friction:input", (0.0, 0.05, 80.0)),
+        ("position_dependent_friction:input@2", (0.01, 0.0, 0.0)),
     ],
 )
 def test_a_part_that_an_effect_does_not_have_speaks_not_against_it(label, values):
