@@ -136,7 +136,7 @@ def _forms(one: Candidate, change: Change) -> list[tuple[list[Values], bool]]:
         return [([change(one.build(start)) for start in one.starts], False)]
     one_sided = one.parameters[0].lower >= 0.0
     found = []
-    for start in one.starts:
+    for start in (*one.starts, *_strongest(one)):
         here = change(one.build(start))
         changes = [here]
         for place, parameter in enumerate(one.parameters[1:], start=1):
@@ -146,6 +146,15 @@ def _forms(one: Candidate, change: Change) -> list[tuple[list[Values], bool]]:
             changes.append((change(one.build(moved)) - here) / _STEP)
         found.append((changes, one_sided))
     return found
+
+
+def _strongest(one: Candidate) -> list[tuple[float, ...]]:
+    """Return the starts of a candidate with the largest strength, where its form is another one.
+
+    A wind-up that is as soft as it may be is nearly a play.
+    """
+    most = one.parameters[0].upper
+    return [(most, *start[1:]) for start in one.starts]
 
 
 def _by_test(data: Data, rows: Sequence[Values]) -> list[Values]:
