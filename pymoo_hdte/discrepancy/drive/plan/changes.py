@@ -25,6 +25,8 @@ Change = Callable[[Sequence[DriveEffect]], Values]
 
 _STEP = 1e-3
 """Step of difference quotients, in units of a parameter's scale."""
+_STRONGER = 5.0
+"""Multiple of its typical strength at which a rival is linearised a second time."""
 
 
 def signatures_of(data: Data, limits: PlanLimits, rated_torque: float) -> Signatures:
@@ -149,12 +151,12 @@ def _forms(one: Candidate, change: Change) -> list[tuple[list[Values], bool]]:
 
 
 def _strongest(one: Candidate) -> list[tuple[float, ...]]:
-    """Return the starts of a candidate with the largest strength, where its form is another one.
+    """Return the starts of a candidate with a larger strength, where its form is another one.
 
     A wind-up that is as soft as it may be is nearly a play.
     """
     most = one.parameters[0].upper
-    return [(most, *start[1:]) for start in one.starts]
+    return [(min(_STRONGER * start[0], most), *start[1:]) for start in one.starts]
 
 
 def _by_test(data: Data, rows: Sequence[Values]) -> list[Values]:
