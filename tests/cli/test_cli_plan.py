@@ -8,7 +8,7 @@ import pytest
 from places import DOCS
 
 from pymoo_hdte.cli.__main__ import main
-from pymoo_hdte.discrepancy.drive.plan import signatures
+from pymoo_hdte.discrepancy.drive.plan import changes
 from pymoo_hdte.drive import hs_20_100, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 
@@ -19,10 +19,10 @@ PAGE = (DOCS / "command_line.md").read_text(encoding="utf-8")
 @pytest.fixture
 def files(tmp_path, monkeypatch):
     """A model and limits; of the library three effects, since hysteresis takes seconds."""
-    candidates = signatures.drive_candidates
+    candidates = changes.drive_candidates
     names = ("coulomb_friction", "stribeck_friction", "soft_windup")
     few = lambda *given: [one for one in candidates(*given) if one.name in names]  # noqa: E731
-    monkeypatch.setattr(signatures, "drive_candidates", few)
+    monkeypatch.setattr(changes, "drive_candidates", few)
     model, limits = tmp_path / "joint.toml", tmp_path / "bench.toml"
     model.write_text(model_toml(preset("calibrated")), encoding="utf-8")
     (tmp_path / "joint_sheet.toml").write_text(sheet_toml(hs_20_100()), encoding="utf-8")

@@ -10,7 +10,8 @@ from scipy.stats import ncx2
 from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.drive.plan import signatures as signatures_module
+from pymoo_hdte.discrepancy.drive.plan import changes
+from pymoo_hdte.discrepancy.drive.plan.changes import signatures_of
 from pymoo_hdte.discrepancy.drive.plan.choice import Aims, smallest_set
 from pymoo_hdte.discrepancy.drive.plan.imagined import (
     imagined_campaign,
@@ -19,7 +20,7 @@ from pymoo_hdte.discrepancy.drive.plan.imagined import (
 )
 from pymoo_hdte.discrepancy.drive.plan.limits import PlanLimits, read_limits
 from pymoo_hdte.discrepancy.drive.plan.plan import plan_tests
-from pymoo_hdte.discrepancy.drive.plan.signatures import Signatures, is_rival, signatures_of
+from pymoo_hdte.discrepancy.drive.plan.signatures import Signatures, is_rival
 from pymoo_hdte.discrepancy.drive.separation import noncentrality_for, power, unimitated
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.drive import preset
@@ -94,7 +95,7 @@ def test_of_several_forms_the_best_imitation_counts():
 
 
 def test_where_the_drive_rattles_nothing_tells_a_clearance_from_others():
-    """Effect b has a clearance: of tests 0 and 1 only the second, loaded one counts for it."""
+    """Effect b has a clearance: of two tests only the second, which is loaded, counts."""
     one, other = np.array([[3.0, 0.0], [1.0, 0.0]]), np.array([[0.0, 3.0], [0.0, 2.0]])
     rivals = [[([one], True)], [([other], True)]]
     found = Signatures.of(
@@ -167,9 +168,9 @@ def only(monkeypatch):
     """Return the powers of all pairs of some effects, with all tests within limits made once."""
 
     def powers(limits, *names):
-        candidates = signatures_module.drive_candidates
+        candidates = changes.drive_candidates
         monkeypatch.setattr(
-            signatures_module,
+            changes,
             "drive_candidates",
             lambda *given: [one for one in candidates(*given) if one.name in names],
         )
@@ -218,9 +219,9 @@ def test_a_channel_that_is_not_measured_tells_nothing(only):
 
 def test_the_plan_of_a_drive_says_what_no_test_tells(monkeypatch):
     names = ("coulomb_friction", "backlash", "soft_windup")
-    candidates = signatures_module.drive_candidates
+    candidates = changes.drive_candidates
     monkeypatch.setattr(
-        signatures_module,
+        changes,
         "drive_candidates",
         lambda *given: [one for one in candidates(*given) if one.name in names],
     )

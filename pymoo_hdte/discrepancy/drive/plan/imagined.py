@@ -103,7 +103,7 @@ def imagined_campaign(
     values = {one.name: np.array([one.start]) for one in base}
     running = [one for one in tests if one.kind == "running"]
     sweeps = [one for one in tests if one.kind != "running"]
-    orders = [one for one in believed.error_orders if one < _ROWS_A_TURN / 2]
+    orders = _orders(believed)
     conditions = Conditions(
         np.array([one.speed for one in running]),
         np.array([one.load for one in running]),
@@ -124,6 +124,14 @@ def imagined_campaign(
     return Campaign(
         "planned", "believed", believed, limits.rig, tuple(records), tuple(swept), rules
     )
+
+
+def _orders(believed: BelievedDrive) -> list[float]:
+    """Return the orders of the lines that records have: of the error, both shafts, and sums."""
+    lines = believed.error_orders
+    sums = [one + other for one in lines for other in lines]
+    found = [1.0 / believed.ratio, 2.0 / believed.ratio, *map(float, range(1, 9)), *lines, *sums]
+    return sorted({round(one, 9) for one in found if one < _ROWS_A_TURN / 2})
 
 
 def imagined_data(

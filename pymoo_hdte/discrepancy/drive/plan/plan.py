@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from pymoo_hdte.discrepancy.drive.plan.changes import signatures_of, stated_orders
 from pymoo_hdte.discrepancy.drive.plan.choice import Aims, smallest_set
 from pymoo_hdte.discrepancy.drive.plan.imagined import (
     PlannedTest,
@@ -17,7 +18,7 @@ from pymoo_hdte.discrepancy.drive.plan.imagined import (
     possible_tests,
 )
 from pymoo_hdte.discrepancy.drive.plan.limits import PlanLimits
-from pymoo_hdte.discrepancy.drive.plan.signatures import Counts, signatures_of, stated_orders
+from pymoo_hdte.discrepancy.drive.plan.signatures import Counts
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
