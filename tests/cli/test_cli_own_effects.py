@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from eyring_rotor import EYRING_DRAG, OF_ROTOR, ROTOR, rotor_record
+from measured_oscillator import EYRING_DRAG, OF_ROTOR, ROTOR, rotor_record
 from places import DOCS
 
 from pymoo_hdte.cli import __main__ as cli

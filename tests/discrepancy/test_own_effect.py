@@ -7,8 +7,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from eyring_rotor import EYRING_DRAG, OF_ROTOR, ROTOR, EyringDrag, rotor_record
 from kept_results import kept
+from measured_oscillator import EYRING_DRAG, OF_ROTOR, ROTOR, EyringDrag, rotor_record
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 

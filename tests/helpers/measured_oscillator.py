@@ -1,15 +1,33 @@
-"""An oscillator in multisine tests: hidden effects of forms that differ from the library's."""
+"""An oscillator in multisine tests: hidden effects of forms that differ from the library's.
 
+And a rotor with the drag of ``docs/examples/eyring_drag.py``, which its model does not know.
+"""
+
+import sys
 from functools import cache
 
 import numpy as np
+from places import DOCS
 from scipy.integrate import solve_ivp
 
-from pymoo_hdte.mechanism import Record
+from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.simulation import simulate_mechanism
+
+sys.path.insert(0, str(DOCS / "examples"))
+
+from eyring_drag import EYRING_DRAG as EYRING_DRAG
+from eyring_drag import EyringDrag as EyringDrag
 
 MASS, STIFFNESS, DAMPING = 1.0, 4000.0, 4.0
 RATE, DURATION, HIGHEST = 250.0, 12.0, 12.0
 POSITION_NOISE, FORCE_NOISE = 1e-5, 0.02
+
+OF_ROTOR = EyringDrag(level=0.03, knee=8.0)
+ROTOR = Mechanism(
+    {"angle": BelievedValue(0.01)},
+    [Port("bearing", {"angle": 1.0})],
+    [Input("torque", {"angle": 1.0})],
+)
 
 
 def multisine(seed, size=20.0):
@@ -107,3 +125,22 @@ def bouc_wen(x, v, z, t):
 def swinging_stiffness(x, v, z, t):
     """A stiffness that varies with time by itself, which no law of the library does."""
     return 1500.0 * x * np.sin(np.pi * t), 0.0
+
+
+def rotor_record(seed, role):
+    """A rotor that is driven to and fro, simulated with the drag, and noise of its sensors.
+
+    The drag has to be registered.
+    """
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 10.0, 0.004)
+    lines = np.arange(1, 20) / 10.0
+    phases = rng.uniform(0.0, 2.0 * np.pi, len(lines))
+    torque = 0.03 * np.cos(2.0 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
+    plan = Record(f"{role} {seed}", role, time, {"torque": torque})
+    course = simulate_mechanism(ROTOR, plan, [LawAt("eyring_drag", "bearing", OF_ROTOR)])
+    channels = {
+        "angle": course.position["angle"] + 1e-5 * rng.standard_normal(len(time)),
+        "torque": torque + 1e-4 * rng.standard_normal(len(time)),
+    }
+    return Record(f"{role} {seed}", role, time, channels)

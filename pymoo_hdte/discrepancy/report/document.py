@@ -102,8 +102,10 @@ def believed_in_words(document: Mapping[str, Any]) -> list[str]:
 def sentence(verdict: Verdict) -> str:
     """Return the verdict in words."""
     chosen = verdict.chosen
-    if verdict.status == "adequate" or chosen is None:
+    if verdict.status == "adequate":
         return "Nothing is missing: the believed drive explains the records within its tolerances."
+    if chosen is None:
+        return "Something is missing that no known effect explains."
     what = " ".join(candidate.sentence for candidate in chosen.candidates)
     if not chosen.listed:
         return f"Something is missing that is none of the known effects. {what}"

@@ -74,8 +74,6 @@ def _sentence(verdict: Verdict) -> str:
         return (
             "Nothing is missing: the believed mechanism explains the records within its tolerances."
         )
-    if verdict.chosen is None:
-        return "Something is missing that no known effect explains."
     return sentence(verdict)
 
 

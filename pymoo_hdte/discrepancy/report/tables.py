@@ -91,12 +91,14 @@ def certainty(finding: DriveFinding) -> str:
     verdict = finding.verdict
     limit = adequate(verdict.degrees_of_freedom, verdict.rules)
     residual = verdict.base.chi_square / verdict.degrees_of_freedom
-    if verdict.status == "adequate" or verdict.chosen is None:
+    if verdict.status == "adequate":
         return (
             "The misfit of the believed drive, fitted within its tolerances, has "
             f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. "
             "An effect too small for these records may still be there."
         )
+    if verdict.chosen is None:
+        return "That something is missing is certain; no effect was there to be tried."
     share = percent(verdict.chosen.explained)
     if not verdict.chosen.listed:
         return (

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-import removed_mends as mends
-from case_campaigns import case_campaign
+import verdict_cases as mends
+from verdict_cases import case_campaign
 
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.discrepancy.engine.verdict import rows_of
@@ -204,6 +204,7 @@ ALSO: dict[str, Callable] = {
     ("name", "mend"),
     [
         ("coulomb", mends.ranking_fits_decide),
+        ("rig-11", mends.ranking_fits_decide),
         ("coulomb-one-load", mends.three_steps),
         ("coulomb-gap", mends.rows_are_believed),
         ("coulomb-noise-x3", mends.rows_are_believed),
@@ -218,7 +219,7 @@ ALSO: dict[str, Callable] = {
         ("nothing-all-values-off", mends.one_parameter_at_a_time),
         ("stiffness-off", mends.freed_values_are_believed),
         ("amplitude-off", mends.amplitudes_are_never_wrong),
-        ("rig-11", mends.one_start),
+        ("rig-11", mends.three_steps),
         ("kinematic-eccentricity", mends.one_effect),
     ],
     ids=lambda one: one if isinstance(one, str) else one.__name__,

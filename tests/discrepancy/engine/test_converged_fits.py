@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from analysed_campaigns import CONDITIONS, LISTED, analysed, ripple_analysis
-from case_campaigns import case_campaign
 from quick_campaigns import RIPPLING, quick_analysis
+from verdict_cases import case_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.discrepancy import analyse
