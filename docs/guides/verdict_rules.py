@@ -121,7 +121,6 @@ found = Fit(
     np.array([best]),
     data - best * signature,
     -signature[:, np.newaxis],
-    np.empty((1, 0)),
 )
 spread = np.sqrt(width**2 / 12.0)
 
