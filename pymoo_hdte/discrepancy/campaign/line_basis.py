@@ -38,7 +38,7 @@ class LineFit:
         As in `order_lines`.
     parts : tuple of slice
         Rows of each block.
-    whole : ndarray, shape (n, 2 + 2 m), or None
+    whole : ndarray, shape (n, p), or None
         The basis of a record of one block.
     triangle : ndarray, shape (p, p)
     """

@@ -1,4 +1,4 @@
-"""Search for the set of effects that explains a misfit: every set is fitted to the end.
+"""Search for the set of effects that explains a misfit; sets that decide are fitted to the end.
 
 Sets grow by the effects that could remove most of what is left, in total or in the part of the data
 that is explained worst. Sets of several effects are tried by exchange of each member as well, and

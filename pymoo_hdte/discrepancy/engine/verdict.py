@@ -97,12 +97,13 @@ def judge(
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
-    screened = screen(data, base, candidates)
-    gain = max((one.reduction for one in screened), default=0.0)
     quiet = down_to_noise(base, degrees_of_freedom, rules)
+    # Screening is slow, and known sets need none unless the base itself may be adequate.
+    screened = screen(data, base, candidates) if quiet or not known else []
+    gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules)
-    if not screened:
+    if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
     search = Search(data, base, candidates)
     if known:
