@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.engine.verdict import Verdict, rows_of
 from pymoo_hdte.effects.sentences import in_words
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
@@ -145,10 +145,7 @@ def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
 def _effects(verdict: Verdict) -> list[dict[str, Any]]:
     """Return the accepted effects; none unless the verdict names or classes them."""
     fitted, found = verdict.accepted, []
-    start = len(fitted.values) - sum(len(one.parameters) for one in fitted.candidates)
-    for candidate in fitted.candidates:
-        rows = np.arange(start, start + len(candidate.parameters))
-        start += len(candidate.parameters)
+    for candidate, rows in rows_of(fitted):
         bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
         found.append(
             {
