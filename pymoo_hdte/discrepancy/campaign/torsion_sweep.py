@@ -9,7 +9,7 @@ is not detected.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -28,6 +28,10 @@ ROWS_A_POINT = 24
 """Number of rows averaged into a point, or slightly more."""
 FEWEST_ROWS = 2 * ROWS_A_POINT
 """Least number of rows of a leg."""
+MOST_ROWS = 500 * ROWS_A_POINT
+"""Rows of a sweep beyond which consecutive ones are averaged first: the covariance of the points
+and the polynomials of the legs grow with the square of their number, and 500 points show a curve of
+stiffness and friction as finely as any law of the package bends."""
 _REVERSAL = 8.0
 """Least reversal at a turning point, in standard deviations of the torque noise."""
 _REVERSAL_SHARE = 0.05
@@ -90,6 +94,34 @@ class TorsionLeg:
         first, last = 2.0 * self.time[:1] - middles[:1], 2.0 * self.time[-1:] - middles[-1:]
         cuts = np.cumsum([len(rows) for rows in self.split(self.time)])[:-1]
         return np.concatenate([first, middles[cuts - 1], last])
+
+
+def shortened(record: TorsionRecord, rig: Rig) -> tuple[TorsionRecord, Rig]:
+    """Return a sweep of at most `MOST_ROWS` rows, and the rig with the noise of such a row.
+
+    A row of a long sweep becomes the mean of an equal number of consecutive rows; fewer rows than
+    make one more are left out at the end. A short sweep is returned as it is.
+
+    Parameters
+    ----------
+    record : TorsionRecord
+    rig : Rig
+        For the noise of one row, which is taken as independent of that of the next.
+    """
+    count = -(-len(record.time) // MOST_ROWS)
+    if count == 1:
+        return record, rig
+    used = len(record.time) // count * count
+    means = {
+        name: getattr(record, name)[:used].reshape(-1, count).mean(axis=1)
+        for name in ("time", "output_angle", "output_torque")
+    }
+    quieter = {
+        name: getattr(rig, name) / count**0.5
+        for name in ("torsion_angle_noise", "output_torque_noise")
+    }
+    short = replace(record, sample_rate=record.sample_rate / count, **means)
+    return short, replace(rig, **quieter)
 
 
 def torsion_legs(record: TorsionRecord, rig: Rig) -> list[TorsionLeg]:

@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from pymoo_hdte.discrepancy.campaign.believed import Rig
 from pymoo_hdte.discrepancy.campaign.records import TorsionRecord
-from pymoo_hdte.discrepancy.campaign.torsion_sweep import TorsionLeg, torsion_legs
+from pymoo_hdte.discrepancy.campaign.torsion_sweep import TorsionLeg, shortened, torsion_legs
 
 Values = NDArray[np.float64]
 
@@ -64,6 +64,8 @@ class TorsionPoints:
 def torsion_points(record: TorsionRecord, rig: Rig) -> TorsionPoints:
     """Reduce a sweep to points, each the mean of about `torsion_sweep.ROWS_A_POINT` rows.
 
+    In a sweep of more than `torsion_sweep.MOST_ROWS` rows they are means of rows themselves.
+
     Parameters
     ----------
     record : TorsionRecord
@@ -80,6 +82,7 @@ def torsion_points(record: TorsionRecord, rig: Rig) -> TorsionPoints:
     InvalidInput
         For too few rows between two turning points.
     """
+    record, rig = shortened(record, rig)
     legs = torsion_legs(record, rig)
     paths = [leg.torque(np.append(leg.edges, leg.end)) for leg in legs]
     starts = np.cumsum([0, *(len(path) for path in paths)])

@@ -54,12 +54,13 @@ BOWED = STEADY + 0.4 * np.sin(np.pi * TIME / 36.0) ** 2
 
 
 def swept(laws, rng, torque=STEADY, rig=RIG, constant=3e-4):
-    """A noisy sweep, row by row."""
-    time = TIME
+    """A noisy sweep of three minutes, row by row."""
+    rows = len(torque)
     torsion = quasi_static_torsion(drive(*laws), torque)[0]
-    angle = -torsion - constant + rig.torsion_angle_noise * rng.standard_normal(1800)
-    reading = torque + rig.output_torque_noise * rng.standard_normal(1800)
-    return TorsionRecord("sweep", "train", 10.0, time, angle, reading)
+    angle = -torsion - constant + rig.torsion_angle_noise * rng.standard_normal(rows)
+    reading = torque + rig.output_torque_noise * rng.standard_normal(rows)
+    time = np.arange(rows) * 180.0 / rows
+    return TorsionRecord("sweep", "train", rows / 180.0, time, angle, reading)
 
 
 def predicted(points, laws):
@@ -215,6 +216,25 @@ def test_residuals_of_the_true_model_are_white_at_the_stated_covariance(laws, rn
     # The clearance jumps between two rows, at the same ones in every sweep: a bias of half a row.
     slack = 1.4 if any(isinstance(law, DeadZone) for _, law in laws) else 1.0
     assert chi2.ppf(0.001, degrees_of_freedom) < total < slack * chi2.ppf(0.999, degrees_of_freedom)
+
+
+@every_law
+def test_a_sweep_whose_rows_are_averaged_first_has_white_residuals_and_no_more_points(laws, rng):
+    """30,001 rows: three of them are one, and the last is left out."""
+    time = np.linspace(0.0, 180.0, 30_001)
+    torque = np.interp(time, [0.0, 36.0, 108.0, 180.0], [0.0, 40.0, -40.0, 40.0])
+    points = torsion_points(swept(laws, rng, torque), RIG)
+    assert 350 < len(points.angle) <= 500
+    left = points.whitening @ (points.angle - predicted(points, laws))
+    assert chi2.ppf(0.001, len(left)) < left @ left < chi2.ppf(0.999, len(left))
+    # 16.7 times the rows of the short sweep say so much more about the compliance.
+    assert information(points) > 16.0 * information(torsion_points(swept(laws, rng), RIG))
+
+
+def information(points):
+    """Return the information of a sweep about the compliance, (N.m/rad)2."""
+    line = points.whitening @ points.torque
+    return line @ line
 
 
 def test_the_torque_noise_is_kept_out(rng):
