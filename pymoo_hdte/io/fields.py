@@ -114,6 +114,10 @@ class Fields:
         """Tell whether an optional field is there."""
         return field in self._left
 
+    def is_table(self, field: str) -> bool:
+        """Tell whether a remaining field is a table."""
+        return isinstance(self._left.get(field), Mapping)
+
     def finish(self) -> None:
         """Raise `InvalidInput` if a field was not asked for: it is misspelt or misplaced."""
         if self._left:

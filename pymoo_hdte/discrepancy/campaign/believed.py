@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.discrepancy.campaign.known_values import known_values
 from pymoo_hdte.drive import DampingReference, DriveEffect, LoadInertia
 from pymoo_hdte.effects.effect import place_of
 from pymoo_hdte.units import ARCSEC
@@ -44,10 +45,12 @@ class BelievedDrive:
     error_tolerance : float
         Relative half-width of the amplitudes.
     effects : tuple of Effect
-        Effects that the drive is believed to have beside Eq. (9), with fixed values. The inertia of
-        the load and the damping of the torsion are given as values instead.
+        Effects that the drive is believed to have beside Eq. (9); their numbers are fixed but for
+        those in ``tolerances``. The inertia of the load and the damping of the torsion are given as
+        values instead.
     tolerances : dict of str to float
-        Relative half-widths of single values of `MECHANICAL`, which replace ``tolerance``.
+        Relative half-widths of single values: of `MECHANICAL`, which replace ``tolerance``, and of
+        effects, by the names of `known_values`.
 
     Raises
     ------
@@ -105,7 +108,7 @@ class BelievedDrive:
         if not isinstance(self.tolerances, Mapping):
             raise InvalidInput("tolerances", self.tolerances, "a number for each name")
         for name, value in self.tolerances.items():
-            one_of("tolerances", name, MECHANICAL)
+            one_of("tolerances", name, (*MECHANICAL, *known_values(self.effects)))
             real_number(f"tolerances.{name}", value, at_least=0.0, below=1.0)
 
     def _check_effects(self) -> None:

@@ -1,8 +1,8 @@
-"""A drive model as the believed model: its values are fitted within tolerances, its effects kept.
+"""A drive model as the believed model: its values are fitted within their tolerances.
 
 The inertia of the load and the damping of the torsion are values of their own, which a fit may
-change within their tolerances; all other effects of the model keep their values. The phases of the
-static error are fitted anew, because they depend on where an encoder has its zero.
+change within their tolerances; other effects keep the numbers that have no tolerance. The phases of
+the static error are fitted anew, because they depend on where an encoder has its zero.
 """
 
 from __future__ import annotations
@@ -128,9 +128,40 @@ def tolerances_of_fields(top: Fields) -> tuple[float, float, dict[str, float]]:
     limits: dict[str, float] = {}
     if top.has("tolerance"):
         table = top.table("tolerance")
-        for name in ("default", "static_error", *MECHANICAL):
+        for name in ("default", "static_error"):
             if table.has(name):
                 limits[name] = table.number(name, at_least=0.0, below=1.0)
-        table.finish()
+        limits |= single_tolerances(table)
     default, error = limits.pop("default", 0.1), limits.pop("static_error", 0.3)
     return default, error, limits
+
+
+def single_tolerances(table: Fields) -> dict[str, float]:
+    """Take the tolerances of single values out of a table, those of effects by dotted names.
+
+    TOML has ``coulomb_friction.input.level`` as a table of its own, or as one name in quotes.
+
+    Raises
+    ------
+    InvalidInput
+        For a name without a dot that is none of `MECHANICAL`, or a number that is no tolerance;
+        what the effects do not have, `BelievedDrive` refuses.
+    """
+    found = {
+        name: table.number(name, at_least=0.0, below=1.0) for name in MECHANICAL if table.has(name)
+    }
+    for name in table.names():
+        if table.is_table(name) or "." in name:
+            found |= _dotted(table, name)
+    table.finish()
+    return found
+
+
+def _dotted(table: Fields, name: str) -> dict[str, float]:
+    """Take a number, or the numbers of a table, by dotted names."""
+    if not table.is_table(name):
+        return {name: table.number(name, at_least=0.0, below=1.0)}
+    inside, found = table.table(name), dict[str, float]()
+    for each in inside.names():
+        found |= {f"{name}.{rest}": one for rest, one in _dotted(inside, each).items()}
+    return found

@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from dataclasses import InitVar, dataclass, replace
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.believed import MECHANICAL, BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.believed_model import believed_of_model
+from pymoo_hdte.discrepancy.campaign.known_values import known_values
 from pymoo_hdte.discrepancy.campaign.plausibility import (
     check_believed,
     check_noise,
@@ -108,8 +109,10 @@ class Campaign:
         'adequate'
         """
         old = self.believed
-        tolerances = old.tolerance, old.error_tolerance, old.tolerances
-        return replace(self, believed=believed_of_model(model, *tolerances))
+        known = (*MECHANICAL, *known_values(model.effects))
+        kept = {name: one for name, one in old.tolerances.items() if name in known}
+        believed = believed_of_model(model, old.tolerance, old.error_tolerance, kept)
+        return replace(self, believed=believed)
 
     @property
     def train(self) -> tuple[RunningRecord, ...]:

@@ -9,7 +9,10 @@ from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
-from pymoo_hdte.discrepancy.campaign.believed_model import believed_from_fields
+from pymoo_hdte.discrepancy.campaign.believed_model import (
+    believed_from_fields,
+    single_tolerances,
+)
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.fields_of_files import build, in_units, placed_in_table
 from pymoo_hdte.discrepancy.campaign.format import (
@@ -157,10 +160,15 @@ def _believed(top: Fields) -> BelievedDrive:
     table = top.table("believed")
     rows = table.tables("effect") if table.has("effect") else []
     effects = tuple(effect_from_fields(row) for row in rows)
-    single = table.table("tolerances") if table.has("tolerances") else Fields({}, "")
-    tolerances = {name: single.number(name) for name in single.names()}
+    single = single_tolerances(table.table("tolerances")) if table.has("tolerances") else {}
     place = f"{CAMPAIGN_FILE}.believed"
-    return build(BelievedDrive, BELIEVED, table, place, effects=effects, tolerances=tolerances)
+    known = {"effects": effects, "tolerances": single}
+    try:
+        return build(BelievedDrive, BELIEVED, table, place, **known)
+    except InvalidInput as error:
+        if error.field not in known:
+            raise
+        raise InvalidInput(f"{place}.{error.field}", error.value, error.allowed) from None
 
 
 def rig_from_fields(table: Fields, place: str) -> Rig:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.campaign.known_values import known_values, with_known_values
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL, words_of
 from pymoo_hdte.discrepancy.engine import candidate
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, candidate_of
+from pymoo_hdte.discrepancy.engine.fitting import Unknowns
 from pymoo_hdte.drive.effects import DriveEffect, DriveSizes, LawAtPort, drive_effects
 from pymoo_hdte.effects.effect import effect_named, place_of
 from pymoo_hdte.effects.unknowns import Parameter
@@ -43,17 +46,32 @@ def out_of_tolerance(
     at_bounds: Sequence[str],
     error_orders: Sequence[float],
     together: bool = False,
+    effects: Sequence[DriveEffect] = (),
 ) -> list[Candidate]:
     """Return a candidate for each base parameter that a fit left at a bound.
 
     A parameter believed to be zero cannot be out of tolerance: if it is not zero, it is missing.
-    What an effect covers under another name is one only ``together`` with others.
+    What an effect covers under another name is one only ``together`` with others. A number of the
+    believed ``effects`` is one if its law takes all values that it may then have.
     """
-    believed = {parameter.name: parameter.start for parameter in base}
-    return [
+    believed, known = {one.name: one.start for one in base}, known_values(effects)
+    found = [
         candidate.out_of_tolerance(name, words_of(name, error_orders))
         for name in at_bounds
-        if (name in MECHANICAL or name.startswith("error_amplitude_"))
+        if (name in MECHANICAL or name.startswith("error_amplitude_") or name in known)
         and believed[name] > 0.0
         and (together or name not in _OF_THEIR_OWN)
     ]
+    return [one for one in found if one.port not in known or _taken(base, one, effects)]
+
+
+def _taken(base: Sequence[Parameter], freed: Candidate, effects: Sequence[DriveEffect]) -> bool:
+    """Tell whether a law takes the least and the largest value of its number without tolerance."""
+    unknowns = Unknowns(base, (freed,))
+    place = [one.name for one in unknowns.parameters].index(freed.port)
+    try:
+        for bound in (unknowns.lower[place], unknowns.upper[place]):
+            with_known_values(effects, {freed.port: bound})
+    except InvalidInput:
+        return False
+    return True

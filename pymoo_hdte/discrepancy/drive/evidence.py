@@ -105,8 +105,10 @@ class Data(Observations):
 
     def out_of_tolerance(self, at_bounds: Sequence[str], together: bool = False) -> list[Candidate]:
         """Return a candidate for each base parameter that a fit left at a bound."""
-        lines = self.campaign.believed.error_orders
-        return out_of_tolerance(self.base, at_bounds, lines, together)
+        believed = self.campaign.believed
+        return out_of_tolerance(
+            self.base, at_bounds, believed.error_orders, together, believed.effects
+        )
 
     def held_out_vote(self, base: Fit, fitted: Fit) -> Vote | None:
         """Return what the records kept out of the fit say of two fits; None without any."""

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.campaign.known_values import known_values
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.observations import Observations
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -70,7 +71,8 @@ class Objective(Unknowns):
         slopes = self.slopes_at(values) if self.slopes is None else self.slopes
         moved = values + np.diag(steps * self.scale)
         base, effects = self._parts(values)
-        swept = [k for k, one in enumerate(self.data.base) if one.name in _IN_SWEEPS]
+        in_sweeps = (*_IN_SWEEPS, *known_values(self.data.campaign.believed.effects))
+        swept = [k for k, one in enumerate(self.data.base) if one.name in in_sweeps]
         torsion = self._torsion(np.vstack([base, moved[swept, :n_base]]), effects)
         by_base = np.zeros((n_base, torsion.shape[1]))
         by_base[swept] = (torsion[1:] - torsion[0]) / steps[swept, None]

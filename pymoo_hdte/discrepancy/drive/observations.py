@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.campaign.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.features import (
     MEANS,
@@ -111,12 +112,23 @@ class Observations:
         self, vectors: Vector, effects: Sequence[DriveEffect]
     ) -> NDArray[np.float64]:
         """Return whitened residuals (v, n_points) of the sweeps; none where there is no sweep."""
+        groups = of_equal_numbers(self.campaign.believed.effects, self._named(vectors))
+        found = np.empty((len(vectors), self.n_sweep_residuals))
+        for rows, known in groups if self.torsion else ():
+            found[rows] = self._swept(vectors[rows], known, effects)
+        return found
+
+    def _swept(
+        self, vectors: Vector, known: Sequence[DriveEffect], effects: Sequence[DriveEffect]
+    ) -> NDArray[np.float64]:
+        """Return whitened residuals of the sweeps where the believed effects are ``known``."""
         values = self._named(vectors)
-        coefficients = coefficients_of(self.campaign.believed, values, effects, 1)
+        believed = replace(self.campaign.believed, effects=tuple(known))
+        coefficients = coefficients_of(believed, values, effects, 1)
         stiffness = coefficients.stiffness * values["locked_stiffness"]
         coefficients = replace(coefficients, stiffness=stiffness)
         sensor = np.column_stack([values["output_torque_gain"], values["output_torque_zero"]])
-        found = [np.empty((len(vectors), 0))]
+        found = []
         for points in self.torsion:
             torsion = np.empty((len(vectors), len(points.angle)))
             # Vectors with equal sensor errors have the same path of the torque.

@@ -10,6 +10,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pymoo_hdte.discrepancy.campaign.believed import MECHANICAL, BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.known_values import (
+    known_unit,
+    known_values,
+    known_words,
+)
 from pymoo_hdte.effects.unknowns import Parameter
 
 __all__ = ["MECHANICAL", "READING", "base_parameters"]
@@ -23,7 +28,7 @@ READING = (
 )
 """Constant of the transmission error (rad), gains (relative) and zeros (N.m) of torque sensors."""
 
-BASE_UNITS = {
+_UNITS = {
     "stiffness": "N.m/rad",
     "damping": "N.m.s/rad",
     "input_inertia": "kg.m2",
@@ -42,6 +47,13 @@ BASE_UNITS = {
 """SI units of the base parameters, by name; those of lines without their number."""
 
 
+def base_unit(name: str) -> str:
+    """Return the SI unit of a base parameter; 1 for none."""
+    if "." in name:
+        return known_unit(name)
+    return _UNITS[name.rstrip("0123456789").rstrip("_")]
+
+
 def words_of(name: str, error_orders: Sequence[float]) -> str:
     """Return a base parameter in physical words: the line of an order, not its number.
 
@@ -49,7 +61,11 @@ def words_of(name: str, error_orders: Sequence[float]) -> str:
     --------
     >>> words_of("error_amplitude_1", (1.0, 2.0))
     'amplitude of order 2 of the static error'
+    >>> words_of("coulomb_friction.input.level", ())
+    'level of the coulomb friction at the input'
     """
+    if "." in name:
+        return known_words(name)
     kind, _, line = name.rpartition("_")
     if kind in ("error_amplitude", "error_phase"):
         part = kind.removeprefix("error_")
@@ -78,6 +94,9 @@ def base_parameters(
         found.append(_within(f"error_amplitude_{line}", amplitude, believed.error_tolerance))
         phase = phases[line]
         found.append(Parameter(f"error_phase_{line}", phase, phase - 9.0, phase + 9.0, 0.1))
+    for name, value in known_values(believed.effects).items():
+        if name in believed.tolerances:
+            found.append(_within(name, value, believed.tolerances[name]))
     found.append(Parameter("offset", offset, offset - 1.0, offset + 1.0, 1e-5))
     # Where the input was locked, a varying stiffness differs from its mean.
     locked = _within("locked_stiffness", 1.0, believed.tolerance_of("stiffness"))
@@ -92,5 +111,5 @@ def base_parameters(
 
 
 def _within(name: str, value: float, tolerance: float) -> Parameter:
-    reach = max(tolerance * value, 1e-12)
+    reach = max(tolerance * abs(value), 1e-12)
     return Parameter(name, value, value - reach, value + reach, reach)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.drive import (
@@ -81,6 +82,8 @@ def predict(
 ) -> Prediction:
     """Return the predicted readings of the sensors.
 
+    Vectors that share the numbers of the believed effects are solved together.
+
     Parameters
     ----------
     believed, rig
@@ -94,6 +97,15 @@ def predict(
     start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
     """
+    groups = of_equal_numbers(believed.effects, values)
+    if len(groups) > 1:
+        parts = []
+        for rows, known in groups:
+            some = {name: column[rows] for name, column in values.items()}
+            one = replace(believed, effects=known)
+            parts.append(predict(one, rig, conditions, orders, some, effects, start))
+        return _joined(parts, [rows for rows, _ in groups], len(conditions))
+    believed = replace(believed, effects=groups[0][1])
     count, records = len(values["offset"]), len(conditions)
     gain = 1.0 + values["output_torque_gain"][:, None]
     load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
@@ -149,13 +161,16 @@ def steady_motions(
             return balance
         held = balance.converged
         plain = solve(replace(coefficients, laws=()), np.flatnonzero(~held), torus)
-        return _merged(balance.rows(held), plain, held)
+        return _merged([balance.rows(held), plain], [np.flatnonzero(held), np.flatnonzero(~held)])
     plain = solve(replace(coefficients, laws=()), every, torus)
     swing = np.abs(plain.torsion[:, 1:]).sum(axis=1)
     held = np.abs(plain.torsion[:, 0]) > swing
     balance = solve(coefficients, np.flatnonzero(held), torus)
     held[held] = balance.converged
-    return _merged(balance.rows(balance.converged), plain.rows(~held), held)
+    return _merged(
+        [balance.rows(balance.converged), plain.rows(~held)],
+        [np.flatnonzero(held), np.flatnonzero(~held)],
+    )
 
 
 def moves_steadily(
@@ -184,13 +199,24 @@ def moves_steadily(
     return np.asarray(motion.converged)
 
 
-def _merged(held: SteadyMotion, plain: SteadyMotion, places: NDArray[np.bool_]) -> SteadyMotion:
-    """Merge rows: those of ``held`` at ``places``, those of ``plain`` elsewhere."""
-    order = np.argsort(np.concatenate([np.flatnonzero(places), np.flatnonzero(~places)]))
+def _joined(
+    parts: Sequence[Prediction], places: Sequence[NDArray[np.int_]], records: int
+) -> Prediction:
+    """Return predictions of several groups of vectors as one, in the order of their places."""
+    order = np.argsort(np.concatenate(places))
+    mean = np.concatenate([one.mean for one in parts])[order]
+    phasors = np.concatenate([one.phasors for one in parts])[order]
+    cases = [np.add.outer(records * rows, np.arange(records)).ravel() for rows in places]
+    return Prediction(mean, phasors, _merged([one.balance for one in parts], cases))
+
+
+def _merged(motions: Sequence[SteadyMotion], places: Sequence[NDArray[np.int_]]) -> SteadyMotion:
+    """Merge the rows of motions on one torus, each with its places among all rows."""
+    order = np.argsort(np.concatenate(places))
     joined = [
-        np.concatenate([getattr(held, name), getattr(plain, name)])[order] for name in BY_CASE
+        np.concatenate([getattr(motion, name) for motion in motions])[order] for name in BY_CASE
     ]
-    return SteadyMotion(held.torus, *joined)
+    return SteadyMotion(motions[0].torus, *joined)
 
 
 def coefficients_of(

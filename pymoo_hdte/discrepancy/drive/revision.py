@@ -15,6 +15,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
 from pymoo_hdte.discrepancy.campaign.believed_model import LEAST
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.campaign.known_values import with_known_values
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive import (
@@ -97,7 +98,9 @@ def drive_model(campaign: Campaign, fitted: Fit, name: str, description: str) ->
             std=scatter * static_error / 3.0,
         ),
         effects=_merged(
-            (*believed.effects, *fitted.effects), values["load_inertia"], believed.ratio
+            (*with_known_values(believed.effects, values), *fitted.effects),
+            values["load_inertia"],
+            believed.ratio,
         ),
     )
 

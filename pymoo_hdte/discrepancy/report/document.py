@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.misfit.relevance import relevance
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
-from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS
+from pymoo_hdte.discrepancy.drive.parameters import base_unit
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
@@ -181,7 +181,7 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> di
 
 
 def _unit(candidate: Candidate, name: str) -> str:
-    return BASE_UNITS[name] if candidate.unit is None else candidate.unit(name)
+    return base_unit(name) if candidate.unit is None else candidate.unit(name)
 
 
 def _line(name: str, candidate: Candidate, fitted: Fit, row: int) -> dict[str, Any]:
@@ -212,8 +212,8 @@ def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
     added = sum(len(candidate.parameters) for candidate in fitted.candidates)
     found = {}
     for row, parameter in enumerate(fitted.parameters[: len(fitted.parameters) - added]):
-        kind = parameter.name.rstrip("0123456789").rstrip("_")
-        entry = quantity(fitted.values[row], fitted.covariance[row, row], BASE_UNITS[kind])
+        unit = base_unit(parameter.name)
+        entry = quantity(fitted.values[row], fitted.covariance[row, row], unit)
         entry["interval95"] = _within_bounds(parameter, entry["interval95"], rules)
         found[parameter.name] = entry | {"at_bound": parameter.name in fitted.at_bounds}
     return found

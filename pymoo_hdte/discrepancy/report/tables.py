@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.gap import Gap
-from pymoo_hdte.discrepancy.drive.parameters import BASE_UNITS, words_of
+from pymoo_hdte.discrepancy.drive.parameters import base_unit, words_of
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
@@ -251,11 +251,13 @@ def _parameter_row(
     half_width: float,
     at_bounds: tuple[str, ...],
 ) -> ParameterRow:
-    name, unit, size = parameter.name, _shown(BASE_UNITS.get(parameter.name, "")), 1.0
+    name, unit, size = parameter.name, _shown(base_unit(parameter.name)), 1.0
     if name.startswith(("error_amplitude_", "error_phase_")):
         kind, line = name.rsplit("_", 1)
         unit, size = ("arcsec", ARCSEC) if kind == "error_amplitude" else ("rad", 1.0)
         name = f"{kind} of order {campaign.believed.error_orders[int(line)]:g}"
+    elif "." in name:
+        name = words_of(name, ())
     elif name == "offset":
         unit, size = "arcsec", ARCSEC
     # Phases and the constant of the encoders have no believed value.

@@ -1,0 +1,134 @@
+"""Numbers of the effects that a drive is believed to have, by name: those that a fit may move.
+
+A name is that of the effect, its port and order, where it has them, and that of the number, with
+dots between: ``coulomb_friction.input.level``, as a campaign's file and a verdict have it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.drive import DriveEffect, LawAtPort
+from pymoo_hdte.effects.effect import effect_named, place_of
+from pymoo_hdte.effects.law import PORTS
+
+_OF_PLACE = ("order", "phase")
+"""Numbers that say where a wave is; a share of them is no tolerance."""
+
+
+def known_values(effects: Sequence[DriveEffect]) -> dict[str, float]:
+    """Return the numbers of effects that may have a tolerance, SI.
+
+    Parameters
+    ----------
+    effects : sequence of DriveEffect
+
+    Examples
+    --------
+    >>> from pymoo_hdte.effects.friction import CoulombFriction
+    >>> known_values([LawAtPort("coulomb_friction", "input", CoulombFriction(0.05))])
+    {'coulomb_friction.input.level': 0.05}
+    """
+    return {
+        f"{_place(effect)}.{number}": float(getattr(_numbers(effect), number))
+        for effect in effects
+        for number in effect_named(effect.name).quantities
+        if number not in _OF_PLACE
+    }
+
+
+def with_known_values(
+    effects: Sequence[DriveEffect], values: Mapping[str, float]
+) -> tuple[DriveEffect, ...]:
+    """Return effects with other numbers.
+
+    Parameters
+    ----------
+    effects : sequence of DriveEffect
+    values : mapping of str to float
+        By the names of `known_values`, SI; absent numbers stay, further names do not count.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that its law does not take.
+    """
+    return tuple(_with(effect, values) for effect in effects)
+
+
+def of_equal_numbers(
+    effects: Sequence[DriveEffect], values: Mapping[str, NDArray[np.float64]]
+) -> list[tuple[NDArray[np.int_], tuple[DriveEffect, ...]]]:
+    """Return groups of vectors that share all numbers of effects, and the effects of each group.
+
+    Parameters
+    ----------
+    effects : sequence of DriveEffect
+    values : mapping of str to ndarray, shape (v,)
+        As in `with_known_values`, for v vectors.
+
+    Returns
+    -------
+    list of tuple
+        Places of the vectors of a group, and the effects with their numbers.
+    """
+    columns = {name: values[name] for name in known_values(effects) if name in values}
+    if not columns:
+        return [(np.arange(len(next(iter(values.values())))), tuple(effects))]
+    table = np.column_stack(list(columns.values()))
+    numbers, group = np.unique(table, axis=0, return_inverse=True)
+    return [
+        (
+            np.flatnonzero(group.ravel() == place),
+            with_known_values(effects, dict(zip(columns, row, strict=True))),
+        )
+        for place, row in enumerate(numbers)
+    ]
+
+
+def known_words(name: str) -> str:
+    """Return a name of `known_values` in words.
+
+    Examples
+    --------
+    >>> known_words("torque_ripple.input.2.amplitude")
+    'amplitude of the torque ripple of order 2 at the input'
+    """
+    effect, _, rest = name.partition(".")
+    place, _, number = rest.rpartition(".")
+    port = place.partition(".")[0]
+    at = f" at the {port}" if port in PORTS else ""
+    order = place.removeprefix(port).removeprefix(".") if at else place
+    of = f" of order {order}" if order else ""
+    return f"{number} of the {effect}{of}{at}".replace("_", " ")
+
+
+def known_unit(name: str) -> str:
+    """Return the SI unit of a number of `known_values`."""
+    return effect_named(name.partition(".")[0]).unit(name.rpartition(".")[2])
+
+
+def _with(effect: DriveEffect, values: Mapping[str, float]) -> DriveEffect:
+    given = {
+        name.rpartition(".")[2]: float(values[name])
+        for name in known_values([effect])
+        if name in values
+    }
+    if not given:
+        return effect
+    numbers = replace(_numbers(effect), **given)
+    return replace(effect, law=numbers) if isinstance(effect, LawAtPort) else numbers
+
+
+def _numbers(effect: DriveEffect) -> Any:
+    return effect.law if isinstance(effect, LawAtPort) else effect
+
+
+def _place(effect: DriveEffect) -> str:
+    name, port, order = place_of(effect)
+    return ".".join([name, *([port] if port else []), *([f"{order:g}"] if order else [])])
