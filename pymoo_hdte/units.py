@@ -29,6 +29,7 @@ UNITS: dict[str, dict[str, float]] = {
     "force": {"N": 1.0},
     "current": {"A": 1.0, "mA": 1e-3},
     "voltage": {"V": 1.0, "mV": 1e-3},
+    "temperature": {"K": 1.0, "C": 1.0},
     "ratio": {"1": 1.0},
     "stiffness": {"N.m/rad": 1.0},
     "inertia": {"kg.m2": 1.0},
@@ -38,8 +39,11 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """For each quantity the units it may be given in, with the factor to SI; the first is the SI unit.
 
-``"1"`` is dimensionless.
+``"1"`` is dimensionless. Zero is that of SI but for `ORIGINS`.
 """
+
+ORIGINS = {"C": 273.15}
+"""Value in SI at zero of a unit, where that is not 0: of degrees Celsius."""
 
 _ENDINGS = {
     "_arcsec": UNITS["angle"]["arcsec"],

@@ -1,6 +1,13 @@
 """Effects: laws of force over motion at the ports of any machine, each with its sentence."""
 
-from pymoo_hdte.effects import friction, hysteresis, linear, load_friction, stiffness
+from pymoo_hdte.effects import (
+    friction,
+    hysteresis,
+    linear,
+    load_friction,
+    stiffness,
+    temperature_friction,
+)
 from pymoo_hdte.effects.effect import Effect, effect_named, known_effects, register, registered
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Periodic, PortState, Response
@@ -23,5 +30,6 @@ __all__ = [
     "register",
     "registered",
     "stiffness",
+    "temperature_friction",
     "unknown",
 ]

@@ -40,6 +40,9 @@ class Sizes:
         Largest torque that the port passes on; 0 where solvers do not know it.
     driven : bool
         Whether the load opposes the motion in some records and drives it in others.
+    temperature : float
+        Mean of the records, K, where their temperatures spread enough to show what depends on them;
+        0 elsewhere.
     read : bool
         Whether it is the reading of a force sensor.
     slower : float
@@ -65,6 +68,7 @@ class Sizes:
     loaded: bool = False
     load: float = 0.0
     driven: bool = False
+    temperature: float = 0.0
     read: bool = False
     slower: float = 1.0
     expected: tuple[float, ...] = ()

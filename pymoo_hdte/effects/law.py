@@ -47,6 +47,8 @@ class PortState:
         Torque that the machine passes on through the port, N.m; None where a solver does not know
         it. At the input of a drive it is what the output delivers to its load, bearings and laws,
         over the ratio, without what accelerates inertias.
+    temperature : ndarray or float
+        Of the machine, K; NaN where it is not known.
     """
 
     position: Values
@@ -56,6 +58,7 @@ class PortState:
     path: Callable[[Values], Values] = _whole
     back: Callable[[Values], Values] = _whole
     load: Values | None = None
+    temperature: Values | float = np.nan
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,11 @@ class Law(Protocol):
 
     @property
     def loaded(self) -> bool:
+        """See `Behaviour`."""
+        ...
+
+    @property
+    def warmed(self) -> bool:
         """See `Behaviour`."""
         ...
 
@@ -174,6 +182,8 @@ class Behaviour:
     loaded: ClassVar[bool] = False
     """Whether the force depends on the torque that the port passes on, `PortState.load`, which only
     solvers of a drive know, and at the input."""
+    warmed: ClassVar[bool] = False
+    """Whether the force depends on `PortState.temperature`, which only records of a drive have."""
     varies_stiffness: ClassVar[bool] = False
     """Whether it is K depth cos(order angle + phase) times the position, with these three numbers:
     then Hill's method and the stability of the drive know it too."""

@@ -14,12 +14,12 @@ from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.text_columns import DECIMALS
 from pymoo_hdte.io.text_header import DELIMITERS
 from pymoo_hdte.io.text_table import LARGEST
-from pymoo_hdte.units import UNITS
+from pymoo_hdte.units import ORIGINS, UNITS
 
 FORMATS = ("matlab", "csv", "plain")
 MEASURED = (
     *("time", "angle", "length", "speed", "linear speed", "acceleration", "linear acceleration"),
-    *("force", "torque", "current", "voltage", "ratio"),
+    *("force", "torque", "current", "voltage", "temperature", "ratio"),
 )
 """Quantities, among those of `pymoo_hdte.units`, that a channel may hold."""
 CHANNEL_UNITS = {unit: size for one in MEASURED for unit, size in UNITS[one].items()}
@@ -31,12 +31,12 @@ COUNTS = "counts"
 
 @dataclass(frozen=True)
 class Channel:
-    """A column with its unit; a value in SI is ``(reading - zero) * factor * scale``.
+    """A column with its unit; a value in SI is ``(reading - zero) * factor * scale + origin``.
 
     Attributes
     ----------
     column : str or int
-        Its title, or in a plain table its number from 0.
+        Its title, or in a plain table its number from 0; an empty title is that of no column.
     unit : str
         One of `CHANNEL_UNITS`, or `COUNTS`.
     scale : float
@@ -83,6 +83,11 @@ class Channel:
         if self.counts_per_turn is not None:
             return 2.0 * math.pi / self.counts_per_turn
         return CHANNEL_UNITS[self.unit]
+
+    @property
+    def origin(self) -> float:
+        """Value in SI at zero of the unit: 0 but for degrees Celsius."""
+        return ORIGINS.get(self.unit, 0.0)
 
     @property
     def period(self) -> float | None:
@@ -153,8 +158,9 @@ def with_zeros(table: Fields, layout: TableLayout) -> TableLayout:
         For a channel that the layout does not have, or a reading that is no number.
     """
     channels = dict(layout.channels)
+    there = [name for name, one in channels.items() if one.column != ""]
     for name in table.names():
-        one_of(table._name("channel"), name, tuple(channels))
+        one_of(table._name("channel"), name, there)
         zero = table.number(name, at_least=-LARGEST, at_most=LARGEST)
         channels[name] = replace(channels[name], zero=zero)
     return replace(layout, channels=channels)

@@ -17,6 +17,7 @@ from pymoo_hdte.io.matlab import read_vectors
 from pymoo_hdte.io.text_columns import TextTable, column_label
 from pymoo_hdte.io.text_lines import Seen
 from pymoo_hdte.io.text_table import LARGEST, read_text_table
+from pymoo_hdte.units import ORIGINS
 
 __all__ = ["CHANNEL_UNITS", "LARGEST", "Channel", "TableLayout", "layout_from_fields"]
 
@@ -57,7 +58,7 @@ class Columns:
         if channel.wraps is not None:
             values = np.unwrap(values, period=channel.wraps)
         values = (values - channel.zero if channel.zero else values) * channel.factor
-        values = (np.unwrap(values) if channel.unwrap else values) * channel.scale
+        values = (np.unwrap(values) if channel.unwrap else values) * channel.scale + channel.origin
         return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
 
     def place(self, row: int, what: str | None = None) -> str:
@@ -201,6 +202,7 @@ def read_columns(
 def _check_unit(table: TextTable, channel: Channel) -> None:
     """Refuse a channel whose unit is another than the file has in its row of units."""
     unit = table.units.get(str(channel.column), "").strip("[]() ")
-    if unit in CHANNEL_UNITS and CHANNEL_UNITS[unit] != channel.factor:
+    stated = CHANNEL_UNITS.get(unit), ORIGINS.get(unit, 0.0)
+    if unit in CHANNEL_UNITS and stated != (channel.factor, channel.origin):
         field = f"{table.file}, line {table.title_line + 1}: unit of {channel.column}"
         raise InvalidInput(field, unit, f"{channel.unit}, as the layout says")

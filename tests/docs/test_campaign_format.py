@@ -122,7 +122,7 @@ def test_the_page_has_every_key_that_is_read_and_no_other(tmp_path, asked):
 def test_the_page_has_every_unit_channel_and_title():
     columns = PAGE.split("## Columns of time and channels")[1]
     (cell,) = re.findall(r"^\| `unit` \|.*\|(.*)\|$", columns, re.M)
-    units = [UNITS["time"], [*UNITS["angle"], COUNTS], UNITS["torque"]]
+    units = [UNITS["time"], [*UNITS["angle"], COUNTS], UNITS["torque"], ["C", "K"]]
     assert [re.findall("`(.*?)`", part) for part in cell.split(";")] == [list(one) for one in units]
     assert all(f"`{name}`" in PAGE for name in LAYOUT.channels)
     assert all(f"`{title}`" in PAGE for title, _ in COLUMNS.values())

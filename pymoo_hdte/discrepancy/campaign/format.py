@@ -89,6 +89,10 @@ COLUMNS = {
     "output_torque": ("output_torque_Nm", 5),
 }
 
+TEMPERATURE = "temperature"
+"""Channel of the drive's temperature, of which a record has the mean; or else its field has it."""
+TEMPERATURE_FIELD = "temperature_C"
+
 LAYOUT = TableLayout(
     format="csv",
     channels={
@@ -100,7 +104,9 @@ LAYOUT = TableLayout(
             ("output_torque", "N.m"),
         )
         for column, _ in (COLUMNS[channel],)
-    },
+    }
+    # No column has the temperature unless the campaign says which.
+    | {TEMPERATURE: Channel("", "C")},
     time=Channel(COLUMNS["time"][0], "s"),
     sample_rate=None,
     skip_rows=0,

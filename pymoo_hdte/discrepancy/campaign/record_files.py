@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.fields_of_files import build, in_units
@@ -21,6 +20,8 @@ from pymoo_hdte.discrepancy.campaign.format import (
     PLAIN_ENDING,
     RANGES,
     RUNNING,
+    TEMPERATURE,
+    TEMPERATURE_FIELD,
     TORSION,
 )
 from pymoo_hdte.discrepancy.campaign.records import ROLES, RunningRecord, TorsionRecord
@@ -28,8 +29,10 @@ from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.layout import TableLayout, layout_from_fields, with_zeros
 from pymoo_hdte.io.tables import Columns, read_columns
 from pymoo_hdte.io.text_lines import Seen
+from pymoo_hdte.units import ORIGINS
 
-Channels = dict[str, NDArray[np.float64]]
+Channels = dict[str, Any]
+"""By attribute of the record: an array (n,), or a number for the temperature."""
 
 
 @dataclass(frozen=True)
@@ -98,9 +101,10 @@ def read_record(
     names = RUNNING if running else TORSION
     layout = layout_from_fields(entry.table("table"), shared) if entry.has("table") else shared
     layout = with_zeros(entry.table("zero"), layout) if entry.has("zero") else layout
-    needed = [field.name for field in fields(kind) if field.name in layout.channels]
-    layout = replace(layout, channels={name: layout.channels[name] for name in needed})
-    known = _ranges(entry, place) if running else {}
+    stated = {name: one for name, one in layout.channels.items() if one.column != ""}
+    needed = [field.name for field in fields(kind) if field.name in stated]
+    layout = replace(layout, channels={name: stated[name] for name in needed})
+    known = _ranges(entry, place) | _temperature(entry, place, layout) if running else {}
     columns = read_columns(path, layout, seen=seen)
     measured = _in_si(columns, ratio)
     with _placed(columns, place):
@@ -120,6 +124,8 @@ def record_table(record: RunningRecord | TorsionRecord) -> dict[str, Any]:
         if getattr(record, spread):
             del table[RUNNING[nominal][0]]
             table |= in_units(record, {spread: (name, RUNNING[nominal][1])})
+    if isinstance(record, RunningRecord) and record.temperature is not None:
+        table[TEMPERATURE_FIELD] = round(record.temperature - ORIGINS["C"], 9)
     test = "running" if running else "torsion"
     return {"file": f"{record.name}{ENDING}", "test": test} | table | {"role": record.role}
 
@@ -150,10 +156,26 @@ def _ranges(entry: Fields, place: str) -> dict[str, Any]:
     return known
 
 
+def _temperature(entry: Fields, place: str, layout: TableLayout) -> dict[str, float]:
+    """Take the temperature out of a record's table, where no column has it; K."""
+    if not entry.has(TEMPERATURE_FIELD):
+        return {}
+    found = entry.number(TEMPERATURE_FIELD)
+    if TEMPERATURE in layout.channels:
+        allowed = f"absent beside the column of the channel {TEMPERATURE}"
+        raise InvalidInput(f"{place}.{TEMPERATURE_FIELD}", found, allowed)
+    if not found > -ORIGINS["C"]:
+        allowed = f"above {-ORIGINS['C']:g}, in degrees Celsius"
+        raise InvalidInput(f"{place}.{TEMPERATURE_FIELD}", found, allowed)
+    return {TEMPERATURE: found + ORIGINS["C"]}
+
+
 def _in_si(columns: Columns, ratio: float) -> Channels:
     """Return time and channels of a file in SI; angles that wrap are on one turn with the other."""
     layout = columns.layout
-    measured = {name: columns.si(channel) for name, channel in layout.channels.items()}
+    measured: Channels = {name: columns.si(one) for name, one in layout.channels.items()}
+    if TEMPERATURE in measured:
+        measured[TEMPERATURE] = float(np.mean(measured[TEMPERATURE]))
     if layout.time is not None:
         measured["time"] = columns.si(layout.time)
     elif layout.sample_rate is not None:

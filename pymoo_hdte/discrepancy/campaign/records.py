@@ -70,6 +70,8 @@ class RunningRecord:
     speed_range, load_range : tuple of float, length 2 or 0
         Lowest and highest mean speed, rad/s, and mean load torque, N.m, that the record may have.
         Without them both are near the values set, within shares that `Rules` has.
+    temperature : float, optional
+        Of the drive, near its lubricant, mean over the record, K.
     jumps : tuple of Jump
         Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
 
@@ -94,6 +96,7 @@ class RunningRecord:
     output_torque: NDArray[np.float64]
     speed_range: tuple[float, ...] = ()
     load_range: tuple[float, ...] = ()
+    temperature: float | None = None
     jumps: tuple[Jump, ...] = ()
 
     def __post_init__(self) -> None:
@@ -104,6 +107,8 @@ class RunningRecord:
         real_number("load_torque", self.load_torque)
         whole_number("samples_averaged", self.samples_averaged, 1)
         real_number("elapsed", self.elapsed, at_least=0.0)
+        if self.temperature is not None:
+            real_number("temperature", self.temperature, above=0.0)
         _check_record(self, ("input_angle", "output_angle", "input_torque", "output_torque"))
 
     def transmission_error(self, ratio: float) -> NDArray[np.float64]:

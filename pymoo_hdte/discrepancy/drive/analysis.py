@@ -17,13 +17,15 @@ from pymoo_hdte.discrepancy.campaign.rows.findings import RowFindings
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
-from pymoo_hdte.discrepancy.drive.prediction import moves_steadily
+from pymoo_hdte.discrepancy.drive.prediction import TOLERANCE, coefficients_of
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
+from pymoo_hdte.drive import SpeedLoop, harmonic_balance
+from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.effects.effect import effect_named
 
 
@@ -128,7 +130,16 @@ def _check_steady(data: Data) -> None:
     if not believed.effects:
         return
     values = {one.name: np.array([one.start]) for one in data.base}
-    steady = moves_steadily(believed, campaign.rig, data.features.conditions, values)
+    conditions = data.features.conditions
+    coefficients = coefficients_of(believed, values, (), len(conditions))
+    steady = harmonic_balance(
+        coefficients,
+        input_speed=conditions.input_speed,
+        load_torque=conditions.output_torque,
+        motor=SpeedLoop(campaign.rig.proportional, campaign.rig.integral),
+        torus=torus_of(coefficients),
+        tolerance=TOLERANCE,
+    ).converged
     if not steady.all():
         lost = data.features.records[int(np.argmin(steady))].name
         names = [effect.name for effect in believed.effects]

@@ -47,14 +47,13 @@ class Features:
 
     def rows(self, rows: NDArray[np.int_]) -> Features:
         """Return the features of some of the records."""
-        conditions = Conditions(
-            self.conditions.input_speed[rows],
-            self.conditions.output_torque[rows],
-            self.conditions.elapsed[rows],
-            self.conditions.bends[rows],
+        return Features(
+            tuple(self.records[row] for row in rows),
+            self.conditions.rows(rows),
+            self.orders,
+            self.values[rows],
+            self.covariance[rows],
         )
-        records = tuple(self.records[row] for row in rows)
-        return Features(records, conditions, self.orders, self.values[rows], self.covariance[rows])
 
     def of_prediction(self, prediction: Prediction) -> NDArray[np.float64]:
         """Return predicted features, shape (v, r, n_features)."""
@@ -91,6 +90,7 @@ def measure(
         output_torque=np.array([line.mean[2] for line in lines]),
         elapsed=np.array([_middle(record) for record in records]),
         bends=np.array([line.bends for line in lines]),
+        temperature=np.array([record.temperature for record in records], dtype=float),
     )
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness

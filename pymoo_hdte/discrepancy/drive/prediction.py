@@ -47,12 +47,25 @@ class Conditions:
         Middle of the record within the session, s.
     bends : complex ndarray, shape (r, 3, 1 + m)
         Contribution of a drift that is curved within a record: see `OrderLines`.
+    temperature : ndarray, optional
+        K, NaN where it is not known; by default in no record.
     """
 
     input_speed: NDArray[np.float64]
     output_torque: NDArray[np.float64]
     elapsed: NDArray[np.float64]
     bends: NDArray[np.complex128]
+    temperature: NDArray[np.float64] | None = None
+
+    def rows(self, rows: NDArray[np.int_]) -> Conditions:
+        """Return the conditions of some of the records."""
+        return Conditions(
+            self.input_speed[rows],
+            self.output_torque[rows],
+            self.elapsed[rows],
+            self.bends[rows],
+            None if self.temperature is None else self.temperature[rows],
+        )
 
     def __len__(self) -> int:
         return len(self.input_speed)
@@ -110,6 +123,8 @@ def predict(
     gain = 1.0 + values["output_torque_gain"][:, None]
     load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
     coefficients = coefficients_of(believed, values, effects, records)
+    if conditions.temperature is not None:
+        coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     near = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
     balance = steady_motions(coefficients, speed, load.ravel(), rig, near)
@@ -171,32 +186,6 @@ def steady_motions(
         [balance.rows(balance.converged), plain.rows(~held)],
         [np.flatnonzero(held), np.flatnonzero(~held)],
     )
-
-
-def moves_steadily(
-    believed: BelievedDrive,
-    rig: Rig,
-    conditions: Conditions,
-    values: dict[str, NDArray[np.float64]],
-) -> NDArray[np.bool_]:
-    """Return for which records, shape (r,), the believed drive has a steady motion.
-
-    Parameters
-    ----------
-    believed, rig, conditions
-    values : dict of ndarray, shape (1,)
-        As in `predict`.
-    """
-    coefficients = coefficients_of(believed, values, (), len(conditions))
-    motion = harmonic_balance(
-        coefficients,
-        input_speed=conditions.input_speed,
-        load_torque=conditions.output_torque,
-        motor=SpeedLoop(rig.proportional, rig.integral),
-        torus=torus_of(coefficients),
-        tolerance=TOLERANCE,
-    )
-    return np.asarray(motion.converged)
 
 
 def _joined(

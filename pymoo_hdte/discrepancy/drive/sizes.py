@@ -45,6 +45,8 @@ class Scales:
         square over a record, means and lines together.
     driven : bool
         Whether the load opposes the motion in some records and drives it in others.
+    temperature : float
+        Mean of the records, K, if all have one and these spread enough; else 0.
     """
 
     speed: float
@@ -55,6 +57,7 @@ class Scales:
     input_torque: float
     output_torque: float
     driven: bool = False
+    temperature: float = 0.0
 
 
 def scales_of(data: Data, base: Fit) -> Scales:
@@ -86,7 +89,16 @@ def scales_of(data: Data, base: Fit) -> Scales:
         input_torque=input_torque,
         output_torque=output_torque,
         driven=bool(braking.max() > least and braking.min() < -least),
+        temperature=_temperature(data),
     )
+
+
+def _temperature(data: Data) -> float:
+    """Return the middle of the records' temperatures, K, if all have one and they spread enough."""
+    known = data.features.conditions.temperature
+    if known is None or not np.ptp(known) >= data.rules.least_temperature_spread:
+        return 0.0
+    return float(np.mean(known))
 
 
 def _size(features: Features, values: NDArray[np.float64], channel: int) -> float:
@@ -153,6 +165,7 @@ def port_sizes(
         ratio=believed.ratio,
         inertia=max(believed.load_inertia, 10.0 * believed.output_inertia),
         duration=scales.duration,
+        temperature=scales.temperature,
     )
     slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
     return {
@@ -164,6 +177,7 @@ def port_sizes(
             residual=residual[port],
             largest=largest[port],
             speed=shared.speed / slower[port],
+            damping=believed.input_damping if port == "input" else 0.0,
             load=scales.torque / believed.ratio if port == "input" else 0.0,
             slower=slower[port],
             expected=_SHAFTS[port],

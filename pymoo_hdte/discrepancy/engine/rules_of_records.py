@@ -153,6 +153,15 @@ class RecordRules(RuleSet):
         "the swing of its torque: the tooth flanks are not held together.",
         f"{BY_HAND}: a few times what the zero of a torque sensor is known to.",
     )
+    least_temperature_spread: float = rule(
+        3.0,
+        "K",
+        "Friction that depends on temperature is looked for if the records' temperatures spread by "
+        "this.",
+        f"{BY_HAND}: greases and oils lose 3 to 7 % of their viscosity per kelvin, so that viscous "
+        "friction changes by 10 to 20 %, as much as it is usually believed to; a sensor on the "
+        "housing follows the lubricant no better than to a kelvin or two.",
+    )
     sweep_gain: float = rule(
         50.0,
         "chi-square",

@@ -144,7 +144,8 @@ class AngleEquations:
             return self.torus.phase(order / slower)
 
         stiffness = self.coefficients.stiffness[:, None]
-        state = PortState(position, speed, phase, stiffness, self._path, self._back, load)
+        warmth = np.reshape(self.coefficients.temperature, (-1, 1))
+        state = PortState(position, speed, phase, stiffness, self._path, self._back, load, warmth)
         total = Response(np.zeros_like(speed))
         for place, law in self.coefficients.laws:
             if place == port:

@@ -60,6 +60,8 @@ class Coefficients:
     reaction : float
         Share of the mesh torque's reaction on the input through the slope of theta_s: 0 in
         Eq. (9), 1 by the principle of virtual work; dimensionless.
+    temperature : float or ndarray, shape (n,)
+        Of the drive, K; NaN where it is not known.
     """
 
     ratio: float
@@ -78,6 +80,7 @@ class Coefficients:
     load_inertia: float | NDArray[np.float64] = 0.0
     laws: tuple[tuple[str, Law], ...] = ()
     reaction: float = 0.0
+    temperature: float | NDArray[np.float64] = np.nan
 
     def rows(self, rows: slice | NDArray[np.int_]) -> Coefficients:
         """Return the coefficients of some of the designs.
@@ -133,5 +136,5 @@ class Coefficients:
 
 _BY_DESIGN = (
     "stiffness", "damping", "input_inertia", "input_damping", "output_inertia", "output_damping",
-    "error_phasors", "load_inertia",
+    "error_phasors", "load_inertia", "temperature",
 )  # fmt: skip
