@@ -46,7 +46,8 @@ class PortState:
     load : ndarray or None
         Torque that the machine passes on through the port, N.m; None where a solver does not know
         it. At the input of a drive it is what the output delivers to its load, bearings and laws,
-        over the ratio, without what accelerates inertias.
+        over the ratio, without what accelerates inertias; at a port of another mechanism, what its
+        ``load`` says.
     temperature : ndarray or float
         Of the machine, K; NaN where it is not known.
     """
@@ -180,8 +181,8 @@ class Behaviour:
     drives: ClassVar[bool] = False
     """Whether the force is a driving force, whatever the direction of motion."""
     loaded: ClassVar[bool] = False
-    """Whether the force depends on the torque that the port passes on, `PortState.load`, which only
-    solvers of a drive know, and at the input."""
+    """Whether the force depends on the torque that the port passes on, `PortState.load`, which is
+    known at the input of a drive and where a mechanism states it."""
     warmed: ClassVar[bool] = False
     """Whether the force depends on `PortState.temperature`, which only records of a drive have."""
     varies_stiffness: ClassVar[bool] = False

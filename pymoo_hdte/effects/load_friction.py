@@ -50,7 +50,7 @@ class LoadFriction(Aperiodic):
             Where the solver does not know the load.
         """
         if state.load is None:
-            allowed = "the input of a drive, whose load the solvers know"
+            allowed = "the input of a drive, or a port whose load is stated"
             raise InvalidInput("port of load_dependent_friction", "of a mechanism", allowed)
         sign, slope = smoothed_sign(state.speed)
         mean = (self.share + self.driven_share) / 2.0 * np.abs(state.load)

@@ -12,21 +12,31 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.effects.law import Law, Memory, PortState, periodic_phase
 from pymoo_hdte.mechanism.mechanism import Loop, Mechanism, Port
-from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
+from pymoo_hdte.mechanism.port_motion import PortMotion, law_force, load_at_port
 from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]
 
 _TURN = 1e-7
+_SOON = 1e-6
+"""s. Step of a difference quotient by time."""
 
 
 class PortForce:
     """The force at a port. States are positions and speeds, shape (2, coordinates)."""
 
     def __init__(
-        self, port: Port, laws: Sequence[Law], mechanism: Mechanism, begin: Values
+        self,
+        port: Port,
+        laws: Sequence[Law],
+        mechanism: Mechanism,
+        begin: Values,
+        record: Record,
     ) -> None:
-        self.port = port
+        self.port, self.time = port, record.time
+        channels = {name: record.channel(name) for name in port.load}
+        loaded = any(law.loaded for law in laws)
+        self.load = load_at_port(port, mechanism.inputs, channels) if loaded else None
         self.row = coordinate_row(mechanism, port.motion)
         self.column = -self.row
         self.spring = (port.stiffness.value, port.damping.value)
@@ -61,8 +71,15 @@ class PortForce:
         stiffness, damping = self.spring
         force = stiffness * d + damping * rate
         here = PortState(d, rate, periodic_phase(d), self.spring[0])  # type: ignore[arg-type]
+        grows = 0.0
+        if self.load is not None:
+            load, growth = self._load_at(time)
+            here = replace(here, load=load)
         for law in self.laws:
             found = law.respond(here)
+            if law.loaded and self.load is not None:
+                later = law.respond(replace(here, load=load + _SOON * growth)).torque
+                grows += np.asarray(later - found.torque).item() / _SOON
             force += np.asarray(found.torque).item()
             stiffness += np.asarray(found.slope).item()
             damping += np.asarray(found.damping).item()
@@ -77,7 +94,19 @@ class PortForce:
         slopes[0], slopes[1] = stiffness * self.row, damping * self.row
         for place, slope, bend in bends:
             slopes[:, place] += stiffness * slope + damping * bend, damping * slope
-        return force, 0.0
+        return force, grows
+
+    def _load_at(self, time: float) -> tuple[Values, Values]:
+        """Return the load that the port passes on, a straight line between samples, and its slope.
+
+        Shape (1,) each.
+        """
+        assert self.load is not None
+        place = min(max(int(np.searchsorted(self.time, time, "right")), 1), len(self.time) - 1)
+        before, after = self.time[place - 1 : place + 1]
+        low, high = self.load[place - 1 : place + 1]
+        slope = (high - low) / (after - before)
+        return np.array([low + slope * (time - before)]), np.array([slope])
 
     def turns(self, before: Values, after: Values, step: float, rtol: float) -> float:
         """Return the share of a step after which laws with memory reverse, 1 for none."""
@@ -99,7 +128,8 @@ class PortForce:
         d, rate, _ = self.motion(path)
         stiffness, damping = self.spring
         laws = [
-            law_force(law, PortMotion(d, rate), stiffness) for law in (*self.laws, *self.memories)
+            law_force(law, PortMotion(d, rate, self.load), stiffness)
+            for law in (*self.laws, *self.memories)
         ]
         return np.asarray(stiffness * d + damping * rate + sum(laws))
 

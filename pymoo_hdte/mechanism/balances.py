@@ -17,7 +17,12 @@ from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
 from pymoo_hdte.mechanism.motion import finer_than, motion_of, smooth, smoothed_noise
-from pymoo_hdte.mechanism.port_motion import PortMotion, law_force, motion_at_port
+from pymoo_hdte.mechanism.port_motion import (
+    PortMotion,
+    law_force,
+    load_at_port,
+    motion_at_port,
+)
 from pymoo_hdte.mechanism.records import Record
 from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, working_rows
 
@@ -94,16 +99,18 @@ class ForceBalance:
         self._acceleration = {
             name: motion.acceleration[self._rows] for name, motion in self.motions.items()
         }
+        signals = {
+            one.name: smooth(self.record.channel(one.name), record.step, highest)
+            for one in mechanism.inputs
+        }
+        self._inputs = {name: one[self._rows] for name, one in signals.items()}
         self.ports = self._port_motions(
             {name: one.position[self._rows] for name, one in self.motions.items()},
             {name: one.speed[self._rows] for name, one in self.motions.items()},
+            self._inputs,
         )
         self._finer = finer_than(cutoff, record.step * stride)
-        self._fine = self.ports if self._finer == 1 else self._port_motions(*self._between(stride))
-        self._inputs = {
-            one.name: smooth(self.record.channel(one.name), record.step, highest)[self._rows]
-            for one in mechanism.inputs
-        }
+        self._fine = self.ports if self._finer == 1 else self._between(stride, signals)
         self.terms = self._terms()
         names = balance_names(mechanism)
         self.constant = np.zeros((len(names), self._bins))
@@ -159,12 +166,16 @@ class ForceBalance:
         return self.record.time[self._rows]
 
     def _port_motions(
-        self, position: dict[str, Values], speed: dict[str, Values]
+        self, position: dict[str, Values], speed: dict[str, Values], inputs: dict[str, Values]
     ) -> dict[str, PortMotion]:
-        return {port.name: motion_at_port(port, position, speed) for port in self.mechanism.ports}
+        found = {}
+        for port in self.mechanism.ports:
+            load = load_at_port(port, self.mechanism.inputs, inputs)
+            found[port.name] = motion_at_port(port, position, speed, load)
+        return found
 
-    def _between(self, stride: int) -> tuple[dict[str, Values], dict[str, Values]]:
-        """Return positions and speeds at ``_finer`` moments around each of the working rate."""
+    def _between(self, stride: int, signals: dict[str, Values]) -> dict[str, PortMotion]:
+        """Return the motion of ports at ``_finer`` moments around each of the working rate."""
         places = np.arange(len(self.record.time))[self._rows]
         offsets = ((np.arange(self._finer) + 0.5) / self._finer - 0.5) * stride
         moments = (places[:, None] + offsets).ravel()
@@ -173,8 +184,12 @@ class ForceBalance:
         def at_moments(values: Values) -> Values:
             return np.asarray(make_interp_spline(every, values, 3)(moments))
 
-        position = {name: at_moments(one.position) for name, one in self.motions.items()}
-        return position, {name: at_moments(one.speed) for name, one in self.motions.items()}
+        loads = {name for port in self.mechanism.ports for name in port.load}
+        return self._port_motions(
+            {name: at_moments(one.position) for name, one in self.motions.items()},
+            {name: at_moments(one.speed) for name, one in self.motions.items()},
+            {name: at_moments(signals[name]) for name in loads},
+        )
 
     def _transform(self, signal: Values) -> Values:
         return np.asarray(dct(signal, type=2, norm="ortho")[: self._bins])

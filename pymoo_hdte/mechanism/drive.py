@@ -76,7 +76,7 @@ def _refuse(coefficients: Coefficients) -> None:
         raise InvalidInput("reaction of the static error", coefficients.reaction, allowed)
     # Periodic laws of a mechanism vary with the motion of their port, which here is the torsion.
     if any(law.loaded for _, law in coefficients.laws):
-        allowed = "effects that depend on motion only: ports do not know what load they transmit"
+        allowed = "effects of motion only: its ports do not know what load the output passes on"
         raise InvalidInput("effects at the input", "load_dependent_friction", allowed)
     allowed = "no effect that varies with the input angle"
     if coefficients.stiffness_depth != 0.0:

@@ -6,7 +6,6 @@ from pymoo_hdte.effects.effect import Effect, known_effects
 
 
 def law_effects() -> list[Effect]:
-    """Return the effects that are laws, at ports or of readings, of the motion there alone."""
+    """Return the effects that are laws, at ports or of readings; none of them of temperature."""
     laws = [one for one in known_effects() if one.law is not None]
-    of_more = ("loaded", "warmed")
-    return [one for one in laws if not any(getattr(one.law, each, False) for each in of_more)]
+    return [one for one in laws if not getattr(one.law, "warmed", False)]

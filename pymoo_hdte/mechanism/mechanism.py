@@ -8,7 +8,7 @@ where the motion at a port is d = A^T q plus its kinematic error. The laws are t
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
@@ -45,9 +45,7 @@ NOTHING = BelievedValue(0.0)
 
 @dataclass(frozen=True)
 class ErrorLine:
-    """Kinematic error of a port: amplitude sin(order q + phase) of a coordinate q.
-
-    The form of Eq. (1) of the paper.
+    """Kinematic error of a port: amplitude sin(order q + phase) of a coordinate q, as Eq. (1).
 
     Attributes
     ----------
@@ -93,6 +91,9 @@ class Port:
     error : tuple of ErrorLine
         Kinematic error, added to d. It does not act back on the coordinate that makes it, as in
         Eq. (9) of the paper.
+    load : mapping of str to float
+        Share of the force of inputs, by name, in the load that the port passes on, on which laws
+        may depend; positive where it opposes a positive motion.
     """
 
     name: str
@@ -101,6 +102,7 @@ class Port:
     damping: BelievedValue = NOTHING
     read: bool = False
     error: tuple[ErrorLine, ...] = ()
+    load: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -199,6 +201,9 @@ class Mechanism:
             self._check_shares(f"motion of {port.name}", port.motion)
             for line in port.error:
                 one_of(f"error of {port.name}", line.coordinate, self.coordinates)
+            for name, share in port.load.items():
+                one_of(f"load of {port.name}", name, [one.name for one in self.inputs])
+                real_number(f"load of {port.name}.{name}", share)
         for one in self.inputs:
             self._check_shares(f"acts of {one.name}", one.acts)
         for loop in self.loops:
@@ -260,19 +265,14 @@ class Mechanism:
 
         inertias = {name: known(f"inertia of {name}", one) for name, one in self.inertias.items()}
         ports = [
-            Port(
-                port.name,
-                port.motion,
-                known(f"stiffness of {port.name}", port.stiffness),
-                known(f"damping of {port.name}", port.damping),
-                port.read,
-                port.error,
+            replace(
+                port,
+                stiffness=known(f"stiffness of {port.name}", port.stiffness),
+                damping=known(f"damping of {port.name}", port.damping),
             )
             for port in self.ports
         ]
-        inputs = [
-            Input(one.name, one.acts, known(f"gain of {one.name}", one.gain)) for one in self.inputs
-        ]
+        inputs = [replace(one, gain=known(f"gain of {one.name}", one.gain)) for one in self.inputs]
         return Mechanism(inertias, ports, inputs, self.loops)
 
     def _check_shares(self, name: str, shares: Mapping[str, float]) -> None:

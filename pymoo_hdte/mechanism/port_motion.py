@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.effects.law import Law, PortState, periodic_phase
-from pymoo_hdte.mechanism.mechanism import Port
+from pymoo_hdte.mechanism.mechanism import Input, Port
 from pymoo_hdte.mechanism.motion import SmoothedMotion
 
 Values = NDArray[np.float64]
@@ -16,13 +17,19 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PortMotion:
-    """Position and speed at a port, shape (n,); SI."""
+    """Position and speed at a port, and the load it passes on where known, shape (n,); SI."""
 
     position: Values
     speed: Values
+    load: Values | None = None
 
 
-def motion_at_port(port: Port, position: dict[str, Values], speed: dict[str, Values]) -> PortMotion:
+def motion_at_port(
+    port: Port,
+    position: dict[str, Values],
+    speed: dict[str, Values],
+    load: Values | None = None,
+) -> PortMotion:
     """Return the motion at a port, with its kinematic error, for coordinates of shape (n,)."""
     here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
     rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
@@ -30,7 +37,21 @@ def motion_at_port(port: Port, position: dict[str, Values], speed: dict[str, Val
         angle = line.order * position[line.coordinate] + line.phase
         here = here + line.amplitude * np.sin(angle)
         rate = rate + line.amplitude * line.order * np.cos(angle) * speed[line.coordinate]
-    return PortMotion(here, rate)
+    return PortMotion(here, rate, load)
+
+
+def load_at_port(
+    port: Port, inputs: Sequence[Input], signals: Mapping[str, Values]
+) -> Values | None:
+    """Return the load that a port passes on, shape (n,), for believed gains; None if unknown.
+
+    ``signals`` are those of the inputs, by name.
+    """
+    if not port.load:
+        return None
+    gains = {one.name: one.gain.value for one in inputs}
+    parts = [share * gains[name] * signals[name] for name, share in port.load.items()]
+    return np.asarray(np.sum(parts, axis=0))
 
 
 def law_force(law: Law, motion: PortMotion | SmoothedMotion, stiffness: float) -> Values:
@@ -47,5 +68,6 @@ def law_force(law: Law, motion: PortMotion | SmoothedMotion, stiffness: float) -
         np.full(1, stiffness),
         path=lambda values: values[None, :],
         back=lambda values: values[0],
+        load=getattr(motion, "load", None),
     )
     return np.broadcast_to(law.respond(state).torque, motion.position.shape)

@@ -88,8 +88,9 @@ def simulate_mechanism(
     for effect in effects:
         one_of(f"port of effect {effect.name}", effect.port, mechanism.port_names)
     begin = _start(mechanism, record, start or {})
+    state = mechanism, begin, record
     ports = [
-        PortForce(port, [one.law for one in effects if one.port == port.name], mechanism, begin)
+        PortForce(port, [one.law for one in effects if one.port == port.name], *state)
         for port in mechanism.ports
     ]
     loops = _closed_loops(mechanism, record, closed_loop)

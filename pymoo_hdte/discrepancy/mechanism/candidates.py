@@ -14,6 +14,7 @@ from pymoo_hdte.effects.effect import Effect, place_of
 from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.mechanism import LawAt, Port
 from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.port_motion import PortMotion
 
 LARGEST = 5.0
 """Largest force of an effect, in units of the largest residual of the base in a balance."""
@@ -89,10 +90,20 @@ def port_sizes(data: MeasuredData, port: Port, force: float, seen: Sequence[floa
         stiffness=port.stiffness.value,
         damping=port.damping.value,
         both_ways=turns_back(data, port.name),
+        load=max(0.0 if one.load is None else float(np.abs(one.load).max()) for one in here),
+        driven=_driven(data, here),
         read=port.read,
         seen=tuple(seen),
         together=True,
     )
+
+
+def _driven(data: MeasuredData, here: Sequence[PortMotion]) -> bool:
+    """Tell whether the load of a port opposes its motion for some of the time and drives it."""
+    powers = [one.load * one.speed for one in here if one.load is not None]
+    power = np.concatenate([*powers, np.zeros(1)])
+    opposing, driving = np.sum(np.maximum(power, 0.0)), np.sum(np.maximum(-power, 0.0))
+    return bool(min(opposing, driving) > data.rules.reverse_share * (opposing + driving))
 
 
 def turns_back(data: MeasuredData, port: str) -> bool:

@@ -13,6 +13,7 @@ the records have units of their own::
     motion = { q = 1.0 }                           # share of each coordinate
     damping = { value = 300.0, tolerance = 1.0 }   # optional, as stiffness
     read = false                                   # optional; true for a force sensor
+    load = { brake = 1.0 }                         # optional: share of inputs in its load
     [[ports.joint.error]]                          # optional: kinematic error, as `ErrorLine`
     coordinate = "q"
     order = 2.0

@@ -105,7 +105,8 @@ def _port_table(port: Port) -> dict[str, Any]:
     elements = {"stiffness": port.stiffness, "damping": port.damping}
     there = {name: _believed_table(one) for name, one in elements.items() if one != NOTHING}
     error = {"error": [vars(line) for line in port.error]} if port.error else {}
-    return {"motion": port.motion, **there} | ({"read": True} if port.read else {}) | error
+    load = {"load": dict(port.load)} if port.load else {}
+    return {"motion": port.motion, **there} | ({"read": True} if port.read else {}) | error | load
 
 
 def model_from_fields(top: Fields, file: str) -> MechanismModel:
@@ -126,15 +127,16 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
     for name, table in _named(top, "coordinates", file).items():
         inertias[name] = _believed(table, "inertia", above=0.0)
         table.finish()
-    ports = [
-        _port(name, table, f"{file}.ports.{name}", inertias)
-        for name, table in _named(top, "ports", file).items()
-    ]
     inputs = []
     for name, table in _named(top, "inputs", file).items():
         acts = _shares(table, "acts", f"{file}.inputs.{name}", inertias)
         inputs.append(Input(name, acts, _believed(table, "gain", at_least=0.0)))
         table.finish()
+    pushing = [one.name for one in inputs]
+    ports = [
+        _port(name, table, f"{file}.ports.{name}", inertias, pushing)
+        for name, table in _named(top, "ports", file).items()
+    ]
     rows = top.tables("loops") if top.has("loops") else []
     loops = [_loop(row, [one.name for one in inputs], inertias) for row in rows]
     try:
@@ -174,7 +176,10 @@ def _shares(
     }
 
 
-def _port(name: str, table: Fields, place: str, coordinates: Collection[str]) -> Port:
+def _port(
+    name: str, table: Fields, place: str, coordinates: Collection[str], inputs: Collection[str]
+) -> Port:
+    load = _shares(table, "load", place, inputs) if table.has("load") else {}
     motion = _shares(table, "motion", place, coordinates)
     stiffness, damping = (
         _believed(table, field, at_least=0.0) if table.has(field) else NOTHING
@@ -190,7 +195,7 @@ def _port(name: str, table: Fields, place: str, coordinates: Collection[str]) ->
         lines.append(ErrorLine(coordinate, **numbers))
         row.finish()
     table.finish()
-    return Port(name, motion, stiffness, damping, read, tuple(lines))
+    return Port(name, motion, stiffness, damping, read, tuple(lines), load)
 
 
 def _loop(row: Fields, inputs: Collection[str], coordinates: Collection[str]) -> Loop:
@@ -211,6 +216,9 @@ def _effect(row: Fields, place: str, mechanism: Mechanism) -> LawAt:
     effect, port = effect_named(name), row.choice("port", mechanism.port_names)
     if effect.of_reading and not mechanism.port(port).read:
         allowed = f"a port with read = true: {name} is what its force sensor shows"
+        raise InvalidInput(f"{place}.port", port, allowed)
+    if getattr(effect.law, "loaded", False) and not mechanism.port(port).load:
+        allowed = f"a port with load = {{ input = share }}, on which {name} depends"
         raise InvalidInput(f"{place}.port", port, allowed)
     numbers = {one: row.number(one) for one in effect.quantities if row.has(one)}
     row.finish()

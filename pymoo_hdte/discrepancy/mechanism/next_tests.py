@@ -168,7 +168,7 @@ def _separation(
                 for sign, one in ((1.0, chosen), (-1.0, hypothesis)):
                     for effect in one.fit.effects:
                         if effect.port == port.name:
-                            scaled = PortMotion(position, speed)
+                            scaled = PortMotion(position, speed, motion.load)
                             force = law_force(effect.law, scaled, port.stiffness.value)
                             difference += sign * share * force
         base = np.column_stack(imitated)

@@ -22,7 +22,9 @@ from pymoo_hdte.mechanism import (
 from pymoo_hdte.mechanism.effects import law_effects
 
 RIG = Mechanism(
-    {"q": BelievedValue(2.0)}, [Port("joint", {"q": 1.0}), Port("cell", {"q": 0.5}, read=True)]
+    {"q": BelievedValue(2.0)},
+    [Port("joint", {"q": 1.0}), Port("cell", {"q": 0.5}, read=True, load={"brake": 1.0})],
+    [Input("brake", {"q": -1.0})],
 )
 READING = {"order": 3.0, "phase": 0.5, "amplitude": 0.1}
 ERROR = effect_named("kinematic_error").law_of(READING)
@@ -47,8 +49,8 @@ def test_every_effect_survives_the_file(known, tmp_path):
 def test_registry_is_that_of_the_drive_and_five_more():
     extra = {"force_offset", "direction_dependent_friction", "kinematic_error"}
     extra |= {"linear_stiffness", "viscous_friction"}
-    # Ports of a mechanism know neither what load they pass on nor a temperature.
-    of_motion = set(LAWS) - {"load_dependent_friction", "temperature_dependent_friction"}
+    # Ports of a mechanism know no temperature.
+    of_motion = set(LAWS) - {"temperature_dependent_friction"}
     assert {one.name for one in law_effects()} == of_motion | extra
     locked = PeriodicClearance(2.0, 0.0, 1e-4, 0.0, 5e-5)
     assert "locked" not in effect_named("clearance_variation").numbers_of(locked)
