@@ -27,6 +27,11 @@ class MaxwellSlip(Aperiodic):
     and stays at ``force`` beyond ``torsion``; after a reversal it follows the same curve at twice
     the scale (Masing).
     Al-Bender, Lampaert, Swevers, IEEE Trans. Automatic Control 50 (2005).
+
+    It stands for the friction before breakaway of Dahl (Aerospace Corporation TOR-158, 1968) and of
+    Canudas de Wit et al. (LuGre, IEEE Trans. Automatic Control 40, 1995) too: a loop of theirs well
+    beyond slip is one of these springs to a few per cent of the force. They forget all but the last
+    reversal, so that small loops tell.
     """
 
     states: ClassVar[int] = SPRINGS
@@ -108,7 +113,10 @@ register(
         MaxwellSlip,
         ("mesh",),
         {"force": "torque", "torsion": "angle", "spread": ""},
-        "The {force} at the {port} lags behind the motion: springs that slip.",
+        "The {force} at the {port} lags behind the motion: springs that slip, or friction of "
+        "Dahl's or LuGre's form, which full loops hardly tell apart. Small slow reversals under a "
+        "load do: springs that slip close every small loop, the other two creep from one to the "
+        "next, and LuGre's changes with the speed.",
         _slipping,
     )
 )

@@ -1,15 +1,18 @@
-"""Harmonic balance with strong hysteresis: the memory in Newton's step, and that it converges."""
+"""Harmonic balance with strong hysteresis, and what forms of friction its law stands for."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations
 from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.drive.solve.torus import stacked, unstacked
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.law import PortState
 from pymoo_hdte.units import ARCSEC
 
 
@@ -71,3 +74,77 @@ def test_springs_that_slip_bear_their_force():
     )
     expected = (coefficients.mean_mesh_torque - 2.0) / coefficients.stiffness[0]
     assert springs.torsion[0, 0].real == pytest.approx(expected, abs=1e-3 * ARCSEC)
+
+
+# --- other forms of friction before breakaway ----------------------------------------------------
+
+FORCE, WAY = 1.5, 3e-4
+FULL_LOOPS = 2e-3 * np.interp(
+    np.arange(0.0, 6.0, 0.01), [0, 1, 3, 5, 6], [0.0, 1.0, -1.0, 1.0, 0.0]
+)
+CYCLE = 40
+SMALL_LOOPS = 5e-4 - 4e-5 * (1.0 - np.cos(2.0 * np.pi * np.arange(6 * CYCLE + 1) / CYCLE))
+LOADED = np.concatenate([np.linspace(0.0, 5e-4, 50, endpoint=False), SMALL_LOOPS])
+
+
+def bristles(path, duration, breakaway=0.0, rate=0.02):
+    """Return the force of Dahl's friction on a path in time; with ``breakaway`` that of LuGre's.
+
+    z' = v - |v| z / slip, force = stiffness z; in LuGre's form the slip falls with the speed.
+    """
+    step, z, found = duration / len(path), 0.0, []
+    for way in np.diff(path, prepend=0.0):
+        slip = WAY * (1.0 + breakaway * np.exp(-((way / step / rate) ** 2)))
+        end = np.sign(way) * slip
+        z = end - (end - z) * np.exp(-np.abs(way) / slip)
+        found.append(FORCE / WAY * z)
+    return np.array(found)
+
+
+def maxwell(values, path):
+    law = MaxwellSlip(*np.exp(values))
+    still = np.zeros((1, len(path)))
+    state = PortState(path[None], still, lambda order: still, np.ones(1))
+    return law.respond(state).torque[0]
+
+
+def fitted_to(force, path):
+    fits = [
+        least_squares(
+            lambda one: maxwell(one, path) - force,
+            np.log([FORCE, share * WAY, 1.4]),
+            diff_step=1e-3,
+        )
+        for share in (1.0, 2.0)
+    ]
+    return min(fits, key=lambda one: one.cost)
+
+
+def creep(force):
+    """Return how far the force at the same place moves from one small loop to the next."""
+    return np.diff(force[-len(SMALL_LOOPS) :: CYCLE])
+
+
+@pytest.mark.parametrize("breakaway", [0.0, 0.5], ids=["dahl", "lugre"])
+def test_full_loops_of_other_forms_are_those_of_springs_that_slip(breakaway):
+    """So that the name of the law stands for all of them, as its sentence says."""
+    force = bristles(FULL_LOOPS, 1e3, breakaway)
+    fit = fitted_to(force, FULL_LOOPS)
+    assert np.sqrt(np.mean(fit.fun**2)) < 0.06 * np.abs(force).max()
+
+
+@pytest.mark.parametrize("breakaway", [0.0, 0.5], ids=["dahl", "lugre"])
+def test_small_reversals_under_a_load_tell_them_apart(breakaway):
+    """Springs that slip close each small loop; Dahl's and LuGre's friction creeps."""
+    springs = fitted_to(bristles(FULL_LOOPS, 1e3, breakaway), FULL_LOOPS).x
+    assert creep(maxwell(springs, LOADED)) == pytest.approx(0.0, abs=1e-9)
+    other = creep(bristles(LOADED, 1e3, breakaway))
+    assert np.all(other[:3] < -0.03 * FORCE)
+
+
+def test_only_lugre_changes_with_the_speed():
+    slow, fast = (bristles(LOADED, duration, 0.5) for duration in (1e3, 1e-2))
+    assert np.abs(slow - fast).max() > 0.1 * FORCE
+    slow, fast = (bristles(LOADED, duration) for duration in (1e3, 1e-2))
+    assert fast == pytest.approx(slow)
+    assert "Dahl's or LuGre's" in effect_named("hysteresis").sentence
