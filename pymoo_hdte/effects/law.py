@@ -49,7 +49,7 @@ class PortState:
         over the ratio, without what accelerates inertias; at a port of another mechanism, what its
         ``load`` says.
     temperature : ndarray or float
-        Of the machine, K; NaN where it is not known.
+        Of the machine in kelvin; NaN where it is not known.
     """
 
     position: Values

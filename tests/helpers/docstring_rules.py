@@ -35,7 +35,7 @@ _SYMBOLS = (
 )
 _WORDS = (
     "SI|units?|dimensionless|pure number|relative|ratios?|share|factors?|cycles|probability|"
-    "per cent|percent|weight|(?:micro)?metres|seconds"
+    "per cent|percent|weight|(?:micro)?metres|seconds|kelvin"
 )
 UNIT = re.compile(
     rf"(?:^|[,;:(] *|\bin |\band |\bor |\bby )(?:{_SYMBOLS})(?=[,;:.)]?(?:\s|$))|\b(?i:{_WORDS})\b"

@@ -71,7 +71,7 @@ class RunningRecord:
         Lowest and highest mean speed, rad/s, and mean load torque, N.m, that the record may have.
         Without them both are near the values set, within shares that `Rules` has.
     temperature : float, optional
-        Of the drive, near its lubricant, mean over the record, K.
+        Of the drive in kelvin, near its lubricant; the mean over the record.
     jumps : tuple of Jump
         Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
 

@@ -48,7 +48,7 @@ class Conditions:
     bends : complex ndarray, shape (r, 3, 1 + m)
         Contribution of a drift that is curved within a record: see `OrderLines`.
     temperature : ndarray, optional
-        K, NaN where it is not known; by default in no record.
+        In kelvin, NaN where it is not known; by default in no record.
     """
 
     input_speed: NDArray[np.float64]

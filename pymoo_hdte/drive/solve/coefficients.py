@@ -61,7 +61,7 @@ class Coefficients:
         Share of the mesh torque's reaction on the input through the slope of theta_s: 0 in
         Eq. (9), 1 by the principle of virtual work; dimensionless.
     temperature : float or ndarray, shape (n,)
-        Of the drive, K; NaN where it is not known.
+        Of the drive in kelvin; NaN where it is not known.
     """
 
     ratio: float
