@@ -24,6 +24,7 @@ from pymoo_hdte.drive import (
     LawAtPort,
     LoadInertia,
     MeshStiffnessVariation,
+    NewZero,
     ThermalDrift,
 )
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, ErrorSource, Mesh, Nominal
@@ -62,6 +63,7 @@ effects = st.one_of(
     st.builds(KinematicReaction, any_size),
     st.builds(Eccentricity, any_size, any_size, above_0),
     st.builds(ThermalDrift, any_size, st.one_of(above_0, st.just(np.inf))),
+    st.builds(NewZero, any_size, any_size),
     laws(),
 )
 
