@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
+from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
@@ -58,6 +59,8 @@ class Verdict:
         as they go.
     shown_in_held_out : bool
         Whether the records kept out of the fit, if there are any, show what is chosen.
+    probability : float or None
+        That it is right: see `probability`. None where it names nothing, or nothing was compared.
     """
 
     status: str
@@ -69,6 +72,7 @@ class Verdict:
     rules: Rules = RULES
     doubts: tuple[str, ...] = ()
     shown_in_held_out: bool = True
+    probability: float | None = None
 
     @property
     def accepted(self) -> Fit:
@@ -102,7 +106,8 @@ def judge(
     screened = screen(data, base, candidates) if quiet or not known else []
     gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
-        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules)
+        clean = probability.of_nothing(screened, len(base.residuals), rules)
+        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
     search = Search(data, base, candidates)
@@ -123,8 +128,18 @@ def judge(
     doubts = doubts_of(search, chosen, vote if shown else None)
     status = _status(chosen, _explains(search, chosen), equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()
+    sure = probability.of_names(status, chosen, rivals, search.found, degrees_of_freedom, rules)
     return Verdict(
-        status, base, chosen, tuple(others), rivals, degrees_of_freedom, rules, tuple(doubts), shown
+        status,
+        base,
+        chosen,
+        tuple(others),
+        rivals,
+        degrees_of_freedom,
+        rules,
+        tuple(doubts),
+        shown,
+        sure,
     )
 
 

@@ -56,6 +56,7 @@ def verdict_document(
         "campaign": finding.campaign.title,
         "status": verdict.status,
         "sentence": sentence(verdict),
+        "probability": verdict.probability,
         "doubts": [in_words(one) for one in verdict.doubts],
         "effects": _effects(verdict),
         "relevance": None if matters is None else matters.as_dict(),
