@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import string
+from collections.abc import Sequence
 
 from pymoo_hdte.checks import InvalidInput, one_of
 
@@ -57,6 +58,11 @@ def sentence_at(sentence: str, port: str, orders: str, force: str) -> str:
 def out_of_tolerance_sentence(parameter: str) -> str:
     """Return the sentence for a base parameter, given in words, that is out of tolerance."""
     return f"The {parameter} lies outside its tolerance."
+
+
+def listed(words: Sequence[str]) -> str:
+    """Return words as a list with commas and a last and; one word as it is."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def in_words(text: str) -> str:

@@ -129,13 +129,10 @@ class Search:
     def _fit(self, effects: Effects, start: Vector) -> Hypothesis:
         """Return a set fitted from a start so far as to rank it, unless it is known already."""
         label = label_of(effects)
-        known = self._by_label.get(label)
-        if known is not None:
-            return known
-        trial = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
-        best = hypothesis_of(trial, self.excess)
-        self._by_label[label] = best
-        return best
+        if label not in self._by_label:
+            trial = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
+            self._by_label[label] = hypothesis_of(trial, self.excess)
+        return self._by_label[label]
 
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end from its last values, and from other starts."""
@@ -143,7 +140,8 @@ class Search:
         if label not in self._finished or starts:
             best = self._best_fit(one.candidates, (one.fit.values, *starts))
             if shapes := other_shapes(best, self._by_label.values(), self.data.rules):
-                best = self._best_fit(one.candidates, (best.fit.values, *shapes))
+                others = self._best_fit(one.candidates, shapes)
+                best = min(best, others, key=lambda each: each.bic)
             self._by_label[label] = best
             self._finished.add(label)
         return self._by_label[label]

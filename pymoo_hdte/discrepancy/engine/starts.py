@@ -17,7 +17,7 @@ Vector = NDArray[np.float64]
 def from_believed(base: Sequence[Parameter], one: Hypothesis) -> Vector:
     """Return the believed values of the base with the fitted ones of a set's effects."""
     believed = np.array([parameter.start for parameter in base])
-    return np.append(believed, one.values_of(one.candidates)[len(believed) :])
+    return np.append(believed, one.fit.values[len(believed) :])
 
 
 def other_shapes(one: Hypothesis, found: Iterable[Hypothesis], rules: Rules) -> list[Vector]:
@@ -39,14 +39,12 @@ def other_shapes(one: Hypothesis, found: Iterable[Hypothesis], rules: Rules) -> 
     """
     if not any(_does_no_better(one, other, rules) for other in found):
         return []
-    starts, end = [], len(one.fit.values)
-    for member in reversed(one.candidates):
-        begin = end - len(member.parameters)
+    starts = []
+    for member, place in one.fit.places:
         for shape in member.starts if len(member.starts) > 1 and not member.linear else ():
             start = one.fit.values.copy()
-            start[begin + 1 : end] = shape[1:]
+            start[place.start + 1 : place.stop] = shape[1:]
             starts.append(start)
-        end = begin
     return starts
 
 

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.engine import probability
@@ -177,12 +176,12 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
 def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
     """Return what forbids to name a set plainly, in words; nothing if it may be named."""
     found, fitted = [], chosen.fit
-    for (candidate, bounded), (_, rows) in zip(
-        bounded_unknowns(fitted), rows_of(fitted), strict=True
+    for (candidate, bounded), (_, place) in zip(
+        bounded_unknowns(fitted), fitted.places, strict=True
     ):
         if bounded:
             found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
-        elif not strength_is_certain(fitted, candidate, rows, search.data.rules):
+        elif not strength_is_certain(fitted, candidate, place, search.data.rules):
             found.append(f"the interval of {candidate.label} contains nothing")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
@@ -200,39 +199,26 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
     A level that ended at zero is a part that the effect does not have.
     """
     found = []
-    for candidate, rows in rows_of(fitted):
+    for candidate, place in fitted.places:
         names = []
-        for row, parameter in zip(rows, candidate.parameters, strict=True):
-            none = parameter.linear and parameter.lower == 0.0 and fitted.bound_sides[row] < 0.0
-            if fitted.bound_sides[row] != 0.0 and not none:
+        for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
+            none = parameter.linear and parameter.lower == 0.0 and side < 0.0
+            if side != 0.0 and not none:
                 names.append(parameter.name)
         found.append((candidate, names))
     return found
 
 
-def rows_of(fitted: Fit) -> list[tuple[Candidate, NDArray[np.int_]]]:
-    """Return the places of each candidate's unknowns among the values of a fit."""
-    start = len(fitted.values) - sum(len(one.parameters) for one in fitted.candidates)
-    found = []
-    for candidate in fitted.candidates:
-        end = start + len(candidate.parameters)
-        found.append((candidate, np.arange(start, end)))
-        start = end
-    return found
-
-
-def strength_is_certain(
-    fitted: Fit, candidate: Candidate, rows: NDArray[np.int_], rules: Rules
-) -> bool:
+def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: Rules) -> bool:
     """Tell whether the strength of an effect differs from nothing, by its own interval.
 
     Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
     friction that falls with speed may have no level. Shapes, which are not zero, do not count.
     """
-    if not len(rows):
+    if not candidate.parameters:
         return True
     limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
-    for row, parameter in zip(rows, candidate.parameters, strict=True):
+    for row, parameter in enumerate(candidate.parameters, place.start):
         if parameter.name.endswith("_cosine"):
             pair = np.array([row, row + 1])
             block = fitted.covariance[np.ix_(pair, pair)]
