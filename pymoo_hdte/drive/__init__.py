@@ -10,6 +10,7 @@ from pymoo_hdte.drive.effects import (
     LawAtPort,
     LoadInertia,
     MeshStiffnessVariation,
+    NewZero,
     ThermalDrift,
 )
 from pymoo_hdte.drive.kinematic_error import KinematicError
@@ -48,6 +49,7 @@ __all__ = [
     "LawAtPort",
     "LoadInertia",
     "MeshStiffnessVariation",
+    "NewZero",
     "OrderSpectrum",
     "Run",
     "SpeedLoop",

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import re
 import string
+from collections.abc import Sequence
 
 from pymoo_hdte.checks import InvalidInput, one_of
 
 BLANKS = ("port", "order", "force")
 """What a sentence may leave open: the port, the orders, and the word for what acts there."""
-_PORT = r"([A-Za-z]\w*(?: of \w+)?)"
+_PORT = r"([A-Za-z]\w*(?:\.\w+)*(?: of \w+)?)"
 _LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
 
 
@@ -59,6 +60,11 @@ def out_of_tolerance_sentence(parameter: str) -> str:
     return f"The {parameter} lies outside its tolerance."
 
 
+def listed(words: Sequence[str]) -> str:
+    """Return words as a list with commas and a last and; one word as it is."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
 def in_words(text: str) -> str:
     """Return a text with all labels of candidates, such as ``torque_ripple:input@6``, in words."""
     return _LABEL.sub(_words, text).replace(")+", ") and ")
@@ -66,5 +72,7 @@ def in_words(text: str) -> str:
 
 def _words(label: re.Match[str]) -> str:
     name, form, port, order = label.groups()
-    details = [port.replace("_", " "), form, None if order is None else f"order {order}"]
+    # Dots stand between the words of a known effect's number, and in its order.
+    port = re.sub(r"_|(?<!\d)\.|\.(?!\d)", " ", port)
+    details = [port, form, None if order is None else f"order {order}"]
     return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"

@@ -24,6 +24,7 @@ from pymoo_hdte.drive import (
     LawAtPort,
     LoadInertia,
     MeshStiffnessVariation,
+    NewZero,
     ThermalDrift,
 )
 from pymoo_hdte.drive.datasheet import ERROR_CLASSES, ErrorSource, Mesh, Nominal
@@ -62,6 +63,7 @@ effects = st.one_of(
     st.builds(KinematicReaction, any_size),
     st.builds(Eccentricity, any_size, any_size, above_0),
     st.builds(ThermalDrift, any_size, st.one_of(above_0, st.just(np.inf))),
+    st.builds(NewZero, any_size, any_size),
     laws(),
 )
 
@@ -130,7 +132,7 @@ def test_a_round_trip_changes_no_bit(model, tmp_path):
 def test_a_file_of_version_1_still_holds_its_model():
     loaded = DriveModel.load(STORED / "drive_model_version_1.npz")
     assert bits(loaded) == bits(MODEL)
-    later = {"load_dependent_friction", "temperature_dependent_friction"}
+    later = {"load_dependent_friction", "temperature_dependent_friction", "new_zero"}
     known = {one.name for one in drive_effects()}
     assert {effect.name for effect in loaded.effects} == known - later
     linear = replace(loaded, effects=loaded.effects[:3])

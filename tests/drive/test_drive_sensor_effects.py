@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import Eccentricity, ThermalDrift, harmonic_balance, preset
+from pymoo_hdte.drive import Eccentricity, NewZero, ThermalDrift, harmonic_balance, preset
 from pymoo_hdte.drive.effects import drive_effects, effect_from_fields
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.units import ARCSEC
@@ -16,6 +16,7 @@ EFFECTS = [
     Eccentricity(1e-5, 0.2, 46.0),
     ThermalDrift(2e-9),
     ThermalDrift(2e-9, 600.0),
+    NewZero(1e-5, 600.0),
 ]
 phases = st.floats(-np.pi, np.pi)
 
@@ -42,6 +43,12 @@ def test_drift_grows_with_the_session_and_not_with_the_angle():
     elapsed = np.array([0.0, 1.0, 10.0, 100.0, 1000.0])
     assert drift.reading(angle, elapsed) == pytest.approx(3e-9 * elapsed)
     assert drift.reading(angle, 500.0) == pytest.approx(np.full(5, 1.5e-6))
+
+
+def test_a_new_zero_holds_from_its_time_on():
+    angle, elapsed = np.linspace(0.0, 6.0, 4), np.array([0.0, 599.0, 600.0, 1e4])
+    read = NewZero(1e-5, 600.0).reading(angle, elapsed)
+    np.testing.assert_array_equal(read, [0.0, 0.0, 1e-5, 1e-5])
 
 
 @given(st.floats(100.0, 1e4), st.floats(0.0, 1e4))

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
+from pymoo_hdte.discrepancy.campaign.rows.session_zero import FEWEST_BESIDE_A_CHANGE
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS, Features
 from pymoo_hdte.discrepancy.engine.fitting import Fit
@@ -40,6 +41,8 @@ class Scales:
         Largest torque at the input, N.m.
     duration : float
         From the first record of the session to the last, s.
+    changes : tuple of float
+        Times between records, none of them near the ends of the session, s.
     error, input_torque, output_torque : float
         Residual of the base in the transmission error, rad, and in the two torques, N.m: root mean
         square over a record, means and lines together.
@@ -58,6 +61,7 @@ class Scales:
     output_torque: float
     driven: bool = False
     temperature: float = 0.0
+    changes: tuple[float, ...] = ()
 
 
 def scales_of(data: Data, base: Fit) -> Scales:
@@ -90,15 +94,24 @@ def scales_of(data: Data, base: Fit) -> Scales:
         output_torque=output_torque,
         driven=bool(braking.max() > least and braking.min() < -least),
         temperature=_temperature(data),
+        changes=_changes(when.elapsed),
     )
 
 
 def _temperature(data: Data) -> float:
-    """Return the middle of the records' temperatures, K, if all have one and they spread enough."""
+    """Return the mean of the records' temperatures, K, if all have one and they spread enough."""
     known = data.features.conditions.temperature
     if known is None or not np.ptp(known) >= data.rules.least_temperature_spread:
         return 0.0
     return float(np.mean(known))
+
+
+def _changes(elapsed: NDArray[np.float64]) -> tuple[float, ...]:
+    """Return the times in the middle between records that are not taken at once."""
+    ordered = np.sort(elapsed)
+    least = FEWEST_BESIDE_A_CHANGE
+    early, late = ordered[least - 1 : -least], ordered[least : 1 - least]
+    return tuple(((early + late) / 2.0)[late > early].tolist())
 
 
 def _size(features: Features, values: NDArray[np.float64], channel: int) -> float:
@@ -166,6 +179,7 @@ def port_sizes(
         inertia=max(believed.load_inertia, 10.0 * believed.output_inertia),
         duration=scales.duration,
         temperature=scales.temperature,
+        changes=scales.changes,
     )
     slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
     return {

@@ -61,7 +61,17 @@ class Fit:
     @property
     def effects_by_candidate(self) -> tuple[tuple[Any, ...], ...]:
         """The fitted effects of each candidate."""
-        return built(self.candidates, self.values[len(self.values) - count(self.candidates) :])
+        return built(self.candidates, self.values[self.n_base :])
+
+    @property
+    def n_base(self) -> int:
+        """Number of parameters of the base."""
+        return len(self.values) - count(self.candidates)
+
+    @property
+    def places(self) -> list[tuple[Candidate, slice]]:
+        """Each candidate with the places of its unknowns among the values."""
+        return places(self.candidates, self.n_base)
 
     @cached_property
     def at_bounds(self) -> tuple[str, ...]:
@@ -268,12 +278,16 @@ def built(
     candidates: Sequence[Candidate], values: Sequence[float] | Vector
 ) -> tuple[tuple[Any, ...], ...]:
     """Return the effects of each of the candidates for their values, one after the other."""
-    effects, start = [], 0
-    for candidate in candidates:
-        end = start + len(candidate.parameters)
-        effects.append(candidate.build([float(value) for value in values[start:end]]))
-        start = end
-    return tuple(effects)
+    return tuple(
+        candidate.build([float(value) for value in values[place]])
+        for candidate, place in places(candidates)
+    )
+
+
+def places(candidates: Sequence[Candidate], first: int = 0) -> list[tuple[Candidate, slice]]:
+    """Return each candidate with the places of its values, the first of all being ``first``."""
+    ends = np.cumsum([first, *(len(one.parameters) for one in candidates)]).tolist()
+    return [(one, slice(*ends[place : place + 2])) for place, one in enumerate(candidates)]
 
 
 def _without_tolerance(parameter: Parameter) -> Parameter:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, count, fit
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened
 from pymoo_hdte.effects.effect import is_contained
@@ -66,14 +66,8 @@ class Hypothesis:
 
     def values_of(self, kept: Sequence[Candidate]) -> NDArray[np.float64]:
         """Return the fitted values of the base and of some of the effects, in their order here."""
-        start = len(self.fit.values) - count(self.candidates)
-        parts = [self.fit.values[:start]]
-        for candidate in self.candidates:
-            end = start + len(candidate.parameters)
-            if candidate in kept:
-                parts.append(self.fit.values[start:end])
-            start = end
-        return np.concatenate(parts)
+        parts = [self.fit.values[place] for one, place in self.fit.places if one in kept]
+        return np.concatenate([self.fit.values[: self.fit.n_base], *parts])
 
     @cached_property
     def names(self) -> frozenset[tuple[str, str]]:
@@ -88,7 +82,7 @@ def label_of(effects: Sequence[Candidate]) -> frozenset[str]:
 
 def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
     """Return a fit with its evidence, for a given excess chi-square of the base."""
-    n_base = len(fitted.values) - count(fitted.candidates)
+    n_base = fitted.n_base
     unknowns = n_base + sum(candidate.unknowns for candidate in fitted.candidates)
     bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
     gain = of_base + (len(fitted.residuals) - n_base) - fitted.chi_square

@@ -1,15 +1,17 @@
 """Bounded nonlinear least squares with few unknowns and slow residuals.
 
 The Levenberg-Marquardt method in Moré's scaling (Lecture Notes in Mathematics 630, 1978), whose
-linear problem is solved within the bounds (BVLS: Stark and Parker, Computational Statistics 10,
-1995). A parameter at a bound therefore neither shortens a step nor has to leave its bound first,
-which a trust region inside the bounds needs many steps for; and unknowns in which residuals are
-linear (gains, zeros, levels, parts of lines) are solved for exactly in every step.
+damping follows how much of the promised reduction a step brought (Nielsen, IMM report 1999-05,
+Technical University of Denmark), and whose linear problem is solved within the bounds (BVLS: Stark
+and Parker, Computational Statistics 10, 1995). A parameter at a bound therefore neither shortens a
+step nor has to leave its bound first, which a trust region inside the bounds needs many steps for;
+and unknowns in which residuals are linear (gains, zeros, levels, parts of lines) are solved for
+exactly in every step.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +27,10 @@ SETTLED_SHARE = 1e-7
 """The same relative to chi-square: where a model is far off, its last digits decide nothing."""
 _DAMPING = 1e-3
 """First damping relative to the scaled curvature."""
-_GOOD, _POOR = 0.75, 0.25
-"""Ratios of the reduction to the promised one above and below which damping is changed."""
+_LEAST_FACTOR, _LEAST_DAMPING = 0.1, 1e-9
+"""Strongest reduction of the damping by one step, and its least value."""
+_TRUSTED = 0.5
+"""Share of the promised reduction above which derivatives are updated by what the step showed."""
 _ATTEMPTS = 12
 """Most dampings tried for one step."""
 
@@ -70,18 +74,43 @@ def minimum(
     """
     values = np.clip(start, problem.lower, problem.upper)
     residuals, jacobian = problem.residuals(values), problem.jacobian(values)
-    size, damping = np.zeros(len(values)), _DAMPING
+    size, damping, confirming, fresh = np.zeros(len(values)), _DAMPING, False, True
     for _ in range(steps):
         size = np.maximum(size, np.linalg.norm(jacobian, axis=0))
-        before = residuals @ residuals
         found = _step(problem, values, residuals, jacobian, size, damping)
-        if found is None:
+        before = residuals @ residuals
+        slow = found is None or before - found.residuals @ found.residuals <= (
+            SETTLED + settled * before
+        )
+        if found is not None:
+            moved = (found.values - values) / problem.scale
+            if not slow and found.share > _TRUSTED:
+                error = found.residuals - residuals - jacobian @ moved
+                jacobian = jacobian + np.outer(error, moved / (moved @ moved))
+                fresh = False
+            elif not (slow and fresh and confirming):
+                jacobian, fresh = problem.jacobian(found.values), True
+            values, residuals, damping = found.values, found.residuals, found.damping
+        elif not fresh:
+            jacobian, fresh = problem.jacobian(values), True
+            continue
+        if not slow:
+            confirming = False
+        elif confirming:
             break
-        values, residuals, damping = found
-        jacobian = problem.jacobian(values)
-        if before - residuals @ residuals <= SETTLED + settled * before:
-            break
+        else:
+            # A damped step along a flat valley is short, and brings little far from the minimum.
+            size, damping, confirming = np.zeros(len(values)), _LEAST_DAMPING, True
     return values, residuals, jacobian
+
+
+class _Step(NamedTuple):
+    """Where a step ends: values, residuals, the next damping, and the share of what it promised."""
+
+    values: Vector
+    residuals: Vector
+    damping: float
+    share: float
 
 
 def _step(
@@ -91,11 +120,8 @@ def _step(
     jacobian: Matrix,
     size: Vector,
     damping: float,
-) -> tuple[Vector, Vector, float] | None:
-    """Return the next values, their residuals and the damping.
-
-    None if no step reduces the sum of squares by what counts.
-    """
+) -> _Step | None:
+    """Return the next step; None if none reduces the sum of squares by what counts."""
     orthonormal, triangle = np.linalg.qr(jacobian)
     along, before = orthonormal.T @ residuals, residuals @ residuals
     size = np.maximum(size, 1e-12)
@@ -103,6 +129,7 @@ def _step(
     lower = np.minimum((problem.lower - values) / problem.scale, 0.0) - 1e-14
     upper = np.maximum((problem.upper - values) / problem.scale, 0.0) + 1e-14
     right = np.concatenate([-along, np.zeros(len(size))])
+    growth = 2.0
     for _ in range(_ATTEMPTS):
         matrix = np.vstack([triangle, np.diag(np.sqrt(damping) * size)])
         step = lsq_linear(matrix, right, (lower, upper), method="bvls").x
@@ -113,8 +140,9 @@ def _step(
         there = problem.residuals(moved)
         gain = before - there @ there
         if gain > 0.0:
-            share = gain / promised
-            factor = 0.2 if share > _GOOD else 1.0 if share > _POOR else 2.0
-            return moved, there, max(factor * damping, 1e-9)
-        damping *= 5.0
+            share = float(gain / promised)
+            factor = max(1.0 - (2.0 * share - 1.0) ** 3, _LEAST_FACTOR)
+            return _Step(moved, there, max(factor * damping, _LEAST_DAMPING), share)
+        growth *= 2.0
+        damping *= growth
     return None

@@ -7,6 +7,18 @@ from dataclasses import dataclass
 from pymoo_hdte.discrepancy.engine.rule_fields import BY_HAND, RuleSet, rule
 
 
+def _counted(share: float, verdict: str, truth: str) -> float:
+    """Return a rule for the share of verdicts that turned out right."""
+    return rule(
+        share,
+        "probability",
+        f"Of verdicts that are {verdict}, the share of which {truth}, where the evidence leaves no "
+        "doubt.",
+        f"{BY_HAND}.",
+        at_most=1.0,
+    )
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReportRules(RuleSet):
     """Thresholds of the map of the misfit, of the proof and of the next test.
@@ -152,3 +164,9 @@ class ReportRules(RuleSet):
         at_least=0.0,
         at_most=1.0,
     )
+
+    # How probable is what is said?
+    named_right: float = _counted(0.95, "named (or of a parameter)", "all its names are true")
+    class_right: float = _counted(0.95, "of a class", "the truth is in the class")
+    partial_right: float = _counted(0.95, "partial", "all its names are true")
+    adequate_right: float = _counted(0.95, "that nothing is missing", "nothing is")

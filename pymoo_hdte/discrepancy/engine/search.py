@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 )
 from pymoo_hdte.discrepancy.engine.membership import ill_explained, is_earned
 from pymoo_hdte.discrepancy.engine.screening import Screened, screen
+from pymoo_hdte.discrepancy.engine.starts import from_believed, other_shapes
 from pymoo_hdte.effects.effect import is_contained
 
 Vector = NDArray[np.float64]
@@ -128,23 +129,27 @@ class Search:
     def _fit(self, effects: Effects, start: Vector) -> Hypothesis:
         """Return a set fitted from a start so far as to rank it, unless it is known already."""
         label = label_of(effects)
-        known = self._by_label.get(label)
-        if known is not None:
-            return known
-        trial = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
-        best = hypothesis_of(trial, self.excess)
-        self._by_label[label] = best
-        return best
+        if label not in self._by_label:
+            trial = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
+            self._by_label[label] = hypothesis_of(trial, self.excess)
+        return self._by_label[label]
 
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end from its last values, and from other starts."""
         label = label_of(one.candidates)
         if label not in self._finished or starts:
-            fits = [fit(self.data, one.candidates, start) for start in (one.fit.values, *starts)]
-            best = min(fits, key=lambda each: each.chi_square)
-            self._by_label[label] = hypothesis_of(best, self.excess)
+            best = self._best_fit(one.candidates, (one.fit.values, *starts))
+            if shapes := other_shapes(best, self._by_label.values(), self.data.rules):
+                others = self._best_fit(one.candidates, shapes)
+                best = min(best, others, key=lambda each: each.bic)
+            self._by_label[label] = best
             self._finished.add(label)
         return self._by_label[label]
+
+    def _best_fit(self, effects: Effects, starts: Sequence[Vector]) -> Hypothesis:
+        """Return the best of the fits of a set from several starts."""
+        fits = [fit(self.data, effects, start) for start in starts]
+        return hypothesis_of(min(fits, key=lambda each: each.chi_square), self.excess)
 
     def _finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near."""
@@ -163,8 +168,7 @@ class Search:
         An inertia that is larger by half moves a resonance past lines, so that chi-square does not
         decrease steadily on the way there; and values of the base that hide an effect lie far off.
         """
-        believed = np.array([parameter.start for parameter in self.data.base])
-        starts = [np.append(believed, one.values_of(one.candidates)[len(believed) :])]
+        starts = [from_believed(self.data.base, one)]
         (*others, last) = one.candidates
         if not others and len(last.starts) > 1 and not last.linear:
             starts += [np.append(self.base.values, start) for start in last.starts]

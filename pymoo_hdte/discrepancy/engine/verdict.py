@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
+from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
@@ -58,6 +58,8 @@ class Verdict:
         as they go.
     shown_in_held_out : bool
         Whether the records kept out of the fit, if there are any, show what is chosen.
+    probability : float or None
+        That it is right: see `probability`. None where it names nothing, or nothing was compared.
     """
 
     status: str
@@ -69,6 +71,7 @@ class Verdict:
     rules: Rules = RULES
     doubts: tuple[str, ...] = ()
     shown_in_held_out: bool = True
+    probability: float | None = None
 
     @property
     def accepted(self) -> Fit:
@@ -102,7 +105,8 @@ def judge(
     screened = screen(data, base, candidates) if quiet or not known else []
     gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
-        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules)
+        clean = probability.of_nothing(screened, len(base.residuals), rules)
+        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
     search = Search(data, base, candidates)
@@ -123,8 +127,18 @@ def judge(
     doubts = doubts_of(search, chosen, vote if shown else None)
     status = _status(chosen, _explains(search, chosen), equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()
+    sure = probability.of_names(status, chosen, rivals, search.found, degrees_of_freedom, rules)
     return Verdict(
-        status, base, chosen, tuple(others), rivals, degrees_of_freedom, rules, tuple(doubts), shown
+        status,
+        base,
+        chosen,
+        tuple(others),
+        rivals,
+        degrees_of_freedom,
+        rules,
+        tuple(doubts),
+        shown,
+        sure,
     )
 
 
@@ -162,12 +176,12 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
 def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
     """Return what forbids to name a set plainly, in words; nothing if it may be named."""
     found, fitted = [], chosen.fit
-    for (candidate, bounded), (_, rows) in zip(
-        bounded_unknowns(fitted), rows_of(fitted), strict=True
+    for (candidate, bounded), (_, place) in zip(
+        bounded_unknowns(fitted), fitted.places, strict=True
     ):
         if bounded:
             found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
-        elif not strength_is_certain(fitted, candidate, rows, search.data.rules):
+        elif not strength_is_certain(fitted, candidate, place, search.data.rules):
             found.append(f"the interval of {candidate.label} contains nothing")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
@@ -185,39 +199,26 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
     A level that ended at zero is a part that the effect does not have.
     """
     found = []
-    for candidate, rows in rows_of(fitted):
+    for candidate, place in fitted.places:
         names = []
-        for row, parameter in zip(rows, candidate.parameters, strict=True):
-            none = parameter.linear and parameter.lower == 0.0 and fitted.bound_sides[row] < 0.0
-            if fitted.bound_sides[row] != 0.0 and not none:
+        for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
+            none = parameter.linear and parameter.lower == 0.0 and side < 0.0
+            if side != 0.0 and not none:
                 names.append(parameter.name)
         found.append((candidate, names))
     return found
 
 
-def rows_of(fitted: Fit) -> list[tuple[Candidate, NDArray[np.int_]]]:
-    """Return the places of each candidate's unknowns among the values of a fit."""
-    start = len(fitted.values) - sum(len(one.parameters) for one in fitted.candidates)
-    found = []
-    for candidate in fitted.candidates:
-        end = start + len(candidate.parameters)
-        found.append((candidate, np.arange(start, end)))
-        start = end
-    return found
-
-
-def strength_is_certain(
-    fitted: Fit, candidate: Candidate, rows: NDArray[np.int_], rules: Rules
-) -> bool:
+def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: Rules) -> bool:
     """Tell whether the strength of an effect differs from nothing, by its own interval.
 
     Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
     friction that falls with speed may have no level. Shapes, which are not zero, do not count.
     """
-    if not len(rows):
+    if not candidate.parameters:
         return True
     limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
-    for row, parameter in zip(rows, candidate.parameters, strict=True):
+    for row, parameter in enumerate(candidate.parameters, place.start):
         if parameter.name.endswith("_cosine"):
             pair = np.array([row, row + 1])
             block = fitted.covariance[np.ix_(pair, pair)]

@@ -8,7 +8,6 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
@@ -20,7 +19,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.engine.verdict import Verdict, rows_of
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.effects.sentences import in_words
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
@@ -56,6 +55,7 @@ def verdict_document(
         "campaign": finding.campaign.title,
         "status": verdict.status,
         "sentence": sentence(verdict),
+        "probability": verdict.probability,
         "doubts": [in_words(one) for one in verdict.doubts],
         "effects": _effects(verdict),
         "relevance": None if matters is None else matters.as_dict(),
@@ -145,7 +145,8 @@ def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
 def _effects(verdict: Verdict) -> list[dict[str, Any]]:
     """Return the accepted effects; none unless the verdict names or classes them."""
     fitted, found = verdict.accepted, []
-    for candidate, rows in rows_of(fitted):
+    for candidate, place in fitted.places:
+        rows = range(place.start, place.stop)
         bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
         found.append(
             {
@@ -161,7 +162,7 @@ def _effects(verdict: Verdict) -> list[dict[str, Any]]:
     return found
 
 
-def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> dict[str, Any]:
+def _parameters(candidate: Candidate, fitted: Fit, rows: Sequence[int]) -> dict[str, Any]:
     """Return values with intervals; cosine and sine part as amplitude and phase.
 
     For a base parameter out of tolerance, its fitted value.
@@ -170,7 +171,7 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: NDArray[np.int_]) -> di
     """
     found: dict[str, Any] = {}
     if candidate.frees is not None:
-        rows = np.array([[one.name for one in fitted.parameters].index(candidate.frees)])
+        rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
     for row in rows:
         name, variance = fitted.parameters[row].name, fitted.covariance[row, row]
         if name.endswith("_cosine"):

@@ -81,10 +81,9 @@ def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
     """Return the accepted effects with values and 95 % intervals."""
     fitted = finding.accepted
     spread = Spread(finding.data, fitted)
-    start, found = len(finding.data.base), []
-    for candidate in fitted.candidates:
-        rows = range(start, start + len(candidate.parameters))
-        start = rows.stop
+    found = []
+    for candidate, place in fitted.places:
+        rows = range(place.start, place.stop)
         found.append(
             {
                 "name": candidate.name,

@@ -10,6 +10,7 @@ from pymoo_hdte.discrepancy.campaign.rows.findings import (
     RowFault,
     RowFindings,
 )
+from pymoo_hdte.effects.sentences import listed
 from pymoo_hdte.units import ARCSEC
 
 _MOST_FAULTS = 50
@@ -62,10 +63,10 @@ def rows_sentence(findings: RowFindings) -> str:
     if counted:
         records = {fault.record for fault in findings.faults}
         where = next(iter(records)) if len(records) == 1 else f"{len(records)} records"
-        words.append(f"{_listed(counted)} in {where}: {_treatment(findings)}.")
+        words.append(f"{listed(counted)} in {where}: {_treatment(findings)}.")
     changed = [one for one in findings.noise if one.replaced]
     if changed:
-        ratios = _listed([f"{one.used / one.stated:.2g} times ({_name(one)})" for one in changed])
+        ratios = listed([f"{one.used / one.stated:.2g} times ({_name(one)})" for one in changed])
         words.append(f"The noise is not the stated one but {ratios}; what was found is used.")
     sentence = " ".join(words)
     return sentence[:1].upper() + sentence[1:]
@@ -81,7 +82,7 @@ def _treatment(findings: RowFindings) -> str:
     if "new zero" in modelled:
         done.append("the records after a new zero are shifted back")
     if findings.left_out:
-        done.append(f"left out as a whole: {_listed(list(findings.left_out))}")
+        done.append(f"left out as a whole: {listed(list(findings.left_out))}")
     return "; ".join(done) or "nothing had to be left out"
 
 
@@ -116,7 +117,3 @@ def _shown(unit: str, size: float) -> tuple[str, float]:
 
 def _name(one: NoiseFinding) -> str:
     return one.name.removesuffix("_noise").replace("_", " ")
-
-
-def _listed(words: list[str]) -> str:
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

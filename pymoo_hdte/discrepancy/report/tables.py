@@ -95,7 +95,7 @@ def certainty(finding: DriveFinding) -> str:
         return (
             "The misfit of the believed drive, fitted within its tolerances, has "
             f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. "
-            "An effect too small for these records may still be there."
+            f"An effect too small for these records may still be there. {_probably(verdict)}"
         )
     if verdict.chosen is None:
         return "That something is missing is certain; no effect was there to be tried."
@@ -157,7 +157,22 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
         orders = finding.campaign.believed.error_orders
         names = ", ".join(words_of(name, orders) for name in chosen.fit.at_bounds)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
-    return words
+    return [*words, _probably(verdict)]
+
+
+def _probably(verdict: Verdict) -> str:
+    """Return the probability that a verdict is right, in words."""
+    what = {
+        "adequate": "nothing of the list is missing",
+        "class": "one of these is the cause",
+        "partial": "what is named is missing, if not all",
+    }.get(verdict.status, "this is the cause")
+    whole = int(100.0 * (verdict.probability or 0.0))
+    return (
+        f"The probability that {what} is {whole} %, by the evidence of "
+        "everything that was compared and by how often such verdicts were right on campaigns with "
+        "a known truth."
+    )
 
 
 def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:

@@ -9,7 +9,8 @@ from pymoo_hdte.drive.effects.base import (
     drive_effects,
     effect_from_fields,
 )
-from pymoo_hdte.drive.effects.encoder import ENCODER_LINE, Eccentricity, ThermalDrift
+from pymoo_hdte.drive.effects.encoder import ENCODER_LINE, Eccentricity
+from pymoo_hdte.drive.effects.encoder_zero import NewZero, ThermalDrift
 from pymoo_hdte.drive.effects.mesh_stiffness import MeshStiffnessVariation
 from pymoo_hdte.drive.effects.shafts import DampingReference, LoadInertia
 from pymoo_hdte.drive.effects.static_error import KinematicErrorLine, KinematicReaction
@@ -25,6 +26,7 @@ __all__ = [
     "LawAtPort",
     "LoadInertia",
     "MeshStiffnessVariation",
+    "NewZero",
     "Session",
     "ThermalDrift",
     "drive_effects",

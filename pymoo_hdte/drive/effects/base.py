@@ -42,6 +42,8 @@ class DriveSizes(Sizes):
         Of the load, kg.m2: the size of an inertia that may be missing.
     duration : float
         Of the session, s.
+    changes : tuple of float
+        Times of the session between records, at which a reading may have changed at once, s.
     """
 
     error: float = 0.0
@@ -50,6 +52,7 @@ class DriveSizes(Sizes):
     ratio: float = 1.0
     inertia: float = 0.0
     duration: float = 0.0
+    changes: tuple[float, ...] = ()
 
     def further(self) -> Self:
         """Return the sizes without the orders of believed lines of the error."""

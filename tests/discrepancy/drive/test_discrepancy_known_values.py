@@ -22,6 +22,7 @@ from pymoo_hdte.drive import KinematicErrorLine, LawAtPort
 from pymoo_hdte.drive.effects import MeshStiffnessVariation
 from pymoo_hdte.effects.friction import CoulombFriction, PeriodicTorque
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.sentences import in_words
 from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.io.fields import Fields
 
@@ -142,6 +143,8 @@ def test_numbers_have_names_words_and_units():
     assert words_of("kinematic_error.3.7.amplitude", ()) == (
         "amplitude of the kinematic error of order 3.7"
     )
+    said = in_words("the nearest is parameter:kinematic_error.3.7.amplitude.")
+    assert said == "the nearest is parameter (kinematic error 3.7 amplitude)."
     assert base_unit("kinematic_error.3.7.amplitude") == "rad"
     assert base_unit("hysteresis.mesh.torsion") == "rad"
     assert not any(name.endswith(("order", "phase")) for name in known_values(effects))

@@ -1,4 +1,4 @@
-"""The two traps of design section 7: without their safeguards a clean drive looks faulty."""
+"""Traps: without their safeguards a clean drive looks faulty, or a new zero like a drift."""
 
 from dataclasses import replace
 
@@ -11,6 +11,8 @@ from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.engine import search
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.drive import NewZero
+from pymoo_hdte.units import ARCSEC
 
 
 @pytest.fixture(scope="module", params=[1, pytest.param(2, marks=pytest.mark.nightly)])
@@ -52,6 +54,20 @@ def test_a_frozen_base_makes_effects_of_its_own_errors(clean, unsearched):
 def test_repeatability_left_out_is_a_false_alarm(clean, unsearched):
     exact = replace(clean.rig, repeatability=0.0)
     assert examine_drive(replace(clean, rig=exact), unsearched).verdict.status != "adequate"
+
+
+def test_a_small_change_of_the_zero_is_no_drift():
+    """Too small to be told from a smooth drift by means alone, it was named thermal drift."""
+    clean = quick_campaign(1)
+    moved = [
+        replace(one, output_angle=one.output_angle + ARCSEC) if one.elapsed > 65.0 else one
+        for one in clean.running
+    ]
+    verdict = examine_drive(replace(clean, running=tuple(moved))).verdict
+    assert verdict.status == "named"
+    (change,) = verdict.chosen.fit.effects
+    assert isinstance(change, NewZero)
+    assert change.size == pytest.approx(ARCSEC, rel=0.3)
 
 
 @pytest.mark.nightly

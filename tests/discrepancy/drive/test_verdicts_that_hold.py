@@ -12,7 +12,6 @@ import verdict_cases as mends
 from verdict_cases import case_campaign
 
 from pymoo_hdte.discrepancy import analyse
-from pymoo_hdte.discrepancy.engine.verdict import rows_of
 from pymoo_hdte.units import ARCSEC
 
 DEVIATIONS = 3.0
@@ -97,15 +96,15 @@ def said(analysis):
 
 def fitted_value(fitted, label, unknown):
     """Return an unknown of an effect, or the amplitude of its line, with its deviation."""
-    ((rows, names),) = [
-        (rows, [parameter.name for parameter in candidate.parameters])
-        for candidate, rows in rows_of(fitted)
+    ((first, names),) = [
+        (place.start, [parameter.name for parameter in candidate.parameters])
+        for candidate, place in fitted.places
         if candidate.label == label
     ]
     if unknown in names:
-        place = rows[names.index(unknown)]
+        place = first + names.index(unknown)
         return fitted.values[place], np.sqrt(fitted.covariance[place, place])
-    pair = [rows[names.index(f"{unknown}_{part}")] for part in ("cosine", "sine")]
+    pair = [first + names.index(f"{unknown}_{part}") for part in ("cosine", "sine")]
     size = np.hypot(*fitted.values[pair])
     direction = fitted.values[pair] / size
     return size, np.sqrt(direction @ fitted.covariance[np.ix_(pair, pair)] @ direction)

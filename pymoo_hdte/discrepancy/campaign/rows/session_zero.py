@@ -26,8 +26,8 @@ Values = NDArray[np.float64]
 _LEAST_FREEDOM = 4
 """Degrees of freedom that loads and a step leave; with fewer, every step fits."""
 
-_FEWEST = 2
-"""Least number of records before and after: one that is off may be so for any reason."""
+FEWEST_BESIDE_A_CHANGE = 2
+"""Least number of records before and after a change: one may be off for any reason."""
 
 _WARMING = (0.03, 0.1, 0.3, 1.0)
 """Time constants of drifts that are compared, in lengths of the session."""
@@ -119,7 +119,9 @@ def _step(means: _Means, rules: Rules) -> tuple[int, float] | None:
     if freedom < _LEAST_FREEDOM:
         return None
     places = np.flatnonzero(np.diff(means.elapsed) > 0.0) + 1
-    places = places[(places >= _FEWEST) & (places <= number - _FEWEST)]
+    places = places[
+        (places >= FEWEST_BESIDE_A_CHANGE) & (places <= number - FEWEST_BESIDE_A_CHANGE)
+    ]
     if not places.size:
         return None
     steps = [_left(means, (np.arange(number) >= place).astype(float)) for place in places]

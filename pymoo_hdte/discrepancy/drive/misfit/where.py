@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.drive.misfit.nature import (
     stray_lines,
 )
 from pymoo_hdte.discrepancy.drive.misfit.trend import broad_band, in_words, strongest, trends
+from pymoo_hdte.effects.sentences import listed
 
 _WORDS = [name.replace("_", " ") for name in CHANNELS]
 # Length of the lists in sentences; thresholds of flagging and of statements are in `Rules`.
@@ -68,7 +69,7 @@ def _where(location: Location, stray: StrayLines, ratio: float) -> str:
     """Return the orders, or else a broad band or fixed frequency, with the channels."""
     size = sizes(location)
     if stray.broad:
-        names = _listed([_WORDS[CHANNELS.index(name)] for name in stray.broad])
+        names = listed([_WORDS[CHANNELS.index(name)] for name in stray.broad])
         return f"In a broad band of the {names}: it comes and goes with time, not with the angle."
     if stray.frequency is None:
         return _orders(location, size, ratio)
@@ -94,7 +95,7 @@ def _orders(location: Location, size: Values, ratio: float) -> str:
     for place in shown:
         channels = _channels(size[:, :, place].sum(axis=0))
         by_channels.setdefault(channels, []).append(_order(location, place, ratio))
-    parts = [f"at {_listed(orders)} in {channels}" for channels, orders in by_channels.items()]
+    parts = [f"at {listed(orders)} in {channels}" for channels, orders in by_channels.items()]
     more = np.count_nonzero(size.any(axis=(0, 1))) - len(shown)
     if more:
         parts.append(f"less at {more} further order{'s' if more > 1 else ''}")
@@ -123,7 +124,7 @@ def _channels(size: Values) -> str:
     """Return the channels whose misfit (4,) matters."""
     least = _MINOR * _weight(size[:, None])[0] / max(np.count_nonzero(size[:3]), 1)
     found = [name for name, one in zip(_WORDS, size, strict=True) if one > 0.0 and one >= least]
-    return "all channels" if len(found) == len(_WORDS) else f"the {_listed(found)}"
+    return "all channels" if len(found) == len(_WORDS) else f"the {listed(found)}"
 
 
 def _growth(location: Location, broad: bool) -> str:
@@ -149,7 +150,7 @@ def _beyond(location: Location, ratio: float) -> str:
     parts += [_order(location, place, ratio) for place in places[:_SHOWN]]
     if not parts:
         parts = [f"{np.sum(~within.records)} of {len(within.records)} records"]
-    return _listed(parts)
+    return listed(parts)
 
 
 def _trusted(location: Location, ratio: float) -> str:
@@ -170,10 +171,10 @@ def _trusted(location: Location, ratio: float) -> str:
     wrong = np.asarray(flagged.any(axis=(0, 1)) | ~within.orders)
     parts = []
     if channels:
-        parts.append(f"in the {_listed(channels)}")
+        parts.append(f"in the {listed(channels)}")
     if wrong.any() and not wrong.all():
         places = np.flatnonzero(wrong).tolist()
-        names = _listed([_order(location, place, ratio) for place in places])
+        names = listed([_order(location, place, ratio) for place in places])
         few = len(places) <= _SHOWN
         parts.append(
             f"at all orders but {names}" if few else f"at {np.sum(~wrong)} of {len(wrong)} orders"
@@ -197,7 +198,3 @@ def _conditions(location: Location, clean: Flags) -> str:
             limit = round(limit / step) * step
             return f"in all records {f'up to {limit:g} {unit}' if limit else 'without load'}"
     return f"in {int(clean.sum())} of {len(clean)} records"
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

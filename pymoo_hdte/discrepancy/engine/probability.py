@@ -1,0 +1,75 @@
+"""How probable it is that a verdict is right: evidence over all compared sets, and experience.
+
+The evidence tells how much better a set explains the data than the others that were compared. It
+cannot tell how often the truth is in none of them, or no fit reached it: that share was counted on
+campaigns with a known truth, for each status.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.discrepancy.engine.screening import Screened
+
+
+def of_names(
+    status: str,
+    chosen: Hypothesis,
+    equivalent: Sequence[Hypothesis],
+    found: Sequence[Hypothesis],
+    degrees_of_freedom: int,
+    rules: Rules,
+) -> float | None:
+    """Return the probability that all names of a verdict, or one of its class, are true.
+
+    Each set counts by its evidence, in units of what even the chosen one leaves. A set that
+    contains all names of another says that they are true, too.
+
+    Parameters
+    ----------
+    status : str
+    chosen : Hypothesis
+    equivalent : sequence of Hypothesis
+        Others of its class.
+    found : sequence of Hypothesis
+        All compared sets.
+    degrees_of_freedom : int
+    rules : Rules
+
+    Returns
+    -------
+    float or None
+        None for a status that names nothing.
+    """
+    experience = {
+        "named": rules.named_right,
+        "parameter": rules.named_right,
+        "class": rules.class_right,
+        "partial": rules.partial_right,
+    }.get(status)
+    if experience is None:
+        return None
+    misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
+    evidence = np.array([one.fit.evidence for one in found])
+    weights = np.exp(-(evidence - evidence.min()) / (2.0 * misfit))
+    named = [one.names for one in (chosen, *equivalent)]
+    says = [any(names <= one.names for names in named) for one in found]
+    return experience * float(weights[says].sum() / weights.sum())
+
+
+def of_nothing(screened: Sequence[Screened], n_residuals: int, rules: Rules) -> float:
+    """Return the probability that nothing is missing, against every candidate that was screened.
+
+    Each counts by the BIC that it would have to first order; all of them together were as likely
+    beforehand as nothing.
+    """
+    if not screened:
+        return rules.adequate_right
+    gains = np.array([one.reduction for one in screened])
+    unknowns = np.array([one.candidate.unknowns for one in screened])
+    odds = np.exp((gains - unknowns * np.log(n_residuals)) / 2.0).mean()
+    return rules.adequate_right / float(1.0 + odds)
