@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.drive.revision import (
     drive_model,
     revised_model,
 )
+from pymoo_hdte.discrepancy.report.certainty import how_sure
 from pymoo_hdte.discrepancy.report.document import believed_in_words, verdict_document
 from pymoo_hdte.discrepancy.report.figures import (
     gap_by_channel,
@@ -32,7 +33,6 @@ from pymoo_hdte.discrepancy.report.optimum import OptimumShift
 from pymoo_hdte.discrepancy.report.row_words import fault_rows, noise_rows, rows_sentence
 from pymoo_hdte.discrepancy.report.tables import (
     STATUSES,
-    certainty,
     effect_rows,
     hypothesis_rows,
     metric_rows,
@@ -163,7 +163,7 @@ def _page(
         proof=proof,
         status=STATUSES[finding.verdict.status],
         effects=effect_rows(document["effects"]),
-        certainty=certainty(finding),
+        certainty=how_sure(finding),
         gap=gap_sentence(finding, proof),
         next_test=in_words(document["next_experiment"]["description"]),
         pictures=pictures,

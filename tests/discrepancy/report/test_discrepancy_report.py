@@ -17,9 +17,10 @@ from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import drive_model, revised_model
 from pymoo_hdte.discrepancy.report import write as report
+from pymoo_hdte.discrepancy.report.certainty import how_sure
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
-from pymoo_hdte.discrepancy.report.tables import certainty, parameter_rows
+from pymoo_hdte.discrepancy.report.tables import parameter_rows
 from pymoo_hdte.discrepancy.report.write import FOLDER, write_report
 from pymoo_hdte.discrepancy.robust_optimum import optimum_shift
 from pymoo_hdte.drive import (
@@ -154,8 +155,8 @@ def test_words_do_not_promise_what_is_not_there(ripple):
     assert "do not use it" in gap_sentence(ripple, spoilt)
     unlisted = replace(ripple, verdict=replace(ripple.verdict, status="unlisted"))
     assert "Nothing was added" in gap_sentence(unlisted, prove(unlisted))
-    assert "what it is, is not" in certainty(unlisted)
-    assert "explains 100 % of the misfit" in certainty(ripple)
+    assert "what it is, is not" in how_sure(unlisted)
+    assert "explains 100 % of the misfit" in how_sure(ripple)
 
 
 def test_parameters_are_told_in_the_reader_s_units(ripple):

@@ -1,0 +1,109 @@
+"""How sure a verdict is, in words: what it explains, what else could, and how probable it is."""
+
+from __future__ import annotations
+
+from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
+from pymoo_hdte.discrepancy.drive.evidence import PARTS
+from pymoo_hdte.discrepancy.drive.parameters import words_of
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    adequate,
+    explains,
+    unexplained,
+)
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.report.gap_words import percent
+from pymoo_hdte.effects.sentences import in_words
+
+
+def how_sure(finding: DriveFinding) -> str:
+    """Return how sure the verdict is, in words."""
+    verdict = finding.verdict
+    limit = adequate(verdict.degrees_of_freedom, verdict.rules)
+    residual = verdict.base.chi_square / verdict.degrees_of_freedom
+    if verdict.status == "adequate":
+        return (
+            "The misfit of the believed drive, fitted within its tolerances, has "
+            f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. "
+            f"An effect too small for these records may still be there. {_probably(verdict)}"
+        )
+    if verdict.chosen is None:
+        return "That something is missing is certain; no effect was there to be tried."
+    share = percent(verdict.chosen.explained)
+    if not verdict.chosen.listed:
+        return (
+            f"No effect of the list is as likely: this explains {share} of the misfit. An error of "
+            "the encoder takes no part in the motion of the drive."
+        )
+    if verdict.status == "unlisted":
+        return (
+            "That something is missing is certain; what it is, is not. The nearest known effect "
+            f"explains {share} of the misfit, {_too_little(finding, verdict.chosen)}."
+            + "".join(f" Against it: {in_words(one)}." for one in verdict.doubts)
+        )
+    return " ".join(_evidence(finding, verdict.chosen, share))
+
+
+def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
+    """Return why the nearest effect is not named."""
+    residual = unexplained(finding.data, finding.verdict.base, nearest.fit)
+    if residual.any():
+        parts = [
+            part.replace("_", " ") for part, missed in zip(PARTS, residual, strict=True) if missed
+        ]
+        return f"but not what shows in {' and '.join(f'the {part}' for part in parts)}"
+    rules = finding.verdict.rules
+    if explains(finding.data, nearest, finding.verdict.base, finding.verdict.degrees_of_freedom):
+        return "but a name needs more than that"
+    share = rules.exact_share if nearest.exact else rules.explained_share
+    return f"where a name takes {100.0 * share:g} %, or what is left to be noise"
+
+
+def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str]:
+    verdict = finding.verdict
+    after = chosen.fit.chi_square / verdict.degrees_of_freedom
+    words = [
+        f"It explains {share} of the misfit that is not noise; what is left has {after:.3g} times "
+        "the variance of the noise."
+    ]
+    if verdict.leaves_more_than_noise:
+        words.append(
+            "That is more than noise: its form is not quite right or more is missing, and values "
+            "may be off by more than their intervals say."
+        )
+    hypotheses = [
+        hypothesis
+        for hypothesis in verdict.alternatives
+        if _names(hypothesis) != _names(chosen)
+        and len(hypothesis.candidates) == len(chosen.candidates)
+    ]
+    if verdict.equivalent:
+        shares = ", ".join(percent(hypothesis.explained) for hypothesis in verdict.equivalent)
+        words.append(f"What these data cannot tell from it explains {shares}.")
+    elif hypotheses:
+        best = min(hypotheses, key=lambda hypothesis: hypothesis.bic)
+        words.append(f"The next best, {in_words(best.label)}, explains {percent(best.explained)}.")
+    if chosen.fit.at_bounds:
+        orders = finding.campaign.believed.error_orders
+        names = ", ".join(words_of(name, orders) for name in chosen.fit.at_bounds)
+        words.append(f"At the bound of its range, and therefore uncertain: {names}.")
+    return [*words, _probably(verdict)]
+
+
+def _probably(verdict: Verdict) -> str:
+    """Return the probability that a verdict is right, in words."""
+    what = {
+        "adequate": "nothing of the list is missing",
+        "class": "one of these is the cause",
+        "partial": "what is named is missing, if not all",
+    }.get(verdict.status, "this is the cause")
+    whole = int(100.0 * (verdict.probability or 0.0))
+    return (
+        f"The probability that {what} is {whole} %, by the evidence of "
+        "everything that was compared and by how often such verdicts were right on campaigns with "
+        "a known truth."
+    )
+
+
+def _names(hypothesis: Hypothesis) -> set[str]:
+    return {candidate.name for candidate in hypothesis.candidates}
