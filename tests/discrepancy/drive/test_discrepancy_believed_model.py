@@ -218,11 +218,6 @@ def test_effects_without_a_steady_motion_are_refused(campaign):
 
 # --- of a mechanism -----------------------------------------------------------------------------
 
-OSCILLATOR = Mechanism(
-    inertias={"x": BelievedValue(1.0, 0.1)},
-    ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
-    inputs=[Input("force", {"x": 1.0})],
-)
 TABLE = """
 [table]
 format = "csv"
@@ -242,7 +237,7 @@ def folder(tmp_path_factory):
     record = rig.record_of(rig.cubic)
     rows = np.column_stack([record.time, record.channels["x"], record.channels["force"]])
     np.savetxt(folder / "train.csv", rows, "%.12g", ",", header="time,x,force", comments="")
-    believed = model_text(MeasuredMechanism(OSCILLATOR, [], title="oscillator").model)
+    believed = model_text(MeasuredMechanism(rig.OSCILLATOR, [], title="oscillator").model)
     (folder / "rig.toml").write_text(believed + TABLE)
     return folder
 
@@ -259,7 +254,7 @@ def test_a_revised_mechanism_fed_back_misses_nothing(folder, tmp_path, capsys):
     assert again.verdict.status == "adequate"
     assert again.finding.remainder == pytest.approx(first.finding.remainder, rel=1e-3)
     tolerances = [one.tolerance for one in again.measured.mechanism.quantities.values()]
-    assert tolerances == [one.tolerance for one in OSCILLATOR.quantities.values()]
+    assert tolerances == [one.tolerance for one in rig.OSCILLATOR.quantities.values()]
     assert again.revised_model().effects == first.revised_model().effects
 
     out = ["--believed", str(model), "--out", str(tmp_path / "second")]
