@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from quick_campaigns import put_ripple_report, quick_analysis, quick_campaign, write_ripple_campaign
+from kept_results import put_files
+from quick_campaigns import quick_analysis, quick_campaign, ripple_report, write_ripple_campaign
 
 from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.discrepancy import analysis as api
@@ -284,7 +285,7 @@ def files_of(folder):
 def reported(tmp_path_factory):
     """The folder of a report on a campaign with a ripple of the motor torque."""
     top = tmp_path_factory.mktemp("ripple")
-    put_ripple_report(top / "one")
+    put_files(ripple_report(), top / "one")
     return top
 
 

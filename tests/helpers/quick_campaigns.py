@@ -61,10 +61,3 @@ def ripple_report() -> dict[str, bytes]:
             cli.main(["discrepancy", str(top / "rig"), "--out", str(top / "out"), "--quiet"]) == 0
         )
         return {path.name: path.read_bytes() for path in (top / "out").iterdir()}
-
-
-def put_ripple_report(folder: Path) -> None:
-    """Write the report on the campaign with a ripple into a new folder."""
-    folder.mkdir()
-    for name, content in ripple_report().items():
-        (folder / name).write_bytes(content)
