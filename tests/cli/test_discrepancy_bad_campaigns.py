@@ -11,7 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from kept_results import put_files
-from quick_campaigns import quick_analysis, quick_campaign, ripple_report, write_ripple_campaign
+from quick_campaigns import (
+    quick_analysis,
+    quick_campaign,
+    ripple_analysis_and_report,
+    ripple_campaign,
+)
 
 from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.discrepancy import analysis as api
@@ -224,7 +229,7 @@ def analysed():
 @pytest.mark.parametrize(
     ("module", "stage"),
     [
-        (report, "_page"),
+        pytest.param(report, "_page", marks=pytest.mark.nightly),
         pytest.param(report, "_revision", marks=pytest.mark.nightly),
         (reports_folder, "_write_all"),
     ],
@@ -285,7 +290,7 @@ def files_of(folder):
 def reported(tmp_path_factory):
     """The folder of a report on a campaign with a ripple of the motor torque."""
     top = tmp_path_factory.mktemp("ripple")
-    put_files(ripple_report(), top / "one")
+    put_files(ripple_analysis_and_report()[1], top / "one")
     return top
 
 
@@ -294,8 +299,8 @@ def test_every_file_is_there(reported):
 
 
 @pytest.mark.nightly
-def test_twice_the_same_bytes(reported, tmp_path):
-    write_ripple_campaign(tmp_path / "rig")
+def test_the_command_writes_the_bytes_of_the_calls_in_python(reported, tmp_path):
+    write_campaign(ripple_campaign(), tmp_path / "rig")
     assert run(tmp_path / "rig", tmp_path / "other", "--quiet") == 0
     assert files_of(tmp_path / "other") == files_of(reported / "one")
 

@@ -149,7 +149,9 @@ def test_robust_problem_of_the_revised_model(revised):
     assert 0.0 < std < mean < 1e3
 
 
+@pytest.mark.nightly
 def test_mechanism_is_slowed_down_and_names_it(tmp_path):
+    """As the command does in the gate, by the calls that a user makes."""
     records = [rotor_record(seed, role) for seed, role in ((1, "train"), (2, "held_out"))]
     measured = MeasuredMechanism(ROTOR, records, title="rotor")
     analysis = analyse(measured, effects=[EYRING_DRAG])

@@ -8,7 +8,7 @@ import measured_oscillator as rig
 import numpy as np
 import pytest
 from planted_features import SCALES
-from quick_campaigns import RIPPLING, quick_analysis, quick_campaign
+from quick_campaigns import ripple_analysis_and_report, ripple_campaign
 from virtual_rig_cases import BELIEVED
 
 from pymoo_hdte.checks import InvalidInput
@@ -49,12 +49,12 @@ SAME_FIT = 2.0
 
 @pytest.fixture(scope="module")
 def campaign():
-    return quick_campaign(*RIPPLING)
+    return ripple_campaign()
 
 
 @pytest.fixture(scope="module")
 def analysis():
-    return quick_analysis(*RIPPLING)
+    return ripple_analysis_and_report()[0]
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_believed_effects_stay_in_model_and_report(analysis, again, tmp_path):
         == (document["believed_effects"])
     )
     assert document["believed_effects"] == believed
-    assert "torque ripple (input): order 3, " in (tmp_path / "report" / "report.html").read_text()
+    assert "torque ripple (input): order 6, " in (tmp_path / "report" / "report.html").read_text()
 
 
 def test_values_tolerances_and_effects_come_from_the_model(analysis, again):
@@ -174,7 +174,7 @@ def test_believed_effects_survive_the_files_of_a_campaign(campaign, tmp_path):
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
-        ("revised_model.toml", "order = 3.0", "order = -3.0", r"revised_model.toml.*order is -3"),
+        ("revised_model.toml", "order = 6.0", "order = -6.0", r"revised_model.toml.*order is -6"),
         ("revised_model.toml", '"torque_ripple"', '"torque_riple"', r"revised_model.toml.*name"),
         ("campaign.toml", "stiffness = 0.05", "stiffness = 1.5", r"line \d+: tolerance.stiffness"),
         ("campaign.toml", "stiffness = 0.05", "stifness = 0.05", r"line \d+: tolerance.stifness"),

@@ -11,7 +11,7 @@ from browser import CHROMIUM, probe
 from example_result import example
 from kept_results import kept, put_files
 from measured_oscillator import cubic_analysis
-from quick_campaigns import ripple_report
+from quick_campaigns import ripple_analysis_and_report
 
 from experiments.runner.report import write_report
 from experiments.runner.store import save
@@ -62,7 +62,7 @@ def files_of(name):
 def page(name, tmp_path):
     """The page of a report."""
     if name == "discrepancy":
-        files = ripple_report()
+        files = ripple_analysis_and_report()[1]
     elif name == "measured":
         files = cubic_analysis()[1]
     else:
@@ -90,7 +90,7 @@ def test_a_reader_sees_everything(name, images, tables, width, page, tmp_path):
 
 
 def test_a_reader_sees_everything_on_a_wide_page(tmp_path):
-    put_files(ripple_report(), tmp_path / "discrepancy")
+    put_files(ripple_analysis_and_report()[1], tmp_path / "discrepancy")
     assert looked_at(tmp_path / "discrepancy" / "report.html", tmp_path, WIDE)["images"]
 
 
