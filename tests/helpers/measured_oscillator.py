@@ -166,7 +166,7 @@ def rotor_record(seed, role):
     The drag has to be registered.
     """
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 10.0, 0.004)
+    time = np.arange(0.0, 10.0 if role == "train" else 2.0 * HELD_OUT, 0.004)
     lines = np.arange(1, 20) / 10.0
     phases = rng.uniform(0.0, 2.0 * np.pi, len(lines))
     torque = 0.03 * np.cos(2.0 * np.pi * np.outer(time, lines) + phases).sum(axis=1)

@@ -83,7 +83,10 @@ def test_a_revised_model_fed_back_misses_nothing(analysis, again):
     assert again.verdict.status == "adequate"
     before, after = analysis.verdict.accepted.chi_square, again.verdict.base.chi_square
     assert abs(after - before) < SAME_FIT
-    # Without the effects it would.
+
+
+@pytest.mark.nightly
+def test_a_revised_model_without_its_effects_misses_them(again):
     believed = replace(again.campaign.believed, effects=())
     assert analyse(replace(again.campaign, believed=believed)).verdict.status == "named"
 
