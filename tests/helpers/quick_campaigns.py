@@ -51,9 +51,9 @@ def quick_analysis(seed: int, *effects) -> DriveAnalysis:
 @kept
 def ripple_campaign() -> Campaign:
     """Return a campaign on a rig whose motor torque has a ripple, as its files have it."""
-    ripple = effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7)
+    ripple = effect("input", ripple=0.02, ripple_order=3.0)
     with TemporaryDirectory() as top:
-        write_campaign(quick_campaign(4, ripple), Path(top) / "rig")
+        write_campaign(quick_campaign(5, ripple), Path(top) / "rig")
         return read_campaign(Path(top) / "rig")
 
 

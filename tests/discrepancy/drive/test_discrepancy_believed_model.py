@@ -102,7 +102,7 @@ def test_believed_effects_stay_in_model_and_report(analysis, again, tmp_path):
         == (document["believed_effects"])
     )
     assert document["believed_effects"] == believed
-    assert "torque ripple (input): order 6, " in (tmp_path / "report" / "report.html").read_text()
+    assert "torque ripple (input): order 3, " in (tmp_path / "report" / "report.html").read_text()
 
 
 def test_values_tolerances_and_effects_come_from_the_model(analysis, again):
@@ -177,7 +177,7 @@ def test_believed_effects_survive_the_files_of_a_campaign(campaign, tmp_path):
 @pytest.mark.parametrize(
     ("file", "old", "new", "words"),
     [
-        ("revised_model.toml", "order = 6.0", "order = -6.0", r"revised_model.toml.*order is -6"),
+        ("revised_model.toml", "order = 3.0", "order = -3.0", r"revised_model.toml.*order is -3"),
         ("revised_model.toml", '"torque_ripple"', '"torque_riple"', r"revised_model.toml.*name"),
         ("campaign.toml", "stiffness = 0.05", "stiffness = 1.5", r"line \d+: tolerance.stiffness"),
         ("campaign.toml", "stiffness = 0.05", "stifness = 0.05", r"line \d+: tolerance.stifness"),
