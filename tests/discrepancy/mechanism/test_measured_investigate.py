@@ -79,6 +79,7 @@ def test_nothing_hidden_is_adequate_and_proved_to_be():
     assert effects(finding) == []
     assert np.all(finding.base_misfit < 1.3 * finding.sensor_noise)
     simulated, balanced = prove_measured(finding)
+    assert simulated.record == balanced.record == others[0].name
     assert simulated.before == simulated.after
     assert balanced.after < 1.3 * balanced.noise_floor
 
