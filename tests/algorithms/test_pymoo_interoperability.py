@@ -12,6 +12,7 @@ from multiprocessing.pool import ThreadPool
 
 import numpy as np
 import pytest
+from night import others_at_night
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.callback import Callback
 from pymoo.core.evaluator import Evaluator
@@ -179,7 +180,7 @@ with open(sys.argv[2], "wb") as file:
 """
 
 
-@pytest.mark.parametrize("store", ["pickle", "dill"])
+@pytest.mark.parametrize("store", others_at_night(["pickle", "dill"], "pickle"))
 def test_checkpoints_go_on_in_another_process_as_if_never_stopped(store, tmp_path):
     module = import_module(store)
     # Every swarm, on every problem.

@@ -2,13 +2,11 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from kept_results import kept
-from measured_oscillator import EYRING_DRAG, OF_ROTOR, ROTOR, EyringDrag, rotor_record
+from kept_results import kept, put_files
+from measured_oscillator import EYRING_DRAG, OF_ROTOR, ROTOR, EyringDrag, reported, rotor_record
 from quick_campaigns import CONDITIONS
 from virtual_rig_cases import BELIEVED, RIG
 
@@ -54,10 +52,7 @@ def analysis_and_report():
     campaign = run_campaign(rig, BELIEVED, RIG, rng, (*CONDITIONS, *SLOW))
     drag = LawAtPort("eyring_drag", "input", PLANTED)
     found = analyse(with_effects(campaign, rig, [drag]), effects=[EYRING_DRAG])
-    with TemporaryDirectory() as top:
-        found.report(Path(top) / "report")
-        files = {path.name: path.read_bytes() for path in (Path(top) / "report").iterdir()}
-    return found, files
+    return reported(found)
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +63,7 @@ def analysis():
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     out = tmp_path_factory.mktemp("own")
-    for name, content in analysis_and_report()[1].items():
-        (out / name).write_bytes(content)
+    put_files(analysis_and_report()[1], out)
     return out
 
 
@@ -155,7 +149,9 @@ def test_robust_problem_of_the_revised_model(revised):
     assert 0.0 < std < mean < 1e3
 
 
+@pytest.mark.nightly
 def test_mechanism_is_slowed_down_and_names_it(tmp_path):
+    """As the command does in the gate, by the calls that a user makes."""
     records = [rotor_record(seed, role) for seed, role in ((1, "train"), (2, "held_out"))]
     measured = MeasuredMechanism(ROTOR, records, title="rotor")
     analysis = analyse(measured, effects=[EYRING_DRAG])

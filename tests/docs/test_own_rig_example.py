@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from kept_results import kept
+from kept_results import kept, put_files
 from places import DOCS
 from scipy.integrate import solve_ivp
 
@@ -62,9 +62,7 @@ def rig(tmp_path_factory):
     """The folder of the example, what it printed, its names and its verdict."""
     folder = tmp_path_factory.mktemp("example") / "my_rig"
     printed, names, files = example()
-    for path, content in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_bytes(content)
+    put_files(files, folder)
     verdict = json.loads((folder / "report" / "verdict.json").read_text(encoding="utf-8"))
     return folder, printed, names, verdict
 

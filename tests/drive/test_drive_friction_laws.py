@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from planted_features import known_data, library, measured
 from quick_campaigns import CONDITIONS, quick_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import analyse
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import SMOOTHING_SPEED, NonlinearDrag
@@ -86,15 +89,31 @@ def test_exponents_and_references_are_checked(bad):
         NonlinearDrag(1e-6, **bad)
 
 
-@pytest.mark.parametrize(
-    ("exponent", "torque", "word"),
-    [(3.0, 0.02, "faster"), pytest.param(0.5, 0.03, "slower", marks=pytest.mark.nightly)],
-)
+POWERS = [(3.0, 0.02, "faster"), (0.5, 0.03, "slower")]
+"""Exponent, torque at the fastest record in N.m, and how the drag grows in words."""
+
+
+@pytest.mark.parametrize(("exponent", "torque", "word"), POWERS)
+def test_a_planted_power_comes_back_with_its_exponent(exponent, torque, word):
+    """Without records, and beside the drag that grows otherwise only."""
+    data = known_data([(600.0, 0.0), (1000.0, 40.0), (1400.0, 20.0), (2000.0, 0.0), (2000.0, 40.0)])
+    drags = [one for one in library(data) if one.name == "nonlinear_drag"]
+    (planted,) = (one for one in drags if word in one.sentence and one.port == "input")
+    data, _ = measured(planted.build((torque, exponent)), np.random.default_rng(5), data)
+    judge_power(judge(data, fit(data), drags), exponent, torque, word)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(("exponent", "torque", "word"), POWERS)
 def test_a_planted_power_is_named_with_its_exponent(exponent, torque, word):
     """Of the records, the fastest is at 2000 r/min."""
     rated = 2000.0 * np.pi / 30.0
     planted = effect("input", drag=torque / rated**exponent, drag_exponent=exponent)
-    verdict = analyse(quick_campaign(5, planted)).verdict
+    judge_power(analyse(quick_campaign(5, planted)).verdict, exponent, torque, word)
+
+
+def judge_power(verdict, exponent, torque, word):
+    """Hold a verdict on a drag against the drag that was planted."""
     assert verdict.status == "named"
     (candidate,) = verdict.chosen.candidates
     assert candidate.name == "nonlinear_drag"

@@ -241,7 +241,7 @@ def test_the_load_acts_even_if_the_error_has_odd_orders_only():
 @pytest.mark.parametrize(
     ("depth", "speed"),
     [
-        (0.3, 209.0),
+        pytest.param(0.3, 209.0, marks=pytest.mark.nightly),
         (0.8, 209.0),
         pytest.param(0.3, 50.0, marks=pytest.mark.nightly),
         pytest.param(0.8, 50.0, marks=pytest.mark.nightly),

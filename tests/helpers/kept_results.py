@@ -4,7 +4,7 @@ import fcntl
 import hashlib
 import os
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
 
@@ -39,3 +39,10 @@ def _made_once(name: str, make: Callable):
             # Findings hold functions made on the way, which pickle alone cannot write.
             path.write_bytes(cloudpickle.dumps(make()))
     return pickle.loads(path.read_bytes())
+
+
+def put_files(files: Mapping[str | Path, bytes], folder: Path) -> None:
+    """Write files, by their path, into a new folder."""
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)

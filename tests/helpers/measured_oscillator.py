@@ -5,11 +5,15 @@ And a rotor with the drag of ``docs/examples/eyring_drag.py``, which its model d
 
 import sys
 from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
+from kept_results import kept
 from places import DOCS
 from scipy.integrate import solve_ivp
 
+from pymoo_hdte.discrepancy import MeasuredMechanism, MechanismAnalysis, analyse
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.simulation import simulate_mechanism
 
@@ -21,6 +25,14 @@ from eyring_drag import EyringDrag as EyringDrag
 MASS, STIFFNESS, DAMPING = 1.0, 4000.0, 4.0
 RATE, DURATION, HIGHEST = 250.0, 12.0, 12.0
 POSITION_NOISE, FORCE_NOISE = 1e-5, 0.02
+HELD_OUT = 4.0
+"""Duration in s of a held-out record, which is simulated twice, in steps that Python takes."""
+
+OSCILLATOR = Mechanism(
+    inertias={"x": BelievedValue(1.0, 0.1)},
+    ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
+    inputs=[Input("force", {"x": 1.0})],
+)
 
 OF_ROTOR = EyringDrag(level=0.03, knee=8.0)
 ROTOR = Mechanism(
@@ -30,22 +42,22 @@ ROTOR = Mechanism(
 )
 
 
-def multisine(seed, size=20.0):
+def multisine(seed, size=20.0, duration=DURATION):
     """Return times and a force of random phases up to `HIGHEST` Hz, root mean square ``size``."""
-    time = np.arange(0.0, DURATION, 1.0 / RATE)
-    lines = np.arange(1, int(HIGHEST * DURATION)) / DURATION
+    time = np.arange(0.0, duration, 1.0 / RATE)
+    lines = np.arange(1, int(HIGHEST * duration)) / duration
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, len(lines))
     force = np.cos(2.0 * np.pi * np.outer(time, lines) + phases).sum(axis=1)
     return time, lines, phases, size / force.std()
 
 
 @cache
-def record_of(hidden, role="train", seed=1, size=20.0):
+def record_of(hidden, role="train", seed=1, size=20.0, duration=DURATION):
     """Return a record of m x'' + c x' + k x + hidden = F.
 
     ``hidden(x, v, z, t)`` returns a force and the rate of an inner state z.
     """
-    time, lines, phases, scale = multisine(seed, size)
+    time, lines, phases, scale = multisine(seed, size, duration)
 
     def force(t):
         return scale * np.cos(2.0 * np.pi * lines * t + phases).sum()
@@ -69,6 +81,11 @@ def record_of(hidden, role="train", seed=1, size=20.0):
             "force": [force(t) for t in time] + FORCE_NOISE * noise.standard_normal(len(time)),
         },
     )
+
+
+def with_held_out(hidden):
+    """Return a training record and a held-out one."""
+    return [record_of(hidden), record_of(hidden, "held_out", seed=3, duration=HELD_OUT)]
 
 
 def relay_record(seed, force_noise=1e-3):
@@ -127,13 +144,29 @@ def swinging_stiffness(x, v, z, t):
     return 1500.0 * x * np.sin(np.pi * t), 0.0
 
 
+@kept
+def cubic_analysis() -> tuple[MechanismAnalysis, dict[str, bytes]]:
+    """Return what is found on an oscillator with Duffing's spring, and the files of its report."""
+    return reported(
+        analyse(MeasuredMechanism(OSCILLATOR, with_held_out(cubic), title="oscillator"))
+    )
+
+
+def reported(analysis):
+    """Return an analysis with all its parts worked out, and the files of its report by name."""
+    with TemporaryDirectory() as top:
+        analysis.report(Path(top) / "report")
+        files = {path.name: path.read_bytes() for path in (Path(top) / "report").iterdir()}
+    return analysis, files
+
+
 def rotor_record(seed, role):
     """A rotor that is driven to and fro, simulated with the drag, and noise of its sensors.
 
     The drag has to be registered.
     """
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 10.0, 0.004)
+    time = np.arange(0.0, 10.0 if role == "train" else 2.0 * HELD_OUT, 0.004)
     lines = np.arange(1, 20) / 10.0
     phases = rng.uniform(0.0, 2.0 * np.pi, len(lines))
     torque = 0.03 * np.cos(2.0 * np.pi * np.outer(time, lines) + phases).sum(axis=1)

@@ -7,8 +7,13 @@ import numpy as np
 from kept_results import kept
 from virtual_rig_cases import BELIEVED, RIG, effect
 
-from pymoo_hdte.cli import __main__ as cli
-from pymoo_hdte.discrepancy import Campaign, DriveAnalysis, analyse, write_campaign
+from pymoo_hdte.discrepancy import (
+    Campaign,
+    DriveAnalysis,
+    analyse,
+    read_campaign,
+    write_campaign,
+)
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
 
@@ -27,8 +32,6 @@ CONDITIONS = tuple(
         (2000.0, 10.0, "held_out"),
     )
 )
-RIPPLING = (5, effect("input", ripple=0.02, ripple_order=3.0))
-"""Seed and effect of a quick campaign on a rig whose motor torque has a ripple."""
 
 
 @kept
@@ -45,26 +48,20 @@ def quick_analysis(seed: int, *effects) -> DriveAnalysis:
     return analyse(quick_campaign(seed, *effects))
 
 
-def write_ripple_campaign(folder: Path) -> None:
-    """Write a campaign on a rig whose motor torque has a ripple."""
-    ripple = effect("input", ripple=0.015, ripple_order=6.0, ripple_phase=0.7)
-    write_campaign(quick_campaign(4, ripple), folder)
+@kept
+def ripple_campaign() -> Campaign:
+    """Return a campaign on a rig whose motor torque has a ripple, as its files have it."""
+    ripple = effect("input", ripple=0.02, ripple_order=3.0)
+    with TemporaryDirectory() as top:
+        write_campaign(quick_campaign(5, ripple), Path(top) / "rig")
+        return read_campaign(Path(top) / "rig")
 
 
 @kept
-def ripple_report() -> dict[str, bytes]:
-    """Return the files of the command's report on the campaign with a ripple, by name."""
-    with TemporaryDirectory() as name:
-        top = Path(name)
-        write_ripple_campaign(top / "rig")
-        assert (
-            cli.main(["discrepancy", str(top / "rig"), "--out", str(top / "out"), "--quiet"]) == 0
-        )
-        return {path.name: path.read_bytes() for path in (top / "out").iterdir()}
-
-
-def put_ripple_report(folder: Path) -> None:
-    """Write the report on the campaign with a ripple into a new folder."""
-    folder.mkdir()
-    for name, content in ripple_report().items():
-        (folder / name).write_bytes(content)
+def ripple_analysis_and_report() -> tuple[DriveAnalysis, dict[str, bytes]]:
+    """Return what is found in `ripple_campaign`, and the files of its report by name."""
+    analysis = analyse(ripple_campaign())
+    with TemporaryDirectory() as top:
+        analysis.report(Path(top) / "report")
+        files = {path.name: path.read_bytes() for path in (Path(top) / "report").iterdir()}
+    return analysis, files

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from night import others_at_night
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.algorithms.moo.nsga3 import NSGA3
 from pymoo.optimize import minimize
@@ -87,6 +88,12 @@ def test_fronts_have_as_many_pieces_as_the_family_says(member):
         assert gaps == (member.variant in {"resonant", "calibrated_duty_cycle"})
 
 
+@pytest.mark.parametrize(
+    "member",
+    others_at_night(FAMILY, "calibrated", "resonant", "calibrated_tolerance"),
+    indirect=True,
+    scope="module",
+)
 def test_nothing_undercuts_a_stored_front(member):
     front = member.pareto_front()
     evolved = minimize(member, NSGA2(pop_size=100), ("n_gen", 40), seed=1).F

@@ -8,7 +8,7 @@ import measured_oscillator as rig
 import numpy as np
 import pytest
 from planted_features import SCALES
-from quick_campaigns import RIPPLING, quick_analysis, quick_campaign
+from quick_campaigns import ripple_analysis_and_report, ripple_campaign
 from virtual_rig_cases import BELIEVED
 
 from pymoo_hdte.checks import InvalidInput
@@ -49,12 +49,12 @@ SAME_FIT = 2.0
 
 @pytest.fixture(scope="module")
 def campaign():
-    return quick_campaign(*RIPPLING)
+    return ripple_campaign()
 
 
 @pytest.fixture(scope="module")
 def analysis():
-    return quick_analysis(*RIPPLING)
+    return ripple_analysis_and_report()[0]
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,10 @@ def test_a_revised_model_fed_back_misses_nothing(analysis, again):
     assert again.verdict.status == "adequate"
     before, after = analysis.verdict.accepted.chi_square, again.verdict.base.chi_square
     assert abs(after - before) < SAME_FIT
-    # Without the effects it would.
+
+
+@pytest.mark.nightly
+def test_a_revised_model_without_its_effects_misses_them(again):
     believed = replace(again.campaign.believed, effects=())
     assert analyse(replace(again.campaign, believed=believed)).verdict.status == "named"
 
@@ -218,11 +221,6 @@ def test_effects_without_a_steady_motion_are_refused(campaign):
 
 # --- of a mechanism -----------------------------------------------------------------------------
 
-OSCILLATOR = Mechanism(
-    inertias={"x": BelievedValue(1.0, 0.1)},
-    ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
-    inputs=[Input("force", {"x": 1.0})],
-)
 TABLE = """
 [table]
 format = "csv"
@@ -242,7 +240,7 @@ def folder(tmp_path_factory):
     record = rig.record_of(rig.cubic)
     rows = np.column_stack([record.time, record.channels["x"], record.channels["force"]])
     np.savetxt(folder / "train.csv", rows, "%.12g", ",", header="time,x,force", comments="")
-    believed = model_text(MeasuredMechanism(OSCILLATOR, [], title="oscillator").model)
+    believed = model_text(MeasuredMechanism(rig.OSCILLATOR, [], title="oscillator").model)
     (folder / "rig.toml").write_text(believed + TABLE)
     return folder
 
@@ -259,7 +257,7 @@ def test_a_revised_mechanism_fed_back_misses_nothing(folder, tmp_path, capsys):
     assert again.verdict.status == "adequate"
     assert again.finding.remainder == pytest.approx(first.finding.remainder, rel=1e-3)
     tolerances = [one.tolerance for one in again.measured.mechanism.quantities.values()]
-    assert tolerances == [one.tolerance for one in OSCILLATOR.quantities.values()]
+    assert tolerances == [one.tolerance for one in rig.OSCILLATOR.quantities.values()]
     assert again.revised_model().effects == first.revised_model().effects
 
     out = ["--believed", str(model), "--out", str(tmp_path / "second")]

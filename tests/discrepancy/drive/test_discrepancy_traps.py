@@ -46,11 +46,13 @@ def test_a_clean_campaign_without_a_sweep_is_adequate(clean):
     assert examine_drive(without).verdict.status == "adequate"
 
 
+@pytest.mark.nightly
 def test_a_frozen_base_makes_effects_of_its_own_errors(clean, unsearched):
     frozen = replace(clean.believed, tolerance=RULES.least_tolerance)
     assert examine_drive(replace(clean, believed=frozen), unsearched).verdict.status != "adequate"
 
 
+@pytest.mark.nightly
 def test_repeatability_left_out_is_a_false_alarm(clean, unsearched):
     exact = replace(clean.rig, repeatability=0.0)
     assert examine_drive(replace(clean, rig=exact), unsearched).verdict.status != "adequate"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from analysed_campaigns import CONDITIONS, LISTED, analysed, ripple_analysis
-from quick_campaigns import RIPPLING, quick_analysis
+from quick_campaigns import quick_analysis, ripple_analysis_and_report
 from verdict_cases import case_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
@@ -86,7 +86,10 @@ def test_no_start_ends_below_the_fits_that_decide(fits, share):
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["quick-ripple", *CASES])
 def test_no_start_ends_below_the_fits_that_decide_a_case(name):
-    analysis = quick_analysis(*RIPPLING) if name == "quick-ripple" else analyse(case_campaign(name))
+    if name == "quick-ripple":
+        analysis, _ = ripple_analysis_and_report()
+    else:
+        analysis = analyse(case_campaign(name))
     data = analysis.finding.data
     hold(data, compared(analysis.verdict, data.rules), 0.2)
 

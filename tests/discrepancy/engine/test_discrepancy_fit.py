@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from night import others_at_night
 from planted_features import CONDITIONS, known_data, listed, measured, with_sweep
 from scipy.stats import chi2, kstest
 
@@ -104,15 +105,15 @@ def test_repeatability_is_the_rms_of_the_change_of_the_static_error():
     assert np.sqrt(mean_square) == pytest.approx(data.campaign.rig.repeatability, rel=1e-3)
 
 
-@pytest.fixture(scope="module")
-def repeated():
-    """Sixty campaigns on drives whose torque sensors err as they are said to: (truth, fit)."""
+@pytest.fixture(scope="module", params=others_at_night([40, 60], 40))
+def repeated(request):
+    """So many campaigns on drives whose torque sensors err as they are said to: (truth, fit)."""
     data, rng = known_data(FEW), np.random.default_rng(12)
     layout = Layout(data.base)
     drawn = np.array(["_torque_" in parameter.name for parameter in data.base])
     prior = np.where(drawn, layout.array("prior"), 0.0)
     found = []
-    for _ in range(60):
+    for _ in range(request.param):
         truth = layout.array("start") + prior * rng.standard_normal(len(layout))
         truth[layout.index("stiffness")] *= rng.uniform(0.95, 1.05)
         values = data.predict(truth[None], ())[0]

@@ -6,7 +6,15 @@ from functools import cache
 import measured_oscillator as rig
 import numpy as np
 import pytest
-from measured_oscillator import bouc_wen, cubic, nothing, swinging_stiffness
+from measured_oscillator import (
+    OSCILLATOR,
+    bouc_wen,
+    cubic,
+    cubic_analysis,
+    nothing,
+    swinging_stiffness,
+    with_held_out,
+)
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.fitting import fit
@@ -26,12 +34,6 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 
-OSCILLATOR = Mechanism(
-    inertias={"x": BelievedValue(1.0, 0.1)},
-    ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
-    inputs=[Input("force", {"x": 1.0})],
-)
-
 
 def dry(x, v, z, t):
     """Dry friction."""
@@ -44,22 +46,9 @@ def finding_on(hidden, seed=1):
     return examine_mechanism(OSCILLATOR, [rig.record_of(hidden, seed=seed)])
 
 
-def with_held_out(hidden):
-    """Return a training record and a held-out one."""
-    return [rig.record_of(hidden), rig.record_of(hidden, "held_out", seed=3)]
-
-
 def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
-    records = with_held_out(cubic)
-    # What a user writes: no more than fifteen lines.
-    oscillator = Mechanism(
-        inertias={"x": BelievedValue(1.0, 0.1)},
-        ports=[Port("spring", {"x": 1.0}, BelievedValue(4100.0, 0.1), BelievedValue(5.0, 0.5))],
-        inputs=[Input("force", {"x": 1.0})],
-    )
-    finding = examine_mechanism(oscillator, records)
-    gaps = prove_measured(finding)
-
+    analysis, _ = cubic_analysis()
+    finding, gaps = analysis.finding, analysis.prove()
     assert finding.verdict.status == "named"
     (effect,) = effects(finding)
     assert (effect["name"], effect["port"]) == ("hardening_stiffness", "spring")
@@ -90,6 +79,7 @@ def test_nothing_hidden_is_adequate_and_proved_to_be():
     assert effects(finding) == []
     assert np.all(finding.base_misfit < 1.3 * finding.sensor_noise)
     simulated, balanced = prove_measured(finding)
+    assert simulated.record == balanced.record == others[0].name
     assert simulated.before == simulated.after
     assert balanced.after < 1.3 * balanced.noise_floor
 
@@ -223,7 +213,7 @@ def test_the_verdict_does_not_hang_on_units():
         ports=[Port("spring", {"x": 1.0}, BelievedValue(4.1, 0.1), BelievedValue(5e-3, 0.5))],
         inputs=[Input("force", {"x": 1.0})],
     )
-    one, other = finding_on(cubic), examine_mechanism(scaled, [milli])
+    one, other = cubic_analysis()[0].finding, examine_mechanism(scaled, [milli])
     assert one.verdict.status == other.verdict.status == "named"
     coefficient = [effects(each)[0]["parameters"]["coefficient"]["value"] for each in (one, other)]
     assert coefficient[1] == pytest.approx(1e-9 * coefficient[0], rel=1e-3)
@@ -233,7 +223,7 @@ def test_the_next_test_sets_what_was_found_against_its_rival():
     test = next_test(finding_on(dry, 4))
     assert test.separates == ("coulomb_friction:spring", "stribeck_friction:spring")
     assert "train 4" in test.description or "another motion" in test.description
-    alone = next_test(finding_on(cubic))
+    alone = cubic_analysis()[0].next_experiment()
     assert "no rival is left" in alone.description
     unknown = next_test(finding_on(swinging_stiffness))
     assert "proved" not in unknown.description

@@ -144,7 +144,8 @@ def test_the_stored_welded_beam_is_what_the_solver_finds():
     assert stored[:, 0].min() == pytest.approx(2.381, abs=1e-3)
 
 
-@pytest.mark.parametrize("row", [pytest.param(0, marks=pytest.mark.nightly), 800])
+@pytest.mark.nightly
+@pytest.mark.parametrize("row", [0, 800])
 def test_the_welded_beam_is_feasible_and_as_cheap_as_another_solver_makes_it(row):
     problem = problem_of("WeldedBeam")
     cost, deflection = np.loadtxt(WELDED_BEAM, delimiter=",", skiprows=1)[row]

@@ -5,11 +5,14 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from experiments.__main__ import main
+from experiments.comparison import paired
 from experiments.comparison.runs import ALGORITHMS, OptimisationRun, robust_problem
 from experiments.paper.scatter import dte_samples, exact_moments
 from experiments.published_values import TABLE_6, TABLE_9
@@ -28,7 +31,7 @@ paired.OptimisationRun = partial(paired.OptimisationRun, **{SMALL})
 sys.exit(main())
 """
 """``python -m experiments`` with optimisations of a hundredth of the evaluations."""
-EXTENTS = [["-c", SMALL_RUNS], pytest.param(["-m", "experiments"], marks=pytest.mark.nightly)]
+EXTENTS = [["-c", SMALL_RUNS], ["-m", "experiments"]]
 
 
 def run_experiments(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -86,12 +89,19 @@ def test_deviation_degrees_of_the_prototypes_come_out_to_the_printed_digit():
     assert np.round(degrees, 3).tolist() == [p.deviation_degree for p in TABLE_6.values()]
 
 
+def test_repetition_does_not_change_a_byte(tmp_path, monkeypatch):
+    monkeypatch.setattr(paired, "OptimisationRun", partial(OptimisationRun, **SMALL))
+    for out in ("one", "two"):
+        arguments = ("table7", "--seeds", "1", "--workers", "1", "--out", str(tmp_path / out))
+        assert main(arguments) == 0
+    one, two = (steady_files(tmp_path / out) for out in ("one", "two"))
+    assert one == two
+    assert {"table7/quality.csv", "table7/fronts.png", "table7/result.json"} <= set(one)
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize(
-    ("extent", "seeds"),
-    [
-        (["-c", SMALL_RUNS], "1"),
-        pytest.param(["-m", "experiments"], "2", marks=pytest.mark.nightly),
-    ],
+    ("extent", "seeds"), [(["-c", SMALL_RUNS], "1"), (["-m", "experiments"], "2")]
 )
 def test_workers_and_repetition_do_not_change_a_byte(extent, seeds, tmp_path):
     for out, workers in (("one", "1"), ("two", "2")):

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from night import others_at_night
 from places import ROOT
 
 from experiments.__main__ import main
@@ -197,7 +198,7 @@ def test_torn_and_differing_files_are_counted(tmp_path, monkeypatch):
     [
         pytest.param(1, set(), {5}, marks=pytest.mark.nightly),
         pytest.param(2, set(), {10}, marks=pytest.mark.nightly),
-        (3, {"a"}, {5}),
+        pytest.param(3, {"a"}, {5}, marks=pytest.mark.nightly),
         (4, {"a"}, {10}),
     ],
 )
@@ -226,7 +227,7 @@ def test_workers_end_with_a_command_that_is_killed():
         assert one.communicate(timeout=20.0) == (b"", None)
 
 
-@pytest.mark.parametrize("size", [0, 10, 4096])
+@pytest.mark.parametrize("size", others_at_night([0, 10, 4096], 4096))
 def test_a_disk_that_fills_up_keeps_the_former_file_and_no_part(tmp_path, size):
     path = tmp_path / "result.csv"
     path.write_bytes(b"former")
