@@ -12,7 +12,8 @@ from pathlib import Path
 
 from experiments.blind.cases import Case
 from experiments.blind.codes import ERROR, NAMES, PORTS, STATUSES, word, words_of_set
-from experiments.blind.scoring import NUMBERS, PARTS, RIVALS
+from experiments.blind.scoring import MOST_IN_CLASS, NUMBERS, PARTS, PLACES, RIVALS
+from experiments.blind.truth import may_be_named, one_name, to_be_named
 from experiments.runner.campaign import Run
 from experiments.runner.committed import read_origin, read_rows, table_with_origin
 from pymoo_hdte.discrepancy.drive.proof import Gap
@@ -23,8 +24,8 @@ CONFIDENT = ("named", "parameter")
 """Statuses that give a single answer."""
 OPENED = 1.5
 """Multiple of the noise floor beyond which the revision has opened a gap."""
-_CASE = ("kind", "truth", "size", "number")
-_WORDS = ("status", "chosen", "equivalents", "truth_in_class", *RIVALS)
+_CASE = ("kind", "number", "truth", "forms", "stress")
+_WORDS = ("status", "probability", "chosen", "equivalents", "members", "truth_in_class", *RIVALS)
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,12 @@ class Outcome:
         Labels (name:port@order) of the effects that it prefers, accepted or not.
     equivalents : tuple of str
         Names in the sets that it cannot tell from those.
+    members : int
+        Number of sets that it cannot tell apart, that of the preferred effects among them.
     truth_in_class : bool
-        Whether one of these sets holds all that is hidden.
+        Whether one of these sets is what is hidden.
+    probability : float or None
+        That the verdict gives itself.
     answers : dict
         What the simpler tools say, by their name.
     numbers : dict
@@ -54,7 +59,9 @@ class Outcome:
     status: str
     chosen: tuple[str, ...]
     equivalents: tuple[str, ...] = ()
+    members: int = 0
     truth_in_class: bool = False
+    probability: float | None = None
     answers: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, float] = field(default_factory=dict)
     seconds: tuple[float, ...] = ()
@@ -64,59 +71,113 @@ class Outcome:
         """Names of the accepted effects."""
         if self.status not in EXPLAINED:
             return ()
-        return tuple(label.partition(":")[0] for label in self.chosen)
+        parts = (label.partition("@")[0].partition(":") for label in self.chosen)
+        return tuple(one_name(name, port) for name, _, port in parts)
+
+    @property
+    def hidden(self) -> frozenset[str]:
+        """Names of what is hidden and could be named."""
+        return to_be_named(self.case)
+
+    @property
+    def true_names(self) -> bool:
+        """Whether something is named and all of it is there."""
+        return bool(self.names) and set(self.names) <= may_be_named(self.case)
+
+    @property
+    def confident(self) -> bool:
+        """Whether the verdict gives a single answer."""
+        return self.status in CONFIDENT
+
+    @property
+    def wrong_confident(self) -> bool:
+        """Whether a single answer has a name that is not hidden, or only what the hidden holds."""
+        missed = bool(self.hidden) and not self.hidden & set(self.names)
+        return self.confident and (missed or not self.true_names)
+
+    @property
+    def wrong_partial(self) -> bool:
+        """Whether what is called certain, but not all, holds a name that is not hidden."""
+        return self.status == "partial" and not self.true_names
 
     @property
     def right(self) -> bool:
-        """Whether the first name is a hidden effect, or the class holds all that is hidden.
+        """Whether the first name is hidden, or a small class holds what is hidden.
 
-        A parameter out of tolerance has to be the right one.
+        Of what is called certain but not all, every name has to be hidden.
         """
-        if self.case.kind == "parameter":
-            return bool(self.names) and self.chosen[0] == f"parameter:{self.case.names[0]}"
-        return bool(self._hidden & set(self.names[:1])) or self._in_class
+        if self.status == "class":
+            return self.truth_in_class and self.members <= MOST_IN_CLASS
+        if self.status == "partial":
+            return self.true_names and bool(self.hidden & set(self.names))
+        return bool(self.hidden & set(self.names[:1]))
+
+    @property
+    def right_first(self) -> bool:
+        """Whether the preferred answer alone, without its class, is what it must be."""
+        if not self.hidden:
+            return self.right_answer
+        return bool(self.hidden & set(self.names[:1]))
+
+    @property
+    def all_named(self) -> bool:
+        """Whether all that is hidden is named with confidence, or is a member of a small class."""
+        if self.status == "class":
+            return self.right
+        return self.confident and bool(self.hidden) and self.hidden <= set(self.names)
+
+    @property
+    def two_named(self) -> bool:
+        """Whether two hidden effects are named, and nothing that is not hidden."""
+        return self.true_names and len(self.hidden & set(self.names)) >= 2
+
+    @property
+    def nothing_hidden(self) -> bool:
+        """Whether the believed model is right as it is."""
+        return self.case.kind != "unlisted" and not self.hidden
 
     @property
     def right_answer(self) -> bool:
         """Whether the verdict is what it must be for what is hidden."""
-        if self.case.kind == "none":
+        if self.nothing_hidden:
             return self.status == "adequate"
         if self.case.kind == "unlisted":
-            return self.status == "unlisted"
-        return self.both if self.case.kind == "pair" else self.right
+            return self.status == "unlisted" or (self.status == "partial" and self.true_names)
+        if self.case.kind == "pair":
+            return self.all_named
+        return self.two_named if self.case.kind == "triple" else self.right
 
     @property
-    def right_word(self) -> bool:
-        """Whether the preferred answer alone, without its class, is what it must be."""
-        if self.case.kind in ("none", "unlisted"):
-            return self.right_answer
-        return bool(self._hidden & set(self.names[:1]))
-
-    @property
-    def both(self) -> bool:
-        """Whether all that is hidden is named or in the class."""
-        return self._hidden <= set(self.names) or self._in_class
-
-    @property
-    def wrong_confident(self) -> bool:
-        """Whether any name is not hidden, and no other is offered."""
-        wrong = not self.right or not set(self.names) <= self._hidden
-        return self.status in CONFIDENT and wrong
+    def true_statement(self) -> bool:
+        """Whether what the verdict says is true: what its probability is of."""
+        if self.status == "class":
+            return self.right
+        if self.status in EXPLAINED:
+            return self.true_names and not self.wrong_confident
+        return self.right_answer
 
     @property
     def answer(self) -> str:
         """One word for a confusion matrix: the truth where it is right, or name or status."""
-        if self.status not in EXPLAINED:
+        if self.status not in EXPLAINED or not self.names:
             return self.status
-        if self.right and len(self._hidden) == 1:
-            return next(iter(self._hidden))
+        if self.right and len(self.case.names) == 1:
+            return self.case.names[0]
         return self.names[0]
+
+    @property
+    def covered(self) -> list[bool]:
+        """Whether each interval of a named effect's quantity holds its true value."""
+        total, held = (int(self.numbers.get(n, 0.0)) for n in ("quantities", "quantities_covered"))
+        return [True] * held + [False] * (total - held)
 
     @property
     def f1(self) -> float | None:
         """Of the flagged cells against those truly moved; None where there is neither."""
         if self.status == ERROR:
             return 0.0
+        if "cells_both" not in self.numbers:
+            return None
         cells = self.numbers.get("cells_moved", 0.0) + self.numbers.get("cells_flagged", 0.0)
         return 2.0 * self.numbers["cells_both"] / cells if cells else None
 
@@ -163,20 +224,12 @@ class Outcome:
         gap = self.gap(name)
         return gap is not None and gap.after <= multiple * gap.noise_floor
 
-    @property
-    def _hidden(self) -> set[str]:
-        return {"parameter"} if self.case.kind == "parameter" else set(self.case.names)
-
-    @property
-    def _in_class(self) -> bool:
-        return self.status == "class" and self.truth_in_class
-
 
 def outcome(case: Case, run: Run) -> Outcome:
     """Decode the run of a `BlindJob`."""
     cells = dict(zip(run.columns, run.values[0].tolist(), strict=True))
     chosen = []
-    for place in ("first", "second"):
+    for place in PLACES:
         if not math.isnan(cells[place]):
             order = cells[f"{place}_order"]
             at = "" if math.isnan(order) else f"@{order:.4g}"
@@ -188,7 +241,9 @@ def outcome(case: Case, run: Run) -> Outcome:
         status=word(cells["status"], STATUSES),
         chosen=tuple(chosen),
         equivalents=() if failed else words_of_set(cells["equivalents"]),
+        members=0 if failed else int(cells["members"]),
         truth_in_class=cells["truth_in_class"] == 1.0,
+        probability=None if math.isnan(cells["probability"]) else cells["probability"],
         answers={n: word(cells[n], NAMES) for n in RIVALS if not math.isnan(cells[n])},
         numbers={name: cells[name] for name in NUMBERS if not math.isnan(cells[name])},
         seconds=run.parts,
@@ -199,7 +254,8 @@ def format_outcomes(outcomes: Sequence[Outcome]) -> str:
     """Return the CSV text of outcomes, with seed, date and versions in a first comment line."""
     rows = []
     for one in outcomes:
-        words = [one.status, " ".join(one.chosen), " ".join(one.equivalents)]
+        said = "" if one.probability is None else f"{one.probability:.6g}"
+        words = [one.status, said, " ".join(one.chosen), " ".join(one.equivalents), one.members]
         answers = [one.answers.get(name, "") for name in RIVALS]
         numbers = [f"{one.numbers[n]:.6g}" if n in one.numbers else "" for n in NUMBERS]
         rows.append([*_identity(one.case), *words, int(one.truth_in_class), *answers, *numbers])
@@ -225,7 +281,9 @@ def read_outcomes(path: Path, seconds_path: Path) -> list[Outcome]:
             status=row["status"],
             chosen=tuple(row["chosen"].split()),
             equivalents=tuple(row["equivalents"].split()),
+            members=int(row["members"]),
             truth_in_class=row["truth_in_class"] == "1",
+            probability=float(row["probability"]) if row["probability"] else None,
             answers={name: row[name] for name in RIVALS if row[name]},
             numbers={name: float(row[name]) for name in NUMBERS if row[name]},
             seconds=tuple(float(time[part]) for part in PARTS if time[part]),
@@ -234,10 +292,9 @@ def read_outcomes(path: Path, seconds_path: Path) -> list[Outcome]:
     ]
 
 
-def _identity(case: Case) -> tuple[str, str, str, int]:
-    return case.kind, case.truth, f"{case.size:g}", case.number
+def _identity(case: Case) -> tuple[str, int, str, str, str]:
+    return case.kind, case.number, case.truth, case.forms, case.stress
 
 
 def _case(row: dict[str, str], root: int) -> Case:
-    names = () if row["truth"] == "none" else tuple(row["truth"].split("+"))
-    return Case(row["kind"], names, float(row["size"]), int(row["number"]), root)
+    return Case(row["kind"], int(row["number"]), root)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from experiments.blind.rig.campaign import restricted
 from experiments.blind.rig.machine import Matrix
-from experiments.blind.rig.session import ARCSEC, SHEET, Circumstances
 from experiments.blind.rig.sensors import Sensors
+from experiments.blind.rig.session import ARCSEC, SHEET, Circumstances
 
 NOISE_FACTORS = (0.5, 1.5, 2.0, 3.0)
 """True noise of all sensors over what is stated."""
@@ -37,7 +38,9 @@ def stressed(about: Circumstances, stress: str, rng: np.random.Generator) -> Cir
     if stress == "parameters":
         signs = rng.choice([-1.0, 1.0], len(PARAMETERS))
         off = 1.0 + signs * rng.uniform(*FAR_OFF, len(PARAMETERS))
-        values = {n: float(k * getattr(SHEET, n)) for n, k in zip(PARAMETERS, off, strict=True)}
+        values: dict[str, Any] = {
+            n: float(k * getattr(SHEET, n)) for n, k in zip(PARAMETERS, off, strict=True)
+        }
         return replace(about, machine=replace(machine, **values))
     if stress == "amplitudes":
         amplitudes = np.array(machine.amplitudes)

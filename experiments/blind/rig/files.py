@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
+
+from experiments.blind.rig.elements import Values
 from experiments.blind.rig.machine import Matrix
 from experiments.blind.rig.runs import Condition
 from experiments.blind.rig.session import (
@@ -55,7 +58,7 @@ def write_campaign_folder(
         _write(folder / name, _TITLES, _ROW, columns)
         parts.append(_record(name, condition, float(about.clocks[place])))
     name = "torsion.csv"
-    times = [number / SWEEP_RATE for number in range(torsion.shape[1])]
+    times = np.arange(torsion.shape[1]) / SWEEP_RATE
     _write(folder / name, _SWEEP_TITLES, _SWEEP_ROW, (times, torsion[0] * degrees, torsion[1]))
     parts.append(
         f'\n[[record]]\nfile = "{name}"\ntest = "torsion"\nrole = "train"\n'
@@ -64,7 +67,7 @@ def write_campaign_folder(
     (folder / "campaign.toml").write_text("".join(parts), encoding="utf-8")
 
 
-def _write(path: Path, titles: str, row: str, columns: tuple) -> None:
+def _write(path: Path, titles: str, row: str, columns: tuple[Values, ...]) -> None:
     # One format over all numbers is several times as fast as one for each row.
     numbers = [number for numbers in zip(*columns, strict=True) for number in numbers]
     text = row * len(columns[0]) % tuple(numbers)

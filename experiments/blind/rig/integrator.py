@@ -115,7 +115,7 @@ def follow(
     seen = np.empty((4, n_samples))
     moved, now = kept.copy(), before.copy()
     f = np.zeros((4, LOAD + 1))
-    at, first, second = y.copy(), np.empty(size), np.empty(size)
+    at, first = y.copy(), np.empty(size)
     since, h = begin, step.length
     for number in range((n_settle + n_samples) * substeps):
         time = begin + number * h

@@ -69,7 +69,7 @@ def hysteresis(rng: Generator, form: int) -> Drawn:
             return Hidden((row,), quantities={"force": torque})
         shares, slips = spread / spread.sum(), yields
         if form == 0:
-            shares, slips = np.full(4, 0.25), longest * np.arange(1, 5) / 4.0
+            shares, slips = np.full(4, 0.25), np.asarray(longest * np.arange(1, 5) / 4.0)
         rows = [
             element(el.SLIP, share * torque / slip, share * torque)
             for share, slip in zip(shares, slips, strict=True)

@@ -29,6 +29,8 @@ LONGEST_STEP = 1.25e-3
 """s; and no line of the highest order turns by more than `FINEST` rad in a step."""
 FINEST = 0.8
 HIGHEST_ORDER = 14.0
+LOADING = 60
+"""Steps in which the brake applies its load."""
 _HALVINGS = 48
 
 
@@ -156,7 +158,9 @@ def run(
     n_samples = rows * condition.averaged
     begin = -n_settle / condition.rate
     y, kept = np.zeros(len(linear.system)), np.zeros(len(plant.rows))
-    y[1] = -load / machine.stiffness
+    # The brake loads the drive before the motor starts: elements with memory know the way.
+    loading = load * np.linspace(0.0, 1.0, LOADING)
+    y[1] = -_locked(plant, loading, 0.0, 0.0, kept)[-1]
     y[1] -= static_error(plant, start + condition.speed * begin)[0]
     if linear.load_row == 2 and machine.third is not None:
         y[4] = y[1] - load / machine.third.stiffness
@@ -200,14 +204,15 @@ def locked_torsion(machine: Machine, torque: Values, interval: float) -> Values:
         for row in plant.rows
         if row[0] in (el.DRY, el.UNEVEN) and row[7] == el.OUTPUT
     )
-    return _locked(plant, torque, interval, max(holding, 0.0))
+    kept = np.zeros(len(plant.rows))
+    return _locked(plant, torque, interval, max(holding, 0.0), kept)
 
 
 @njit(cache=True)
-def _locked(plant: Plant, torque: Values, interval: float, holding: float) -> Values:
+def _locked(plant: Plant, torque: Values, interval: float, holding: float, kept: Values) -> Values:
+    """Return the torsion under torques (n,), and leave the states of memory in ``kept``."""
     rows = len(plant.rows)
-    kept, moved, trial = np.zeros(rows), np.zeros(rows), np.zeros(rows)
-    before = np.zeros(rows)
+    moved, trial, before = np.zeros(rows), np.zeros(rows), np.zeros(rows)
     found = np.empty(len(torque))
     carried = d = 0.0
     for place in range(len(torque)):

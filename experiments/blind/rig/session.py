@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -137,7 +138,9 @@ def draw_circumstances(
 ) -> Circumstances:
     """Draw a bench whose parameters lie uniformly within the tolerances, and a session on it."""
     off = 1.0 + sheet.tolerance * rng.uniform(-1.0, 1.0, len(UNCERTAIN))
-    true = {name: float(k * getattr(sheet, name)) for name, k in zip(UNCERTAIN, off, strict=True)}
+    true: dict[str, Any] = {
+        name: float(k * getattr(sheet, name)) for name, k in zip(UNCERTAIN, off, strict=True)
+    }
     lines, records = len(sheet.orders), len(conditions)
     amplitudes = np.array(sheet.amplitudes)
     amplitudes *= 1.0 + sheet.error_tolerance * rng.uniform(-1.0, 1.0, lines)
@@ -191,7 +194,9 @@ def running(about: Circumstances, record: int, machine: Machine, sensors: Sensor
 def sweep_torque() -> Values:
     """Return the torque of the load during the torsion sweep, N.m, shape (n,)."""
     corners = SWEEP_LEG * np.arange(len(SWEEP))
-    return np.interp(np.arange(round(corners[-1] * SWEEP_RATE)) / SWEEP_RATE, corners, SWEEP)
+    clock = np.arange(round(corners[-1] * SWEEP_RATE)) / SWEEP_RATE
+    torque: Values = np.interp(clock, corners, SWEEP).astype(np.float64)
+    return torque
 
 
 def sweep(machine: Machine, sensors: Sensors) -> Matrix:

@@ -153,7 +153,8 @@ def _unrepeated(about: Circumstances, kept: Sequence[int], orders: Values) -> Ma
     width = 3 * (1 + 2 * len(orders))
     for row, record in enumerate(kept):
         speed = about.conditions[record].speed
-        parts = [_placed(np.array([spread, 0.0, 0.0]), np.zeros((0, 3)), np.zeros(0), orders)]
+        none = np.zeros((0, 3), dtype=complex)
+        parts = [_placed(np.array([spread, 0.0, 0.0]), none, np.zeros(0), orders)]
         for order in machine.orders:
             answer = spread * response(machine, order, speed)
             parts += [
