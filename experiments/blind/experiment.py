@@ -9,8 +9,9 @@ seconds, in the results folder.
 from __future__ import annotations
 
 from experiments.blind.cases import SCORING_SEED, Case, all_cases
-from experiments.blind.data import Outcome, format_outcomes, format_seconds, outcome, read_outcomes
+from experiments.blind.data import format_outcomes, format_seconds, outcome, read_outcomes
 from experiments.blind.figures import confusion_matrix, reliability_diagram
+from experiments.blind.outcome import Outcome
 from experiments.blind.reliability import reliability_table
 from experiments.blind.rig.visible import LEAST
 from experiments.blind.scoring import BlindJob

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.blind.codes import ERROR
-from experiments.blind.data import Outcome
+from experiments.blind.outcome import Outcome
 from experiments.blind.reliability import reliability
 from experiments.blind.rig.forms import LISTED, UNLISTED
 from experiments.blind.truth import PARAMETER

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from experiments.blind.data import Outcome
+from experiments.blind.outcome import Outcome
 from experiments.blind.targets import Estimate, rate
 from experiments.runner.result import Cell, Column, Table
 

@@ -173,7 +173,7 @@ def _places(one: Hypothesis) -> frozenset[tuple[str, str, float | None]]:
 
 
 def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:
-    """Return how many quantities of named effects have true values, and how many intervals hold them.
+    """Return how many quantities of named effects have true values, and how many are covered.
 
     Quantities that the hidden form does not have are left out, and effects that are not hidden.
     """

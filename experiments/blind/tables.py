@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from experiments.blind.codes import STATUSES
-from experiments.blind.data import Outcome
+from experiments.blind.outcome import Outcome
 from experiments.blind.rig.forms import LISTED
 from experiments.blind.scoring import COMPARED, DETERMINED, PARTS, RIVALS
 from experiments.blind.targets import (

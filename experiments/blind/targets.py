@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binomtest, quantile_test
 
-from experiments.blind.data import Outcome
+from experiments.blind.outcome import Outcome
 
 # "Must reach" of issue 21, as rates; they are judged as design section 8 says.
 MOST_WRONG = {

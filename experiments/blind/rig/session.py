@@ -214,9 +214,8 @@ def sweep(machine: Machine, sensors: Sensors) -> Matrix:
 
 def row_times(condition: Condition, rows: int) -> Values:
     """Return the middle times of rows, s, shape (rows,)."""
-    return (np.arange(rows) + 0.5 * (1.0 - 1.0 / condition.averaged)) * (
-        condition.averaged / condition.rate
-    )
+    first = 0.5 * (1.0 - 1.0 / condition.averaged)
+    return (np.arange(float(rows)) + first) * (condition.averaged / condition.rate)
 
 
 def averaged_rows(condition: Condition, shown: Matrix) -> Matrix:
