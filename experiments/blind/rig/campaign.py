@@ -48,19 +48,26 @@ def made_visible(
 
 
 def seen_of(about: Circumstances, effect: Drawn, session: Shown, clean: Shown) -> float:
-    """Return the visibility of an effect: its session beside the same without it."""
-    further = [
-        row[2] / (about.machine.ratio if row[0] == el.LOAD_RIPPLE else 1.0)
-        for row in effect.hidden.elements
-        if row[0] in (el.ERROR_WAVE, el.LOAD_RIPPLE)
-    ]
-    orders = orders_seen(about.machine.ratio, further)
-    changes = [
-        features(about, place, session.records[place] - clean.records[place], orders)
-        for place, condition in enumerate(about.conditions)
-        if condition.role == "train"
-    ]
-    return visibility(about, changes, orders, session.torsion[0] - clean.torsion[0])
+    """Return the visibility of an effect: its session beside the same without it.
+
+    Where it has a simpler special case, beside that, in the records under load alone: a gap that
+    varies is else a gap, and without load its flanks rattle; where in its turn the input was locked
+    for the sweep is not known.
+    """
+    rows = [row for row in effect.hidden.elements if row[0] in (el.ERROR_WAVE, el.LOAD_RIPPLE)]
+    ratios = {el.ERROR_WAVE: 1.0, el.LOAD_RIPPLE: about.machine.ratio}
+    orders = orders_seen(about.machine.ratio, [row[2] / ratios[int(row[0])] for row in rows])
+    bend = session.torsion[0] - clean.torsion[0]
+    if effect.simpler is not None:
+        simpler = replace(effect, build=effect.simpler)
+        clean, bend = shown(about, [simpler]), np.zeros_like(bend)
+    changes = []
+    for place, condition in enumerate(about.conditions):
+        if condition.role == "train":
+            change = session.records[place] - clean.records[place]
+            counts = effect.simpler is None or condition.load != 0.0
+            changes.append(features(about, place, change * counts, orders))
+    return visibility(about, changes, orders, bend)
 
 
 def restricted(about: Circumstances, kept: Sequence[int]) -> Circumstances:

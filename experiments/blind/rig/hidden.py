@@ -66,6 +66,8 @@ class Drawn:
         Whether the effect has a size at all.
     components : tuple of str
         Names of further effects that it contains: a friction that varies has a mean.
+    simpler : callable or None
+        From a size to the special case of another name that it is without what must be visible.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Drawn:
     build: Callable[[float], Hidden]
     scales: bool = True
     components: tuple[str, ...] = ()
+    simpler: Callable[[float], Hidden] | None = None
 
     @property
     def hidden(self) -> Hidden:

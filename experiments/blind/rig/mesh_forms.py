@@ -108,9 +108,12 @@ def clearance_variation(rng: Generator, form: int) -> Drawn:
         row = element(el.PLAY, half_width, share * half_width, order, at, form, moves, shape)
         return Hidden((row,))
 
+    def steady(half_width: float) -> Hidden:
+        return Hidden((element(el.PLAY, half_width, 0.0, order, at, form),))
+
     words = f"{CONTACTS[form]}, {('both flanks', 'one flank', 'with a harmonic')[form]}"
     size = rng.uniform(2.0, 8.0) * ARCSEC
-    return Drawn("clearance_variation", "mesh", words, size, 30.0 * ARCSEC, build)
+    return Drawn("clearance_variation", "mesh", words, size, 30.0 * ARCSEC, build, simpler=steady)
 
 
 def mesh_stiffness_variation(rng: Generator, form: int) -> Drawn:

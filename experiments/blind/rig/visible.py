@@ -5,7 +5,8 @@ within their tolerances, gains and zeros, and the error that does not repeat mov
 per standard deviation, by the closed form of the linear machine. The visibility is the length of D
 in standard deviations of what these explain, sqrt(D' (S + B B' + R R')^-1 D), and of the torsion
 sweep beside it what no straight line explains. An effect drawn less visible than `LEAST` is made
-larger, up to its largest plausible size: one to two times `LEAST` visible.
+larger, up to its largest plausible size: one to two times `LEAST` visible. Of an effect that has a
+simpler one in it (a gap whose width varies is a gap), the difference from that must be visible.
 """
 
 from __future__ import annotations

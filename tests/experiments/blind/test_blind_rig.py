@@ -13,7 +13,7 @@ import pytest
 from experiments.blind.cases import BELIEVED, RIG
 from experiments.blind.rig import elements as el
 from experiments.blind.rig import integrator
-from experiments.blind.rig.campaign import Shown, seen_of
+from experiments.blind.rig.campaign import Shown, made_visible, seen_of, shown
 from experiments.blind.rig.elements import element
 from experiments.blind.rig.files import write_campaign_folder
 from experiments.blind.rig.forms import FORMS, LISTED, UNLISTED, draw_effect
@@ -30,7 +30,7 @@ from experiments.blind.rig.session import (
     sweep,
     sweep_torque,
 )
-from experiments.blind.rig.visible import features, orders_seen
+from experiments.blind.rig.visible import LEAST, features, orders_seen
 from pymoo_hdte.discrepancy import read_campaign
 from pymoo_hdte.drive.effects import drive_effects
 
@@ -253,6 +253,21 @@ def test_visibility_counts_neither_what_a_base_fit_absorbs_nor_a_straight_sweep(
     found = features(about, 0, shown.records[0] - plain[0], orders)
     line = np.hypot(found[0, 1], found[0, 1 + len(orders)])
     assert line == pytest.approx(effect.size, rel=2e-3)
+
+
+def test_a_gap_that_varies_must_differ_visibly_from_one_that_does_not():
+    conditions = tuple(replace(RATED, load=load) for load in (20.0, 40.0, 0.0))
+    about = draw_circumstances(np.random.default_rng(2), conditions=conditions)
+    clean = shown(about, ())
+    effect = draw_effect("clearance_variation", 0, np.random.default_rng(1))
+    assert seen_of(about, effect, shown(about, [effect]), clean) > 5.0
+    steady = replace(effect, build=effect.simpler)
+    assert seen_of(about, steady, shown(about, [steady]), clean) == 0.0
+    # Without comparison a gap is plain to see in the sweep.
+    assert seen_of(about, replace(steady, simpler=None), shown(about, [steady]), clean) > 100.0
+    small = replace(effect, size=0.01 * effect.size)
+    larger, _ = made_visible(about, small, clean, np.random.default_rng(3))
+    assert seen_of(about, larger, shown(about, [larger]), clean) > 0.8 * LEAST
 
 
 def test_a_folder_is_what_was_measured_and_what_is_believed(tmp_path):
