@@ -38,13 +38,14 @@ def made_visible(
 
     Its session beside it is that of the returned size.
     """
-    factor = LEAST * rng.uniform(1.0, 2.0)
     session = shown(about, [effect])
     seen = seen_of(about, effect, session, clean)
-    if seen >= LEAST or not effect.scales:
-        return effect, session
-    larger = effect.times(factor / seen if seen > 0.0 else np.inf)
-    return larger, shown(about, [larger])
+    while seen < LEAST and effect.scales and effect.size < effect.largest:
+        # What the tolerances can imitate makes the visibility grow faster than the size.
+        effect = effect.times(min(max(rng.uniform(1.0, 2.0) * LEAST / seen, 1.2), 2.0))
+        session = shown(about, [effect])
+        seen = seen_of(about, effect, session, clean)
+    return effect, session
 
 
 def seen_of(about: Circumstances, effect: Drawn, session: Shown, clean: Shown) -> float:
@@ -61,12 +62,11 @@ def seen_of(about: Circumstances, effect: Drawn, session: Shown, clean: Shown) -
     if effect.simpler is not None:
         simpler = replace(effect, build=effect.simpler)
         clean, bend = shown(about, [simpler]), np.zeros_like(bend)
-    changes = []
-    for place, condition in enumerate(about.conditions):
-        if condition.role == "train":
-            change = session.records[place] - clean.records[place]
-            counts = effect.simpler is None or condition.load != 0.0
-            changes.append(features(about, place, change * counts, orders))
+    changes = {
+        place: features(about, place, session.records[place] - clean.records[place], orders)
+        for place, condition in enumerate(about.conditions)
+        if condition.role == "train" and (effect.simpler is None or condition.load != 0.0)
+    }
     return visibility(about, changes, orders, bend)
 
 
