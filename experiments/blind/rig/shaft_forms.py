@@ -145,7 +145,10 @@ def load_inertia(rng: Generator, form: int) -> Drawn:
         return Hidden(third=ThirdBody(EXTRA, inertia, *coupling))
 
     words = ("rigid", "on a stiff shaft", "in a viscous clutch")
-    return Drawn("load_inertia", "output", words[form], rng.uniform(0.02, 0.08), 0.2, build)
+    # What a clutch loses damps the torsion too.
+    damping = ("damping_reference",) if form == 2 else ()
+    return Drawn("load_inertia", "output", words[form], rng.uniform(0.02, 0.08), 0.2, build,
+                 components=damping)  # fmt: skip
 
 
 def thermal_drift(rng: Generator, form: int) -> Drawn:
