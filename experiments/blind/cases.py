@@ -8,7 +8,7 @@ that its twin, the same session and noise without what is hidden, can be run too
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 
 import numpy as np
 
@@ -85,25 +85,10 @@ class Case:
         """One of `STRESSES`, or nothing."""
         return STRESSES[self.number % len(STRESSES)] if self.kind == "stressed" else ""
 
-    @cached_property
+    @property
     def drawn(self) -> tuple[Drawn, ...]:
         """What is hidden, at the sizes that are drawn before they are made visible."""
-        rng, number = self.generator("effects"), self.number
-        if self.kind == "none":
-            return ()
-        if self.kind == "unlisted":
-            return (draw_effect(UNLISTED[number % len(UNLISTED)], 0, rng),)
-        if self.kind in ("pair", "triple"):
-            return _several(rng, 2 if self.kind == "pair" else 3)
-        if self.kind == "stressed":
-            turn, stress = divmod(number, len(STRESSES))
-            # Every third hides nothing, each time with another stress.
-            if (turn + stress + turn // len(LISTED)) % 3 == 2:
-                return ()
-            number = turn
-        turn, place = divmod(number, len(LISTED))
-        name = LISTED[place]
-        return (draw_effect(name, turn % FORMS[name], rng),)
+        return _drawn(self)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -149,3 +134,24 @@ def _several(rng: np.random.Generator, count: int) -> tuple[Drawn, ...]:
         except Clash:
             continue
         return effects
+
+
+@cache
+def _drawn(case: Case) -> tuple[Drawn, ...]:
+    """Draw what a case hides. It is kept here, as what is drawn cannot go with a case to a worker."""
+    rng, number = case.generator("effects"), case.number
+    if case.kind == "none":
+        return ()
+    if case.kind == "unlisted":
+        return (draw_effect(UNLISTED[number % len(UNLISTED)], 0, rng),)
+    if case.kind in ("pair", "triple"):
+        return _several(rng, 2 if case.kind == "pair" else 3)
+    if case.kind == "stressed":
+        turn, stress = divmod(number, len(STRESSES))
+        # Every third hides nothing, each time with another stress.
+        if (turn + stress + turn // len(LISTED)) % 3 == 2:
+            return ()
+        number = turn
+    turn, place = divmod(number, len(LISTED))
+    name = LISTED[place]
+    return (draw_effect(name, turn % FORMS[name], rng),)

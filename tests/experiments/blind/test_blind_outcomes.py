@@ -9,7 +9,7 @@ from experiments.blind.data import outcome, read_outcomes
 from experiments.blind.experiment import OUTCOMES, SECONDS
 from experiments.blind.scoring import COLUMNS, verdict_scores
 from experiments.runner.campaign import Run
-from experiments.runner.committed import DATA
+from experiments.runner.committed import DATA, read_rows
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 
 CHEAPEST = 2
@@ -26,6 +26,9 @@ def outcomes():
 
 def test_they_are_a_beginning_of_the_list(outcomes):
     assert [one.case for one in outcomes] == all_cases()[: len(outcomes)]
+    stored = [(row["truth"], row["forms"], row["stress"]) for row in read_rows(DATA / OUTCOMES)]
+    drawn = [(one.truth, one.forms, one.stress) for one in (each.case for each in outcomes)]
+    assert stored == drawn
 
 
 def same_again(stored):

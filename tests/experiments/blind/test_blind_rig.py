@@ -24,6 +24,7 @@ from experiments.blind.rig.runs import Condition, locked_torsion, plant_of, run
 from experiments.blind.rig.session import (
     ARCSEC,
     SHEET,
+    UNCERTAIN,
     averaged_rows,
     draw_circumstances,
     running,
@@ -33,6 +34,10 @@ from experiments.blind.rig.session import (
 from experiments.blind.rig.visible import LEAST, features, orders_seen
 from pymoo_hdte.discrepancy import read_campaign
 from pymoo_hdte.drive.effects import drive_effects
+from pymoo_hdte.virtual.hidden_forms import HiddenEffect
+from pymoo_hdte.virtual.rig import TrueRig
+from pymoo_hdte.virtual.runs import Condition as TheirCondition
+from pymoo_hdte.virtual.runs import simulate_run
 
 RATED = Condition(2000.0, 40.0, 1000.0, 1, "train")
 SHORT = (RATED, replace(RATED, load=0.0, role="held_out"))
@@ -41,6 +46,10 @@ ABOUT = replace(
     clocks=np.array([500.0, 600.0]),
 )
 MACHINE = ABOUT.machine
+NOISE = np.array(
+    [SHEET.angle_noise * 101.0, SHEET.angle_noise, SHEET.input_noise, SHEET.output_noise]
+)
+"""Standard deviations of a sample of each channel."""
 
 
 def transmission_error(seen, ratio=101.0):
@@ -95,6 +104,24 @@ def test_a_linear_machine_moves_as_its_transfer_function_says(third):
         assert mean == pytest.approx(means(machine, 40.0, RATED.speed), rel=2e-5)
 
 
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_two_benches_that_were_written_apart_move_alike(share):
+    believed = replace(
+        BELIEVED,
+        error_amplitudes=MACHINE.amplitudes,
+        **{name: getattr(MACHINE, name) for name in UNCERTAIN},
+    )
+    other = TrueRig(believed, MACHINE.phases, (HiddenEffect("", "input", {"reaction": share}),))
+    same = TheirCondition(2000.0, 40.0, 1000.0, 1, "train")
+    theirs = simulate_run(other.mechanics(RIG), same, 40.0, 0.3, 0.0)
+    machine = replace(MACHINE, elements=(element(el.REACTION, share),))
+    ours = run(machine, RATED, 40.0, 0.3, 0.0)
+    # Their motor begins without the friction of the output's bearing, so that the input lags.
+    lag = np.mean((ours - theirs)[0])
+    change = np.abs(ours - theirs - np.array([[lag], [lag / 101.0], [0.0], [0.0]])).max(axis=1)
+    assert np.all(change < 2e-3 * NOISE)
+
+
 def test_what_the_motor_gives_is_load_and_loss():
     row = element(el.STRIBECK, 0.01, 0.02, 20.0, 0, 0.2)
     machine = replace(MACHINE, elements=(row,))
@@ -128,11 +155,9 @@ def test_halving_the_step_changes_far_less_than_the_noise():
     machine, _ = equipped(MACHINE, ABOUT.sensors, hidden)
     for condition in (RATED, replace(RATED, rpm=600.0, averaged=2)):
         coarse, fine = (run(machine, condition, 20.0, 0.3, 0.0, times) for times in (1, 2))
-        noise = np.array([SHEET.angle_noise * 101.0, SHEET.angle_noise, SHEET.input_noise,
-                          SHEET.output_noise])  # fmt: skip
-        assert np.all(np.abs(fine - coarse).max(axis=1) < 0.03 * noise)
+        assert np.all(np.abs(fine - coarse).max(axis=1) < 0.03 * NOISE)
         # The mean of ten thousand samples is known to a hundredth of their noise.
-        mean = np.abs((fine - coarse).mean(axis=1)) / noise
+        mean = np.abs((fine - coarse).mean(axis=1)) / NOISE
         assert np.all(mean < 5e-3)
 
 

@@ -1,5 +1,6 @@
 """Blind campaigns: what a case hides and nothing else, scores of verdicts, exact intervals."""
 
+import pickle
 import shutil
 import sys
 import tomllib
@@ -97,6 +98,11 @@ def test_any_beginning_of_the_list_has_the_same_mix():
     for stress in STRESSES:
         nothing = [one for one in stressed_cases if one.stress == stress and not one.names]
         assert 20 <= len(nothing) <= 24
+
+
+def test_a_case_goes_to_a_worker_after_it_was_asked_what_it_hides():
+    assert ECCENTRIC.names == ("eccentricity",)
+    assert pickle.loads(pickle.dumps(BlindJob(ECCENTRIC))) == BlindJob(ECCENTRIC)
 
 
 def test_several_effects_differ_and_one_bench_can_have_them():
