@@ -138,7 +138,7 @@ def _several(rng: np.random.Generator, count: int) -> tuple[Drawn, ...]:
 
 @cache
 def _drawn(case: Case) -> tuple[Drawn, ...]:
-    """Draw what a case hides. It is kept here, as what is drawn cannot go with a case to a worker."""
+    """Draw what a case hides; kept here, as what is drawn cannot go with a case to a worker."""
     rng, number = case.generator("effects"), case.number
     if case.kind == "none":
         return ()

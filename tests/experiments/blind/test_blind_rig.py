@@ -290,9 +290,10 @@ def test_a_gap_that_varies_must_differ_visibly_from_one_that_does_not():
     assert seen_of(about, steady, shown(about, [steady]), clean) == 0.0
     # Without comparison a gap is plain to see in the sweep.
     assert seen_of(about, replace(steady, simpler=None), shown(about, [steady]), clean) > 100.0
-    small = replace(effect, size=0.01 * effect.size)
+    small = replace(effect, size=0.2 * effect.size)
     larger, _ = made_visible(about, small, clean, np.random.default_rng(3))
-    assert seen_of(about, larger, shown(about, [larger]), clean) > 0.8 * LEAST
+    assert seen_of(about, small, shown(about, [small]), clean) < LEAST
+    assert seen_of(about, larger, shown(about, [larger]), clean) >= LEAST
 
 
 def test_a_folder_is_what_was_measured_and_what_is_believed(tmp_path):
