@@ -30,6 +30,8 @@ BLOCKS = 100
 STRESSES = ("noise", "outliers", "one_load", "half", "parameters", "amplitudes")
 """Noise other than stated, faulty rows, one load only, half of the records; base parameters, or
 amplitudes of the static error, far beyond their tolerance."""
+HIDES_NOTHING = {"noise": 2, "outliers": 2}
+"""Every which case hides nothing: half of those where an alarm would be a false one; else 4."""
 OUT_OF_TOLERANCE = ("parameters", "amplitudes")
 """Stresses that are something to be named themselves."""
 
@@ -148,10 +150,11 @@ def _drawn(case: Case) -> tuple[Drawn, ...]:
         return _several(rng, 2 if case.kind == "pair" else 3)
     if case.kind == "stressed":
         turn, stress = divmod(number, len(STRESSES))
-        # Every third hides nothing, each time with another stress.
-        if (turn + stress + turn // len(LISTED)) % 3 == 2:
+        every = HIDES_NOTHING.get(case.stress, 4)
+        if (turn + stress + turn // len(LISTED)) % every == every - 1:
             return ()
-        number = turn
+        # Each stress begins elsewhere in the list of effects.
+        number = turn + 5 * stress
     turn, place = divmod(number, len(LISTED))
     name = LISTED[place]
     return (draw_effect(name, turn % FORMS[name], rng),)
