@@ -52,7 +52,8 @@ DETERMINED = 0.5
 is: damping of the output bearings has one of 150."""
 MOST_IN_CLASS = 3
 """Members of a class that still says something."""
-PLACES = ("first", "second", "third")
+PLACES = tuple(f"chosen_{number}" for number in range(1, 13))
+"""Of what is named: three effects at most, and as many as nine base parameters."""
 DEVIATIONS = 1.959963984540054
 """Half-width of a 95 % interval, in standard deviations."""
 VERDICT_COLUMNS = (

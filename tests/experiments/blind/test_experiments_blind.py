@@ -50,7 +50,7 @@ from experiments.runner.registry import Context
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data, start_parameters
 from pymoo_hdte.discrepancy.drive.features import measure
-from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.candidate import Layout, out_of_tolerance
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 
@@ -243,6 +243,21 @@ def test_a_verdict_survives_the_way_through_numbers():
     assert found.probability is None
     alone = as_outcome(case, verdict_scores(case, replace(verdict, equivalent=())))
     assert not alone.all_named
+
+
+def test_all_that_is_named_is_kept():
+    """Several base parameters beside effects, the last of which must not be lost."""
+    data = known_data()
+    base = fit(data)
+    freed = [out_of_tolerance(name, name) for name in
+             ("stiffness", "input_damping", "load_inertia", "error_amplitude_2")]  # fmt: skip
+    candidates = (*freed, listed(data, "thermal_drift"))
+    chosen = Hypothesis(replace(base, candidates=candidates), 0.0, 1.0)
+    verdict = replace(analysed(data).verdict, status="named", chosen=chosen, equivalent=())
+    found = as_outcome(ECCENTRIC, verdict_scores(ECCENTRIC, verdict))
+    assert found.chosen == tuple(one.label for one in candidates)
+    expected = ("parameter", "parameter", "load_inertia", "parameter", "thermal_drift")
+    assert found.names == expected
 
 
 def test_all_that_a_verdict_may_say_has_a_code():
@@ -440,7 +455,8 @@ def made_up_score(case, tools):
     if case.kind == "unlisted":
         raise ArithmeticError("a step too far")
     scores = dict(zip(COLUMNS, np.linspace(1.0, 2.0, len(COLUMNS)), strict=True))
-    scores |= {"status": 1.0, "first": 3.0, "first_port": 1.0, "second": np.nan, "third": np.nan}
+    scores |= dict.fromkeys(blind_scoring.PLACES, np.nan)
+    scores |= {"status": 1.0, "chosen_1": 3.0, "chosen_1_port": 1.0}
     scores |= {"equivalents": 5.0, "members": 2.0, "truth_in_class": 0.0, "probability": 0.9}
     scores |= dict.fromkeys(blind_scoring.RIVALS, 2.0)
     return scores, (1.0, 2.0, 3.0, 4.0)
