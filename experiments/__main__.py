@@ -25,6 +25,7 @@ FAILED = 1
 SMALL = [one for one in EXPERIMENTS if one.has_small_version]
 STORED = [one for one in EXPERIMENTS if one.reads_outcome]
 SEEDED = [one for one in EXPERIMENTS if one.takes_seeds]
+LIMITED = [one for one in EXPERIMENTS if one.takes_cases]
 SEEDS = 20
 """Runs of every algorithm: the paper's number, and the default here."""
 INTERRUPTED = 130
@@ -45,6 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--full is for {_names(STORED)}")
     if options.seeds and options.name and not chosen[0].takes_seeds:
         parser.error(f"--seeds is for {_names(SEEDED)}")
+    if options.cases and not (options.full and options.name and chosen[0].takes_cases):
+        parser.error(f"--cases is for {_names(LIMITED)} with --full")
     try:
         check_page(options.out)
     except (InvalidInput, OSError) as error:
@@ -61,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with executor or nullcontext():
         campaign = Campaign(options.out, executor)
         seeds = options.seeds or SEEDS
-        context = Context(seeds, options.out, campaign, options.full, options.quick)
+        context = Context(seeds, options.out, campaign, options.full, options.quick, options.cases)
         return _run(chosen, context)
 
 
@@ -112,6 +115,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--out", type=Path, default=Path("results"), help="folder of the results (default results)"
+    )
+    parser.add_argument(
+        "--cases",
+        type=_positive,
+        help=f"with --full, only the first so many cases of {_names(LIMITED)}",
     )
     extent = parser.add_mutually_exclusive_group()
     extent.add_argument(

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from experiments.blind.cases import BELIEVED
+from experiments.blind.rig.forms import LISTED, UNLISTED
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine.verdict import STATUSES as VERDICTS
 from pymoo_hdte.drive.effects import ENCODER_LINE
-from pymoo_hdte.virtual.hidden_forms import HIDDEN_FORMS
 
 ERROR = "error"
 """Status of a case in which the workflow raised an exception."""
 STATUSES = (*VERDICTS, ERROR)
 NAMES = (
-    *HIDDEN_FORMS,
+    *LISTED,
+    *UNLISTED,
     ENCODER_LINE,
     "parameter",
     *(status for status in STATUSES if status != "parameter"),
 )
 """What a tool may answer: an effect, or a status where it names none."""
-PORTS = ("input", "output", "mesh", "sensor", "base", *MECHANICAL)
+_LINES = tuple(f"error_amplitude_{line}" for line in range(len(BELIEVED.error_orders)))
+PORTS = ("input", "output", "mesh", "sensor", *MECHANICAL, *_LINES)
+"""Where an effect is; of a parameter out of tolerance, its name."""
 
 
 def code(word: str, words: tuple[str, ...]) -> float:

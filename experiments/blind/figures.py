@@ -1,4 +1,4 @@
-"""Figures of the blind campaigns: confusion matrix and detection limits."""
+"""Figures of the blind campaigns: confusion matrix and reliability diagram."""
 
 from __future__ import annotations
 
@@ -8,24 +8,26 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments.blind.codes import ERROR
-from experiments.blind.data import Outcome
-from experiments.blind.limits import LIMITS, curve
+from experiments.blind.outcome import Outcome
+from experiments.blind.reliability import reliability
+from experiments.blind.rig.forms import LISTED, UNLISTED
+from experiments.blind.truth import PARAMETER
 from experiments.comparison.figures import BLUE, GREY, grid
-from pymoo_hdte.virtual.hidden_forms import LISTED_FORMS, UNLISTED_FORMS
+from pymoo_hdte.drive.effects import ENCODER_LINE
 
-_TRUTHS = (*LISTED_FORMS, "parameter", "none", *UNLISTED_FORMS)
-_ANSWERS = (*LISTED_FORMS, "parameter", "adequate", "unlisted", ERROR)
-_COLUMNS = 5
+_TRUTHS = (*LISTED, "none", *UNLISTED)
+_ANSWERS = (*LISTED, PARAMETER, ENCODER_LINE, "adequate", "unlisted", ERROR)
+_OF_ONE = ("none", "single", "unlisted")
+"""Kinds that hide at most one effect, and no stress."""
 
 
 def confusion_matrix(outcomes: Sequence[Outcome]) -> Figure:
     """Draw what is hidden against what is answered, for all cases that hide at most one effect."""
     counts = np.zeros((len(_TRUTHS), len(_ANSWERS)), dtype=int)
     for one in outcomes:
-        if one.case.kind in ("pair", "detection"):
+        if one.case.kind not in _OF_ONE:
             continue
-        truth = "parameter" if one.case.kind == "parameter" else one.case.truth
-        counts[_TRUTHS.index(truth), _ANSWERS.index(one.answer)] += 1
+        counts[_TRUTHS.index(one.case.truth), _ANSWERS.index(one.answer)] += 1
     figure, axes = grid(1, 1, width=9.5, height=9.0)
     axis = axes.flat[0]
     axis.grid(False)
@@ -40,34 +42,29 @@ def confusion_matrix(outcomes: Sequence[Outcome]) -> Figure:
     axis.set_yticks(range(len(_TRUTHS)), words[1], fontsize=8)
     axis.set_xlabel("answer")
     axis.set_ylabel("hidden")
-    for place in (len(LISTED_FORMS), len(LISTED_FORMS) + 2):
+    for place in (len(LISTED), len(LISTED) + 1):
         axis.axhline(place - 0.5, color=GREY, linewidth=1)
-    axis.axvline(len(LISTED_FORMS) - 0.5, color=GREY, linewidth=1)
+    axis.axvline(len(LISTED) - 0.5, color=GREY, linewidth=1)
     return figure
 
 
-def detection_limits(outcomes: Sequence[Outcome]) -> Figure:
-    """Draw the rate of right verdicts over the size of each listed effect."""
-    rows = -(-len(LISTED_FORMS) // _COLUMNS)
-    figure, axes = grid(rows, _COLUMNS, width=2.6, height=2.2)
-    for axis, name in zip(axes.flat, LISTED_FORMS, strict=False):
-        points = curve(outcomes, name)
-        for limit in LIMITS:
-            axis.axhline(limit, color=GREY, linewidth=0.8, linestyle="--")
-        sizes = [size for size, _ in points]
-        values = [estimate.value for _, estimate in points]
-        ends = [
-            [estimate.value - estimate.low for _, estimate in points],
-            [estimate.high - estimate.value for _, estimate in points],
-        ]
-        axis.errorbar(sizes, values, np.abs(ends), fmt="o-", color=BLUE, markersize=4, linewidth=1)
-        axis.set_xscale("log")
-        axis.set_ylim(-0.05, 1.05)
-        axis.set_title(name.replace("_", " "), fontsize=9)
-    for axis in axes.flat[len(LISTED_FORMS) :]:
-        axis.set_visible(False)
-    for axis in axes[-1]:
-        axis.set_xlabel("size", fontsize=8)
-    for axis in axes[:, 0]:
-        axis.set_ylabel("right", fontsize=8)
+def reliability_diagram(outcomes: Sequence[Outcome]) -> Figure:
+    """Draw the share of true statements over the probability that they were given."""
+    points = reliability(outcomes)
+    figure, axes = grid(1, 1, width=5.0, height=4.5)
+    axis = axes.flat[0]
+    axis.plot([0.0, 1.0], [0.0, 1.0], color=GREY, linewidth=0.8, linestyle="--")
+    said = [point for point, _ in points]
+    values = [one.value for _, one in points]
+    ends = [
+        [one.value - one.low for _, one in points],
+        [one.high - one.value for _, one in points],
+    ]
+    if points:
+        axis.errorbar(said, values, np.abs(ends), fmt="o", color=BLUE, markersize=4, linewidth=1)
+    for point, one in points:
+        axis.annotate(str(one.n), (point, one.value), xytext=(5, -9), textcoords="offset points",
+                      fontsize=7)  # fmt: skip
+    axis.set_xlabel("mean probability said")
+    axis.set_ylabel("share true")
     return figure

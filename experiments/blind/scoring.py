@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from experiments.blind.campaigns import Hiding, campaign_of, hiding
 from experiments.blind.cases import Case
 from experiments.blind.codes import ERROR, NAMES, PORTS, STATUSES, code, code_of_set
+from experiments.blind.truth import may_be_named, one_name, to_be_named
 from experiments.runner.campaign import Run
 from pymoo_hdte.discrepancy import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding, examine_drive
@@ -29,30 +31,37 @@ from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.drive.proof import Proof, prove
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy.engine.verdict import Verdict, rows_of
+from pymoo_hdte.effects.unknowns import line_with_variance
 
 PARTS = ("analyse", "locate", "prove", "next_experiment")
 RIVALS = ("largest_residual_rule", "sparse_regression")
 """Functions of `simpler_tools`, from an analysis to a name, "adequate" or "unlisted"."""
 COMPARED = ("none", "single", "unlisted")
 """Kinds on which the simpler tools are run too."""
-REVISED = ("single", "pair")
-"""Kinds of cases in which a right verdict adds a listed effect to the model."""
+REVISED = ("single", "pair", "triple")
+"""Kinds in which a right verdict adds listed effects to the model."""
+LOCATED = ("none", "unlisted", *REVISED)
+"""Kinds whose flagged cells are compared with the cells truly moved."""
 GAPS = ("transmission_error", "leading", "overall")
 """Gaps on held-out records: that of the verdict's document, that of the channel in which the base
 stands out of the noise most, and that of all features."""
 DETERMINED = 0.5
 """Standard error, in tolerances, up to which the records and not the bounds say what a parameter
 is: damping of the output bearings has one of 150."""
+MOST_IN_CLASS = 3
+"""Members of a class that still says something."""
+PLACES = tuple(f"chosen_{number}" for number in range(1, 13))
+"""Of what is named: three effects at most, and as many as nine base parameters."""
+DEVIATIONS = 1.959963984540054
+"""Half-width of a 95 % interval, in standard deviations."""
 VERDICT_COLUMNS = (
     "status",
-    "first",
-    "first_port",
-    "first_order",
-    "second",
-    "second_port",
-    "second_order",
+    "probability",
+    *(f"{place}{part}" for place in PLACES for part in ("", "_port", "_order")),
     "equivalents",
+    "members",
     "truth_in_class",
 )
 NUMBERS = (
@@ -64,6 +73,8 @@ NUMBERS = (
     "bias_error",
     "bias_of_all_before",
     "bias_of_all_after",
+    "quantities",
+    "quantities_covered",
     *(f"{gap}_{state}" for gap in GAPS for state in ("before", "after", "floor")),
 )
 COLUMNS = (*VERDICT_COLUMNS, *NUMBERS, *RIVALS)
@@ -109,23 +120,22 @@ def other_tools() -> dict[str, Tool]:
 
 
 def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, ...]]:
-    """Return the scores of a case and the seconds of the `PARTS` that it takes.
-
-    For a detection limit the verdict is all that counts.
-    """
-    campaign = case.run(case.effects())
+    """Return the scores of a case and the seconds of the `PARTS`."""
+    hidden = hiding(case)
+    campaign = campaign_of(hidden, hidden.session)
     analysis, analysed = _timed(examine_drive, campaign)
-    scores = verdict_scores(case, analysis.verdict)
-    if case.kind == "detection":
-        return scores, (analysed,)
     location, located = _timed(locate, analysis)
     proof, proved = _timed(prove, analysis)
     _, proposed = _timed(next_experiment, analysis)
-    if case.kind != "parameter":
-        twin = case.run(()) if case.effects() else campaign
+    verdict = analysis.verdict
+    scores = verdict_scores(case, verdict)
+    if verdict.status == "named":
+        scores |= coverage_scores(hidden, verdict)
+    if case.kind in LOCATED:
+        twin = campaign_of(hidden, hidden.twin) if hidden.effects else campaign
         scores |= location_scores(truly_moved(analysis, twin), location.flagged)
         if case.kind in REVISED:
-            scores |= bias_scores(analysis.verdict, twin_fit(twin, analysis.data.features))
+            scores |= bias_scores(verdict, twin_fit(twin, analysis.data.features))
     if proof is not None:
         scores |= gap_scores(proof)
     if case.kind in COMPARED:
@@ -134,20 +144,56 @@ def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, .
 
 
 def verdict_scores(case: Case, verdict: Verdict) -> Scores:
-    """Return what the verdict says, and whether its class holds all that is hidden."""
+    """Return what the verdict says, and whether its class holds what is hidden."""
+    probability = getattr(verdict, "probability", None)
     scores = {"status": code(verdict.status, STATUSES)}
+    scores["probability"] = np.nan if probability is None else float(probability)
     candidates = verdict.chosen.candidates if verdict.chosen is not None else ()
-    for place, candidate in zip(("first", "second"), candidates, strict=False):
+    for place, candidate in zip(PLACES, candidates, strict=False):
         scores[place] = code(candidate.name, NAMES)
         scores[f"{place}_port"] = code(candidate.port, PORTS)
         scores[f"{place}_order"] = np.nan if candidate.order is None else candidate.order
-    truth = {"parameter"} if case.kind == "parameter" else set(case.names)
-    alike = [
-        {candidate.name for candidate in hypothesis.candidates} for hypothesis in verdict.equivalent
-    ]
-    scores["equivalents"] = code_of_set(set().union(*alike))
-    scores["truth_in_class"] = float(any(truth <= names for names in alike))
+    sets = [_names(one) for one in verdict.equivalent]
+    scores["equivalents"] = code_of_set(set().union(*sets))
+    rivals = verdict.equivalent if verdict.chosen is None else (verdict.chosen, *verdict.equivalent)
+    scores["members"] = float(len({_places(one) for one in rivals})) if rivals else 0.0
+    hidden, allowed = to_be_named(case), may_be_named(case)
+    scores["truth_in_class"] = float(
+        bool(hidden) and any(hidden <= _names(one) <= allowed for one in rivals)
+    )
     return scores
+
+
+def _names(one: Hypothesis) -> set[str]:
+    return {one_name(candidate.name, candidate.port) for candidate in one.candidates}
+
+
+def _places(one: Hypothesis) -> frozenset[tuple[str, str, float | None]]:
+    """Return names, ports and orders: forms of one effect are one member of a class."""
+    return frozenset((c.name, c.port, c.order) for c in one.candidates)
+
+
+def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:
+    """Return how many quantities of named effects have true values, and how many are covered.
+
+    Quantities that the hidden form does not have are left out, and effects that are not hidden.
+    """
+    fitted, total, covered = verdict.accepted, 0, 0
+    for candidate, rows in rows_of(fitted):
+        for row in rows:
+            name, value = fitted.parameters[row].name, float(fitted.values[row])
+            variance = float(fitted.covariance[row, row])
+            if name.endswith("_cosine"):
+                pair = np.array([row, row + 1])
+                cosine, sine = fitted.values[pair]
+                block = fitted.covariance[np.ix_(pair, pair)]
+                (value, variance), _ = line_with_variance(cosine, sine, block)
+                name = name.removesuffix("_cosine")
+            true = hidden.quantities.get((candidate.name, name))
+            if true is not None:
+                total += 1
+                covered += abs(value - true) <= DEVIATIONS * variance**0.5
+    return {"quantities": float(total), "quantities_covered": float(covered)}
 
 
 def truly_moved(analysis: DriveFinding, twin: Campaign) -> Flags:

@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from experiments.blind.codes import STATUSES
-from experiments.blind.data import Outcome
-from experiments.blind.limits import LIMITS, curve, size_at
+from experiments.blind.outcome import Outcome
+from experiments.blind.rig.forms import LISTED
 from experiments.blind.scoring import COMPARED, DETERMINED, PARTS, RIVALS
-from experiments.blind.targets import Estimate, Judged, demands, median, rate, select, time_demand
+from experiments.blind.targets import (
+    KINDS,
+    NOTHING_STRESSED,
+    Estimate,
+    Judged,
+    demands,
+    median,
+    nothing_stressed,
+    rate,
+    select,
+    time_demand,
+)
 from experiments.runner.result import Cell, Column, Finding, Table, significant
-from pymoo_hdte.virtual.hidden_forms import LISTED_FORMS
 
-KINDS = {
-    "none": "nothing",
-    "single": "one listed effect",
-    "unlisted": "one unlisted effect",
-    "pair": "two listed effects",
-    "parameter": "a parameter out of tolerance",
-}
 JUDGED_COLUMNS = (
     Column("demand"),
     Column("cases that hide"),
@@ -29,18 +32,27 @@ JUDGED_COLUMNS = (
     Column("high", "", 3, "measured"),
     Column("verdict"),
 )
-_ANSWERS = len(LISTED_FORMS) + 2
+_ANSWERS = len(LISTED) + 2
 """All names, "adequate" and "unlisted": what chance chooses from."""
 
 
+_OTHERS = ("class", "partial", "unlisted", "adequate", "error")
+"""Statuses beside those of a single answer."""
+
+
 def must_reach_table(outcomes: Sequence[Outcome]) -> Table:
-    """Return what must be reached beside what was measured."""
+    """Return what must be reached beside what was measured, what falls short first."""
+    order = ("missed", "within chance", "met", "not run")
+    judged = sorted(demands(outcomes), key=lambda one: order.index(one.verdict))
     note = (
+        "What falls short stands first. Confident are the statuses named and parameter; such an "
+        "answer is wrong if any name in it is not hidden. A class is right if it has at most three "
+        "members and one of them is what is hidden, a partial answer if all its names are hidden. "
         "Intervals are exact: Clopper and Pearson's for rates, order statistics' for medians. A "
         "demand is missed where an exact one-sided test at 1 % rejects it. A gap that exceeds the "
         "noise floor by less than a tenth cannot shrink and counts for no median."
     )
-    return _judged_table("must_reach", "Must reach", list(demands(outcomes)), note)
+    return _judged_table("must_reach", "Must reach", judged, note)
 
 
 def times_tables(outcomes: Sequence[Outcome]) -> tuple[Table, Table]:
@@ -50,14 +62,13 @@ def times_tables(outcomes: Sequence[Outcome]) -> tuple[Table, Table]:
         "Processor time of analyse, locate, prove and next experiment.", wall_times=True,
     )  # fmt: skip
     rows: list[tuple[Cell, ...]] = []
-    for kind, words in KINDS.items():
-        groups: tuple[str | None, ...] = (*LISTED_FORMS,) if kind == "single" else (None,)
-        for name in groups:
-            chosen = [one.seconds for one in select(outcomes, kind, name) if one.seconds]
-            parts = [median([one[k] for one in chosen]).value for k in range(len(PARTS))]
-            whole = median([sum(one) for one in chosen])
-            what = _plain(name) if name else words
-            rows.append((what, whole.n, *parts, whole.value, whole.high))
+    groups = [(KINDS[kind], select(outcomes, kind)) for kind in KINDS if kind != "single"]
+    groups += [(_plain(name), select(outcomes, "single", name)) for name in LISTED]
+    for words, chosen in groups:
+        seconds = [one.seconds for one in chosen if one.seconds]
+        parts = [median([one[k] for one in seconds]).value for k in range(len(PARTS))]
+        whole = median([sum(one) for one in seconds])
+        rows.append((words, whole.n, *parts, whole.value, whole.high))
     columns = (
         Column("hidden"),
         Column("cases"),
@@ -72,25 +83,31 @@ def times_tables(outcomes: Sequence[Outcome]) -> tuple[Table, Table]:
 
 def status_table(outcomes: Sequence[Outcome]) -> Table:
     """Return how often each status is the answer, by kind."""
+    groups = [(words, select(outcomes, kind)) for kind, words in KINDS.items()]
+    groups.append((NOTHING_STRESSED, nothing_stressed(outcomes)))
     rows: list[tuple[Cell, ...]] = []
-    for kind, words in KINDS.items():
-        chosen = select(outcomes, kind)
+    for words, chosen in groups:
         counts = [sum(one.status == status for one in chosen) for status in STATUSES]
-        wrong = sum(one.wrong_confident for one in chosen)
-        f1 = median([one.f1 for one in chosen if one.case.names and "cells_moved" in one.numbers])
-        rows.append((words, len(chosen), *counts, sum(one.right for one in chosen), wrong,
-                     f1.value))  # fmt: skip
+        flags = ("right_answer", "right", "wrong_confident", "wrong_partial")
+        scores = [sum(getattr(one, flag) for one in chosen) for flag in flags]
+        partly = sum(one.status == "partial" and one.true_names for one in chosen)
+        both = sum(one.status == "partial" and one.two_named for one in chosen)
+        rows.append((words, len(chosen), *counts, *scores, partly, both))
     columns = (
         Column("hidden"),
         Column("cases"),
         *(Column(status, group="status") for status in STATUSES),
-        Column("right", group="first name"),
-        Column("wrong, confident", group="first name"),
-        Column("F1 of cells", "", 3, "median"),
+        Column("as it must be", group="answer"),
+        Column("first name or class right", group="answer"),
+        Column("wrong, confident", group="answer"),
+        Column("wrong, partial", group="answer"),
+        Column("true, partial", group="answer"),
+        Column("two named, partial", group="answer"),
     )
     note = (
-        "Confident are the statuses named and parameter. Error: the workflow raised an exception, "
-        "which counts as wrong everywhere."
+        "As it must be: adequate where nothing is hidden, the right name or class of one effect, "
+        "all of two, two of three, unlisted (or what is certain beside it) where no list holds it. "
+        "Error: the workflow raised an exception, which counts as wrong everywhere."
     )
     return Table("statuses", "Verdicts by what is hidden", columns, tuple(rows), note=note)
 
@@ -98,11 +115,11 @@ def status_table(outcomes: Sequence[Outcome]) -> Table:
 def effects_table(outcomes: Sequence[Outcome]) -> Table:
     """Return the scores of each listed effect."""
     rows: list[tuple[Cell, ...]] = []
-    for name in LISTED_FORMS:
+    for name in LISTED:
         chosen = select(outcomes, "single", name)
         right = rate([one.right for one in chosen])
         counts = [sum(one.status == status for one in chosen)
-                  for status in ("class", "unlisted", "adequate", "error")]  # fmt: skip
+                  for status in _OTHERS]  # fmt: skip
         biases = [median([one.numbers.get(f"bias_{state}") for one in chosen]).value
                   for state in ("before", "after", "error")]  # fmt: skip
         gaps = [one.gap("leading") for one in chosen]
@@ -122,7 +139,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
         Column("low", "", 3, "right"),
         Column("high", "", 3, "right"),
         Column("wrong, confident"),
-        *(Column(status, group="status") for status in ("class", "unlisted", "adequate", "error")),
+        *(Column(status, group="status") for status in _OTHERS),
         Column("F1 of cells", "", 3, "median"),
         Column("before", "", 2, "bias of the base, in tolerances"),
         Column("after", "", 2, "bias of the base, in tolerances"),
@@ -141,7 +158,7 @@ def effects_table(outcomes: Sequence[Outcome]) -> Table:
         f"record determines {_pooled(outcomes, 'bias_of_all')}. The leading channel is that in "
         "which the base stands out of the noise most; the end is its."
     )
-    return Table("effects", "Each listed effect at its typical size", columns, tuple(rows),
+    return Table("effects", "Each listed effect, alone", columns, tuple(rows),
                  note=note)  # fmt: skip
 
 
@@ -152,27 +169,6 @@ def _pooled(outcomes: Sequence[Outcome], name: str) -> str:
     return significant((squares[0] / squares[1]) ** 0.5, 2) if numbers else "none"
 
 
-def limits_table(outcomes: Sequence[Outcome]) -> Table:
-    """Return the rate of right verdicts by size, and the sizes found in half and in 95 %."""
-    sizes = sorted({one.case.size for one in outcomes if one.case.kind == "detection"} | {1.0})
-    rows: list[tuple[Cell, ...]] = []
-    for name in LISTED_FORMS:
-        points = dict(curve(outcomes, name))
-        at = [points[size].value if size in points else None for size in sizes]
-        rows.append((_plain(name), *at, *(size_at(outcomes, name, limit) for limit in LIMITS)))
-    columns = (
-        Column("hidden"),
-        *(Column(f"{size:g}", "", 3, "rate of right verdicts at size") for size in sizes),
-        *(Column(f"{limit:.0%}".replace("%", " %"), "", 2, "size found in") for limit in LIMITS),
-    )
-    note = (
-        "Size 1 is a typical effect. Sizes found in half and in 95 % lie between two sizes tried, "
-        "on the rates made monotone; none where that rate is not reached, or is already at the "
-        "smallest size."
-    )
-    return Table("limits", "Detection limits", columns, tuple(rows), note=note)
-
-
 def tools_table(outcomes: Sequence[Outcome]) -> Table:
     """Return how often simpler tools and chance are right on the same cases."""
     rows: list[tuple[Cell, ...]] = []
@@ -181,7 +177,7 @@ def tools_table(outcomes: Sequence[Outcome]) -> Table:
         expected = {"none": "adequate", "unlisted": "unlisted"}.get(kind)
         rates: dict[str, Estimate] = {
             "this workflow, name or class": rate([one.right_answer for one in chosen]),
-            "this workflow, first name alone": rate([one.right_word for one in chosen]),
+            "this workflow, first name alone": rate([one.right_first for one in chosen]),
         }
         for tool in RIVALS:
             answers = [one.answers.get(tool, "error") == (expected or one.case.truth)
@@ -199,29 +195,46 @@ def tools_table(outcomes: Sequence[Outcome]) -> Table:
         Column("high", "", 3, "right"),
     )
     note = (
-        f"Chance picks one of {_ANSWERS} answers: {len(LISTED_FORMS)} names, adequate, unlisted. "
+        f"Chance picks one of {_ANSWERS} answers: {len(LISTED)} names, adequate, unlisted. "
         "Right are adequate where nothing is hidden, unlisted, and the effect's name."
     )
     return Table("tools", "What simpler tools say of the same cases", columns, tuple(rows),
                  note=note)  # fmt: skip
 
 
+def wrong_table(outcomes: Sequence[Outcome]) -> Table:
+    """Return every wrong answer that is given with confidence."""
+    wrong = [one for one in outcomes if one.wrong_confident]
+    title = f"All {len(wrong)} wrong answers that are given with confidence"
+    return _cases_table("wrong", title, wrong, folded=False)
+
+
 def misses_table(outcomes: Sequence[Outcome]) -> Table:
-    """Return every case at typical size whose verdict is not right."""
+    """Return every case whose verdict is not what it must be."""
+    missed = [one for one in outcomes if not one.right_answer]
+    title = f"All {len(missed)} cases whose verdict is not what it must be"
+    return _cases_table("misses", title, missed, folded=True)
+
+
+def _cases_table(name: str, title: str, chosen: Sequence[Outcome], folded: bool) -> Table:
     rows = tuple(
-        (one.case.truth.replace("+", " + "), one.case.number, one.status, ", ".join(one.chosen),
+        (one.case.kind, one.case.number, one.case.truth.replace("+", " + "), one.case.forms,
+         one.case.stress.replace("_", " "), one.status, one.probability, ", ".join(one.chosen),
          ", ".join(map(_plain, one.equivalents)))
-        for one in outcomes
-        if one.case.kind != "detection" and not one.right_answer
+        for one in chosen
     )  # fmt: skip
     columns = (
-        Column("hidden"),
+        Column("kind"),
         Column("case"),
+        Column("hidden"),
+        Column("form"),
+        Column("stress"),
         Column("status"),
+        Column("probability", "", 3),
         Column("preferred"),
         Column("not told from it"),
     )
-    return Table("misses", f"All {len(rows)} cases that went wrong", columns, rows, folded=True)
+    return Table(name, title, columns, rows, folded=folded)
 
 
 def _judged_table(

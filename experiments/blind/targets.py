@@ -12,8 +12,47 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import binomtest, quantile_test
 
-from experiments.blind import cases as required
-from experiments.blind.data import Outcome
+from experiments.blind.outcome import Outcome
+
+# "Must reach" of issue 21, as rates; they are judged as design section 8 says.
+MOST_WRONG = {
+    "single": 10 / 1000,
+    "pair": 4 / 400,
+    "triple": 1 / 100,
+    "unlisted": 2 / 200,
+    "stressed": 4 / 400,
+}
+"""Confident wrong answers of each kind."""
+LEAST_RIGHT = 0.97
+"""Share of singles whose first name or class is right."""
+LEAST_BOTH = 0.80
+"""Share of pairs of which both effects are named, or are in a small class."""
+LEAST_TWO_OF_THREE = 0.60
+MOST_ALARMS = 6 / 300
+"""Share of false alarms where nothing is hidden, with misstated noise and faulty rows too."""
+MOST_BIAS_LEFT = 0.1
+"""Bias of the base parameters after the revision over that before it."""
+COVERED = (0.92, 0.97)
+"""Share of true values in the 95 % intervals of named effects."""
+LEAST_F1 = 0.9
+"""F1 score of the flagged cells; as in the campaign before this one."""
+LEAST_SHRINKAGE = 0.85
+"""Median shrinkage of the gap on the held-out records; as before."""
+FLOOR_MULTIPLE = 1.5
+"""Multiple of the noise floor within which a gap has closed."""
+LEAST_CLOSED = 0.70
+MOST_SECONDS = 5.5
+"""Median time of a case on one core: half of the 9 to 13 s of the workflow before."""
+ALARM_STRESSES = ("noise", "outliers")
+KINDS = {
+    "none": "nothing",
+    "single": "one listed effect",
+    "pair": "two listed effects",
+    "triple": "three listed effects",
+    "unlisted": "one unlisted effect",
+    "stressed": "one or nothing, under stress",
+}
+NOTHING_STRESSED = "nothing, with misstated noise or faulty rows"
 
 LEVEL = 0.01
 
@@ -117,65 +156,53 @@ def judge_median(
 
 def demands(outcomes: Sequence[Outcome]) -> Iterator[Judged]:
     """Judge everything that must be reached but the time."""
-    single, listed = select(outcomes, "single"), "one listed effect"
-    clean, unlisted = select(outcomes, "none"), select(outcomes, "unlisted")
+    single, listed = select(outcomes, "single"), KINDS["single"]
+    for kind, most in MOST_WRONG.items():
+        wrong = [one.wrong_confident for one in select(outcomes, kind)]
+        yield judge_rate("wrong name with confidence", KINDS[kind], wrong, most, at_least=False)
     yield judge_rate(
-        "first name or class right", listed, [one.right for one in single], required.LEAST_RIGHT
+        "first name or class right", listed, [one.right for one in single], LEAST_RIGHT
     )
-    for kind, words in (
-        ("single", listed),
-        ("pair", "two listed effects"),
-        ("unlisted", "one unlisted effect"),
-    ):
-        yield judge_rate(
-            "wrong name with confidence",
-            words,
-            [one.wrong_confident for one in select(outcomes, kind)],
-            required.MOST_WRONG_CONFIDENT,
-            at_least=False,
-        )
-    yield judge_rate(
-        "alarm",
-        "nothing hidden",
-        [not one.right_answer for one in clean],
-        required.MOST_ALARMS,
-        at_least=False,
-    )
-    yield judge_rate(
-        "noticed as unlisted",
-        "one unlisted effect",
-        [one.right_answer for one in unlisted],
-        required.LEAST_NOTICED,
-    )
-    yield judge_rate(
-        "both named",
-        "two listed effects",
-        [one.both for one in select(outcomes, "pair")],
-        required.LEAST_BOTH,
-    )
-    yield judge_median(
-        "F1 of the flagged cells, median", listed, [one.f1 for one in single], required.LEAST_F1
-    )
+    pairs, triples = select(outcomes, "pair"), select(outcomes, "triple")
+    both = [one.all_named for one in pairs]
+    yield judge_rate("both named, or in a class of at most three", KINDS["pair"], both, LEAST_BOTH)
+    two = [one.two_named for one in triples]
+    yield judge_rate("two named", KINDS["triple"], two, LEAST_TWO_OF_THREE)
+    alarms = [one.status != "adequate" for one in select(outcomes, "none")]
+    yield judge_rate("alarm", KINDS["none"], alarms, MOST_ALARMS, at_least=False)
+    alarms = [one.status != "adequate" for one in nothing_stressed(outcomes)]
+    yield judge_rate("alarm", NOTHING_STRESSED, alarms, MOST_ALARMS, at_least=False)
     yield judge_median(
         "bias left in the base over bias before, median",
         listed,
         [one.bias_ratio for one in single],
-        required.MOST_BIAS_LEFT,
+        MOST_BIAS_LEFT,
         at_least=False,
     )
+    values = [flag for one in outcomes for flag in one.covered]
+    for end, at_least in zip(COVERED, (True, False), strict=True):
+        yield judge_rate("95 % intervals that hold the true value", "what is named", values, end,
+                         at_least)  # fmt: skip
+    yield judge_median("F1 of the flagged cells, median", listed, [one.f1 for one in single],
+                       LEAST_F1)  # fmt: skip
     for gap in ("transmission_error", "leading"):
         yield from _proof(gap, single)
 
 
+def nothing_stressed(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    """Return the outcomes in which only what is stated of noise or rows is wrong."""
+    return [
+        one
+        for one in select(outcomes, "stressed")
+        if one.nothing_hidden and one.case.stress in ALARM_STRESSES
+    ]
+
+
 def time_demand(outcomes: Sequence[Outcome]) -> Judged:
     """Judge the time of all parts together."""
-    whole = [
-        sum(one.seconds) if one.seconds else np.inf
-        for one in outcomes
-        if one.case.kind != "detection"
-    ]
-    return judge_median("time of a campaign, median, s", "all but detection limits", whole,
-                        required.MOST_SECONDS, at_least=False)  # fmt: skip
+    whole = [sum(one.seconds) if one.seconds else np.inf for one in outcomes]
+    return judge_median("time of a campaign, median, s", "all kinds", whole, MOST_SECONDS,
+                        at_least=False)  # fmt: skip
 
 
 _GAP_WORDS = {
@@ -187,9 +214,9 @@ _GAP_WORDS = {
 def _proof(gap: str, single: Sequence[Outcome]) -> Iterator[Judged]:
     where = f"one listed effect, {_GAP_WORDS[gap]}"
     shrunk = [one.shrinkage(gap) for one in single]
-    multiple = required.FLOOR_MULTIPLE
+    multiple = FLOOR_MULTIPLE
     closed = [one.closed(gap, multiple) for one in single if one.open_before(gap, multiple)]
     yield judge_median("shrinkage of the held-out gap, median", where, shrunk,
-                       required.LEAST_SHRINKAGE)  # fmt: skip
-    yield judge_rate(f"held-out gap within {required.FLOOR_MULTIPLE:g} x the noise floor", where,
-                     closed, required.LEAST_CLOSED)  # fmt: skip
+                       LEAST_SHRINKAGE)  # fmt: skip
+    yield judge_rate(f"held-out gap within {FLOOR_MULTIPLE:g} x the noise floor", where,
+                     closed, LEAST_CLOSED)  # fmt: skip

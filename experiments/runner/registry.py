@@ -44,6 +44,8 @@ class Context:
         Whether to run long campaigns instead of reading their committed outcome.
     quick
         Whether to run a small version of those that have one.
+    cases
+        How many cases, from the first on, of a full run of those that can be limited; None for all.
     """
 
     seeds: int
@@ -51,10 +53,13 @@ class Context:
     campaign: Campaign
     full: bool = False
     quick: bool = False
+    cases: int | None = None
 
     def command(self, experiment: str) -> str:
         """Return the command for this extent of an experiment."""
         option = " --full" if self.full else " --quick" if self.quick else ""
+        if self.full and self.cases is not None:
+            option += f" --cases {self.cases}"
         return f"python -m experiments {experiment}{option}"
 
 
@@ -76,6 +81,8 @@ class Experiment:
         Whether it shows the committed outcome of a long campaign, which ``--full`` runs.
     has_small_version
         Whether it takes ``--quick``.
+    takes_cases
+        Whether ``--cases`` limits its full run.
     takes_seeds
         Whether ``--seeds`` says how many runs it makes; others have numbers of their own.
     """
@@ -86,6 +93,7 @@ class Experiment:
     by_default: bool = True
     reads_outcome: bool = False
     has_small_version: bool = False
+    takes_cases: bool = False
     takes_seeds: bool = False
 
     def run(self, context: Context) -> Result:
@@ -159,6 +167,7 @@ EXPERIMENTS = (
         "blind.experiment",
         "Blind campaigns: what the discrepancy workflow finds of what is hidden",
         reads_outcome=True,
+        takes_cases=True,
     ),
     Experiment(
         "sealed_rigs",

@@ -1,0 +1,53 @@
+"""Committed outcomes of blind cases: a beginning of the list, and what the code says today."""
+
+import numpy as np
+import pytest
+
+from experiments.blind.campaigns import campaign_of, hiding
+from experiments.blind.cases import all_cases
+from experiments.blind.data import outcome, read_outcomes
+from experiments.blind.experiment import OUTCOMES, SECONDS
+from experiments.blind.scoring import COLUMNS, verdict_scores
+from experiments.runner.campaign import Run
+from experiments.runner.committed import DATA, read_rows
+from pymoo_hdte.discrepancy.drive.analysis import examine_drive
+
+CHEAPEST = 2
+"""Cases that the gate runs anew; the nightly run takes a dozen, spread over the list."""
+DOZEN = 12
+
+
+@pytest.fixture(scope="module")
+def outcomes():
+    if not (DATA / OUTCOMES).is_file():
+        pytest.skip("no blind case has been run and committed yet")
+    return read_outcomes(DATA / OUTCOMES, DATA / SECONDS)
+
+
+def test_they_are_a_beginning_of_the_list(outcomes):
+    assert [one.case for one in outcomes] == all_cases()[: len(outcomes)]
+    stored = [(row["truth"], row["forms"], row["stress"]) for row in read_rows(DATA / OUTCOMES)]
+    drawn = [(one.truth, one.forms, one.stress) for one in (each.case for each in outcomes)]
+    assert stored == drawn
+
+
+def same_again(stored):
+    hidden = hiding(stored.case)
+    verdict = examine_drive(campaign_of(hidden, hidden.session)).verdict
+    scores = verdict_scores(stored.case, verdict)
+    row = [scores.get(column, np.nan) for column in COLUMNS]
+    found = outcome(stored.case, Run(COLUMNS, np.array([row]), 0.0))
+    assert (found.status, found.chosen) == (stored.status, stored.chosen), stored.case.key
+    assert found.equivalents == stored.equivalents, stored.case.key
+
+
+def test_the_cheapest_end_as_they_are_stored(outcomes):
+    for stored in sorted(outcomes, key=lambda one: sum(one.seconds) or 1e9)[:CHEAPEST]:
+        same_again(stored)
+
+
+@pytest.mark.nightly
+def test_a_dozen_ends_as_it_is_stored(outcomes):
+    step = max(len(outcomes) // DOZEN, 1)
+    for stored in outcomes[::step][:DOZEN]:
+        same_again(stored)
