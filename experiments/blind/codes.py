@@ -8,13 +8,16 @@ from experiments.blind.cases import BELIEVED
 from experiments.blind.rig.forms import LISTED, UNLISTED
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.engine.verdict import STATUSES as VERDICTS
-from pymoo_hdte.drive.effects import ENCODER_LINE
+from pymoo_hdte.drive.effects import ENCODER_LINE, drive_effects
 
 ERROR = "error"
 """Status of a case in which the workflow raised an exception."""
 STATUSES = (*VERDICTS, ERROR)
+_NEVER_HIDDEN = tuple(sorted({one.name for one in drive_effects()} - set(LISTED)))
+"""Effects that the workflow may name and no case hides."""
 NAMES = (
     *LISTED,
+    *_NEVER_HIDDEN,
     *UNLISTED,
     ENCODER_LINE,
     "parameter",

@@ -32,7 +32,7 @@ from pymoo_hdte.discrepancy.drive.proof import Proof, prove
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy.engine.verdict import Verdict, rows_of
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.effects.unknowns import line_with_variance
 
 PARTS = ("analyse", "locate", "prove", "next_experiment")
@@ -145,7 +145,7 @@ def score(case: Case, tools: Mapping[str, Tool]) -> tuple[Scores, tuple[float, .
 
 def verdict_scores(case: Case, verdict: Verdict) -> Scores:
     """Return what the verdict says, and whether its class holds what is hidden."""
-    probability = getattr(verdict, "probability", None)
+    probability = verdict.probability
     scores = {"status": code(verdict.status, STATUSES)}
     scores["probability"] = np.nan if probability is None else float(probability)
     candidates = verdict.chosen.candidates if verdict.chosen is not None else ()
@@ -179,8 +179,8 @@ def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:
     Quantities that the hidden form does not have are left out, and effects that are not hidden.
     """
     fitted, total, covered = verdict.accepted, 0, 0
-    for candidate, rows in rows_of(fitted):
-        for row in rows:
+    for candidate, place in fitted.places:
+        for row in range(place.start, place.stop):
             name, value = fitted.parameters[row].name, float(fitted.values[row])
             variance = float(fitted.covariance[row, row])
             if name.endswith("_cosine"):
