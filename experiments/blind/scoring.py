@@ -238,10 +238,12 @@ def bias_scores(verdict: Verdict, twin: Fit) -> Scores:
         np.sqrt(np.diagonal(fitted.covariance)[rows]) / scale for fitted in (twin, verdict.accepted)
     )
     known = np.maximum(error, revised) < DETERMINED
-    scores = {"bias_error": _root_mean_square(error[known])}
+    # Where nothing is known well enough, there is nothing to compare.
+    scores = {"bias_error": _root_mean_square(error[known])} if known.any() else {}
     for state, fitted in (("before", verdict.base), ("after", verdict.accepted)):
         moved = (fitted.values[rows] - twin.values[rows]) / scale
-        scores[f"bias_{state}"] = _root_mean_square(moved[known])
+        if known.any():
+            scores[f"bias_{state}"] = _root_mean_square(moved[known])
         scores[f"bias_of_all_{state}"] = _root_mean_square(moved)
     return scores
 

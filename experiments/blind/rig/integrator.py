@@ -14,6 +14,7 @@ from scipy.linalg import expm
 
 from experiments.blind.rig.elements import Values
 from experiments.blind.rig.machine import LinearPart, Matrix
+from experiments.blind.rig.shapes import copy_into
 from experiments.blind.rig.torques import LOAD, Plant, torques
 
 
@@ -123,13 +124,15 @@ def follow(
             when = time + 0.5 * h * ((stage + 1) // 2)
             motor = torques(plant, when, at, kept, before, since, moved, now, f[stage])
             if stage == 0:
-                kept[:], before[:], since = moved, now, time
+                copy_into(kept, moved)
+                copy_into(before, now)
+                since = time
                 sample = number // substeps - n_settle
                 if sample >= 0 and number % substeps == 0:
                     seen[0, sample], seen[1, sample] = y[0], y[1]
                     seen[2, sample], seen[3, sample] = read_torques(plant, readout, y, f[0], motor)
                 moving(step.halfway, y, step.half, f[0], first)
-                at[:] = first
+                copy_into(at, first)
             elif stage == 1:
                 moving(step.halfway, y, step.half, f[1], at)
             elif stage == 2:
@@ -144,7 +147,7 @@ def follow(
             for j in range(3):
                 total += step.middle[i, j] * f[0, j] + step.last[i, j] * f[3, j]
             y[i] = total
-        at[:] = y
+        copy_into(at, y)
     return seen
 
 

@@ -12,6 +12,7 @@ from experiments.blind.rig import elements as el
 from experiments.blind.rig.elements import Values, table
 from experiments.blind.rig.integrator import follow, readout_of, step_of
 from experiments.blind.rig.machine import LinearPart, Machine, Matrix, linear_part
+from experiments.blind.rig.shapes import copy_into
 from experiments.blind.rig.torques import (
     LOAD,
     Plant,
@@ -205,7 +206,7 @@ def locked_torsion(machine: Machine, torque: Values, interval: float) -> Values:
         if row[0] in (el.DRY, el.UNEVEN) and row[7] == el.OUTPUT
     )
     kept = np.zeros(len(plant.rows))
-    return _locked(plant, torque, interval, max(holding, 0.0), kept)
+    return _locked(plant, torque, interval, max(float(holding), 0.0), kept)
 
 
 @njit(cache=True)
@@ -227,9 +228,9 @@ def _locked(plant: Plant, torque: Values, interval: float, holding: float, kept:
                 high = middle
         d = 0.5 * (low + high)
         _static(plant, d, kept, before, moved, trial)
-        kept[:] = trial
-        before[:] = d
+        copy_into(kept, trial)
         for e in range(rows):
+            before[e] = d
             row = plant.rows[e]
             if row[0] == el.CREEP:
                 kept[e] += (row[1] * d - kept[e]) * (1.0 - math.exp(-interval / row[2]))
@@ -242,9 +243,9 @@ def _static(
     plant: Plant, d: float, kept: Values, before: Values, moved: Values, trial: Values
 ) -> float:
     """Return the torque that holds a torsion, N.m, and write states of memory to ``trial``."""
-    moved[:] = kept
+    copy_into(moved, kept)
     total = elastic_torque(plant, d, 0.0, 0.0, 0.0, kept, before, moved)
-    trial[:] = moved
+    copy_into(trial, moved)
     for e in range(len(plant.rows)):
         row = plant.rows[e]
         if row[0] == el.BRISTLES and row[7] == el.OUTPUT:

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 MEAN_OF_BUMP = 1.2660658777520084
 """I0(1), mean of exp(cos x) over a period."""
 TRAPEZOID = 3.0
 """How steep the sides of the rounded trapezoid are."""
+
+
+@njit(cache=True)
+def copy_into(target: NDArray[np.float64], source: NDArray[np.float64]) -> None:
+    """Copy an array (n,) into another; slices take seconds to compile, for words of an error."""
+    for place in range(len(source)):
+        target[place] = source[place]
 
 
 @njit(cache=True)

@@ -13,6 +13,7 @@ from experiments.blind.rig.shapes import (
     beyond_gap,
     bouc_wen,
     bump,
+    copy_into,
     decay,
     rounded_sign,
     wave,
@@ -195,8 +196,9 @@ def torques(
     value, slope = static_error(plant, angle)
     d = y[0] / plant.ratio - y[1] - value
     rate = y[2] / plant.ratio - y[3] - slope * speed
-    moved[:] = kept
-    now[:] = d
+    copy_into(moved, kept)
+    for e in range(len(now)):
+        now[e] = d
     spring = elastic_torque(plant, d, angle, speed, time, kept, before, moved)
     dashpot = plant.damping * rate
     motor, on_input, on_output, load = plant.motor, 0.0, 0.0, plant.load
