@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -44,11 +45,12 @@ class MaxwellSlip(Aperiodic):
         real_number("hysteresis.torsion", self.torsion, above=0.0)
         real_number("hysteresis.spread", self.spread, above=0.0)
 
-    @property
+    # Kept, as integrators ask for them in every step.
+    @cached_property
     def _slips(self) -> Values:
         return np.asarray(self.torsion * (np.arange(1, SPRINGS + 1) / SPRINGS) ** self.spread)
 
-    @property
+    @cached_property
     def _stiffnesses(self) -> Values:
         return self.force / (SPRINGS * self._slips)
 

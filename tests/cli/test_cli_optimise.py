@@ -141,6 +141,7 @@ class TestCheck:
         assert study.optimum_check.mean == pytest.approx(dte.mean(), abs=0.06)
         assert study.optimum_check.std == pytest.approx(dte.std(), abs=0.1)
 
+    @pytest.mark.nightly
     def test_standard_errors_are_the_scatter_over_other_random_drives(self, checks):
         of_nominal = [before for before, _ in checks]
         means, stds = np.array([(one.mean, one.std) for one in of_nominal]).T

@@ -48,6 +48,7 @@ def run(folder, out, *options):
     return cli.main(["discrepancy", str(folder), "--out", str(out), "--quiet", *map(str, options)])
 
 
+@pytest.mark.nightly
 def test_the_effect_of_a_file_is_named_believed_and_forgotten(folder, tmp_path):
     before = known_effects()
     assert run(folder, tmp_path / "out", "--effects", EXAMPLE) == 0

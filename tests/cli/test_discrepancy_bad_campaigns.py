@@ -262,6 +262,7 @@ def test_interrupted_in_the_last_step_the_earlier_report_stays(tmp_path, monkeyp
     assert (tmp_path / "out" / PAGE_FILE).read_text() == "earlier"
 
 
+@pytest.mark.nightly
 def test_too_few_conditions_and_nothing_held_out_are_said(clean, tmp_path, capsys):
     fast = [replace(one, role="train") for one in clean.running if one.input_speed > 200.0]
     write_campaign(replace(clean, running=tuple(fast)), tmp_path / "rig")

@@ -56,15 +56,14 @@ def no_proof(patch):
     """The held-out records have no say."""
     doubts_of = verdict.doubts_of
 
-    def without_proof(search, chosen):
-        return [one for one in doubts_of(search, chosen) if one != verdict.NOT_PROVEN]
-
-    patch.setattr(verdict, "doubts_of", without_proof)
+    patch.setattr(
+        verdict, "doubts_of", lambda search, chosen, vote: doubts_of(search, chosen, None)
+    )
 
 
 def no_doubts(patch):
     """Neither the held-out records nor bounds and intervals have a say."""
-    patch.setattr(verdict, "doubts_of", lambda search, chosen: [])
+    patch.setattr(verdict, "doubts_of", lambda search, chosen, vote: [])
 
 
 def one_parameter_at_a_time(patch):

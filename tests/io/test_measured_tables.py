@@ -82,12 +82,14 @@ def test_every_unit_is_converted(tmp_path):
     known |= {"rpm": math.pi / 30}
     known |= dict.fromkeys(("ms", "mm", "mm/s", "N.mm", "mN.m", "mA", "mV"), 1e-3)
     known |= dict.fromkeys(("deg", "deg/s"), math.pi / 180)
-    si = {"s", "m", "rad", "rad/s", "m/s", "N", "N.m", "A", "V", "m/s2", "rad/s2", "1"}
+    si = {"K", "s", "m", "rad", "rad/s", "m/s", "N", "N.m", "A", "V", "m/s2", "rad/s2", "1"}
     known |= dict.fromkeys(set(tables.CHANNEL_UNITS) & si, 1.0)
-    assert len(known) == len(tables.CHANNEL_UNITS)
+    assert {*known, "C"} == set(tables.CHANNEL_UNITS)
     for unit, factor in known.items():
         values = tables.read_table(path, layout(x=Channel("a", unit))).channels["x"]
         np.testing.assert_allclose(values, np.arange(20.0) * factor, rtol=1e-14)
+    values = tables.read_table(path, layout(x=Channel("a", "C"))).channels["x"]
+    np.testing.assert_allclose(values, np.arange(20.0) + 273.15, rtol=1e-14)
 
 
 @pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2 * math.pi), ("rev", 1.0)])

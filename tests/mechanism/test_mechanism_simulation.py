@@ -124,6 +124,7 @@ def test_without_damping_energy_is_kept():
     assert v**2 + 250.0 * q**2 + 1250.0 * q**4 == pytest.approx(12.0, rel=1e-6)
 
 
+@pytest.mark.nightly
 def test_hysteresis_takes_the_area_of_masings_loop_in_every_cycle():
     law, step = MaxwellSlip(30.0, 0.08, 1.5), 5e-4
     coarse = np.arange(801) * 0.005

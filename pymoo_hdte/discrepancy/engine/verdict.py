@@ -185,6 +185,10 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
             found.append(f"the interval of {candidate.label} contains nothing")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
+    curves = [one.label for one in chosen.candidates if not one.exact]
+    freed = any(one.frees is not None for one in chosen.candidates)
+    if curves and freed and not search.enough(chosen):
+        found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
     if vote is not None and vote.after >= vote.before:
         found.append(NOT_PROVEN)
     per_degree = fitted.chi_square / search.degrees_of_freedom

@@ -245,6 +245,7 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.mark.nightly
 def test_a_revised_mechanism_fed_back_misses_nothing(folder, tmp_path, capsys):
     first = analyse(read_rig(folder))
     assert [one.name for one in first.verdict.accepted.candidates] == ["hardening_stiffness"]

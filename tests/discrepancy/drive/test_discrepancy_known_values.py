@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from quick_campaigns import RIPPLING, quick_analysis, quick_campaign
+from quick_campaigns import ripple_analysis_and_report, ripple_campaign
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import analyse, read_campaign, write_campaign
@@ -34,7 +34,8 @@ FRICTION = LawAtPort("coulomb_friction", "input", CoulombFriction(0.01))
 @pytest.fixture(scope="module")
 def holding():
     """A campaign that believes the ripple it has, and a friction that it does not have."""
-    campaign = quick_campaign(*RIPPLING).believing(quick_analysis(*RIPPLING).revised_model())
+    analysis, _ = ripple_analysis_and_report()
+    campaign = ripple_campaign().believing(analysis.revised_model())
     believed = replace(campaign.believed, effects=(*campaign.believed.effects, FRICTION))
     return replace(campaign, believed=believed)
 

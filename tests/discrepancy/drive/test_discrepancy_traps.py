@@ -41,6 +41,7 @@ def test_a_clean_drive_is_adequate(seed):
     assert quick_analysis(seed).verdict.status == "adequate"
 
 
+@pytest.mark.nightly
 def test_a_clean_campaign_without_a_sweep_is_adequate(clean):
     without = replace(clean, torsion=())
     assert examine_drive(without).verdict.status == "adequate"

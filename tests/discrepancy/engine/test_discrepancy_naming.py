@@ -281,6 +281,7 @@ def test_what_explains_one_channel_is_not_the_cause_of_what_another_shows():
     assert verdict_on(data, [CUBIC, RIPPLE], explained_part_share=0.0).status == "partial"
 
 
+@pytest.mark.nightly
 def test_what_one_record_alone_shows_does_not_speak_against_a_curve():
     """One condition may lie at a resonance, where no form is exact."""
     data = disturbed(planted({CUBIC: (6e9,)}), 3000.0)
@@ -355,6 +356,7 @@ def test_a_second_effect_must_remove_most_of_what_is_left():
     assert labels_of(verdict_on(data, [RIPPLE, LINE], **lenient)) == {RIPPLE, LINE}
 
 
+@pytest.mark.nightly
 def test_a_second_effect_is_looked_for_where_the_first_explains_least():
     """The curve takes 96 % of the excess, and nothing of that of the input torque."""
     data = planted({CUBIC: (6e9,), DRAG: (0.0088, 2.0)})
@@ -369,6 +371,7 @@ def test_a_second_effect_is_looked_for_where_the_first_explains_least():
 
 
 @pytest.mark.parametrize("looked_at", [True, pytest.param(False, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
 def test_a_second_effect_is_looked_for_in_the_sweep_alone(looked_at, monkeypatch):
     """The first leaves so much of a running record that the whole hides what the sweep shows."""
     conditions = [(rpm, load) for rpm in (10.0, 1000.0, 2000.0) for load in (0.0, 20.0, 40.0)]

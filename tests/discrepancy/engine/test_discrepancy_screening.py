@@ -38,12 +38,11 @@ PLANTED = {
 
 NOW = (
     "kinematic_error:mesh@3",
-    "nonlinear_drag/sublinear:input",
     "load_dependent_friction:input",
     "soft_windup:mesh",
     "thermal_drift:sensor",
 )
-"""One of a kind: a line, powers of the speed, a share of the load, a curve, a drift."""
+"""One of a kind: a line, a share of the load, a curve, a drift."""
 
 
 def of_label(data, label):
@@ -85,6 +84,7 @@ def test_reduction_by_a_line_is_that_of_linear_least_squares():
     assert found.start == pytest.approx(planted, abs=0.1 * np.hypot(*planted))
 
 
+@pytest.mark.nightly
 def test_noise_gives_a_candidate_its_share_by_chance():
     """The reduction by two unknowns is a chi-square of two degrees of freedom."""
     data = known_data(FEW)

@@ -60,6 +60,7 @@ def test_a_user_finds_the_cubic_spring_of_a_duffing_oscillator():
     assert quantities(finding)["stiffness of spring"]["value"] == pytest.approx(4000.0, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_hysteresis_of_another_form_is_named():
     finding = examine_mechanism(OSCILLATOR, with_held_out(bouc_wen))
     assert [one["name"] for one in effects(finding)] == ["hysteresis"]
@@ -84,7 +85,7 @@ def test_nothing_hidden_is_adequate_and_proved_to_be():
     assert balanced.after < 1.3 * balanced.noise_floor
 
 
-@pytest.mark.parametrize("force_noise", [1e-3, 1.0])
+@pytest.mark.parametrize("force_noise", [pytest.param(1e-3, marks=pytest.mark.nightly), 1.0])
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (2, 3))]
 )
@@ -202,6 +203,7 @@ def test_an_effect_that_is_known_is_not_found_again():
     assert finding.base_misfit < 0.2 * finding_on(dry, 4).base_misfit
 
 
+@pytest.mark.nightly
 def test_the_verdict_does_not_hang_on_units():
     # In mm, N and g: the same physics.
     record = rig.record_of(cubic)
@@ -282,6 +284,7 @@ def test_two_records_of_one_name_and_a_held_out_one_without_a_channel_are_refuse
         examine_mechanism(OSCILLATOR, [record, held_out])
 
 
+@pytest.mark.nightly
 def test_a_spring_and_a_damper_that_were_forgotten_are_named():
     (port,) = OSCILLATOR.ports
     for lost, name, size in (
@@ -294,6 +297,7 @@ def test_a_spring_and_a_damper_that_were_forgotten_are_named():
         assert effect["parameters"]["coefficient"]["value"] == pytest.approx(size, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_play_takes_the_stiffness_that_is_fitted_and_not_the_believed_one():
     def play(x, v, z, t):
         return rig.STIFFNESS * (np.clip(x, -0.002, 0.002) * -1.0), 0.0

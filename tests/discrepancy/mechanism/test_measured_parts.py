@@ -95,6 +95,7 @@ def test_a_ripple_is_one_effect_with_its_orders():
     assert np.cos(phase - 0.5) == pytest.approx(-1.0, abs=0.01)
 
 
+@pytest.mark.nightly
 def test_one_direction_is_said_and_the_reverse_run_proposed():
     one_way = examine_mechanism(JOINT, [turning(f"{v}", v, dry) for v in (0.5, 1.5, 2.5)])
     assert [one["name"] for one in effects(one_way)] == ["coulomb_friction"]
@@ -118,6 +119,7 @@ def test_friction_and_an_offset_are_told_apart_by_two_directions():
     assert effect["parameters"]["force"]["value"] == pytest.approx(0.8, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_a_rest_that_nobody_explains_does_not_hide_the_main_effect():
     generator = np.random.default_rng(3)
     # A slow wander, a hundred times the sensors' noise and a sixth of the friction.
@@ -133,6 +135,7 @@ def test_a_rest_that_nobody_explains_does_not_hide_the_main_effect():
     assert finding.remainder < 0.35 * finding.base_misfit
 
 
+@pytest.mark.nightly
 def test_intervals_cover_when_the_rest_is_coloured():
     """95 % intervals of 120 fits; those of a white rest would cover far less."""
     truth = np.array([INERTIA, VISCOUS])
@@ -240,6 +243,7 @@ def test_a_stop_with_noise_is_no_second_direction():
     ]
 
 
+@pytest.mark.nightly
 def test_a_port_with_a_small_share_of_the_motion_is_searched_in_its_own_forces():
     geared = Mechanism(
         JOINT.inertias,
@@ -256,6 +260,7 @@ def test_a_port_with_a_small_share_of_the_motion_is_searched_in_its_own_forces()
     assert first["parameters"]["level"]["value"] == pytest.approx(size, rel=0.02)
 
 
+@pytest.mark.nightly
 def test_a_ripple_between_two_bodies_is_found():
     pair = Mechanism(
         {"a": BelievedValue(0.05), "b": BelievedValue(0.03)},

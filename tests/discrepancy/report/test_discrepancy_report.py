@@ -88,6 +88,7 @@ def test_verdict_and_model_are_read_back(written, ripple):
     assert load_model(written / "revised_model.toml", sheet) == revised_model(ripple)
 
 
+@pytest.mark.nightly
 def test_same_analysis_gives_the_same_bytes(written, ripple, location, tmp_path):
     again = tmp_path / "again"
     write_report(ripple, location, prove(ripple), PROPOSAL, optimum_shift, again)
@@ -232,6 +233,7 @@ def test_revised_model_with_a_law_goes_through_surrogate_and_swarm(ripple):
         assert soft.dte_arcsec(design[None, :])[0] == pytest.approx(choice.reached[0], rel=0.1)
 
 
+@pytest.mark.nightly
 def test_inert_law_moves_the_optimum_by_the_change_of_solver_only(ripple):
     plain = revised_with(ripple)
     inert = revised_with(ripple, LawAtPort("soft_windup", "mesh", SoftWindup(0.0, 2e-4)))

@@ -75,9 +75,9 @@ def page(name, tmp_path):
 @pytest.mark.parametrize(
     ("name", "images", "tables"),
     [
-        ("optimise", 0, 5),
-        ("simulate", 3, 1),
-        ("identify", 5, 3),
+        pytest.param("optimise", 0, 5, marks=pytest.mark.nightly),
+        pytest.param("simulate", 3, 1, marks=pytest.mark.nightly),
+        pytest.param("identify", 5, 3, marks=pytest.mark.nightly),
         ("discrepancy", 5, 4),
         ("measured", 3, 3),
         ("experiments", 1, 1),

@@ -105,6 +105,7 @@ def test_a_linear_machine_moves_as_its_transfer_function_says(third):
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
+@pytest.mark.nightly
 def test_two_benches_that_were_written_apart_move_alike(share):
     believed = replace(
         BELIEVED,
@@ -235,7 +236,8 @@ def test_the_motor_carries_friction_from_the_start():
 
 def test_every_listed_effect_of_the_library_is_hidden_and_has_foreign_forms():
     names = {one.name for one in drive_effects()}
-    assert set(LISTED) == names
+    # Changes of a zero are faults of rows, and these campaigns have no temperatures.
+    assert set(LISTED) == names - {"new_zero", "temperature_dependent_friction"}
     assert min(FORMS.values()) >= 3
     assert not set(UNLISTED) & names
     assert len(UNLISTED) >= 8

@@ -111,6 +111,7 @@ def test_a_local_fit_recovers_the_model_that_made_the_numbers():
     assert rung.physical(found)["std_arcsec"] == pytest.approx(8.0, rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_the_same_seed_gives_the_same_fit():
     rung = Candidate((), "semi_amplitude", NARROW)
     budget = Budget(population=6, generations=1, starts=1, local_evaluations=2)

@@ -52,6 +52,7 @@ def test_the_true_size_is_among_the_possible_ones(n, rng):
         assert low <= n <= high
 
 
+@pytest.mark.nightly
 def test_the_printed_tests_fit_200_values_and_not_20():
     sizes = [possible_sizes(row.shapiro_w, row.shapiro_p) for row in TABLE_2.values()]
     assert all(low <= 200 <= high for low, high in sizes)
