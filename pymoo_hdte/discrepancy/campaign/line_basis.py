@@ -109,11 +109,6 @@ class LineFit:
         return self.values(part) - basis @ self.projections[0]
 
     @property
-    def whole_basis(self) -> NDArray[np.float64]:
-        """The orthonormal columns in all rows, shape (n, p)."""
-        return np.vstack([self.basis(part) for part in self.parts])
-
-    @property
     def whole_residual(self) -> NDArray[np.float64]:
         """What the lines leave of the channels in all rows, shape (n, 4)."""
         return np.vstack([self.residual(part, self.basis(part)) for part in self.parts])

@@ -14,8 +14,8 @@ def _counted(right: int, of: int, verdict: str, truth: str) -> float:
         "probability",
         f"Of verdicts that are {verdict}, the share of which {truth}, where the evidence leaves no "
         "doubt.",
-        f"Simulation: {right} of {of} on the first cases of seed 777 of the blind campaign and on the "
-        "shared cases; one more of either kind is assumed (Laplace's rule of succession).",
+        f"Simulation: {right} of {of} on the first cases of seed 777 of the blind campaign and on "
+        "the shared cases; one more of either kind is assumed (Laplace's rule of succession).",
         at_most=1.0,
     )
 

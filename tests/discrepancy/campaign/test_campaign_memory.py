@@ -17,6 +17,7 @@ READ_AND_FIT = """
 import resource, sys
 import numpy as np
 from pymoo_hdte.discrepancy import order_lines, read_campaign, residual_spectrum
+from pymoo_hdte.discrepancy.campaign.rows.examination import examined_rows
 
 def peak():
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -26,6 +27,7 @@ campaign = read_campaign(sys.argv[1])
 record, ratio = campaign.running[0], campaign.believed.ratio
 lines = order_lines(record, campaign.rig, ratio, np.arange(1.0, 41.0))
 residual_spectrum(record, campaign.rig, ratio, [1.0, 2.0], 0.5)
+examined_rows(campaign, np.arange(1.0, 21.0))
 print(peak(), len(record.time), abs(lines.phasors[0, 1]))
 """
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from pymoo_hdte.discrepancy.campaign.line_basis import LineFit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 
 Rows = NDArray[np.float64]
@@ -45,23 +46,37 @@ class Step(NamedTuple):
     deviations: float
 
 
-class Lines(NamedTuple):
-    """What order lines make of a step of one from a row to the end, for every row.
+class Lines:
+    """What order lines leave of a step of one from a row to the end, for every row.
 
-    ``basis`` (n, p) is orthonormal, ``shares`` (n, p) the step's part in it, and ``lengths`` (n,)
-    the square of the length of the rest.
+    Block by block, as `LineFit` has them.
+
+    Parameters
+    ----------
+    fit : LineFit
+
+    Attributes
+    ----------
+    lengths : ndarray, shape (n,)
+        Square of the length of what is left.
     """
 
-    basis: Rows
-    shares: Rows
-    lengths: Rows
+    def __init__(self, fit: LineFit) -> None:
+        self.fit, self.lengths = fit, np.arange(len(fit.record.time), 0.0, -1.0)
+        later = np.zeros(len(fit.triangle))
+        for part in reversed(fit.parts):
+            shares = later + np.cumsum(fit.basis(part)[::-1], axis=0)[::-1]
+            self.lengths[part] -= np.einsum("np,np->n", shares, shares)
+            later = shares[0]
 
-    @classmethod
-    def of(cls, basis: Rows) -> Lines:
-        """Return that of an orthonormal basis."""
-        shares = np.cumsum(basis[::-1], axis=0)[::-1]
-        rest = np.arange(len(basis), 0.0, -1.0) - np.einsum("np,np->n", shares, shares)
-        return cls(basis, shares, rest)
+    def left_of_step(self, row: int) -> Rows:
+        """Return what is left of the step from a row, shape (n,)."""
+        left = np.zeros(len(self.lengths))
+        left[row:] = 1.0
+        share = sum(self.fit.basis(part).T @ left[part] for part in self.fit.parts)
+        for part in self.fit.parts:
+            left[part] -= self.fit.basis(part) @ share
+        return left
 
 
 def scatter(rows: Rows) -> float:
@@ -217,7 +232,7 @@ def _contrast(half: int) -> tuple[Rows, float]:
 def _step_in_record(residual: Rows, lines: Lines, deviations: float, rules: Rules) -> Step | None:
     """Return the jump that explains most of a residual, if hardly anything else is left then."""
     noise = scatter(residual)
-    basis, shares, lengths = lines
+    lengths = lines.lengths
     known = lengths > 1.0
     known[:_LEAST_ROWS] = known[len(known) - _LEAST_ROWS + 1 :] = False
     if not known.any():
@@ -225,9 +240,8 @@ def _step_in_record(residual: Rows, lines: Lines, deviations: float, rules: Rule
     strength = _strength(residual, lengths, known) / noise
     row = int(np.argmax(np.abs(strength)))
     size = float(strength[row] * noise / np.sqrt(lengths[row]))
-    stepped = -shares[row] @ basis.T
-    stepped[row:] += 1.0
-    left = float(np.abs(_strength(residual - size * stepped, lengths, known)).max()) / noise
+    rest = residual - size * lines.left_of_step(row)
+    left = float(np.abs(_strength(rest, lengths, known)).max()) / noise
     clear = abs(float(strength[row]))
     if clear > max(deviations, rules.fault_prominence * left) and _abrupt(
         residual, row, size, _WIDE

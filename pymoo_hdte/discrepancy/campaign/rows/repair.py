@@ -177,7 +177,7 @@ class _RunSearch(RowSearch[RunningRecord]):
     def _clearest_step(self, fit: LineFit) -> tuple[Step, str, float] | None:
         """Return the jump that stands out most, the channel that jumps, and by how much."""
         residual, found = fit.whole_residual, list[tuple[Step, str, float]]()
-        lines = Lines.of(fit.whole_basis)
+        lines = Lines(fit)
         for place in range(residual.shape[1]):
             one = step(residual[:, place], lines, self.deviations, self.rules)
             if one is None:
