@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.stats import mannwhitneyu
 
 from experiments.comparison.paired import SIGNIFICANT
-from experiments.comparison.ranks import RivalTest, average_ranks, holm_against, win_tie_loss
+from experiments.comparison.ranks import average_ranks
+from experiments.comparison.rivals import RivalTest, holm_against, win_tie_loss
 from experiments.contest.peers_data import Scores
 from experiments.contest.peers_tables import (
     NAMES,

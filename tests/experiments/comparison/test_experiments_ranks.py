@@ -16,15 +16,13 @@ from experiments.comparison.ranks import (
     average_ranks,
     cliques,
     friedman,
-    holm_against,
     medians,
     nemenyi_difference,
-    outcomes,
     problem_ranks,
     rank_intervals,
-    win_tie_loss,
 )
 from experiments.comparison.ranks_figures import critical_difference_plot, rank_heatmap
+from experiments.comparison.rivals import holm_against, outcomes, win_tie_loss
 from pymoo_hdte.checks import InvalidInput
 
 # Areas under the curve, J. Mach. Learn. Res. 7 (2006), Table 6. The last row but one is printed as
