@@ -1,6 +1,7 @@
 """The machine: data sheet, static error, equations of motion, steady state, time integration."""
 
-from pymoo_hdte.drive.datasheet import DataSheet, hs_20_100, load_datasheet
+from pymoo_hdte.drive.datasheet import DataSheet
+from pymoo_hdte.drive.datasheet_file import hs_20_100, load_datasheet
 from pymoo_hdte.drive.effects import (
     DampingReference,
     DriveEffect,

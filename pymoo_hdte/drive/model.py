@@ -13,14 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of
-from pymoo_hdte.drive.datasheet import (
-    NOMINAL_FIELDS,
-    DataSheet,
-    datasheet_from_fields,
-    hs_20_100,
-    sheet_table,
-    unit_of,
-)
+from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, DataSheet, unit_of
+from pymoo_hdte.drive.datasheet_file import datasheet_from_fields, hs_20_100, sheet_table
 from pymoo_hdte.drive.effects import DriveEffect, effect_from_fields
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.solve.coefficients import Coefficients

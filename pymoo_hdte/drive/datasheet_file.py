@@ -1,0 +1,137 @@
+"""Data sheets on file: read with the units of every quantity, and written in SI."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte.drive.datasheet import NOMINAL_QUANTITIES, DataSheet, ErrorSource, Mesh, Nominal
+from pymoo_hdte.effects.quantities import with_unit
+from pymoo_hdte.io.fields import Fields
+from pymoo_hdte.io.toml import read_toml
+
+
+def load_datasheet(path: str | Path) -> DataSheet:
+    """Read and check a data sheet in the format of ``drive/data/hs_20_100.toml``.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a TOML file, in which every quantity has its unit.
+
+    Returns
+    -------
+    DataSheet
+
+    Raises
+    ------
+    InvalidInput
+        For a wrong, missing, superfluous, negative, non-finite or unit-less field.
+    OSError
+        If the file cannot be read.
+    """
+    return datasheet_from_fields(read_toml(Path(path)))
+
+
+def datasheet_from_fields(sheet: Fields) -> DataSheet:
+    """Build a data sheet from its table.
+
+    Raises
+    ------
+    InvalidInput
+        As `load_datasheet`.
+    """
+    teeth = sheet.table("teeth")
+    rated = sheet.table("rated")
+    result = DataSheet(
+        name=sheet.text("name"),
+        source=sheet.text("source"),
+        flexspline_teeth=teeth.whole("flexspline", 2),
+        circular_spline_teeth=teeth.whole("circular_spline", 3),
+        input_speed=rated.quantity("input_speed", "speed", above=0.0),
+        load_torque=rated.quantity("load_torque", "torque", at_least=0.0),
+        nominal=_nominal(sheet.table("nominal")),
+        mesh=_mesh(sheet.table("mesh")),
+        error_sources=tuple(_error_source(row) for row in sheet.tables("error_source")),
+    )
+    for table in (teeth, rated, sheet):
+        table.finish()
+    return result
+
+
+def hs_20_100() -> DataSheet:
+    """Return the data sheet of the drive in the paper, HS-20-100 (Tables 1, 2 and 4)."""
+    with as_file(files("pymoo_hdte.drive") / "data" / "hs_20_100.toml") as path:
+        return load_datasheet(path)
+
+
+def _nominal(table: Fields) -> Nominal:
+    values = {
+        name: table.quantity(name, kind, above=0.0) for name, kind in NOMINAL_QUANTITIES.items()
+    }
+    table.finish()
+    return Nominal(**values)
+
+
+def _mesh(table: Fields) -> Mesh:
+    mesh = Mesh(
+        error_influence=table.number("error_influence", above=0.0),
+        teeth_in_mesh=table.whole("teeth_in_mesh", 1),
+        pitch_diameter=table.quantity("pitch_diameter", "length", above=0.0),
+        pressure_angle=table.quantity("pressure_angle", "angle", at_least=0.0),
+    )
+    table.finish()
+    return mesh
+
+
+def _error_source(row: Fields) -> ErrorSource:
+    source = ErrorSource(
+        component=row.text("component"),
+        symbol=row.text("symbol"),
+        description=row.text("description"),
+        error_class=row.text("class"),
+        mean=row.quantity("mean", "length", at_least=0.0),
+        std=row.quantity("std", "length", at_least=0.0),
+    )
+    row.finish()
+    return source
+
+
+def sheet_table(sheet: DataSheet) -> dict[str, Any]:
+    """Return the table of a data sheet, from which `datasheet_from_fields` makes it again."""
+    nominal = asdict(sheet.nominal)
+    return {
+        "name": sheet.name,
+        "source": sheet.source,
+        "teeth": {
+            "flexspline": sheet.flexspline_teeth,
+            "circular_spline": sheet.circular_spline_teeth,
+        },
+        "rated": {
+            "input_speed": with_unit(sheet.input_speed, "speed"),
+            "load_torque": with_unit(sheet.load_torque, "torque"),
+        },
+        "nominal": {
+            name: with_unit(nominal[name], quantity)
+            for name, quantity in NOMINAL_QUANTITIES.items()
+        },
+        "mesh": {
+            "error_influence": sheet.mesh.error_influence,
+            "teeth_in_mesh": sheet.mesh.teeth_in_mesh,
+            "pitch_diameter": with_unit(sheet.mesh.pitch_diameter, "length"),
+            "pressure_angle": with_unit(sheet.mesh.pressure_angle, "angle"),
+        },
+        "error_source": [
+            {
+                "component": source.component,
+                "symbol": source.symbol,
+                "description": source.description,
+                "class": source.error_class,
+                "mean": with_unit(source.mean, "length"),
+                "std": with_unit(source.std, "length"),
+            }
+            for source in sheet.error_sources
+        ],
+    }
