@@ -23,9 +23,9 @@ def how_sure(finding: DriveFinding) -> str:
     residual = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate":
         return (
-            "The misfit of the believed drive, fitted within its tolerances, has "
+            f"{_probably(verdict)} The misfit of the believed drive, fitted within its tolerances, has "
             f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. "
-            f"An effect too small for these records may still be there. {_probably(verdict)}"
+            "An effect too small for these records may still be there."
         )
     if verdict.chosen is None:
         return "That something is missing is certain; no effect was there to be tried."
@@ -87,7 +87,7 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
         orders = finding.campaign.believed.error_orders
         names = ", ".join(words_of(name, orders) for name in chosen.fit.at_bounds)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
-    return [*words, _probably(verdict)]
+    return [_probably(verdict), *words]
 
 
 def _probably(verdict: Verdict) -> str:
