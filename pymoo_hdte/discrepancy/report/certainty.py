@@ -23,9 +23,9 @@ def how_sure(finding: DriveFinding) -> str:
     residual = verdict.base.chi_square / verdict.degrees_of_freedom
     if verdict.status == "adequate":
         return (
-            f"{_probably(verdict)} The misfit of the believed drive, fitted within its tolerances, has "
-            f"{residual:.2f} times the variance of the noise; up to {limit:.2f} counts as noise. "
-            "An effect too small for these records may still be there."
+            f"{_probably(verdict)} The misfit of the believed drive, fitted within its tolerances, "
+            f"has {residual:.2f} times the variance of the noise; up to {limit:.2f} counts as "
+            "noise. An effect too small for these records may still be there."
         )
     if verdict.chosen is None:
         return "That something is missing is certain; no effect was there to be tried."
