@@ -116,7 +116,7 @@ def judge(
         search.singles(screened)
         if not search.enough(search.found[0]):
             search.grow()
-    chosen = _best(search)
+    chosen = _special_case(search, _best(search))
     others = [one for one in search.found if one is not chosen]
     equivalent = [one for one in others if _is_rival(search, one, chosen)]
     if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
@@ -153,6 +153,22 @@ def _best(search: Search) -> Hypothesis:
     if best is not None:
         return best
     return next(one for one in found if search.earned(one))
+
+
+def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
+    """Return the special case of a set that does as well, if the set itself ended at a bound.
+
+    At the bound of a law lies a simpler one, or one that these data do not show: dry friction that
+    falls within less than the slowest speed is dry friction.
+    """
+    if not any(bounded for _, bounded in bounded_unknowns(best.fit)):
+        return best
+    simpler = (
+        one
+        for one in search.found
+        if one.names != best.names and contains(best, one) and search.enough(one)
+    )
+    return next((one for one in simpler if _explains(search, one) and search.earned(one)), best)
 
 
 def _explains(search: Search, one: Hypothesis) -> bool:

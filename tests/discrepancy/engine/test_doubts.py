@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pymoo_hdte.discrepancy.engine import verdict
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.verdict import doubts_of
 
@@ -54,3 +55,41 @@ def test_what_is_left_in_multiples_of_the_noise_is_a_doubt():
     limit = RULES.contradicting_chi_square
     assert not doubts(0.99 * limit, LINE)
     assert doubts(1.01 * limit, LINE)
+
+
+def law(name, *, bounded=False, chi_square=1000.0):
+    """A set of one law at the input with one unknown, which may have ended at its upper bound."""
+    level = SimpleNamespace(name="level", linear=False, lower=0.0)
+    only = SimpleNamespace(name=name, port="input", exact=False, parameters=(level,))
+    fitted = SimpleNamespace(
+        chi_square=chi_square,
+        bound_sides=np.array([1.0 if bounded else 0.0]),
+        places=[(only, slice(0, 1))],
+    )
+    return SimpleNamespace(fit=fitted, candidates=(only,), names=frozenset({(name, "input")}))
+
+
+@pytest.mark.parametrize(
+    ("bounded", "left", "name"),
+    [
+        (True, 1000.0, "coulomb_friction"),
+        (True, 5000.0, "stribeck_friction"),
+        (False, 1000.0, "stribeck_friction"),
+    ],
+)
+def test_the_special_case_that_does_as_well_stands_for_a_law_at_its_bound(
+    bounded, left, name, monkeypatch
+):
+    """On a linear axis (EMPS) friction fell within less than the slowest speed."""
+    monkeypatch.setattr(verdict, "_explains", lambda search, one: True)
+    best, simple = (
+        law("stribeck_friction", bounded=bounded),
+        law("coulomb_friction", chi_square=left),
+    )
+    search = SimpleNamespace(
+        found=[best, simple],
+        enough=lambda one: one.fit.chi_square < 1100.0,
+        earned=lambda one: True,
+    )
+    ((chosen, _),) = verdict._special_case(search, best).names
+    assert chosen == name
