@@ -92,9 +92,9 @@ def amplitudes_are_never_wrong(patch):
     """Amplitudes of the believed static error cannot be out of tolerance."""
     names = evidence.out_of_tolerance
 
-    def without_lines(base, at_bounds, error_orders, together=False):
+    def without_lines(base, at_bounds, *further):
         bounds = [name for name in at_bounds if not name.startswith("error_amplitude")]
-        return names(base, bounds, error_orders, together)
+        return names(base, bounds, *further)
 
     patch.setattr(evidence, "out_of_tolerance", without_lines)
 

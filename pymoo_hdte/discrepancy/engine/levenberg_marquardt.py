@@ -29,6 +29,8 @@ _DAMPING = 1e-3
 """First damping relative to the scaled curvature."""
 _LEAST_FACTOR, _LEAST_DAMPING = 0.1, 1e-9
 """Strongest reduction of the damping by one step, and its least value."""
+_STEPS_A_JACOBIAN = 5
+"""Most steps for each time that derivatives could be computed."""
 _TRUSTED = 0.5
 """Share of the promised reduction above which derivatives are updated by what the step showed."""
 _ATTEMPTS = 12
@@ -62,7 +64,7 @@ def minimum(
     start : ndarray, shape (n_unknowns,)
         Moved to the nearest bound where it is outside.
     steps : int
-        Most steps.
+        Most steps with derivatives of their own; several times as many if derivatives are updated.
     settled : float
         Share of the sum of squares that a step has to remove for the search to go on.
 
@@ -75,7 +77,7 @@ def minimum(
     values = np.clip(start, problem.lower, problem.upper)
     residuals, jacobian = problem.residuals(values), problem.jacobian(values)
     size, damping, confirming, fresh = np.zeros(len(values)), _DAMPING, False, True
-    for _ in range(steps):
+    for _ in range(_STEPS_A_JACOBIAN * steps):
         size = np.maximum(size, np.linalg.norm(jacobian, axis=0))
         found = _step(problem, values, residuals, jacobian, size, damping)
         before = residuals @ residuals
