@@ -135,10 +135,11 @@ class Search:
         return self._by_label[label]
 
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
-        """Return a set fitted to the end from its last values, and from other starts."""
+        """Return a set fitted to the end from its last values, the believed base and other starts."""
         label = label_of(one.candidates)
         if label not in self._finished or starts:
-            best = self._best_fit(one.candidates, (one.fit.values, *starts))
+            believed = from_believed(self.data.base, one)
+            best = self._best_fit(one.candidates, (one.fit.values, believed, *starts))
             if shapes := other_shapes(best, self._by_label.values(), self.data.rules):
                 others = self._best_fit(one.candidates, shapes)
                 best = min(best, others, key=lambda each: each.bic)
@@ -163,12 +164,12 @@ class Search:
                 self._finish(one)
 
     def _from_other_starts(self, one: Hypothesis) -> None:
-        """Fit a set again from the believed values, and from all starts of a single effect.
+        """Fit a single effect again from all its starts.
 
         An inertia that is larger by half moves a resonance past lines, so that chi-square does not
         decrease steadily on the way there; and values of the base that hide an effect lie far off.
         """
-        starts = [from_believed(self.data.base, one)]
+        starts = list[Vector]()
         (*others, last) = one.candidates
         if not others and len(last.starts) > 1 and not last.linear:
             starts += [np.append(self.base.values, start) for start in last.starts]
