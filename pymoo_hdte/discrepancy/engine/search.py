@@ -135,7 +135,7 @@ class Search:
         return self._by_label[label]
 
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
-        """Return a set fitted to the end from its last values, the believed base and other starts."""
+        """Return a set fitted to the end: from its values, the believed base and other starts."""
         label = label_of(one.candidates)
         if label not in self._finished or starts:
             believed = from_believed(self.data.base, one)
