@@ -27,7 +27,7 @@ from experiments.blind.tables import (
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA, stored_outcome
 from experiments.runner.registry import Context, require
-from experiments.runner.result import Picture, Result
+from experiments.runner.result import Picture, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 
 OUTCOMES = "blind.csv"
@@ -56,32 +56,39 @@ def run(context: Context) -> Result:
         title="Blind campaigns: what the discrepancy workflow finds",
         command=context.command("blind"),
         paragraphs=(*stored, SETTING, _extent(outcomes)),
-        tables=(
-            must_reach_table(outcomes),
-            wrong_table(outcomes),
-            *times_tables(outcomes),
-            reliability_table(outcomes),
-            status_table(outcomes),
-            effects_table(outcomes),
-            tools_table(outcomes),
-            misses_table(outcomes),
-        ),
-        pictures=(
-            Picture(
-                "confusion",
-                "What is hidden against what is answered, where at most one effect is hidden: a "
-                "name, or a status where none is given. A class that holds the truth counts as the "
-                "truth. Shades are shares of a row, numbers are cases.",
-                confusion_matrix(outcomes),
-            ),
-            Picture(
-                "reliability",
-                "Share of what is true over the probability with which it was said, with exact "
-                "95 % intervals and the number of answers.",
-                reliability_diagram(outcomes),
-            ),
-        ),
+        tables=(must_reach_table(outcomes), *(_tables(outcomes) if outcomes else ())),
+        pictures=_pictures(outcomes) if outcomes else (),
         headline="must_reach",
+    )
+
+
+def _tables(outcomes: list[Outcome]) -> tuple[Table, ...]:
+    return (
+        wrong_table(outcomes),
+        *times_tables(outcomes),
+        reliability_table(outcomes),
+        status_table(outcomes),
+        effects_table(outcomes),
+        tools_table(outcomes),
+        misses_table(outcomes),
+    )
+
+
+def _pictures(outcomes: list[Outcome]) -> tuple[Picture, ...]:
+    return (
+        Picture(
+            "confusion",
+            "What is hidden against what is answered, where at most one effect is hidden: a name, "
+            "or a status where none is given. A class that holds the truth counts as the truth. "
+            "Shades are shares of a row, numbers are cases.",
+            confusion_matrix(outcomes),
+        ),
+        Picture(
+            "reliability",
+            "Share of what is true over the probability with which it was said, with exact 95 % "
+            "intervals and the number of answers.",
+            reliability_diagram(outcomes),
+        ),
     )
 
 
@@ -89,7 +96,9 @@ def _extent(outcomes: list[Outcome]) -> str:
     """Return in words how many cases of the list have been run."""
     total = len(all_cases())
     if not outcomes:
-        return f"None of the {total} cases of the list has been run yet: all figures are missing."
+        return (
+            f"No outcome of the {total} cases of the list is stored yet: all figures are missing."
+        )
     what = f"{len(outcomes)} of the {total} cases of the list have been run"
     if len(outcomes) == total:
         return f"{what}."

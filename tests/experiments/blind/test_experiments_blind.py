@@ -499,6 +499,9 @@ def test_without_outcomes_the_report_says_that_nothing_has_been_run(tmp_path, mo
     assert "None of the 2400 cases" in " ".join(found.paragraphs)
     assert {row[-1] for row in found.tables[0].rows} == {"not run"}
     assert not found.tables[0].findings
+    # Tables of no case would look like findings: no wrong answer among none.
+    assert len(found.tables) == 1
+    assert not found.pictures
 
 
 def test_outcomes_survive_their_csv(tmp_path):
