@@ -96,9 +96,7 @@ def _extent(outcomes: list[Outcome]) -> str:
     """Return in words how many cases of the list have been run."""
     total = len(all_cases())
     if not outcomes:
-        return (
-            f"No outcome of the {total} cases of the list is stored yet: all figures are missing."
-        )
+        return f"None of the {total} cases of the list is stored yet: all figures are missing."
     what = f"{len(outcomes)} of the {total} cases of the list have been run"
     if len(outcomes) == total:
         return f"{what}."
