@@ -210,9 +210,8 @@ def quantity(value: float, variance: float, unit: str) -> dict[str, Any]:
 
 def base_parameters(fitted: Fit, rules: Rules) -> dict[str, Any]:
     """Return the base values of a fit with units, intervals and whether they ended at a bound."""
-    added = sum(len(candidate.parameters) for candidate in fitted.candidates)
     found = {}
-    for row, parameter in enumerate(fitted.parameters[: len(fitted.parameters) - added]):
+    for row, parameter in enumerate(fitted.parameters[: fitted.n_base]):
         unit = base_unit(parameter.name)
         entry = quantity(fitted.values[row], fitted.covariance[row, row], unit)
         entry["interval95"] = _within_bounds(parameter, entry["interval95"], rules)
