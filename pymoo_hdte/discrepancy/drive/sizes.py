@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive
-from pymoo_hdte.discrepancy.campaign.rows.session_zero import FEWEST_BESIDE_A_CHANGE
+from pymoo_hdte.discrepancy.campaign.rows.session_zero import places_of_change
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS, Features
 from pymoo_hdte.discrepancy.engine.fitting import Fit
@@ -109,9 +109,8 @@ def _temperature(data: Data) -> float:
 def _changes(elapsed: NDArray[np.float64]) -> tuple[float, ...]:
     """Return the times in the middle between records that are not taken at once."""
     ordered = np.sort(elapsed)
-    least = FEWEST_BESIDE_A_CHANGE
-    early, late = ordered[least - 1 : -least], ordered[least : 1 - least]
-    return tuple(((early + late) / 2.0)[late > early].tolist())
+    late = places_of_change(ordered)
+    return tuple(((ordered[late - 1] + ordered[late]) / 2.0).tolist())
 
 
 def _size(features: Features, values: NDArray[np.float64], channel: int) -> float:

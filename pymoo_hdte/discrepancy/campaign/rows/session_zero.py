@@ -26,7 +26,7 @@ Values = NDArray[np.float64]
 _LEAST_FREEDOM = 4
 """Degrees of freedom that loads and a step leave; with fewer, every step fits."""
 
-FEWEST_BESIDE_A_CHANGE = 2
+_FEWEST = 2
 """Least number of records before and after a change: one may be off for any reason."""
 
 _WARMING = (0.03, 0.1, 0.3, 1.0)
@@ -103,6 +103,15 @@ def _means(records: Sequence[RunningRecord], believed: BelievedDrive, rig: Rig) 
     )
 
 
+def places_of_change(elapsed: Values) -> NDArray[np.int_]:
+    """Return the first records after a possible change, for rising times of records (n,), s.
+
+    Not between records taken at once, nor near the ends of the session.
+    """
+    places = np.flatnonzero(np.diff(elapsed) > 0.0) + 1
+    return places[(places >= _FEWEST) & (places <= len(elapsed) - _FEWEST)]
+
+
 def _left(means: _Means, *courses: Values) -> tuple[float, float]:
     """Return the chi-square beside loads and further courses, and the size of the last one."""
     design = np.column_stack([means.loads, *courses]) * means.weights[:, None]
@@ -118,10 +127,7 @@ def _step(means: _Means, rules: Rules) -> tuple[int, float] | None:
     freedom = number - n_loads - 1
     if freedom < _LEAST_FREEDOM:
         return None
-    places = np.flatnonzero(np.diff(means.elapsed) > 0.0) + 1
-    places = places[
-        (places >= FEWEST_BESIDE_A_CHANGE) & (places <= number - FEWEST_BESIDE_A_CHANGE)
-    ]
+    places = places_of_change(means.elapsed)
     if not places.size:
         return None
     steps = [_left(means, (np.arange(number) >= place).astype(float)) for place in places]
