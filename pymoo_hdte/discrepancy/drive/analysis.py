@@ -131,7 +131,7 @@ def _check_steady(data: Data) -> None:
         return
     values = {one.name: np.array([one.start]) for one in data.base}
     conditions = data.features.conditions
-    coefficients = coefficients_of(believed, values, (), len(conditions))
+    coefficients = coefficients_of(believed, values, believed.effects, len(conditions))
     steady = harmonic_balance(
         coefficients,
         input_speed=conditions.input_speed,

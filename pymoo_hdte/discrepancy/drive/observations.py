@@ -123,8 +123,7 @@ class Observations:
     ) -> NDArray[np.float64]:
         """Return whitened residuals of the sweeps where the believed effects are ``known``."""
         values = self._named(vectors)
-        believed = replace(self.campaign.believed, effects=tuple(known))
-        coefficients = coefficients_of(believed, values, effects, 1)
+        coefficients = coefficients_of(self.campaign.believed, values, (*known, *effects), 1)
         stiffness = coefficients.stiffness * values["locked_stiffness"]
         coefficients = replace(coefficients, stiffness=stiffness)
         sensor = np.column_stack([values["output_torque_gain"], values["output_torque_zero"]])

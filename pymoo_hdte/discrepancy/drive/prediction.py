@@ -110,25 +110,36 @@ def predict(
     start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
     """
+    parts = []
     groups = of_equal_numbers(believed.effects, values)
-    if len(groups) > 1:
-        parts = []
-        for rows, known in groups:
-            some = {name: column[rows] for name, column in values.items()}
-            one = replace(believed, effects=known)
-            parts.append(predict(one, rig, conditions, orders, some, effects, start))
-        return _joined(parts, [rows for rows, _ in groups], len(conditions))
-    believed = replace(believed, effects=groups[0][1])
+    for rows, known in groups:
+        some = {name: column[rows] for name, column in values.items()}
+        present = (*known, *effects)
+        parts.append(_predict_group(believed, rig, conditions, orders, some, present, start))
+    if len(parts) == 1:
+        return parts[0]
+    return _joined(parts, [rows for rows, _ in groups], len(conditions))
+
+
+def _predict_group(
+    believed: BelievedDrive,
+    rig: Rig,
+    conditions: Conditions,
+    orders: Sequence[float],
+    values: dict[str, NDArray[np.float64]],
+    present: Sequence[DriveEffect],
+    start: SteadyMotion | None,
+) -> Prediction:
+    """Return the prediction of vectors that share all effects ``present``."""
     count, records = len(values["offset"]), len(conditions)
     gain = 1.0 + values["output_torque_gain"][:, None]
     load = (conditions.output_torque - values["output_torque_zero"][:, None]) / gain
-    coefficients = coefficients_of(believed, values, effects, records)
+    coefficients = coefficients_of(believed, values, present, records)
     if conditions.temperature is not None:
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     near = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
     balance = steady_motions(coefficients, speed, load.ravel(), rig, near)
-    present = (*believed.effects, *effects)
     channels = [
         balance.transmission_error,
         balance.motor_torque + _driving(balance, coefficients),
@@ -139,7 +150,7 @@ def predict(
     means = np.array([channel[:, 0].real for channel in channels])
     phasors = np.moveaxis(lines, -1, 0).reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
-    _read(believed, conditions, orders, values, present, mean, phasors)
+    _read(believed.ratio, conditions, orders, values, present, mean, phasors)
     return Prediction(mean, phasors, balance)
 
 
@@ -214,7 +225,7 @@ def coefficients_of(
     effects: Sequence[DriveEffect],
     records: int,
 ) -> Coefficients:
-    """Return the coefficients of all rows, vectors outermost, believed effects first."""
+    """Return the coefficients of all rows, vectors outermost, with all effects; believed first."""
     rows = {name: np.repeat(values[name], records) for name in MECHANICAL}
     lines = [
         sine_phasor(values[f"error_amplitude_{line}"], values[f"error_phase_{line}"])
@@ -236,7 +247,7 @@ def coefficients_of(
         error_phasors=np.repeat(np.array(lines).T, records, axis=0),
         load_inertia=rows["load_inertia"],
     )
-    for effect in (*believed.effects, *effects):
+    for effect in effects:
         coefficients = effect.apply(coefficients)
     return coefficients
 
@@ -263,7 +274,7 @@ def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.co
 
 
 def _read(
-    believed: BelievedDrive,
+    ratio: float,
     conditions: Conditions,
     orders: Sequence[float],
     values: dict[str, NDArray[np.float64]],
@@ -273,7 +284,7 @@ def _read(
 ) -> None:
     """Add the errors of the sensors in place: offset, drift, eccentricity, gains and zeros."""
     mean[..., 0] += values["offset"][:, None]
-    session = Session(orders, believed.ratio, conditions.elapsed, conditions.bends)
+    session = Session(orders, ratio, conditions.elapsed, conditions.bends)
     for effect in effects:
         added = effect.reading_lines(session)
         if added is not None:

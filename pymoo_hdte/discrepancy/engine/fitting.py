@@ -129,16 +129,18 @@ def fit(
     start: Vector | None = None,
     steps: int | None = None,
     settled: float = SETTLED_SHARE,
+    known: Sequence[Fit] = (),
 ) -> Fit:
     """Fit base parameters and those of candidates from ``start`` (by default their own starts).
 
     It takes at most ``steps`` steps, by default as many as the rules allow, and ends earlier where
-    one removes less than the share ``settled`` of chi-square.
+    one removes less than the share ``settled`` of chi-square, or where it arrives at a ``known``
+    fit of the same candidates.
     """
     objective = data.objective(candidates)
     begin = objective.start if start is None else start
     most = data.rules.fit_evaluations if steps is None else steps
-    values, residuals, jacobian = minimum(objective, begin, most, settled)
+    values, residuals, jacobian = minimum(objective, begin, most, settled, known)
     return Fit(objective.candidates, objective.parameters, values, residuals, jacobian)
 
 

@@ -11,6 +11,7 @@ exactly in every step.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -35,6 +36,27 @@ _TRUSTED = 0.5
 """Share of the promised reduction above which derivatives are updated by what the step showed."""
 _ATTEMPTS = 12
 """Most dampings tried for one step."""
+_SAME = 0.1
+"""Change of chi-square up to which a place is a known minimum; verdicts differ by 10 and more."""
+
+
+class Minimum(Protocol):
+    """Where a search ended, with residuals and derivatives there."""
+
+    @property
+    def values(self) -> Vector:
+        """Shape (n_unknowns,)."""
+        ...
+
+    @property
+    def residuals(self) -> Vector:
+        """Shape (n,)."""
+        ...
+
+    @property
+    def jacobian(self) -> Matrix:
+        """Shape (n, n_unknowns), by unknowns in units of their scale."""
+        ...
 
 
 class Differentiable(Protocol):
@@ -54,7 +76,11 @@ class Differentiable(Protocol):
 
 
 def minimum(
-    problem: Differentiable, start: Vector, steps: int, settled: float = SETTLED_SHARE
+    problem: Differentiable,
+    start: Vector,
+    steps: int,
+    settled: float = SETTLED_SHARE,
+    known: Sequence[Minimum] = (),
 ) -> tuple[Vector, Vector, Matrix]:
     """Return where the sum of squares is least near a start, with residuals and derivatives there.
 
@@ -67,6 +93,8 @@ def minimum(
         Most steps with derivatives of their own; several times as many if derivatives are updated.
     settled : float
         Share of the sum of squares that a step has to remove for the search to go on.
+    known : sequence of Minimum
+        Found from other starts: a search that arrives at one of them ends there.
 
     Returns
     -------
@@ -77,7 +105,10 @@ def minimum(
     values = np.clip(start, problem.lower, problem.upper)
     residuals, jacobian = problem.residuals(values), problem.jacobian(values)
     size, damping, confirming, fresh = np.zeros(len(values)), _DAMPING, False, True
-    for _ in range(_STEPS_A_JACOBIAN * steps):
+    for step in range(_STEPS_A_JACOBIAN * steps):
+        # Not at the start: a part of a law that has vanished shows nothing of its other unknowns.
+        if step and any(_arrived(problem, values, residuals, jacobian, one) for one in known):
+            break
         size = np.maximum(size, np.linalg.norm(jacobian, axis=0))
         found = _step(problem, values, residuals, jacobian, size, damping)
         before = residuals @ residuals
@@ -104,6 +135,16 @@ def minimum(
             # A damped step along a flat valley is short, and brings little far from the minimum.
             size, damping, confirming = np.zeros(len(values)), _LEAST_DAMPING, True
     return values, residuals, jacobian
+
+
+def _arrived(
+    problem: Differentiable, values: Vector, residuals: Vector, jacobian: Matrix, at: Minimum
+) -> bool:
+    """Tell whether values are at a known minimum as far as residuals show it, and no better."""
+    way = (values - at.values) / problem.scale
+    changes = (each @ way for each in (at.jacobian, jacobian))
+    better = residuals @ residuals < at.residuals @ at.residuals
+    return not better and all(change @ change <= _SAME for change in changes)
 
 
 class _Step(NamedTuple):

@@ -23,7 +23,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 )
 from pymoo_hdte.discrepancy.engine.membership import ill_explained, is_earned
 from pymoo_hdte.discrepancy.engine.screening import Screened, screen
-from pymoo_hdte.discrepancy.engine.starts import from_believed, other_shapes
+from pymoo_hdte.discrepancy.engine.starts import best_fit
 from pymoo_hdte.effects.effect import is_contained
 
 Vector = NDArray[np.float64]
@@ -54,6 +54,7 @@ class Search:
         self._by_label: dict[frozenset[str], Hypothesis] = {}
         self._finished: set[frozenset[str]] = set()
         self._extended: set[frozenset[str]] = set()
+        self._resumed = False
 
     @property
     def found(self) -> list[Hypothesis]:
@@ -94,7 +95,8 @@ class Search:
             self._finish_near(size + 1)
 
     def resume(self, known: Sequence[Hypothesis]) -> None:
-        """Fit sets that another search has found, from their values."""
+        """Fit sets that another search has found on nearly the same data, from their values."""
+        self._resumed = True
         for one in known:
             self._fit(one.candidates, one.fit.values)
         for size in {len(one.members) for one in known}:
@@ -135,22 +137,19 @@ class Search:
         return self._by_label[label]
 
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
-        """Return a set fitted to the end: from its values, the believed base and other starts."""
+        """Return a set fitted to the end: from its values, the believed base and other starts.
+
+        A resumed search needs no other starts, from which its sets come.
+        """
         label = label_of(one.candidates)
         if label not in self._finished or starts:
-            believed = from_believed(self.data.base, one)
-            best = self._best_fit(one.candidates, (one.fit.values, believed, *starts))
-            if shapes := other_shapes(best, self._by_label.values(), self.data.rules):
-                others = self._best_fit(one.candidates, shapes)
-                best = min(best, others, key=lambda each: each.bic)
-            self._by_label[label] = best
+            if self._resumed:
+                best = fit(self.data, one.candidates, one.fit.values)
+            else:
+                best = best_fit(self.data, one, starts, self._by_label.values())
+            self._by_label[label] = hypothesis_of(best, self.excess)
             self._finished.add(label)
         return self._by_label[label]
-
-    def _best_fit(self, effects: Effects, starts: Sequence[Vector]) -> Hypothesis:
-        """Return the best of the fits of a set from several starts."""
-        fits = [fit(self.data, effects, start) for start in starts]
-        return hypothesis_of(min(fits, key=lambda each: each.chi_square), self.excess)
 
     def _finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near."""

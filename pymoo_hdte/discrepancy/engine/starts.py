@@ -1,4 +1,4 @@
-"""Where fits of a set of effects begin again, so that they do not end at a local minimum."""
+"""Fits of a set of effects from several starts, so that they do not end at a local minimum."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import Parameter
@@ -14,41 +15,60 @@ from pymoo_hdte.effects.unknowns import Parameter
 Vector = NDArray[np.float64]
 
 
-def from_believed(base: Sequence[Parameter], one: Hypothesis) -> Vector:
+def best_fit(
+    data: Evidence, one: Hypothesis, starts: Sequence[Vector], found: Iterable[Hypothesis]
+) -> Fit:
+    """Return the best fit of a set from its values, the believed base and other starts.
+
+    A fit ends where it arrives at an earlier one.
+
+    Parameters
+    ----------
+    data : Evidence
+    one : Hypothesis
+        The set, fitted at least so far as to rank it.
+    starts : sequence of ndarray, shape (n_parameters,)
+        In addition to its own values and those with the believed base.
+    found : iterable of Hypothesis
+        Sets that it may contain: where it does no better than one of them, other shapes are tried.
+    """
+    fits = [fit(data, one.candidates, one.fit.values)]
+
+    def fit_from(further: Iterable[Vector]) -> Fit:
+        for start in further:
+            fits.append(fit(data, one.candidates, start, known=fits))
+        return min(fits, key=lambda each: each.chi_square)
+
+    best = fit_from((_from_believed(data.base, one), *starts))
+    return fit_from(_other_shapes(best, one, found, data.rules))
+
+
+def _from_believed(base: Sequence[Parameter], one: Hypothesis) -> Vector:
     """Return the believed values of the base with the fitted ones of a set's effects."""
     believed = np.array([parameter.start for parameter in base])
     return np.append(believed, one.fit.values[len(believed) :])
 
 
-def other_shapes(one: Hypothesis, found: Iterable[Hypothesis], rules: Rules) -> list[Vector]:
+def _other_shapes(
+    best: Fit, one: Hypothesis, found: Iterable[Hypothesis], rules: Rules
+) -> list[Vector]:
     """Return starts with other shapes for a set that does no better than a special case of it.
 
     A part of a law that has vanished during a fit has no shape that could lead it back.
-
-    Parameters
-    ----------
-    one : Hypothesis
-    found : iterable of Hypothesis
-        Sets that it may contain.
-    rules : Rules
-
-    Returns
-    -------
-    list of ndarray, shape (n_parameters,)
-        None where the set does better than all that it contains.
     """
-    if not any(_does_no_better(one, other, rules) for other in found):
-        return []
+    special = {
+        name
+        for other in found
+        if one.names != other.names
+        and contains(one, other)
+        and other.fit.chi_square - best.chi_square < rules.evidence_distance
+        for name in other.names
+    }
     starts = []
-    for member, place in one.fit.places:
-        for shape in member.starts if len(member.starts) > 1 and not member.linear else ():
-            start = one.fit.values.copy()
+    for member, place in best.places if special else ():
+        vanished = (member.name, member.port) not in special and not member.linear
+        for shape in member.starts if len(member.starts) > 1 and vanished else ():
+            start = best.values.copy()
             start[place.start + 1 : place.stop] = shape[1:]
             starts.append(start)
     return starts
-
-
-def _does_no_better(one: Hypothesis, other: Hypothesis, rules: Rules) -> bool:
-    gain = other.fit.chi_square - one.fit.chi_square
-    wider = one.names != other.names and contains(one, other)
-    return wider and gain < rules.evidence_distance

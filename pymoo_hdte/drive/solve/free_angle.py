@@ -111,9 +111,8 @@ def harmonic_balance(
     for first in range(0, max(n, 1), _ROWS_AT_ONCE):
         rows = slice(first, first + _ROWS_AT_ONCE)
         equations = AngleEquations(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
-        solver = _Solver(equations)
-        if start is not None and np.array_equal(start.torus.orders, torus.orders):
-            solver.begin(start.rows(rows))
+        fits = start is not None and np.array_equal(start.torus.orders, torus.orders)
+        solver = _Solver(equations, start.rows(rows) if start is not None and fits else None)
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
             solver.solve(tolerance)
@@ -126,19 +125,23 @@ def harmonic_balance(
 class _Solver:
     """Newton's iteration for one block of rows."""
 
-    def __init__(self, equations: AngleEquations) -> None:
+    def __init__(self, equations: AngleEquations, near: SteadyMotion | None) -> None:
+        """Begin from nearby cases that have converged, elsewhere from rest under load."""
         self.equations = equations
-        self.torsion = np.zeros_like(equations.static)
-        self.torsion[:, 0] = equations.static_torsion()
-        self.energy = np.zeros_like(equations.static)
-        self.energy[:, :1] = equations.speed**2 / 2.0
-        self.converged = np.zeros(len(self.torsion), dtype=bool)
-
-    def begin(self, near: SteadyMotion) -> None:
-        """Begin from nearby cases that have converged."""
-        kept = near.converged[:, None]
-        self.torsion = np.where(kept, near.torsion, self.torsion)
-        self.energy = self.equations.at_wanted_speed(np.where(kept, near.energy, self.energy))
+        self.converged = np.zeros(len(equations.speed), dtype=bool)
+        if near is not None and np.all(near.converged):
+            self.torsion, self.energy = near.torsion.copy(), near.energy
+        else:
+            self.torsion = np.zeros_like(equations.static)
+            self.torsion[:, 0] = equations.static_torsion()
+            self.energy = np.zeros_like(equations.static)
+            self.energy[:, :1] = equations.speed**2 / 2.0
+            if near is not None:
+                kept = near.converged[:, None]
+                self.torsion = np.where(kept, near.torsion, self.torsion)
+                self.energy = np.where(kept, near.energy, self.energy)
+        if near is not None:
+            self.energy = equations.at_wanted_speed(self.energy)
 
     def solve(self, tolerance: float) -> None:
         """Iterate until the torsion converges; rows that do not are marked."""

@@ -100,6 +100,7 @@ class Torus:
         weights = np.full((len(self.orders), 1), 2.0 / self.size)
         weights[0] = 1.0 / self.size
         self._analysis = weights * np.exp(-1j * argument)
+        self._places: dict[float, tuple[int, bool] | None] = {}
 
     def _flat(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
         """Return the indices of multiples (..., n_angles) in a flattened transform of the grid."""
@@ -119,6 +120,11 @@ class Torus:
 
     def find(self, order: float) -> tuple[int, bool] | None:
         """Return the same as `place`, or None for an order that is not kept."""
+        if order not in self._places:
+            self._places[order] = self._searched(order)
+        return self._places[order]
+
+    def _searched(self, order: float) -> tuple[int, bool] | None:
         for sign in (1.0, -1.0):
             places = np.flatnonzero(np.abs(self.orders - sign * order) < _TOLERANCE)
             if places.size:

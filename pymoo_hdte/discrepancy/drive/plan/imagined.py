@@ -210,7 +210,8 @@ def _swept(
     legs = ((0.0, reach, half), (reach, -reach, whole), (-reach, reach, whole))
     path = [np.linspace(one, other, rows + 1)[1:] for one, other, rows in legs]
     ends = np.concatenate([[0.0], *path])
-    torsion = mean_torsion(coefficients_of(believed, values, effects, 1), ends)[0]
+    every = (*believed.effects, *effects)
+    torsion = mean_torsion(coefficients_of(believed, values, every, 1), ends)[0]
     torque, rate = (ends[1:] + ends[:-1]) / 2.0, limits.sample_rate
     noise = rng.standard_normal((2, len(torque)))
     return TorsionRecord(

@@ -1,0 +1,67 @@
+"""The least squares behind every fit, on problems whose minima are known."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SETTLED, minimum
+
+WEIGHT = 100.0
+NEAR = np.sqrt(SETTLED)
+"""Way from a minimum at which chi-square, of curvature 2 or more, is that of the minimum."""
+
+
+class TwoMinima:
+    """Residuals w (x^2 - 1) and x - 1 + y, y: least at (1, 0), and higher near (-1, 1)."""
+
+    scale = np.ones(2)
+    lower, upper = np.full(2, -5.0), np.full(2, 5.0)
+
+    def __init__(self):
+        self.asked = Counter()
+
+    def residuals(self, values):
+        self.asked["residuals"] += 1
+        x, y = values
+        return np.array([WEIGHT * (x**2 - 1.0), x - 1.0 + y, y])
+
+    def jacobian(self, values):
+        self.asked["jacobian"] += 1
+        return np.array([[2.0 * WEIGHT * values[0], 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def found(start, known=()):
+    """Where a search ends, and how often it asked for derivatives."""
+    problem = TwoMinima()
+    values, residuals, jacobian = minimum(problem, np.array(start), 40, known=known)
+    return Fit((), (), values, residuals, jacobian), problem.asked["jacobian"]
+
+
+def test_each_start_ends_at_the_minimum_of_its_side():
+    low, _ = found([3.0, 2.0])
+    high, _ = found([-3.0, 2.0])
+    assert low.values == pytest.approx([1.0, 0.0], abs=NEAR)
+    assert low.chi_square == pytest.approx(0.0, abs=SETTLED)
+    # There y = (1 - x) / 2 = 1 leaves 1 + 1.
+    assert high.values == pytest.approx([-1.0, 1.0], abs=NEAR)
+    assert high.chi_square == pytest.approx(2.0, abs=SETTLED)
+
+
+def test_a_search_that_arrives_at_a_known_minimum_ends_there():
+    low, whole = found([3.0, 2.0])
+    again, part = found([3.5, -2.0], [low])
+    assert part < whole
+    way = low.jacobian @ (again.values - low.values)
+    assert way @ way < 1.0
+    assert again.chi_square >= low.chi_square
+
+
+def test_a_known_minimum_elsewhere_or_a_worse_one_ends_no_search():
+    low, _ = found([3.0, 2.0])
+    high, _ = found([-3.0, 2.0])
+    assert found([-3.0, 2.0], [low])[0].values == pytest.approx(high.values, abs=NEAR)
+    # A place beside the minimum that claims to be one.
+    beside = Fit((), (), low.values + np.array([0.0, 0.3]), np.array([0.0, 0.3, 0.3]), low.jacobian)
+    assert found([3.0, 2.0], [beside])[0].values == pytest.approx(low.values, abs=NEAR)
