@@ -202,6 +202,7 @@ class TestCheck:
         assert 0.0 < mean.error < before.mean_error + after.mean_error
         assert 0.0 < std.error < before.std_error + after.std_error
 
+    @pytest.mark.nightly
     def test_the_errors_of_gains_are_their_scatter_over_other_random_drives(self, study, checks):
         gains = [
             replace(study, initial_check=before, optimum_check=after).gains.values()

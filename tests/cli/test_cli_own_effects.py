@@ -66,6 +66,7 @@ def test_the_effect_of_a_file_is_named_believed_and_forgotten(folder, tmp_path):
     assert json.loads((again / "verdict.json").read_text())["status"] == "adequate"
 
 
+@pytest.mark.nightly
 def test_without_the_file_nothing_else_explains_it(folder):
     assert analyse(read_rig(folder)).verdict.status != "named"
 

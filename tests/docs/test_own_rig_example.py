@@ -186,6 +186,7 @@ def test_every_toml_block_is_read(at_the_rig):
     np.testing.assert_allclose(record.channels["angle"], np.deg2rad(degrees))
 
 
+@pytest.mark.nightly
 def test_every_python_block_runs_and_prints_what_the_page_says(at_the_rig):
     names, printed = {}, []
     for block in blocks("python"):

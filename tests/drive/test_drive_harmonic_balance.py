@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from law_cases import EFFECTS, LAWS, memoryless
+from night import others_at_night
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
@@ -66,7 +67,9 @@ def test_presets_agree_with_the_integrator_though_the_angle_is_free(name):
     )
 
 
-@pytest.mark.parametrize("effect", MEMORYLESS, ids=lambda effect: effect.name)
+@pytest.mark.parametrize(
+    "effect", others_at_night(MEMORYLESS, *MEMORYLESS[::3]), ids=lambda effect: effect.name
+)
 def test_every_law_agrees_with_the_integrator_along_the_whole_turn(effect):
     model = with_effects(preset("resonant"), effect)
     # What the start left over dies out with J_in / B_in, 0.12 s with ten times the damping B_in.

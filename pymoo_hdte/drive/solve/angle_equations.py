@@ -107,7 +107,8 @@ class AngleEquations:
         angular_speed = self._angular_speed(energy)
         energy_slope = torus.signal(torus.derivative(energy))
         error = self.static + torsion
-        error_slope = torus.signal(torus.derivative(error))
+        slope = torus.signal(torus.derivative(torsion))
+        error_slope = self._static_slope + slope
         error_curvature = torus.signal(torus.derivative(torus.derivative(error)))
         output_acceleration = (
             energy_slope / coefficients.ratio
@@ -116,7 +117,7 @@ class AngleEquations:
         )
         output_speed = angular_speed * (1.0 / coefficients.ratio - error_slope)
         position = torus.signal(torsion)
-        rate = angular_speed * torus.signal(torus.derivative(torsion))
+        rate = angular_speed * slope
         stiffness = coefficients.stiffness[:, None] * self._varying
         damping = coefficients.damping[:, None]
         mesh = self._laws("mesh", position, rate)

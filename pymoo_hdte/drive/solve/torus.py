@@ -34,17 +34,21 @@ def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
     return (1.0, *found)
 
 
-def multiples_of(fundamentals: Sequence[float], order: float) -> NDArray[np.int_]:
+@lru_cache(maxsize=1024)
+def multiples_of(fundamentals: tuple[float, ...], order: float) -> NDArray[np.int_]:
     """Return the smallest whole multiples of the fundamentals, 1 first, that sum to ``order``."""
     spans = [range(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1) for _ in fundamentals[1:]]
     for parts in sorted(product(*spans), key=lambda parts: sum(map(abs, parts))):
         rest = order - float(np.dot(parts, fundamentals[1:]))
         if abs(rest - round(rest)) < _TOLERANCE:
-            return np.array([round(rest), *parts])
+            found = np.array([round(rest), *parts])
+            # All callers share it.
+            found.flags.writeable = False
+            return found
     raise InvalidInput("order", order, f"a sum of multiples of {tuple(fundamentals)}")
 
 
-def largest_multiples(fundamentals: Sequence[float], orders: Sequence[float]) -> list[int]:
+def largest_multiples(fundamentals: tuple[float, ...], orders: Sequence[float]) -> list[int]:
     """Return the largest multiple of each fundamental in any of the ``orders``."""
     found = np.array([multiples_of(fundamentals, order) for order in orders], dtype=int)
     most = np.abs(found.reshape(-1, len(fundamentals))).max(axis=0, initial=0)
@@ -96,10 +100,12 @@ class Torus:
         self._differences = self._flat(lines[:, None] - lines)
         self._sums = self._flat(lines[:, None] + lines)
         argument = self._multiples @ self._phases
-        self._cosine, self._sine = np.cos(argument), np.sin(argument)
-        weights = np.full((len(self.orders), 1), 2.0 / self.size)
+        # Real and imaginary part of a harmonic side by side, as complex numbers lie in memory.
+        parts = np.stack([np.cos(argument), -np.sin(argument)], axis=1)
+        self._synthesis = parts.reshape(-1, self.size)
+        weights = np.full(len(self.orders), 2.0 / self.size)
         weights[0] = 1.0 / self.size
-        self._analysis = weights * np.exp(-1j * argument)
+        self._analysis = np.ascontiguousarray((np.repeat(weights, 2)[:, None] * self._synthesis).T)
         self._places: dict[float, tuple[int, bool] | None] = {}
 
     def _flat(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
@@ -153,12 +159,11 @@ class Torus:
 
     def signal(self, phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return values on the grid, shape (n, G), of Re sum phasor exp(i order alpha)."""
-        real, imaginary = np.ascontiguousarray(phasors.real), np.ascontiguousarray(phasors.imag)
-        return real @ self._cosine - imaginary @ self._sine
+        return np.ascontiguousarray(phasors).view(float) @ self._synthesis
 
     def phasors(self, values: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the kept harmonics, shape (n, n_harmonics), of values on the grid."""
-        return values @ self._analysis.T
+        return (values @ self._analysis).view(complex)
 
     def derivative(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the harmonics of the derivative by the input angle."""
@@ -197,8 +202,8 @@ class Torus:
         ``weights`` and ``places`` have shape (terms, n, G); the terms are summed. Matrices act as
         those of `product_matrix`.
         """
-        synthesis = np.concatenate([self._cosine, -self._sine]).T
-        analysis = np.concatenate([self._analysis.real, self._analysis.imag])
+        synthesis = np.concatenate([self._synthesis[::2], self._synthesis[1::2]]).T
+        analysis = np.concatenate([self._analysis[:, ::2], self._analysis[:, 1::2]], axis=1).T
         recalled = sum(
             weight[..., None] * synthesis[place]
             for weight, place in zip(weights, places, strict=True)

@@ -134,6 +134,7 @@ def test_2500000_rows_of_150_megabytes_stay_below_a_gigabyte(tmp_path):
     assert most < GIGABYTE
 
 
+@pytest.mark.nightly
 def test_a_long_torsion_sweep_takes_the_memory_of_its_columns(tmp_path):
     write_long_sweep(tmp_path / "rig", ROWS)
     before, most, n_rows, compliance = peaks(tmp_path / "rig", READ_AND_SWEEP)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from night import others_at_night
 from places import SHARED
 from small_campaigns import small_campaign
 
@@ -301,6 +302,7 @@ GARBAGE = st.one_of(
 )
 
 
+@pytest.mark.nightly
 @settings(
     max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
@@ -329,11 +331,14 @@ def test_a_garbled_line_gives_an_error_or_a_campaign(folder, tmp_path, file, at,
     assert refused == "" or ".toml" in refused or ".csv.gz" in refused
 
 
+SHARED_CAMPAIGNS = sorted(RIGS.glob("*/campaign.toml"))
 needs_shared = pytest.mark.skipif(not RIGS.is_dir(), reason="the shared rig data are not here")
 
 
 @needs_shared
-@pytest.mark.parametrize("path", sorted(RIGS.glob("*/campaign.toml")), ids=lambda p: p.parent.name)
+@pytest.mark.parametrize(
+    "path", others_at_night(SHARED_CAMPAIGNS, *SHARED_CAMPAIGNS[:4]), ids=lambda p: p.parent.name
+)
 def test_shared_campaigns_are_read(path):
     read = read_campaign(path.parent)
     assert (len(read.train), len(read.held_out), len(read.torsion)) == (13, 6, 1)

@@ -181,8 +181,8 @@ def test_a_drift_over_the_session_is_no_new_zero(clean, course):
     ("case", "faults", "replaced"),
     [
         ("nothing-encoder-spikes", ["spike"] * 3, 0),
-        ("nothing-encoder-jump", ["jump"], 0),
-        ("coulomb-gap", ["gap"], 0),
+        pytest.param("nothing-encoder-jump", ["jump"], 0, marks=pytest.mark.nightly),
+        pytest.param("coulomb-gap", ["gap"], 0, marks=pytest.mark.nightly),
         ("coulomb-noise-x3", [], 4),
     ],
 )

@@ -96,6 +96,7 @@ def test_a_drive_from_verdict_to_report(analysis, reported):
     assert read_drive_model(out / "revised_model.toml") == analysis.revised_model()
 
 
+@pytest.mark.nightly
 def test_a_mechanism_from_verdict_to_report(tmp_path):
     of_mechanism, _ = cubic_analysis()
     document = of_mechanism.report(tmp_path / "report")

@@ -202,6 +202,7 @@ def test_statistics_are_relative_to_what_was_measured(ripple):
         assert metrics.mean_error == pytest.approx(np.mean(predicted - measured))
 
 
+@pytest.mark.nightly
 def test_floor_is_what_a_perfect_model_leaves(clean, rng):
     held_out = clean.held_out
     base = clean.verdict.base

@@ -205,6 +205,7 @@ def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
     assert names == {"eccentricity", "kinematic_error"}
 
 
+@pytest.mark.nightly
 def test_an_error_of_the_encoder_s_scale_is_described_though_it_is_in_no_list():
     label = f"encoder_line:sensor@{SCALE:.4g}"
     verdict = verdict_on(

@@ -122,6 +122,7 @@ class TestPrintedStatistics:
             lead = found.predicted[HIGH] - found.predicted[LOW]
             assert lead >= bounds().least_lead - 1e-4
 
+    @pytest.mark.nightly
     def test_predictions_that_fit_are_recognised_and_others_are_not(self):
         near = np.array([88.0, 80.0, 90.0, 99.0, 77.0])
         fitting = nearest_assignment(near, to="predicted", ranked=True)
@@ -136,6 +137,7 @@ class TestPrintedStatistics:
         table = consistency_table([exact, wrong])
         assert [finding.agrees for finding in table.findings] == [True, False]
 
+    @pytest.mark.nightly
     def test_no_measured_values_give_a_smaller_rmse_than_the_best_case(self, rng):
         predictions = rng.uniform(75.0, 105.0, 5)
         prediction = Prediction("ours", predictions, predictions)

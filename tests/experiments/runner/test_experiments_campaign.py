@@ -179,6 +179,7 @@ def test_a_failing_job_is_reported_and_the_finished_ones_are_kept(tmp_path, exec
     assert "walk_seed3.csv" not in names
 
 
+@pytest.mark.nightly
 def test_a_killed_worker_is_an_error_and_not_a_wait_without_end(tmp_path):
     with make_executor(2) as executor, pytest.raises(BrokenExecutor):
         Campaign(tmp_path, executor).run([KilledWalk(seed) for seed in SEEDS], "walks")
