@@ -112,9 +112,10 @@ class ExponentialIntegrator:
 
     def tangent(self, state: Values, time: float) -> Triple:
         """Return the nonlinear parts: forces (r,), slopes by state (r, 2, coordinates), by time."""
-        slopes = np.empty((len(self.curved), *state.shape))
-        found = [one.at(state, time, slopes[place]) for place, one in enumerate(self.curved)]
-        forces, rates = np.reshape(found, (-1, 2)).T.copy()
+        count = len(self.curved)
+        forces, slopes, rates = np.empty(count), np.empty((count, *state.shape)), np.empty(count)
+        for place, one in enumerate(self.curved):
+            forces[place], rates[place] = one.at(state, time, slopes[place])
         return forces, slopes, rates
 
     def longest(self, state: Values) -> float:

@@ -19,17 +19,6 @@ from pymoo_hdte.surrogate import TruncatedNormal
 GUIDES = {path.stem: path for path in (DOCS / "guides").glob("*.py")}
 PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (DOCS / "reference").glob("*.md")}
 NOISE = TruncatedNormal(0.0, 1.0)
-LONG = (
-    "drive_data_sheet",
-    "exact_moments",
-    "extend",
-    "own_problem",
-    "robust_study",
-    "steady_state",
-    "verdict_rules",
-)
-"""Guides that the documentation, of which the gate builds all, is built with; nightly runs judge
-what they print, and the suite runs the others."""
 NUMBER = r"(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 
 
@@ -47,13 +36,6 @@ def output_of(guide):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout
-
-
-def guide_cases(*cases):
-    """Return cases, each beginning with the name of a guide, with those of long ones marked."""
-    return [
-        pytest.param(*case, marks=pytest.mark.nightly if case[0] in LONG else ()) for case in cases
-    ]
 
 
 def numbers_of(guide, pattern):
