@@ -24,7 +24,10 @@ NUMBER = r"(-?\d+(?:\.\d+)?(?:e[-+]?\d+)?)"
 
 @kept
 def output_of(guide):
-    """Return what a guide prints in a process of its own, in which a warning is an error."""
+    """Return what a guide prints in a process of its own, in which a warning is an error.
+
+    At night: the gate runs every guide once, when it builds the documentation.
+    """
     done = subprocess.run(
         [
             sys.executable, "-W", "error",
@@ -51,16 +54,18 @@ def texts_of(guide):
     return " ".join(re.sub(r"^# ?", "", GUIDES[guide].read_text(), flags=re.M).split())
 
 
-@pytest.mark.parametrize("guide", guide_cases(*((name,) for name in sorted(GUIDES))))
+@pytest.mark.nightly
+@pytest.mark.parametrize("guide", sorted(GUIDES))
 def test_guide_runs_and_its_checks_hold(guide):
     lines = output_of(guide).splitlines()
     assert lines
     assert not [line for line in lines if line.endswith("False")]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("guide", "pattern", "tolerance"),
-    guide_cases(
+    [
         ("exact_moments", "closed form #, Gauss-Legendre #", 1e-11),
         ("exact_moments", "recurrence #, rule #", 1e-9),
         ("exact_moments", "exact #, quadrature #", 2e-9),
@@ -75,7 +80,7 @@ def test_guide_runs_and_its_checks_hold(guide):
         ("drive_data_sheet", "model #, surrogate # arcsec", 0.1),
         ("verdict_rules", "standard deviation #, ordinary least squares #", 2e-4),
         ("verdict_rules", "evidence #, by integration #", 0.1),
-    ),
+    ],
 )  # fmt: skip
 def test_two_ways_to_one_number_agree(guide, pattern, tolerance):
     for first, second in numbers_of(guide, pattern):
