@@ -208,6 +208,7 @@ def test_gate_builds_the_site_as_its_front_page_says():
         assert f".venv/bin/{command}\n" in gate
 
 
+@pytest.mark.nightly
 def test_picture_of_the_rooms_is_that_of_the_imports(tmp_path):
     """Every arrow of the picture on the architecture page is an import, and none is missing."""
     script = DOCS / "rooms_picture.py"

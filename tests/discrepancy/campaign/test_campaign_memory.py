@@ -114,6 +114,7 @@ def peaks(folder, script=READ_AND_FIT):
     return int(before), int(most), int(n_rows), float(found)
 
 
+@pytest.mark.nightly
 def test_a_long_record_takes_the_memory_of_its_columns_and_of_a_block(tmp_path):
     write_large(tmp_path / "rig", ROWS)
     before, most, n_rows, line = peaks(tmp_path / "rig")

@@ -55,6 +55,7 @@ def data_of(campaign):
     return training_data(campaign, measure(campaign, campaign.train, orders))
 
 
+@pytest.mark.nightly
 def test_a_number_that_may_move_explains_the_records_and_reaches_the_model(holding):
     campaign = with_amplitude(holding, 0.8, amplitude=0.3, level=0.99)
     analysis = analyse(campaign)
