@@ -17,8 +17,9 @@ from pymoo_hdte.discrepancy.campaign.rows.findings import RowFindings
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
 from pymoo_hdte.discrepancy.drive.features import Features, measure
-from pymoo_hdte.discrepancy.drive.prediction import TOLERANCE, coefficients_of
+from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
+from pymoo_hdte.discrepancy.drive.steady_states import TOLERANCE
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit

@@ -26,6 +26,7 @@ from pymoo_hdte.discrepancy.drive.prediction import Prediction, coefficients_of,
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.drive import DriveEffect, SteadyMotion, mean_torsion
+from pymoo_hdte.drive.solve.free_angle import STEPS
 from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
@@ -89,21 +90,23 @@ class Observations:
         covariance[:, 0, 0] += spread**2
         return covariance
 
-    def predict(
-        self, vectors: Vector, effects: Sequence[DriveEffect], start: SteadyMotion | None = None
-    ) -> NDArray[np.float64]:
+    def predict(self, vectors: Vector, effects: Sequence[DriveEffect]) -> NDArray[np.float64]:
         """Return features, shape (v, r, f), of vectors (v, n_base) of base parameters."""
-        return self.features.of_prediction(self.prediction(vectors, effects, start))
+        return self.features.of_prediction(self.prediction(vectors, effects))
 
     def prediction(
-        self, vectors: Vector, effects: Sequence[DriveEffect], start: SteadyMotion | None = None
+        self,
+        vectors: Vector,
+        effects: Sequence[DriveEffect],
+        start: SteadyMotion | None = None,
+        steps: int = STEPS,
     ) -> Prediction:
         """Return the prediction behind `predict`, steady states included."""
         values = self._named(vectors)
         believed, rig = self.campaign.believed, self.campaign.rig
         features = self.features
         orders = features.orders.tolist()
-        return predict(believed, rig, features.conditions, orders, values, effects, start)
+        return predict(believed, rig, features.conditions, orders, values, effects, start, steps)
 
     def _named(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}

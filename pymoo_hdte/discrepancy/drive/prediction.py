@@ -16,21 +16,15 @@ from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
+from pymoo_hdte.discrepancy.drive.steady_states import merged, steady_motions
 from pymoo_hdte.drive import (
     Coefficients,
     DriveEffect,
-    SpeedLoop,
     SteadyMotion,
-    harmonic_balance,
 )
 from pymoo_hdte.drive.effects import Session
-from pymoo_hdte.drive.solve.free_angle import torus_of
+from pymoo_hdte.drive.solve.free_angle import STEPS
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
-from pymoo_hdte.drive.solve.steady_motion import BY_CASE
-from pymoo_hdte.drive.solve.torus import Torus
-
-TOLERANCE = 1e-7
-"""Tolerance of the harmonic balance: far below the noise, and twice as fast as full precision."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +86,7 @@ def predict(
     values: dict[str, NDArray[np.float64]],
     effects: Sequence[DriveEffect] = (),
     start: SteadyMotion | None = None,
+    steps: int = STEPS,
 ) -> Prediction:
     """Return the predicted readings of the sensors.
 
@@ -109,13 +104,15 @@ def predict(
         In addition to the believed ones; shared by all vectors.
     start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
+    steps : int
+        Most steps of Newton's method for a steady state.
     """
     parts = []
     groups = of_equal_numbers(believed.effects, values)
     for rows, known in groups:
         some = {name: column[rows] for name, column in values.items()}
         present = (*known, *effects)
-        parts.append(_predict_group(believed, rig, conditions, orders, some, present, start))
+        parts.append(_predict_group(believed, rig, conditions, orders, some, present, start, steps))
     if len(parts) == 1:
         return parts[0]
     return _joined(parts, [rows for rows, _ in groups], len(conditions))
@@ -129,6 +126,7 @@ def _predict_group(
     values: dict[str, NDArray[np.float64]],
     present: Sequence[DriveEffect],
     start: SteadyMotion | None,
+    steps: int,
 ) -> Prediction:
     """Return the prediction of vectors that share all effects ``present``."""
     count, records = len(values["offset"]), len(conditions)
@@ -139,7 +137,7 @@ def _predict_group(
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     near = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
-    balance = steady_motions(coefficients, speed, load.ravel(), rig, near)
+    balance = steady_motions(coefficients, speed, load.ravel(), rig, near, steps)
     channels = [
         balance.transmission_error,
         balance.motor_torque + _driving(balance, coefficients),
@@ -154,51 +152,6 @@ def _predict_group(
     return Prediction(mean, phasors, balance)
 
 
-def steady_motions(
-    coefficients: Coefficients,
-    speed: NDArray[np.float64],
-    load: NDArray[np.float64],
-    rig: Rig,
-    start: SteadyMotion | None = None,
-) -> SteadyMotion:
-    """Return the steady state of all rows.
-
-    Where a clearance would open because the load does not hold the flanks together, the drive
-    rattles and has no steady state. Such a record, or one for which none is found, is no evidence
-    for or against the laws and is predicted without them.
-    """
-    motor = SpeedLoop(rig.proportional, rig.integral)
-
-    def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> SteadyMotion:
-        return harmonic_balance(
-            coefficients.rows(rows),
-            input_speed=speed[rows],
-            load_torque=load[rows],
-            motor=motor,
-            torus=torus,
-            tolerance=TOLERANCE,
-            start=None if start is None else start.rows(rows),
-        )
-
-    torus, every = torus_of(coefficients), np.arange(len(speed))
-    if not any(law.rattles for _, law in coefficients.laws):
-        balance = solve(coefficients, every, torus)
-        if np.all(balance.converged):
-            return balance
-        held = balance.converged
-        plain = solve(replace(coefficients, laws=()), np.flatnonzero(~held), torus)
-        return _merged([balance.rows(held), plain], [np.flatnonzero(held), np.flatnonzero(~held)])
-    plain = solve(replace(coefficients, laws=()), every, torus)
-    swing = np.abs(plain.torsion[:, 1:]).sum(axis=1)
-    held = np.abs(plain.torsion[:, 0]) > swing
-    balance = solve(coefficients, np.flatnonzero(held), torus)
-    held[held] = balance.converged
-    return _merged(
-        [balance.rows(balance.converged), plain.rows(~held)],
-        [np.flatnonzero(held), np.flatnonzero(~held)],
-    )
-
-
 def _joined(
     parts: Sequence[Prediction], places: Sequence[NDArray[np.int_]], records: int
 ) -> Prediction:
@@ -207,16 +160,7 @@ def _joined(
     mean = np.concatenate([one.mean for one in parts])[order]
     phasors = np.concatenate([one.phasors for one in parts])[order]
     cases = [np.add.outer(records * rows, np.arange(records)).ravel() for rows in places]
-    return Prediction(mean, phasors, _merged([one.balance for one in parts], cases))
-
-
-def _merged(motions: Sequence[SteadyMotion], places: Sequence[NDArray[np.int_]]) -> SteadyMotion:
-    """Merge the rows of motions on one torus, each with its places among all rows."""
-    order = np.argsort(np.concatenate(places))
-    joined = [
-        np.concatenate([getattr(motion, name) for motion in motions])[order] for name in BY_CASE
-    ]
-    return SteadyMotion(motions[0].torus, *joined)
+    return Prediction(mean, phasors, merged([one.balance for one in parts], cases))
 
 
 def coefficients_of(

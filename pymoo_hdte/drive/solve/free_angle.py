@@ -34,7 +34,8 @@ from pymoo_hdte.drive.solve.torus import (
 
 HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
-_STEPS = 50
+STEPS = 50
+"""Most steps of Newton's method."""
 _WITHOUT_MEMORY = 10
 """Steps before those that include the memory of hysteresis, which cost ten times as much."""
 _NEARLY_CONSTANT = 0.02
@@ -69,6 +70,7 @@ def harmonic_balance(
     torus: Torus | None = None,
     tolerance: float = 1e-11,
     start: SteadyMotion | None = None,
+    steps: int = STEPS,
 ) -> SteadyMotion:
     """Return the steady state of the n designs of ``coefficients``, laws at ports included.
 
@@ -90,6 +92,8 @@ def harmonic_balance(
         Largest change of the torsion, relative to its size, at which the iteration ends.
     start : SteadyMotion, optional
         Nearby cases, a row each, to begin from; ignored if their torus is another.
+    steps : int
+        Most steps of Newton's method; a row that would need more has not converged.
 
     Returns
     -------
@@ -115,7 +119,7 @@ def harmonic_balance(
         solver = _Solver(equations, start.rows(rows) if start is not None and fits else None)
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
-            solver.solve(tolerance)
+            solver.solve(tolerance, steps)
         parts.append(solver.result())
     return SteadyMotion(
         torus, *(np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE)
@@ -143,12 +147,12 @@ class _Solver:
         if near is not None:
             self.energy = equations.at_wanted_speed(self.energy)
 
-    def solve(self, tolerance: float) -> None:
+    def solve(self, tolerance: float, steps: int) -> None:
         """Iterate until the torsion converges; rows that do not are marked."""
         equations, left = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
         before, part = np.full_like(size, np.inf), np.ones_like(size)
-        for step in range(_STEPS):
+        for step in range(steps):
             torsion, energy = self.torsion[left], self.energy[left]
             if step == _WITHOUT_MEMORY:
                 before[left], part[left] = np.inf, 1.0

@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from pymoo_hdte.checks import InvalidInput
 
@@ -204,11 +205,16 @@ class Torus:
         """
         synthesis = np.concatenate([self._synthesis[::2], self._synthesis[1::2]]).T
         analysis = np.concatenate([self._analysis[:, ::2], self._analysis[:, 1::2]], axis=1).T
-        recalled = sum(
-            weight[..., None] * synthesis[place]
-            for weight, place in zip(weights, places, strict=True)
-        )
-        return np.asarray(analysis @ recalled)
+        terms, n, size = weights.shape
+        ends = np.arange(0, terms * size + 1, terms)
+        found = np.empty((n, len(analysis), len(analysis)))
+        for row in range(n):
+            # Only at points where anything is recalled: a slipping spring has forgotten.
+            weight, place = weights[:, row].T, places[:, row].T
+            held = np.flatnonzero(weight.any(axis=1))
+            recall = csr_array((weight.ravel(), place.ravel(), ends), shape=(size, size))
+            found[row] = analysis[:, held] @ (recall[held] @ synthesis)
+        return found
 
 
 def stacked(phasors: NDArray[np.complex128]) -> NDArray[np.float64]:

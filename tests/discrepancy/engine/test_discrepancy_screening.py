@@ -203,3 +203,22 @@ def test_a_line_of_the_input_is_found_at_its_order_where_the_ratio_is_no_whole_n
     features = Features(records, conditions, orders, np.zeros((3, 18)), np.zeros((3, 18, 18)))
     # What the lines of such a ratio leak to comes after it.
     assert unexpected_orders(features, 50.5, RIG)[0] == 7.0
+
+
+def test_a_record_in_which_the_drive_would_rattle_says_nothing_of_a_clearance():
+    """Predicted without any law, it would show the laws that the fit has already."""
+    soft, play = (of_label(known_data(), label) for label in ("soft_windup:mesh", "backlash:mesh"))
+    values = (0.3, 3e-4, 3.0)
+    known = known_data([*FEW, (1000.0, 0.0)])
+    data, _ = measured(soft.build(values), np.random.default_rng(1), known)
+    fitted = fit(data, (soft,), np.append(fit(data).values, values), 1)
+    added = play.build(play.starts[0])
+    base = fitted.values[None, : len(data.base)]
+    held = data.prediction(base, (*fitted.effects, *added)).balance.converged
+    assert not held.all()
+    assert np.all(data.features.conditions.output_torque[~held] < 1.0)
+    n_records, n_features = data.features.values.shape
+    change = data.response(fitted)(added)[: n_records * n_features]
+    of_record = np.abs(change.reshape(n_records, n_features)).max(axis=1)
+    assert np.all(of_record[~held] == 0.0)
+    assert np.all(of_record[held] > 0.0)

@@ -1,0 +1,79 @@
+"""Steady states of the records of a campaign, those in which a drive has none included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.campaign.believed import Rig
+from pymoo_hdte.drive import Coefficients, SpeedLoop, SteadyMotion, harmonic_balance
+from pymoo_hdte.drive.solve.free_angle import STEPS, torus_of
+from pymoo_hdte.drive.solve.steady_motion import BY_CASE
+from pymoo_hdte.drive.solve.torus import Torus
+
+TOLERANCE = 1e-7
+"""Tolerance of the harmonic balance: far below the noise, and twice as fast as full precision."""
+
+
+def steady_motions(
+    coefficients: Coefficients,
+    speed: NDArray[np.float64],
+    load: NDArray[np.float64],
+    rig: Rig,
+    start: SteadyMotion | None = None,
+    steps: int = STEPS,
+) -> SteadyMotion:
+    """Return the steady state of all rows.
+
+    Where a clearance would open because the load does not hold the flanks together, the drive
+    rattles and has no steady state. Such a record, or one for which none is found, is no evidence
+    for or against the laws: it is predicted without them, and marked as not converged.
+    """
+    motor = SpeedLoop(rig.proportional, rig.integral)
+
+    def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> SteadyMotion:
+        return harmonic_balance(
+            coefficients.rows(rows),
+            input_speed=speed[rows],
+            load_torque=load[rows],
+            motor=motor,
+            torus=torus,
+            tolerance=TOLERANCE,
+            start=None if start is None else start.rows(rows),
+            steps=steps,
+        )
+
+    torus, every = torus_of(coefficients), np.arange(len(speed))
+    if not any(law.rattles for _, law in coefficients.laws):
+        balance = solve(coefficients, every, torus)
+        if np.all(balance.converged):
+            return balance
+        held = balance.converged
+        plain = solve(replace(coefficients, laws=()), np.flatnonzero(~held), torus)
+        parts = [balance.rows(held), _not_converged(plain)]
+        return merged(parts, [np.flatnonzero(held), np.flatnonzero(~held)])
+    plain = _not_converged(solve(replace(coefficients, laws=()), every, torus))
+    swing = np.abs(plain.torsion[:, 1:]).sum(axis=1)
+    held = np.abs(plain.torsion[:, 0]) > swing
+    balance = solve(coefficients, np.flatnonzero(held), torus)
+    held[held] = balance.converged
+    return merged(
+        [balance.rows(balance.converged), plain.rows(~held)],
+        [np.flatnonzero(held), np.flatnonzero(~held)],
+    )
+
+
+def merged(motions: Sequence[SteadyMotion], places: Sequence[NDArray[np.int_]]) -> SteadyMotion:
+    """Merge the rows of motions on one torus, each with its places among all rows."""
+    order = np.argsort(np.concatenate(places))
+    joined = [
+        np.concatenate([getattr(motion, name) for motion in motions])[order] for name in BY_CASE
+    ]
+    return SteadyMotion(motions[0].torus, *joined)
+
+
+def _not_converged(motion: SteadyMotion) -> SteadyMotion:
+    return replace(motion, converged=np.zeros_like(motion.converged))
