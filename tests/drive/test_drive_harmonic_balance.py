@@ -426,3 +426,15 @@ def test_places_of_orders():
     )
     with pytest.raises(InvalidInput, match=r"order is 9\.5"):
         TORUS.place(9.5)
+
+
+@pytest.mark.parametrize("highest", [(4, 2), (9, 2, 3)])
+def test_harmonics_on_a_grid_are_their_sum_there_and_come_back(highest, rng):
+    """The larger torus goes by fast Fourier transforms."""
+    torus = Torus((1.0, 0.02, 0.37)[: len(highest)], highest)
+    phasors = rng.standard_normal((3, len(torus.orders), 2)) @ [1.0, 1j]
+    phasors[:, 0] = phasors[:, 0].real
+    phases = np.array([torus.phase(order) for order in torus.orders])
+    values = torus.signal(phasors)
+    assert values == pytest.approx((phasors @ np.exp(1j * phases)).real, abs=1e-10)
+    assert np.abs(torus.phasors(values) - phasors).max() < 1e-12

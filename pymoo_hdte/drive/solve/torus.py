@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
 from scipy.sparse import csr_array
 
 from pymoo_hdte.checks import InvalidInput
@@ -20,6 +21,8 @@ from pymoo_hdte.checks import InvalidInput
 Matrices = NDArray[np.float64]
 
 _TOLERANCE = 1e-8
+_DENSE = 140
+"""Harmonics up to which a matrix product is faster than a fast Fourier transform of the grid."""
 _LARGEST_MULTIPLE = 4
 """An order whose fraction is at most this multiple of a known one needs no angle of its own."""
 
@@ -100,6 +103,8 @@ class Torus:
         lines = self._multiples
         self._differences = self._flat(lines[:, None] - lines)
         self._sums = self._flat(lines[:, None] + lines)
+        self._places_of, self._conjugates_of = self._flat(lines), self._flat(-lines)
+        self._axes = tuple(range(1, 1 + len(self._shape)))
         argument = self._multiples @ self._phases
         # Real and imaginary part of a harmonic side by side, as complex numbers lie in memory.
         parts = np.stack([np.cos(argument), -np.sin(argument)], axis=1)
@@ -160,11 +165,23 @@ class Torus:
 
     def signal(self, phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return values on the grid, shape (n, G), of Re sum phasor exp(i order alpha)."""
-        return np.ascontiguousarray(phasors).view(float) @ self._synthesis
+        if len(self.orders) <= _DENSE:
+            return np.ascontiguousarray(phasors).view(float) @ self._synthesis
+        spectrum = np.zeros((len(phasors), self.size), dtype=complex)
+        spectrum[:, self._places_of] = 0.5 * phasors
+        spectrum[:, self._conjugates_of] += 0.5 * phasors.conj()
+        grid = spectrum.reshape(-1, *self._shape)
+        values = fft.ifftn(grid, axes=self._axes, norm="forward", overwrite_x=True).real
+        return np.ascontiguousarray(values).reshape(len(phasors), self.size)
 
     def phasors(self, values: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the kept harmonics, shape (n, n_harmonics), of values on the grid."""
-        return (values @ self._analysis).view(complex)
+        if len(self.orders) <= _DENSE:
+            return (values @ self._analysis).view(complex)
+        spectrum = fft.fftn(values.reshape(-1, *self._shape), axes=self._axes, norm="forward")
+        found = 2.0 * spectrum.reshape(len(values), self.size)[:, self._places_of]
+        found[:, 0] *= 0.5
+        return np.asarray(found)
 
     def derivative(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the harmonics of the derivative by the input angle."""
@@ -183,8 +200,7 @@ class Torus:
         Fourier coefficients F of the factor, line j of the product is the sum over lines k of
         F(j - k) x_k + F(j + k) conj(x_k).
         """
-        axes = tuple(range(1, 1 + len(self._shape)))
-        spectrum = np.fft.fftn(factor.reshape(-1, *self._shape), axes=axes) / self.size
+        spectrum = fft.fftn(factor.reshape(-1, *self._shape), axes=self._axes, norm="forward")
         flat = spectrum.reshape(len(factor), self.size)
         below, above = flat[:, self._differences], flat[:, self._sums]
         size = len(self.orders)
