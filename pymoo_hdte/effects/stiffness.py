@@ -55,12 +55,20 @@ def _sharpness() -> Parameter:
     return unknown("sharpness", 1.0, 20.0, 3.0)
 
 
+_MOST_AT_PEAK = 10.0
+"""Largest force of a cubic at the largest deflection, in units of the believed spring's."""
+
+
 def _hardening(sizes: Sizes) -> list[Guess]:
     """Guess a cubic, and for a port that is wound up by a load also a corner on the way."""
     if sizes.stiffness == 0.0:
         return []
     travel, typical = sizes.travel, sizes.force / sizes.travel**3
-    found = [Guess((unknown("coefficient", 0.0, 20.0 * typical, typical),))]
+    most = 20.0 * typical
+    if not sizes.loaded:
+        # Of a motion's misfit the root mean square says little about the force at peak travel.
+        most = max(most, _MOST_AT_PEAK * sizes.stiffness / travel**2)
+    found = [Guess((unknown("coefficient", 0.0, most, typical),))]
     if sizes.loaded:
         corner = (
             unknown("stiffening", 0.0, 0.9, 0.2),

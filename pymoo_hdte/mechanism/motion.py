@@ -74,7 +74,9 @@ def timing_noise(signal: Values) -> float:
     return float(np.sqrt(np.sum(beyond[clear] ** 2) / (12.0 * len(signal))))
 
 
-def highest_frequency(position: Values, step: float, deviation: float) -> float:
+def highest_frequency(
+    position: Values, step: float, deviation: float, samples: float = 1.0 / _HIGHEST_SHARE
+) -> float:
     """Return the frequency in Hz up to which a position exceeds its noise.
 
     Parameters
@@ -84,6 +86,8 @@ def highest_frequency(position: Values, step: float, deviation: float) -> float:
         s.
     deviation : float
         Standard deviation of its white noise.
+    samples : float
+        Fewest in a period of it.
 
     Raises
     ------
@@ -97,17 +101,18 @@ def highest_frequency(position: Values, step: float, deviation: float) -> float:
     )
     noise = 2.0 * step * deviation**2 * (2.0 * np.sin(np.pi * frequency * step)) ** 4
     stands_out = power[1:] > _STANDS_OUT * noise[1:]
+    strongest = int(np.argmax(power[1:] / frequency[1:] ** 4))
     # The lowest frequencies contain the leakage of the window even for white noise.
-    if not np.all(stands_out[:_FEWEST]):
+    if not (np.all(stands_out[:_FEWEST]) or stands_out[strongest]):
         ratio = float(np.min(power[1:] / np.maximum(noise[1:], 1e-300)))
         raise InvalidInput(
             "power of a position over that of its noise",
             ratio,
             f"more than {_STANDS_OUT:g} at low frequencies, or nothing is known of its motion",
         )
-    quiet = np.flatnonzero(~stands_out)
-    last = quiet[0] if quiet.size else len(stands_out)
-    return float(min(frequency[last], highest_share(step)))
+    quiet = np.flatnonzero(~stands_out[strongest:])
+    last = strongest + quiet[0] if quiet.size else len(stands_out)
+    return float(min(frequency[last], 1.0 / (samples * step)))
 
 
 def highest_share(step: float) -> float:

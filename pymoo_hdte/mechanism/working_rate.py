@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import prev_fast_len
 
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.mechanism.mechanism import Mechanism
@@ -39,8 +40,11 @@ def working_rows(mechanism: Mechanism, record: Record, cutoff: float) -> slice:
         )
     margin = margin_of(cutoff, record.step)
     stride = stride_of(highest_known(mechanism, record, cutoff), record.step)
-    rows = slice(margin, len(record.time) - margin, stride)
-    n = len(record.time[rows])
+    # Of a length without large prime factors: a transform of another one takes many times as long.
+    n = prev_fast_len(
+        max(len(record.time[margin : len(record.time) - margin : stride]), 1), real=True
+    )
+    rows = slice(margin, margin + (n - 1) * stride + 1, stride)
     if np.count_nonzero(frequencies(n, record.step * stride) <= cutoff) < _FEWEST_BINS:
         shortest = _FEWEST_BINS / (2.0 * cutoff) + 2.0 * margin * record.step
         raise InvalidInput(

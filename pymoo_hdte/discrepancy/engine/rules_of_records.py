@@ -186,6 +186,15 @@ class RecordRules(RuleSet):
         f"{BY_HAND}: the noise of the sensors is an estimate from the same records.",
         at_least=1.0,
     )
+    band_share: float = rule(
+        0.2,
+        "share of the power of a position",
+        "Where more lies beyond a tenth of the sampling rate, records are interpolated to a finer "
+        "rate; what is left beyond the band that is used is said.",
+        f"{BY_HAND}: motions that are sampled finely have some per cent there, an oscillator at "
+        "its resonance with nine samples in a period has 84 %.",
+        at_most=1.0,
+    )
     fewest_periods: float = rule(
         5.0,
         "periods in a record",

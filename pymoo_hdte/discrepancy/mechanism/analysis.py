@@ -35,6 +35,7 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     check_sampling,
     check_scale,
     check_signals,
+    fine_enough,
     usual_cutoff,
 )
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
@@ -49,7 +50,8 @@ class MechanismFinding:
     mechanism : Mechanism
         Without the effects that were to be found.
     records : tuple of Record
-        All that were given, training and held out.
+        All that were given, training and held out; interpolated where they were sampled less than
+        ten times in a period of the cutoff.
     cutoff : float
         Hz, up to which the motion is known.
     data : MeasuredData
@@ -125,7 +127,8 @@ def examine_mechanism(
     records : sequence of Record
         At least one of them of role ``train``.
     cutoff : float, optional
-        Hz, up to which the motion is known; by default where it falls below its noise.
+        Hz, up to which the motion is known; by default where it falls below its noise. At most a
+        third of the sampling rate.
     known : sequence of LawAt
         Effects that the mechanism is known to have.
     rules : Rules
@@ -146,15 +149,17 @@ def examine_mechanism(
     if not train:
         raise InvalidInput("number of train records", 0, "at least 1")
     check_signals(mechanism, records)
-    cutoff = usual_cutoff(mechanism, train) if cutoff is None else cutoff
+    cutoff = usual_cutoff(mechanism, train, rules) if cutoff is None else cutoff
+    records = fine_enough(records, cutoff)
     check_sampling(mechanism, records, cutoff)
+    train = [record for record in records if record.role == "train"]
     sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
     base = fit(sensors)
     candidates = _candidates(sensors, base)
     data = _with_rest(sensors, base, candidates)
     verdict = _judged(sensors, data, candidates)
-    return MechanismFinding(mechanism, tuple(records), cutoff, data, verdict)
+    return MechanismFinding(mechanism, records, cutoff, data, verdict)
 
 
 def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.mechanism import Mechanism, Record
 from pymoo_hdte.mechanism.balances import balance_names
-from pymoo_hdte.mechanism.motion import highest_frequency
+from pymoo_hdte.mechanism.motion import highest_frequency, highest_share
+from pymoo_hdte.mechanism.resampling import COARSEST, noise_between, refined, share_beyond
 from pymoo_hdte.mechanism.working_rate import working_rows
 
 
@@ -38,24 +41,56 @@ def check_signals(mechanism: Mechanism, records: Sequence[Record]) -> None:
                 raise InvalidInput(f"channel {name} of {record.name}", float(channel[0]), allowed)
 
 
-def usual_cutoff(mechanism: Mechanism, records: Sequence[Record]) -> float:
+def usual_cutoff(mechanism: Mechanism, records: Sequence[Record], rules: Rules) -> float:
     """Return the frequency, Hz, up to which every coordinate exceeds its noise.
+
+    At most a tenth of the sampling rate; a third where that would leave out more than
+    `Rules.band_share` of the power of some coordinate.
 
     Raises
     ------
     InvalidInput
         See `highest_frequency`.
     """
+    beyond = (
+        share_beyond(record.channels[name], record.step, highest_share(record.step))
+        for record in records
+        for name in mechanism.coordinates
+    )
+    coarse = max(beyond) > rules.band_share
     found = []
     for record in records:
         for name in mechanism.coordinates:
-            noise = record.noise_of(name)
+            noise = noise_between(record, name) if coarse else record.noise_of(name)
+            samples = COARSEST if coarse else 1.0 / highest_share(1.0)
             try:
-                found.append(highest_frequency(record.channels[name], record.step, noise))
+                found.append(highest_frequency(record.channels[name], record.step, noise, samples))
             except InvalidInput as error:
                 field = f"{name} of record {record.name}: {error.field}"
                 raise InvalidInput(field, error.value, error.allowed) from None
     return min(found)
+
+
+def fine_enough(records: Sequence[Record], cutoff: float) -> tuple[Record, ...]:
+    """Return records with ten samples in a period of the cutoff, interpolated where they have less.
+
+    Raises
+    ------
+    InvalidInput
+        If a record has less than three.
+    """
+    real_number("cutoff", cutoff, above=0.0)
+    found = []
+    for record in records:
+        if cutoff * record.step * COARSEST > 1.0 + 1e-9:
+            raise InvalidInput(
+                f"sampling rate of record {record.name}",
+                round(1.0 / record.step, 6),
+                f"at least {COARSEST * cutoff:.4g} Hz, three samples in a period of the cutoff of "
+                f"{cutoff:.4g} Hz; or a cutoff of at most {1.0 / (COARSEST * record.step):.4g} Hz",
+            )
+        found.append(refined(record, math.ceil(cutoff / highest_share(record.step) - 1e-9)))
+    return tuple(found)
 
 
 def check_sampling(mechanism: Mechanism, records: Sequence[Record], cutoff: float) -> None:

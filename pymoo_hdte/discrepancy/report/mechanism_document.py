@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, wit
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentences import in_words
 from pymoo_hdte.effects.unknowns import line_with_variance
+from pymoo_hdte.mechanism.resampling import share_beyond
 
 
 def mechanism_verdict_document(
@@ -56,6 +57,7 @@ def mechanism_verdict_document(
                 for one in finding.data.known
             ]
         ),
+        "band": band(finding),
         "location": locate_in_mechanism(finding).summary(),
         "remainder": remainder(finding),
         "limits": limits(finding),
@@ -146,6 +148,37 @@ def remainder(finding: MechanismFinding) -> dict[str, Any]:
         "sentence": words,
         "share_removed": removed,
         "left": dict(zip(finding.data.names, after.tolist(), strict=True)),
+    }
+
+
+def band(finding: MechanismFinding) -> dict[str, Any]:
+    """Return the band that is used, Hz, the largest shares of power beyond it, and a sentence.
+
+    Of the motion of a coordinate, and of a force by an input or at a sensor, in a training record;
+    but for their means.
+    """
+    mechanism, cutoff = finding.mechanism, finding.cutoff
+    read = [port.name for port in mechanism.ports if port.read]
+    of_forces = [*(one.name for one in mechanism.inputs), *read]
+
+    def largest(names: Sequence[str]) -> float:
+        shares = (
+            share_beyond(record.channels[name], record.step, cutoff)
+            for record in finding.records
+            for name in names
+            if record.role == "train"
+        )
+        return max(shares, default=0.0)
+
+    motion, force = largest(tuple(mechanism.coordinates)), largest(of_forces)
+    much = max(motion, force) > finding.data.rules.band_share
+    return {
+        "cutoff_Hz": cutoff,
+        "share_of_motion_beyond": motion,
+        "share_of_force_beyond": force,
+        "sentence": f"Model and records are compared up to {cutoff:.3g} Hz; beyond lie "
+        f"{100.0 * motion:.2g} % of the motion's power and {100.0 * force:.2g} % of the forces'"
+        f"{', about which nothing is known' if much else ''}.",
     }
 
 
