@@ -103,7 +103,7 @@ def highest_frequency(
     stands_out = power[1:] > _STANDS_OUT * noise[1:]
     strongest = int(np.argmax(power[1:] / frequency[1:] ** 4))
     # The lowest frequencies contain the leakage of the window even for white noise.
-    if not (np.all(stands_out[:_FEWEST]) or stands_out[strongest]):
+    if not (np.all(stands_out[:_FEWEST]) or (strongest >= _FEWEST and stands_out[strongest])):
         ratio = float(np.min(power[1:] / np.maximum(noise[1:], 1e-300)))
         raise InvalidInput(
             "power of a position over that of its noise",

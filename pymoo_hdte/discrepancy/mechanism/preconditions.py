@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.mechanism import Mechanism, Record
 from pymoo_hdte.mechanism.balances import balance_names
@@ -41,7 +41,7 @@ def check_signals(mechanism: Mechanism, records: Sequence[Record]) -> None:
                 raise InvalidInput(f"channel {name} of {record.name}", float(channel[0]), allowed)
 
 
-def usual_cutoff(mechanism: Mechanism, records: Sequence[Record], rules: Rules) -> float:
+def usual_cutoff(mechanism: Mechanism, records: Sequence[Record], rules: Rules = RULES) -> float:
     """Return the frequency, Hz, up to which every coordinate exceeds its noise.
 
     At most a tenth of the sampling rate; a third where that would leave out more than
