@@ -156,12 +156,12 @@ def test_a_held_out_record_that_cannot_be_judged_is_refused_by_name_at_once():
         channels = {channel: values[rows] for channel, values in record.channels.items()}
         return Record(name, "held_out", record.time[rows], channels)
 
-    with pytest.raises(InvalidInput, match=r"sampling rate of record slow is 50.* a cutoff of at"):
-        examine_mechanism(OSCILLATOR, [record, held_out("slow", slice(None, None, 5))])
+    with pytest.raises(InvalidInput, match=r"sampling rate of record slow is 25.* a cutoff of at"):
+        examine_mechanism(OSCILLATOR, [record, held_out("slow", slice(None, None, 10))])
     with pytest.raises(InvalidInput, match=r"duration of record brief .* at least"):
         examine_mechanism(OSCILLATOR, [record, held_out("brief", slice(100))])
     with pytest.raises(
-        InvalidInput, match=r"sampling rate of record train 1 is 250.*most 83.33 Hz"
+        InvalidInput, match=r"rate of record train 1 is 250.*most 83.33 Hz"
     ):
         examine_mechanism(OSCILLATOR, [record], cutoff=84.0)
 
