@@ -16,8 +16,8 @@ from pymoo_hdte.mechanism.records import Record
 Values = NDArray[np.float64]
 
 COARSEST = 3.0
-"""Samples in a period of the highest frequency: the filter is flat up to there, and falls by half
-of the rate; twice as many as the theorem asks for would be none."""
+"""Fewest samples in a period. The theorem asks for two; a filter of finite length has to fall between
+a third and half of the rate."""
 _REACH = 32
 """Samples to either side from which a value between two of them is made."""
 _KAISER = 8.0

@@ -160,9 +160,7 @@ def test_a_held_out_record_that_cannot_be_judged_is_refused_by_name_at_once():
         examine_mechanism(OSCILLATOR, [record, held_out("slow", slice(None, None, 10))])
     with pytest.raises(InvalidInput, match=r"duration of record brief .* at least"):
         examine_mechanism(OSCILLATOR, [record, held_out("brief", slice(100))])
-    with pytest.raises(
-        InvalidInput, match=r"rate of record train 1 is 250.*most 83.33 Hz"
-    ):
+    with pytest.raises(InvalidInput, match=r"rate of record train 1 is 250.*most 83.33 Hz"):
         examine_mechanism(OSCILLATOR, [record], cutoff=84.0)
 
 
