@@ -56,8 +56,8 @@ def _sharpness() -> Parameter:
 
 
 _MOST_AT_PEAK = 10.0
-"""Largest force of a cubic at the largest deflection, in units of the believed spring's; set by hand:
-far beyond every spring for which one stiffness is believed."""
+"""Largest force of a cubic at the largest deflection, in units of the believed spring's. Set by
+hand: far beyond every spring for which one stiffness is believed."""
 
 
 def _hardening(sizes: Sizes) -> list[Guess]:

@@ -16,8 +16,8 @@ from pymoo_hdte.mechanism.records import Record
 Values = NDArray[np.float64]
 
 COARSEST = 3.0
-"""Fewest samples in a period. The theorem asks for two; a filter of finite length has to fall between
-a third and half of the rate."""
+"""Fewest samples in a period. The theorem asks for two; a filter of finite length needs the way
+from a third to half of the rate to fall."""
 _REACH = 32
 """Samples to either side from which a value between two of them is made."""
 _KAISER = 8.0
