@@ -8,7 +8,7 @@ significant beyond this residual, and states it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -252,19 +252,12 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
         return verdict
     simplest = min(near, key=lambda one: (_unknowns(one), one.bic))
     others = tuple(one for one in (chosen, *verdict.alternatives) if one is not simplest)
-    equivalent = tuple(
+    equivalent = (
         one
         for one in verdict.equivalent
         if one is not simplest and len(one.candidates) == len(simplest.candidates)
     )
-    status = "class" if equivalent else "named"
-    return replace(
-        verdict,
-        status=status,
-        chosen=simplest,
-        alternatives=others,
-        equivalent=equivalent,
-    )
+    return _with_rivals(replace(verdict, chosen=simplest, alternatives=others), equivalent)
 
 
 def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
@@ -276,13 +269,18 @@ def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
     if chosen is None or verdict.status != "class":
         return verdict
     most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
-    equivalent = tuple(
+    equivalent = (
         one
         for one in verdict.equivalent
         if np.all(data.power(one.fit.residuals) <= most) and not contains(one, chosen)
     )
-    status = "class" if equivalent else "named"
-    return replace(verdict, status=status, equivalent=equivalent)
+    return _with_rivals(verdict, equivalent)
+
+
+def _with_rivals(verdict: Verdict, equivalent: Iterable[Hypothesis]) -> Verdict:
+    """Return the verdict with other hypotheses that explain as much, which make it a class."""
+    rivals = tuple(equivalent)
+    return replace(verdict, status="class" if rivals else "named", equivalent=rivals)
 
 
 def _unknowns(one: Hypothesis) -> int:
