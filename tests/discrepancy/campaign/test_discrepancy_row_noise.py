@@ -120,6 +120,7 @@ def test_a_clean_drive_with_bad_records_is_adequate(spoilt):
     assert document["rows"]["left_out"] == 3
 
 
+@pytest.mark.nightly
 def test_what_was_found_stands_in_the_verdict_and_on_the_page(spoilt, clean, tmp_path):
     verdict = spoilt.report(tmp_path / "out")
     assert [one["name"] for one in verdict["noise"] if one["replaced"]] == ["output_torque_noise"]

@@ -61,6 +61,7 @@ def sought(campaign):
     return [one.label for one in drive_candidates(sizes)]
 
 
+@pytest.mark.nightly
 def test_it_is_named_with_its_rate():
     verdict = analyse(warm_campaign()).verdict
     assert (verdict.status, verdict.chosen.label) == ("named", f"{NAME}:input")

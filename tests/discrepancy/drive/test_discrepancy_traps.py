@@ -59,6 +59,7 @@ def test_repeatability_left_out_is_a_false_alarm(clean, unsearched):
     assert examine_drive(replace(clean, rig=exact), unsearched).verdict.status != "adequate"
 
 
+@pytest.mark.nightly
 def test_a_small_change_of_the_zero_is_no_drift():
     """Too small to be told from a smooth drift by means alone, it was named thermal drift."""
     clean = quick_campaign(1)

@@ -235,6 +235,7 @@ def test_a_listed_effect_is_named_before_one_in_no_list_that_does_as_well():
     assert any(better)
 
 
+@pytest.mark.nightly
 def test_what_one_record_alone_shows_is_unlisted():
     verdict = verdict_on(disturbed(planted({}), 1000.0), FEW)
     assert verdict.status == "unlisted"
@@ -269,6 +270,7 @@ def test_a_curve_need_explain_its_share_only():
     assert (verdict.status, labels_of(verdict)) == ("named", {CUBIC})
 
 
+@pytest.mark.nightly
 def test_what_explains_one_channel_is_not_the_cause_of_what_another_shows():
     data = planted({CUBIC: (6e9,)})
     for record in (1, 3):

@@ -35,7 +35,7 @@ HELD_OUT = record_of(nothing, "held_out", seed=3, duration=4.0)
 
 def coarse_records(hidden):
     return [
-        coarse(record_of(hidden, duration=24.0)),
+        coarse(record_of(hidden)),
         coarse(record_of(hidden, "held_out", seed=3, duration=4.0)),
     ]
 
@@ -84,9 +84,9 @@ def test_a_cubic_spring_is_found_at_eight_samples_a_period():
     assert f"{band['cutoff_Hz']:.3g} Hz" in files["report.html"].decode()
 
 
-@pytest.mark.parametrize("every", [3, 5])
+@pytest.mark.parametrize("every", [3, pytest.param(5, marks=pytest.mark.nightly)])
 def test_nothing_hidden_is_adequate_however_coarse_the_samples(every):
-    records = [coarse(one, every) for one in (record_of(nothing, duration=24.0), HELD_OUT)]
+    records = [coarse(one, every) for one in (record_of(nothing), HELD_OUT)]
     assert examine_mechanism(OSCILLATOR, records).verdict.status == "adequate"
 
 
@@ -103,6 +103,6 @@ def test_less_than_three_samples_in_a_period_of_the_cutoff_are_refused():
 
 def test_the_planted_noise_is_that_of_the_helpers():
     """What the floor of a coarse record says: no more than the sensors have."""
-    record = coarse(record_of(nothing, duration=24.0))
+    record = coarse(record_of(nothing))
     assert floor_noise(record.channels["x"]) == pytest.approx(POSITION_NOISE, rel=0.25)
     assert floor_noise(record.channels["force"]) == pytest.approx(FORCE_NOISE, rel=0.25)

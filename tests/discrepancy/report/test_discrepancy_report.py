@@ -96,6 +96,7 @@ def test_same_analysis_gives_the_same_bytes(written, ripple, location, tmp_path)
         assert (again / name).read_bytes() == (written / name).read_bytes()
 
 
+@pytest.mark.nightly
 def test_earlier_report_is_replaced_and_nothing_else(written, ripple, location, tmp_path):
     arguments = (ripple, location, None, PROPOSAL, not_tried)
     out = tmp_path / "deep" / "out"

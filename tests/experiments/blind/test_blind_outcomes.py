@@ -12,7 +12,7 @@ from experiments.runner.campaign import Run
 from experiments.runner.committed import DATA, read_rows
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 
-CHEAPEST = 2
+CHEAPEST = 1
 """Cases that the gate runs anew; the nightly run takes a dozen, spread over the list."""
 DOZEN = 12
 
@@ -41,7 +41,7 @@ def same_again(stored):
     assert found.equivalents == stored.equivalents, stored.case.key
 
 
-def test_the_cheapest_end_as_they_are_stored(outcomes):
+def test_the_cheapest_ends_as_it_is_stored(outcomes):
     for stored in sorted(outcomes, key=lambda one: sum(one.seconds) or 1e9)[:CHEAPEST]:
         same_again(stored)
 
