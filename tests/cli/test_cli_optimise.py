@@ -224,6 +224,7 @@ class TestCheck:
         assert study.sources.variance**0.5 == pytest.approx(study.objectives[1], rel=1e-9)
 
 
+@pytest.mark.nightly
 def test_a_preset_on_another_drive_is_said_to_be_borrowed(tmp_path, capsys):
     text = sheet_toml(hs_20_100()).replace("HS-20-100", "MY-17-100").replace("25830.0", "20000.0")
     (tmp_path / "mine.toml").write_text(text)

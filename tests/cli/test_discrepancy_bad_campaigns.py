@@ -229,11 +229,12 @@ def analysed():
 @pytest.mark.parametrize(
     ("module", "stage"),
     [
-        pytest.param(report, "_page", marks=pytest.mark.nightly),
-        pytest.param(report, "_revision", marks=pytest.mark.nightly),
+        (report, "_page"),
+        (report, "_revision"),
         (reports_folder, "_write_all"),
     ],
 )
+@pytest.mark.nightly
 def test_an_interrupted_run_leaves_nothing(
     module, stage, folder, analysed, tmp_path, monkeypatch, capsys
 ):

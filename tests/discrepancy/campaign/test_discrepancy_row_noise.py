@@ -112,6 +112,7 @@ def spoilt(clean):
     return analyse(spiky(jumping(misstated(clean))))
 
 
+@pytest.mark.nightly
 def test_a_clean_drive_with_bad_records_is_adequate(spoilt):
     assert spoilt.verdict.status == "adequate"
     document = json.loads(json.dumps(spoilt.finding.rows.as_dict()))

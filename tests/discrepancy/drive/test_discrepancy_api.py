@@ -129,6 +129,7 @@ class OwnFriction(CoulombFriction):
     """A law of the user's."""
 
 
+@pytest.mark.nightly
 def test_effects_of_the_user_are_looked_for_and_known_from_then_on(campaign):
     asked = []
 

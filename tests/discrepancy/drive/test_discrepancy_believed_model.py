@@ -78,6 +78,7 @@ def again(believing):
     return analyse(read_campaign(believing))
 
 
+@pytest.mark.nightly
 def test_a_revised_model_fed_back_misses_nothing(analysis, again):
     assert analysis.verdict.status == "named"
     assert again.verdict.status == "adequate"

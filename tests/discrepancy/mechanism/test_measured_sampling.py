@@ -35,7 +35,7 @@ HELD_OUT = record_of(nothing, "held_out", seed=3, duration=4.0)
 
 def coarse_records(hidden):
     return [
-        coarse(record_of(hidden)),
+        coarse(record_of(hidden, duration=8.0)),
         coarse(record_of(hidden, "held_out", seed=3, duration=4.0)),
     ]
 

@@ -79,7 +79,7 @@ def page(name, tmp_path):
         pytest.param("simulate", 3, 1, marks=pytest.mark.nightly),
         pytest.param("identify", 5, 3, marks=pytest.mark.nightly),
         ("discrepancy", 5, 4),
-        ("measured", 3, 3),
+        pytest.param("measured", 3, 3, marks=pytest.mark.nightly),
         ("experiments", 1, 1),
     ],
 )
@@ -128,6 +128,7 @@ def test_the_design_under_the_pointer_is_shown(place, optimum, front, tmp_path):
     assert float(shown[2].split()[0]) == pytest.approx(front[row, 2], rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_arrow_keys_step_along_the_front_from_the_chosen_design(optimum, front, tmp_path):
     document = json.loads((optimum.parent / "optimum.json").read_text())
     row = document["designs"]["balanced"]["row_of_front"]

@@ -66,6 +66,7 @@ def test_moments_are_those_of_samples_of_the_surrogate(name, bands):
     assert found["prototypes_mean"] == prototype_dte(problem.model).mean()
 
 
+@pytest.mark.nightly
 def test_surrogates_of_high_order_give_the_moments_of_the_model():
     model = preset("resonant")
     found = surrogate_moments(model, NARROW, 6)

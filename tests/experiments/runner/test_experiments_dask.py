@@ -149,8 +149,9 @@ def interruptible():
 
 @pytest.mark.parametrize(
     ("n_workers", "algorithms"),
-    [(2, ()), pytest.param(3, ("NSGA-II", "AMP-MOPSO"), marks=pytest.mark.nightly)],
+    [(2, ()), (3, ("NSGA-II", "AMP-MOPSO"))],
 )
+@pytest.mark.nightly
 def test_workers_of_which_one_is_killed_write_the_bytes_of_one_process(
     n_workers, algorithms, tmp_path
 ):
