@@ -75,7 +75,7 @@ def timing_noise(signal: Values) -> float:
 
 
 def highest_frequency(
-    position: Values, step: float, deviation: float, samples: float = 1.0 / _HIGHEST_SHARE
+    position: Values, step: float, deviation: float, share: float = _HIGHEST_SHARE
 ) -> float:
     """Return the frequency in Hz up to which a position exceeds its noise.
 
@@ -86,8 +86,8 @@ def highest_frequency(
         s.
     deviation : float
         Standard deviation of its white noise.
-    samples : float
-        Fewest in a period of it.
+    share : float
+        Largest result as a share of the sampling rate.
 
     Raises
     ------
@@ -112,12 +112,12 @@ def highest_frequency(
         )
     quiet = np.flatnonzero(~stands_out[strongest:])
     last = strongest + quiet[0] if quiet.size else len(stands_out)
-    return float(min(frequency[last], 1.0 / (samples * step)))
+    return float(min(frequency[last], highest_share(step, share)))
 
 
-def highest_share(step: float) -> float:
-    """Return the highest frequency, Hz, that a sampling step resolves with ten samples."""
-    return _HIGHEST_SHARE / step
+def highest_share(step: float, share: float = _HIGHEST_SHARE) -> float:
+    """Return a share of the sampling rate, Hz; by default what ten samples in a period resolve."""
+    return share / step
 
 
 def stride_of(cutoff: float, step: float) -> int:

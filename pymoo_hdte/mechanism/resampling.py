@@ -15,9 +15,9 @@ from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]
 
-COARSEST = 3.0
-"""Fewest samples in a period. The theorem asks for two; a filter of finite length needs the way
-from a third to half of the rate to fall."""
+COARSEST_SHARE = 1.0 / 3.0
+"""Largest cutoff as a share of the sampling rate: three samples in a period. The theorem asks for
+two; a filter of finite length needs the way from a third to half of the rate to fall."""
 _REACH = 32
 """Samples to either side from which a value between two of them is made."""
 _KAISER = 8.0
@@ -73,13 +73,12 @@ def refined(record: Record, factor: int) -> Record:
     ----------
     record : Record
     factor : int
+        At least 2.
 
     Returns
     -------
     Record
     """
-    if factor == 1:
-        return record
     taps = firwin(2 * _REACH * factor + 1, 1.0 / factor, window=("kaiser", _KAISER))
     kept = slice(_REACH * factor, (len(record.time) - 1 - _REACH) * factor + 1)
     time = record.time[0] + record.step / factor * np.arange(factor * len(record.time))[kept]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +12,7 @@ from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.mechanism import Mechanism, Record
 from pymoo_hdte.mechanism.balances import balance_names
 from pymoo_hdte.mechanism.motion import highest_frequency, highest_share
-from pymoo_hdte.mechanism.resampling import COARSEST, noise_between, refined, share_beyond
+from pymoo_hdte.mechanism.resampling import COARSEST_SHARE, noise_between, refined, share_beyond
 from pymoo_hdte.mechanism.working_rate import working_rows
 
 
@@ -62,9 +61,9 @@ def usual_cutoff(mechanism: Mechanism, records: Sequence[Record], rules: Rules =
     for record in records:
         for name in mechanism.coordinates:
             noise = noise_between(record, name) if coarse else record.noise_of(name)
-            samples = COARSEST if coarse else 1.0 / highest_share(1.0)
+            share = COARSEST_SHARE if coarse else highest_share(1.0)
             try:
-                found.append(highest_frequency(record.channels[name], record.step, noise, samples))
+                found.append(highest_frequency(record.channels[name], record.step, noise, share))
             except InvalidInput as error:
                 field = f"{name} of record {record.name}: {error.field}"
                 raise InvalidInput(field, error.value, error.allowed) from None
@@ -82,14 +81,16 @@ def fine_enough(records: Sequence[Record], cutoff: float) -> tuple[Record, ...]:
     real_number("cutoff", cutoff, above=0.0)
     found = []
     for record in records:
-        if cutoff * record.step * COARSEST > 1.0 + 1e-9:
+        fine, most = highest_share(record.step), highest_share(record.step, COARSEST_SHARE)
+        if cutoff > most:
             raise InvalidInput(
                 f"sampling rate of record {record.name}",
                 round(1.0 / record.step, 6),
-                f"at least {COARSEST * cutoff:.4g} Hz, three samples in a period of the cutoff of "
-                f"{cutoff:.4g} Hz; or a cutoff of at most {1.0 / (COARSEST * record.step):.4g} Hz",
+                f"at least {cutoff / COARSEST_SHARE:.4g} Hz, three samples in a period of the "
+                f"cutoff of {cutoff:.4g} Hz; or a cutoff of at most {most:.4g} Hz",
             )
-        found.append(refined(record, math.ceil(cutoff / highest_share(record.step) - 1e-9)))
+        # Finer than the ratio asks for, so that rounding refuses no record afterwards.
+        found.append(record if cutoff <= fine else refined(record, int(cutoff / fine) + 1))
     return tuple(found)
 
 
