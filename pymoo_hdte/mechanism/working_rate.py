@@ -41,9 +41,7 @@ def working_rows(mechanism: Mechanism, record: Record, cutoff: float) -> slice:
     margin = margin_of(cutoff, record.step)
     stride = stride_of(highest_known(mechanism, record, cutoff), record.step)
     # Of a length without large prime factors: a transform of another one takes many times as long.
-    n = prev_fast_len(
-        max(len(record.time[margin : len(record.time) - margin : stride]), 1), real=True
-    )
+    n = prev_fast_len(max(len(range(margin, len(record.time) - margin, stride)), 1), real=True)
     rows = slice(margin, margin + (n - 1) * stride + 1, stride)
     if np.count_nonzero(frequencies(n, record.step * stride) <= cutoff) < _FEWEST_BINS:
         shortest = _FEWEST_BINS / (2.0 * cutoff) + 2.0 * margin * record.step

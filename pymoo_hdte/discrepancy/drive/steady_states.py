@@ -46,24 +46,20 @@ def steady_motions(
             steps=steps,
         )
 
-    torus, every = torus_of(coefficients), np.arange(len(speed))
-    if not any(law.rattles for _, law in coefficients.laws):
-        balance = solve(coefficients, every, torus)
-        if np.all(balance.converged):
-            return balance
-        held = balance.converged
-        plain = solve(replace(coefficients, laws=()), np.flatnonzero(~held), torus)
-        parts = [balance.rows(held), _not_converged(plain)]
-        return merged(parts, [np.flatnonzero(held), np.flatnonzero(~held)])
-    plain = _not_converged(solve(replace(coefficients, laws=()), every, torus))
-    swing = np.abs(plain.torsion[:, 1:]).sum(axis=1)
-    held = np.abs(plain.torsion[:, 0]) > swing
+    bare, torus = replace(coefficients, laws=()), torus_of(coefficients)
+    rattles = any(law.rattles for _, law in coefficients.laws)
+    held = np.ones(len(speed), dtype=bool)
+    if rattles:
+        plain = solve(bare, np.arange(len(speed)), torus)
+        held = np.abs(plain.torsion[:, 0]) > np.abs(plain.torsion[:, 1:]).sum(axis=1)
     balance = solve(coefficients, np.flatnonzero(held), torus)
     held[held] = balance.converged
-    return merged(
-        [balance.rows(balance.converged), plain.rows(~held)],
-        [np.flatnonzero(held), np.flatnonzero(~held)],
-    )
+    if held.all():
+        return balance
+    lost = np.flatnonzero(~held)
+    plain = plain.rows(lost) if rattles else solve(bare, lost, torus)
+    plain = replace(plain, converged=np.zeros_like(plain.converged))
+    return merged([balance.rows(balance.converged), plain], [np.flatnonzero(held), lost])
 
 
 def merged(motions: Sequence[SteadyMotion], places: Sequence[NDArray[np.int_]]) -> SteadyMotion:
@@ -73,7 +69,3 @@ def merged(motions: Sequence[SteadyMotion], places: Sequence[NDArray[np.int_]]) 
         np.concatenate([getattr(motion, name) for motion in motions])[order] for name in BY_CASE
     ]
     return SteadyMotion(motions[0].torus, *joined)
-
-
-def _not_converged(motion: SteadyMotion) -> SteadyMotion:
-    return replace(motion, converged=np.zeros_like(motion.converged))

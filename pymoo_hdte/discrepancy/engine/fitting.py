@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
-from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SETTLED_SHARE, minimum
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SETTLED_SHARE, Minimum, minimum
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import Parameter
 
@@ -140,8 +140,9 @@ def fit(
     objective = data.objective(candidates)
     begin = objective.start if start is None else start
     most = data.rules.fit_evaluations if steps is None else steps
-    values, residuals, jacobian = minimum(objective, begin, most, settled, known)
-    return Fit(objective.candidates, objective.parameters, values, residuals, jacobian)
+    ends = [Minimum(one.values, one.residuals, one.jacobian) for one in known]
+    found = minimum(objective, begin, most, settled, ends)
+    return Fit(objective.candidates, objective.parameters, *found)
 
 
 @dataclass(frozen=True)

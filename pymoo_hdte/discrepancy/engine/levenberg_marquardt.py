@@ -40,23 +40,15 @@ _SAME = 0.1
 """Change of chi-square up to which a place is a known minimum; verdicts differ by 10 and more."""
 
 
-class Minimum(Protocol):
-    """Where a search ended, with residuals and derivatives there."""
+class Minimum(NamedTuple):
+    """Where a search ended: values (n_unknowns,), residuals (n,), derivatives (n, n_unknowns).
 
-    @property
-    def values(self) -> Vector:
-        """Shape (n_unknowns,)."""
-        ...
+    Derivatives are by unknowns in units of their scale.
+    """
 
-    @property
-    def residuals(self) -> Vector:
-        """Shape (n,)."""
-        ...
-
-    @property
-    def jacobian(self) -> Matrix:
-        """Shape (n, n_unknowns), by unknowns in units of their scale."""
-        ...
+    values: Vector
+    residuals: Vector
+    jacobian: Matrix
 
 
 class Differentiable(Protocol):
@@ -81,8 +73,8 @@ def minimum(
     steps: int,
     settled: float = SETTLED_SHARE,
     known: Sequence[Minimum] = (),
-) -> tuple[Vector, Vector, Matrix]:
-    """Return where the sum of squares is least near a start, with residuals and derivatives there.
+) -> Minimum:
+    """Return where the sum of squares is least near a start.
 
     Parameters
     ----------
@@ -98,9 +90,7 @@ def minimum(
 
     Returns
     -------
-    values : ndarray, shape (n_unknowns,)
-    residuals : ndarray, shape (n,)
-    jacobian : ndarray, shape (n, n_unknowns)
+    Minimum
     """
     values = np.clip(start, problem.lower, problem.upper)
     residuals, jacobian = problem.residuals(values), problem.jacobian(values)
@@ -134,7 +124,7 @@ def minimum(
         else:
             # A damped step along a flat valley is short, and brings little far from the minimum.
             size, damping, confirming = np.zeros(len(values)), _LEAST_DAMPING, True
-    return values, residuals, jacobian
+    return Minimum(values, residuals, jacobian)
 
 
 def _arrived(

@@ -168,11 +168,9 @@ class Search:
         An inertia that is larger by half moves a resonance past lines, so that chi-square does not
         decrease steadily on the way there; and values of the base that hide an effect lie far off.
         """
-        starts = list[Vector]()
         (*others, last) = one.candidates
         if not others and len(last.starts) > 1 and not last.linear:
-            starts += [np.append(self.base.values, start) for start in last.starts]
-        self._finish(one, *starts)
+            self._finish(one, *(np.append(self.base.values, start) for start in last.starts))
 
     def _parameters(self) -> None:
         """Fit all base parameters that want to leave their tolerances together.

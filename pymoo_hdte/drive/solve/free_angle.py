@@ -111,12 +111,13 @@ def harmonic_balance(
     if np.any(speed == 0.0):
         raise InvalidInput("input_speed", 0.0, "other than 0")
     torus = torus_of(coefficients) if torus is None else torus
+    if start is not None and not np.array_equal(start.torus.orders, torus.orders):
+        start = None
     parts = []
     for first in range(0, max(n, 1), _ROWS_AT_ONCE):
         rows = slice(first, first + _ROWS_AT_ONCE)
         equations = AngleEquations(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
-        fits = start is not None and np.array_equal(start.torus.orders, torus.orders)
-        solver = _Solver(equations, start.rows(rows) if start is not None and fits else None)
+        solver = _Solver(equations, None if start is None else start.rows(rows))
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
             solver.solve(tolerance, steps)

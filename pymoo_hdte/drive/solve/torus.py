@@ -8,7 +8,7 @@ by point, and the discrete Fourier transform leads to the orders and back withou
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -103,16 +103,34 @@ class Torus:
         lines = self._multiples
         self._differences = self._flat(lines[:, None] - lines)
         self._sums = self._flat(lines[:, None] + lines)
-        self._places_of, self._conjugates_of = self._flat(lines), self._flat(-lines)
+        self._kept, self._conjugates = self._flat(lines), self._flat(-lines)
         self._axes = tuple(range(1, 1 + len(self._shape)))
+        self._places: dict[float, tuple[int, bool] | None] = {}
+
+    @cached_property
+    def _synthesis(self) -> NDArray[np.float64]:
+        """Values on the grid by harmonics, (2 H, G); a large torus needs it for memories only.
+
+        Real and imaginary part of a harmonic are side by side, as complex numbers lie in memory.
+        """
         argument = self._multiples @ self._phases
-        # Real and imaginary part of a harmonic side by side, as complex numbers lie in memory.
-        parts = np.stack([np.cos(argument), -np.sin(argument)], axis=1)
-        self._synthesis = parts.reshape(-1, self.size)
+        return np.stack([np.cos(argument), -np.sin(argument)], axis=1).reshape(-1, self.size)
+
+    @cached_property
+    def _analysis(self) -> NDArray[np.float64]:
+        """Harmonics by values on the grid, (G, 2 H), as `_synthesis` has them."""
         weights = np.full(len(self.orders), 2.0 / self.size)
         weights[0] = 1.0 / self.size
-        self._analysis = np.ascontiguousarray((np.repeat(weights, 2)[:, None] * self._synthesis).T)
-        self._places: dict[float, tuple[int, bool] | None] = {}
+        return np.ascontiguousarray((np.repeat(weights, 2)[:, None] * self._synthesis).T)
+
+    @cached_property
+    def _by_parts(self) -> tuple[Matrices, Matrices]:
+        """Both with all real parts first, as `stacked` has them: (G, 2 H) and (2 H, G)."""
+        synthesis, analysis = self._synthesis, self._analysis
+        return (
+            np.concatenate([synthesis[::2], synthesis[1::2]]).T,
+            np.concatenate([analysis[:, ::2], analysis[:, 1::2]], axis=1).T,
+        )
 
     def _flat(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
         """Return the indices of multiples (..., n_angles) in a flattened transform of the grid."""
@@ -168,8 +186,8 @@ class Torus:
         if len(self.orders) <= _DENSE:
             return np.ascontiguousarray(phasors).view(float) @ self._synthesis
         spectrum = np.zeros((len(phasors), self.size), dtype=complex)
-        spectrum[:, self._places_of] = 0.5 * phasors
-        spectrum[:, self._conjugates_of] += 0.5 * phasors.conj()
+        spectrum[:, self._kept] = 0.5 * phasors
+        spectrum[:, self._conjugates] += 0.5 * phasors.conj()
         grid = spectrum.reshape(-1, *self._shape)
         values = fft.ifftn(grid, axes=self._axes, norm="forward", overwrite_x=True).real
         return np.ascontiguousarray(values).reshape(len(phasors), self.size)
@@ -179,7 +197,7 @@ class Torus:
         if len(self.orders) <= _DENSE:
             return (values @ self._analysis).view(complex)
         spectrum = fft.fftn(values.reshape(-1, *self._shape), axes=self._axes, norm="forward")
-        found = 2.0 * spectrum.reshape(len(values), self.size)[:, self._places_of]
+        found = 2.0 * spectrum.reshape(len(values), self.size)[:, self._kept]
         found[:, 0] *= 0.5
         return np.asarray(found)
 
@@ -219,8 +237,7 @@ class Torus:
         ``weights`` and ``places`` have shape (terms, n, G); the terms are summed. Matrices act as
         those of `product_matrix`.
         """
-        synthesis = np.concatenate([self._synthesis[::2], self._synthesis[1::2]]).T
-        analysis = np.concatenate([self._analysis[:, ::2], self._analysis[:, 1::2]], axis=1).T
+        synthesis, analysis = self._by_parts
         terms, n, size = weights.shape
         ends = np.arange(0, terms * size + 1, terms)
         found = np.empty((n, len(analysis), len(analysis)))

@@ -12,15 +12,12 @@ from experiments.runner.campaign import Run
 from experiments.runner.committed import DATA, read_rows
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 
-CHEAPEST = 1
-"""Cases that the gate runs anew; the nightly run takes a dozen, spread over the list."""
 DOZEN = 12
+"""Cases that the nightly run takes, spread over the list; the gate runs the cheapest one anew."""
 
 
 @pytest.fixture(scope="module")
 def outcomes():
-    if not (DATA / OUTCOMES).is_file():
-        pytest.skip("no blind case has been run and committed yet")
     return read_outcomes(DATA / OUTCOMES, DATA / SECONDS)
 
 
@@ -42,8 +39,7 @@ def same_again(stored):
 
 
 def test_the_cheapest_ends_as_it_is_stored(outcomes):
-    for stored in sorted(outcomes, key=lambda one: sum(one.seconds) or 1e9)[:CHEAPEST]:
-        same_again(stored)
+    same_again(min(outcomes, key=lambda one: sum(one.seconds) or 1e9))
 
 
 @pytest.mark.nightly
