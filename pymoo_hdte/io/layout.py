@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.io.fields import Fields
@@ -50,6 +51,8 @@ class Channel:
         With `COUNTS` only.
     zero : float
         Reading where the channel is zero, in the unit.
+    integrated : bool
+        Whether the readings are the rates of what is wanted, which is zero in the first row.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class Channel:
     wraps: float | None = None
     counts_per_turn: float | None = None
     zero: float = 0.0
+    integrated: bool = False
 
     def __post_init__(self) -> None:
         units = (COUNTS, *(UNITS["angle"] if self.unwrap else CHANNEL_UNITS))
@@ -132,7 +136,8 @@ def layout_from_fields(table: Fields, usual: TableLayout | None = None) -> Table
     InvalidInput
         With the field.
     """
-    form = table.choice("format", FORMATS) if table.has("format") else usual and usual.format
+    form = usual.format if usual else None
+    form = table.choice("format", FORMATS) if table.has("format") else form
     mapped = _channels(table, form, usual)
     time = usual.time if usual else None
     if table.has("time"):
@@ -212,7 +217,7 @@ def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel
         raise InvalidInput(table._name("unwrap"), unwrap, "true or false")
     units = UNITS["angle"] if unwrap else units
     unit = table.choice("unit", (COUNTS, *units) if set(UNITS["angle"]) <= set(units) else units)
-    options = {
+    options: dict[str, Any] = {
         name: table.number(name, at_least=-LARGEST, at_most=LARGEST)
         for name in ("scale", "wraps", "counts_per_turn", "zero")
         if table.has(name)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.io.even_steps import LONGEST_STEP, even_steps, is_even
@@ -61,6 +62,19 @@ class Columns:
         values = (values - channel.zero if channel.zero else values) * channel.factor
         values = (np.unwrap(values) if channel.unwrap else values) * channel.scale + channel.origin
         return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
+
+    def signal(self, channel: Channel, rows: slice) -> NDArray[np.float64]:
+        """Return some rows of a channel as they are used, shape (n,); their times rise.
+
+        Turns of an angle that wraps, and rates, count from the first row of the file.
+        """
+        values = self.si(channel)
+        if not channel.integrated:
+            return values[rows]
+        time = self.time
+        before = float(np.trapezoid(values[: rows.start + 1], time[: rows.start + 1]))
+        within = make_interp_spline(time[rows], values[rows], 3).antiderivative()(time[rows])
+        return within - within[0] + before
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -142,13 +156,8 @@ def read_table(
     for at in np.flatnonzero(gaps > LONGEST_GAP)[:1]:
         allowed = f"gaps of at most {LONGEST_GAP} rows; here are {gaps[at]}"
         raise missing(int(whole[at]) + 1, allowed)
-    # Of the whole file, because the turns of an angle that wraps are counted from its start.
     kept = slice(rows.start + start, rows.start + stop)
-    channels = {name: read.si(channel)[kept] for name, channel in layout.channels.items()}
-    dropped = int(np.count_nonzero(~finite))
-    time = read.time[kept]
-    if layout.time is None or is_even(time):
-        return Table(time, channels, dropped)
+    time, dropped = read.time[kept], int(np.count_nonzero(~finite))
     steps = np.diff(time)
     mean, usual = float(np.mean(steps)), float(np.median(steps))
     for row in np.flatnonzero((steps <= 0.0) | (steps > LONGEST_STEP * mean))[:1]:
@@ -157,7 +166,11 @@ def read_table(
             f"{LONGEST_STEP * mean:.4g} s, {LONGEST_STEP:g} mean steps; or take a sample_rate, or "
             "a record for each part"
         )
-        raise refuse(start + int(row) + 1, layout.time.column, allowed)
+        column = layout.time.column if layout.time else next(iter(columns))
+        raise refuse(start + int(row) + 1, column, allowed)
+    channels = {name: read.signal(channel, kept) for name, channel in layout.channels.items()}
+    if layout.time is None or is_even(time):
+        return Table(time, channels, dropped)
     even = even_steps(time, channels)
     return Table(even.time, even.signals, dropped, even.remark)
 

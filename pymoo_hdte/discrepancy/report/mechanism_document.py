@@ -196,6 +196,14 @@ def limits(finding: MechanismFinding) -> list[str]:
         for record in finding.records
         if record.dropped
     ]
+    found += [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
+    found += [
+        f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "
+        f"are told in units of {one.name}. Their ratios and the kind of effect are determined, "
+        "their sizes are not."
+        for one in finding.mechanism.inputs
+        if not one.scaled
+    ]
     if not any(record.role == "held_out" for record in finding.records):
         found.append("No record was held out: the correction is not proved where it was not made.")
     if any(finding.accepted.bound_sides[: len(finding.data.base)]):
