@@ -18,8 +18,8 @@ from pymoo_hdte.io.even_steps import STEP_SPREAD
 
 Values = NDArray[np.float64]
 
-RATE_SLACK = 1.0 + STEP_SPREAD
-"""Ratio up to which rates count as equal: steps of a record may differ as much among themselves."""
+RATE_SLACK = 1.0 + STEP_SPREAD / 2.0
+"""Ratio up to which rates count as equal: steps of a record may deviate by twice as much."""
 _STANDS_OUT = 4.0
 """Least ratio of the power of a position to that of its noise."""
 _FEWEST = 4

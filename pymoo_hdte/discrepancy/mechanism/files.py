@@ -8,7 +8,7 @@ the records have units of their own::
     cutoff = 40.0                                  # optional, Hz
 
     [coordinates.q]
-    inertia = { value = 100.0, tolerance = 0.5 }   # relative tolerance, 0 to 1; absent: known
+    inertia = { value = 100.0, tolerance = 0.5 }   # relative, 0 to 1; or factor = 3.0; or known
     [ports.joint]
     motion = { q = 1.0 }                           # share of each coordinate
     damping = { value = 300.0, tolerance = 1.0 }   # optional, as stiffness
@@ -21,7 +21,7 @@ the records have units of their own::
     phase = 0.0
     [inputs.vir]
     acts = { q = 1.0 }
-    gain = { value = 35.15 }
+    gain = { value = 35.15 }                       # absent: forces are in units of the signal
     [[loops]]                                      # optional, as `Loop`
     input = "vir"
     reference = "qg"
@@ -43,7 +43,11 @@ the records have units of their own::
     ...
     [[records]]
     file = "DATA_EMPS.mat"                         # in the folder of the data
-    role = "train"                                 # or "held_out"
+    files = { vir = "voltage.csv" }                # optional: channels that have files of their own
+    role = "train"                                 # or "held_out"; absent: first 60 %, last 40 %
+    share = [0.0, 0.5]                             # optional, with a role: part of the rows; or
+    rows = [0, 12000]                              # instead: first row, and the first after it; or
+    seconds = [0.0, 12.0]                          # instead: as in the column of time
     name = "trapezoids"                            # optional: without it the name of the file
     sha256 = "6cf6814ae14618"                      # optional: first 8 or more digits
     zero = { q = 12.5 }                            # optional: readings at zero, unit of the column
