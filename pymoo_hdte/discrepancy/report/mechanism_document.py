@@ -21,7 +21,7 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
 from pymoo_hdte.effects.effect import effect_named
-from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import line_with_variance
 from pymoo_hdte.mechanism.resampling import share_beyond
 
