@@ -52,9 +52,11 @@ class Columns:
     length: int
 
     def si(self, channel: Channel, rows: slice = slice(None)) -> NDArray[np.float64]:
-        """Return a channel in SI, shape (n,); what is not finite is interpolated."""
+        """Return a channel in SI, shape (n,); what is not finite is interpolated if any is."""
         raw = self.raw[channel.column][rows]
         at = np.flatnonzero(np.isfinite(raw))
+        if at.size == 0:
+            return np.full(raw.size, np.nan)
         # Unwrapped before interpolation, which is invalid across a jump of the angle.
         values = raw if at.size == raw.size else raw[at]
         if channel.wraps is not None:

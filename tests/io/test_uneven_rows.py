@@ -106,6 +106,13 @@ def test_a_part_of_a_file_has_its_rows_and_its_times(tmp_path):
         read_table(path, LAYOUT, part=Part("seconds", 0.0, 1.0))
 
 
+def test_a_part_of_a_file_without_numbers_is_refused(tmp_path):
+    path = written(tmp_path, np.full(40, np.nan))
+    for part in (Part("seconds", 0.0, 1.0), Part("share", 0.0, 0.6)):
+        with pytest.raises(InvalidInput, match="finite rows .* is 0"):
+            read_table(path, LAYOUT, part=part)
+
+
 def test_a_gap_outside_of_a_part_is_no_fault_of_it(tmp_path):
     time = 0.01 * np.arange(1000.0)
     time[500:] += 3.0
