@@ -109,7 +109,7 @@ def test_a_part_of_a_file_has_its_rows_and_its_times(tmp_path):
 def test_a_part_of_a_file_without_numbers_is_refused(tmp_path):
     path = written(tmp_path, np.full(40, np.nan))
     for part in (Part("seconds", 0.0, 1.0), Part("share", 0.0, 0.6)):
-        with pytest.raises(InvalidInput, match="finite rows .* is 0"):
+        with pytest.raises(InvalidInput, match=r"finite rows .* is 0"):
             read_table(path, LAYOUT, part=part)
 
 
