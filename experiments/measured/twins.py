@@ -16,7 +16,7 @@ from experiments.measured.rigs import Study, coloured_rest
 from experiments.runner.result import Column, Table
 from experiments.runner.result import Finding as Agreement
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
-from pymoo_hdte.discrepancy.mechanism.proof import fitted_mechanism
+from pymoo_hdte.discrepancy.mechanism.held_out import fitted_mechanism
 from pymoo_hdte.effects.friction import NonlinearDrag
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import ForceBalance

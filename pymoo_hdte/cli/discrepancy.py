@@ -66,7 +66,7 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
 
 def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> dict[str, Any]:
     """Analyse a campaign or a rig and write its report; return the verdict's document."""
-    from pymoo_hdte.cli.reading_bar import ReadingBar
+    from pymoo_hdte.cli.reading_bar import ReadingBar, SimulationBar
     from pymoo_hdte.discrepancy import analyse, check_report_folder
 
     check_report_folder(options.out)
@@ -74,7 +74,8 @@ def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> di
     with closing(ReadingBar(options.quiet)) as bar:
         measured = _believing(_measured(options.campaign, options.data, bar), *believed)
     say("looking for what is missing")
-    analysis = analyse(measured)
+    with closing(SimulationBar(options.quiet)) as simulated:
+        analysis = analyse(measured, progress=simulated)
     say("locating the misfit")
     analysis.locate()
     say("proving it on the records that were held out")

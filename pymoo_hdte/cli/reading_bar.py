@@ -1,6 +1,8 @@
-"""A bar on the terminal while the records of a large campaign are read."""
+"""Bars on the terminal while a large campaign is read and held-out records are simulated."""
 
 from __future__ import annotations
+
+from typing import Any, ClassVar
 
 from tqdm import tqdm
 
@@ -8,13 +10,16 @@ MANY_BYTES = 20_000_000
 """Smaller records are read within a few seconds."""
 
 
-class ReadingBar:
-    """Follows the bytes that are read; none if quiet, without a terminal or for few bytes.
+class _Bar:
+    """Follows what is done; none if quiet or without a terminal.
 
     Parameters
     ----------
     quiet : bool
     """
+
+    looks: ClassVar[dict[str, Any]]
+    least: ClassVar[int] = 1
 
     def __init__(self, quiet: bool) -> None:
         # Without a terminal tqdm disables itself.
@@ -22,16 +27,27 @@ class ReadingBar:
         self._bar: tqdm | None = None
 
     def __call__(self, done: int, total: int) -> None:
-        """Move on to ``done`` of ``total`` bytes."""
-        if total < MANY_BYTES:
+        """Move on to ``done`` of ``total``."""
+        if total < self.least:
             return
         if self._bar is None:
-            self._bar = tqdm(
-                total=total, unit="B", unit_scale=True, leave=False, disable=self._silent
-            )
+            self._bar = tqdm(total=total, leave=False, disable=self._silent, **self.looks)
         self._bar.update(done - self._bar.n)
 
     def close(self) -> None:
         """Take the bar away."""
         if self._bar is not None:
             self._bar.close()
+
+
+class ReadingBar(_Bar):
+    """Follows the bytes that are read; none for few bytes."""
+
+    looks: ClassVar[dict[str, Any]] = {"unit": "B", "unit_scale": True}
+    least: ClassVar[int] = MANY_BYTES
+
+
+class SimulationBar(_Bar):
+    """Follows the windows of held-out records that are simulated."""
+
+    looks: ClassVar[dict[str, Any]] = {"unit": "window", "desc": "simulating"}

@@ -20,6 +20,7 @@ from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism
+from pymoo_hdte.discrepancy.mechanism.held_out import Progress
 from pymoo_hdte.discrepancy.mechanism.location import MechanismLocation, locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest, next_test
@@ -34,15 +35,24 @@ ONE_THREAD = threadpool_limits.wrap(limits=1)
 
 @overload
 def analyse(
-    measured: Campaign, effects: Sequence[Effect] = (), rules: Rules = RULES
+    measured: Campaign,
+    effects: Sequence[Effect] = (),
+    rules: Rules = RULES,
+    progress: Progress | None = None,
 ) -> DriveAnalysis: ...
 @overload
 def analyse(
-    measured: MeasuredMechanism, effects: Sequence[Effect] = (), rules: Rules = RULES
+    measured: MeasuredMechanism,
+    effects: Sequence[Effect] = (),
+    rules: Rules = RULES,
+    progress: Progress | None = None,
 ) -> MechanismAnalysis: ...
 @ONE_THREAD
 def analyse(
-    measured: Campaign | MeasuredMechanism, effects: Sequence[Effect] = (), rules: Rules = RULES
+    measured: Campaign | MeasuredMechanism,
+    effects: Sequence[Effect] = (),
+    rules: Rules = RULES,
+    progress: Progress | None = None,
 ) -> DriveAnalysis | MechanismAnalysis:
     """Return which effects the believed model lacks, by comparison with measurements.
 
@@ -61,6 +71,9 @@ def analyse(
         if they are not yet, so that reports and model files know them.
     rules : Rules, optional
         Thresholds of the verdict.
+    progress : callable, optional
+        Of a mechanism, is told how many windows of the held-out records have been simulated, and
+        how many there are.
 
     Returns
     -------
@@ -89,7 +102,7 @@ def analyse(
     if isinstance(measured, Campaign):
         return DriveAnalysis(examine_drive(measured, rules))
     believed = measured.mechanism, measured.records, measured.cutoff, measured.effects
-    return MechanismAnalysis(measured, examine_mechanism(*believed, rules))
+    return MechanismAnalysis(measured, examine_mechanism(*believed, rules, progress))
 
 
 class DriveAnalysis:

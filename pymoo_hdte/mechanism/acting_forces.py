@@ -23,14 +23,17 @@ _SOON = 1e-6
 
 
 class PortForce:
-    """The force at a port. States are positions and speeds, shape (2, coordinates)."""
+    """The force at a port. States are positions and speeds, shape (2, coordinates).
+
+    ``passed`` are those from rest up to the start, shape (k, 2, coordinates).
+    """
 
     def __init__(
         self,
         port: Port,
         laws: Sequence[Law],
         mechanism: Mechanism,
-        begin: Values,
+        passed: Values,
         record: Record,
     ) -> None:
         self.port, self.time = port, record.time
@@ -48,7 +51,12 @@ class PortForce:
         self.laws = [law for law in laws if not law.states]
         self.memories = [cast(Memory, law) for law in laws if law.states]
         self.kept = [np.zeros(law.states) for law in self.memories]
-        self.since = self.motion(begin)[0]
+        # Inner states depend on the way between reversals only.
+        way = self.motion(passed)[0]
+        turns = np.flatnonzero(np.diff(np.sign(np.diff(way)))) + 1
+        self.since = way[0]
+        for d in (*way[turns], way[-1]):
+            self._pass(d)
 
     def motion(self, states: Values) -> tuple[Any, Any, list[tuple[int, Any, Any]]]:
         """Return d, d', and by error line its coordinate and the slopes of d and d' over it.
@@ -118,7 +126,9 @@ class PortForce:
 
     def settle(self, state: Values) -> None:
         """Keep the inner states of laws, which up to a reversal depend on the way only."""
-        d = self.motion(state)[0]
+        self._pass(self.motion(state)[0])
+
+    def _pass(self, d: Values) -> None:
         for law, kept in zip(self.memories, self.kept, strict=True):
             kept[:] = law.moved(kept, d - self.since)
         self.since = d

@@ -54,6 +54,7 @@ def simulate_mechanism(
     effects: Sequence[LawAt] = (),
     *,
     start: Mapping[str, ArrayLike] | None = None,
+    history: Mapping[str, ArrayLike] | None = None,
     closed_loop: bool | None = None,
     rtol: float = 1e-6,
 ) -> SimulatedCourse:
@@ -66,11 +67,14 @@ def simulate_mechanism(
     record : Record
         Gives the inputs, or the references of loops, and measured starts.
     effects : sequence of LawAt
-        Springs of hysteresis start unstretched.
+        Springs of hysteresis start as the ``history`` leaves them.
     start : mapping of str to (float, float), optional
         Position and speed of coordinates, shape (2,), SI. Others start at the first sample of their
         channel with the speed of a parabola through its first 20, those without a channel at rest
         at 0.
+    history : mapping of str to ndarray, shape (k,), optional
+        Positions of every coordinate before the start, from rest, SI; k of at least 1. Without it
+        laws with memory start from rest.
     closed_loop : bool, optional
         Whether loops command their inputs; by default those do whose reference the record has.
     rtol : float
@@ -88,7 +92,8 @@ def simulate_mechanism(
     for effect in effects:
         one_of(f"port of effect {effect.name}", effect.port, mechanism.port_names)
     begin = _start(mechanism, record, start or {})
-    state = mechanism, begin, record
+    passed = _history(mechanism, begin, history)
+    state = mechanism, passed, record
     ports = [
         PortForce(port, [one.law for one in effects if one.port == port.name], *state)
         for port in mechanism.ports
@@ -133,6 +138,22 @@ def _closed_loops(mechanism: Mechanism, record: Record, closed: bool | None) -> 
     if len(set(driven)) < len(driven):
         raise InvalidInput("inputs of closed loops", driven, "each input once")
     return loops
+
+
+def _history(mechanism: Mechanism, begin: Values, given: Mapping[str, ArrayLike] | None) -> Values:
+    """Return the states up to the start, shape (k, 2, coordinates), without speeds before it."""
+    if given is None:
+        return begin[None]
+    for name in given:
+        one_of("history", name, mechanism.coordinates)
+    for name in mechanism.coordinates:
+        one_of("coordinate of history", name, tuple(given))
+    first = next(iter(given))
+    shape = (len(finite_array(f"history of {first}", given[first], (None,))),)
+    passed = np.zeros((*shape, 2, len(mechanism.coordinates)))
+    for place, name in enumerate(mechanism.coordinates):
+        passed[:, 0, place] = finite_array(f"history of {name}", given[name], shape)
+    return np.concatenate([passed, begin[None]])
 
 
 def _start(mechanism: Mechanism, record: Record, given: Mapping[str, ArrayLike]) -> Values:

@@ -30,6 +30,12 @@ from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
 from pymoo_hdte.discrepancy.mechanism.candidates import mechanism_candidates
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy.mechanism.held_out import (
+    Progress,
+    SimulatedRecord,
+    simulate_held_out,
+    voted,
+)
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.mechanism.preconditions import (
     check_sampling,
@@ -59,6 +65,8 @@ class MechanismFinding:
     verdict : Verdict
         What is missing: its ``status`` is ``"adequate"``, ``"named"``, ``"class"``,
         ``"parameter"`` or ``"unlisted"``.
+    simulated : tuple of SimulatedRecord
+        The held-out records by the base and by what the training records named.
     """
 
     mechanism: Mechanism
@@ -66,6 +74,7 @@ class MechanismFinding:
     cutoff: float
     data: MeasuredData
     verdict: Verdict
+    simulated: tuple[SimulatedRecord, ...] = ()
 
     @property
     def accepted(self) -> Fit:
@@ -113,6 +122,7 @@ def examine_mechanism(
     cutoff: float | None = None,
     known: Sequence[LawAt] = (),
     rules: Rules = RULES,
+    progress: Progress | None = None,
 ) -> MechanismFinding:
     """Return the verdict on records of a mechanism.
 
@@ -133,6 +143,8 @@ def examine_mechanism(
         Effects that the mechanism is known to have.
     rules : Rules
         Thresholds of the verdict.
+    progress : callable, optional
+        Is told how many windows of held-out records have been simulated, and how many there are.
 
     Returns
     -------
@@ -159,7 +171,10 @@ def examine_mechanism(
     candidates = _candidates(sensors, base)
     data = _with_rest(sensors, base, candidates)
     verdict = _judged(sensors, data, candidates)
-    return MechanismFinding(mechanism, records, cutoff, data, verdict)
+    fits = verdict.base, verdict.accepted
+    simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
+    verdict = voted(verdict, data, records, simulated)
+    return MechanismFinding(mechanism, records, cutoff, data, verdict, simulated)
 
 
 def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:

@@ -1,38 +1,36 @@
 """Validation on records that were not fitted: gaps of motion and forces before and after.
 
-A simulation with the measured inputs, or with the references where a loop is closed, shows the
-quality of the model's predictions; the force balances show its error at each moment, without the
-drift that an open loop accumulates.
+Simulations in windows, see `held_out`, show the quality of the model's predictions; the force
+balances show its error at each moment.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, root_mean_square
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
-from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-from pymoo_hdte.mechanism.records import FINER
-from pymoo_hdte.mechanism.simulation import simulate_mechanism
+from pymoo_hdte.discrepancy.mechanism.held_out import (
+    Extent,
+    SimulatedRecord,
+    laws_of,
+    simulate_held_out,
+)
+from pymoo_hdte.mechanism import Record
 
 Values = NDArray[np.float64]
-
-_FEWEST = 5
-_QUARTER = 0.25
-"""Share of a period of the cutoff in which a motion is nearly a parabola."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredGap:
     """Root mean squares of measured minus predicted.
+
+    Of a simulation at the samples of its windows but those at which they start.
 
     Attributes
     ----------
@@ -51,6 +49,8 @@ class MeasuredGap:
         Predictions of the models; minus their residual for a balance.
     least_share : float
         Least excess of a gap over the noise floor, as a share of it, for a shrinkage to be stated.
+    extent : Extent or None
+        How much of the record was simulated; None for a balance.
     """
 
     record: str
@@ -64,6 +64,7 @@ class MeasuredGap:
     predicted_before: Values
     predicted_after: Values
     least_share: float = RULES.least_gap_share
+    extent: Extent | None = None
 
     @property
     def shrinkage(self) -> float | None:
@@ -72,6 +73,17 @@ class MeasuredGap:
         if not excess > self.least_share * self.noise_floor:
             return None
         return min(1.0 - (self.after - self.noise_floor) / excess, 1.0)
+
+    @property
+    def determination(self) -> tuple[float, float] | None:
+        """1 - power of the error over that of the motion about its mean, before and after.
+
+        The R2 of a simulation; None for a balance. nan where the model diverges.
+        """
+        if self.extent is None:
+            return None
+        power = float(np.var(self.measured)) or np.nan
+        return 1.0 - self.before**2 / power, 1.0 - self.after**2 / power
 
     def as_dict(self) -> dict[str, Any]:
         """Return its numbers as plain values."""
@@ -84,81 +96,68 @@ class MeasuredGap:
             "noise_floor": self.noise_floor,
             "shrinkage": None if self.shrinkage is None else _finite(self.shrinkage),
             "unit": "SI",
+            **self._of_simulation(),
+        }
+
+    def _of_simulation(self) -> dict[str, Any]:
+        if self.extent is None or self.determination is None:
+            return {}
+        before, after = self.determination
+        return {
+            "r2_before": _finite(before),
+            "r2_after": _finite(after),
+            "window_s": self.extent.length,
+            "windows": self.extent.windows,
+            "windows_possible": self.extent.room,
         }
 
 
-def prove_measured(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
+def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[MeasuredGap, ...]:
     """Return the gaps on the held-out records; none where none was held out.
 
     Where nothing is named, before and after are equal.
+
+    Parameters
+    ----------
+    finding : MechanismFinding
+    whole : bool
+        Simulate whole records without a break, which may take minutes.
     """
-    held_out = [record for record in finding.records if record.role == "held_out"]
+    simulated = finding.simulated
+    if whole:
+        fits = finding.verdict.base, finding.accepted
+        known = finding.data.known
+        simulated = simulate_held_out(
+            finding.mechanism, finding.records, finding.data, fits, known, whole=True
+        )
+    by_name = {one.record: one for one in simulated}
     found: list[MeasuredGap] = []
-    for record in held_out:
-        found += _simulated(finding, record)
-        found += _balanced(finding, record)
+    for record in finding.records:
+        if record.role == "held_out":
+            found += _simulated(finding, by_name[record.name])
+            found += _balanced(finding, record)
     return tuple(found)
 
 
-def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:
-    """Return a mechanism with the values of a fit, as known ones."""
-    return mechanism.with_values(fitted_values(mechanism, fitted))
-
-
-def fitted_values(mechanism: Mechanism, fitted: Fit) -> dict[str, float]:
-    """Return the fitted quantities of the mechanism, SI, by name."""
-    return {
-        parameter.name: float(value)
-        for parameter, value in zip(fitted.parameters, fitted.values, strict=True)
-        if parameter.name in mechanism.quantities
-    }
-
-
-def _simulated(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
-    base, accepted = finding.verdict.base, finding.accepted
-    before_all = _positions(finding, record, base)
-    after_all = before_all if accepted is base else _positions(finding, record, accepted)
-    found = []
-    for name in finding.mechanism.coordinates:
-        measured = record.channels[name]
-        before, after = before_all[name], after_all[name]
-        found.append(
-            MeasuredGap(
-                record.name,
-                name,
-                "simulation",
-                _size(measured - before),
-                _size(measured - after),
-                record.noise_of(name),
-                record.time,
-                measured,
-                before,
-                after,
-                finding.data.rules.least_gap_share,
-            )
+def _simulated(finding: MechanismFinding, one: SimulatedRecord) -> list[MeasuredGap]:
+    after = one.before if finding.accepted is finding.verdict.base else one.after
+    return [
+        MeasuredGap(
+            one.record,
+            name,
+            "simulation",
+            _size(measured - one.before[name]),
+            _size(measured - after[name]),
+            one.noise[name],
+            one.time,
+            measured,
+            one.before[name],
+            after[name],
+            finding.data.rules.least_gap_share,
+            one.extent,
         )
-    return found
-
-
-def _positions(finding: MechanismFinding, record: Record, fitted: Fit) -> dict[str, Values]:
-    """Return the simulated positions at the samples of a record, nan where a model diverges."""
-    mechanism = fitted_mechanism(finding.mechanism, fitted)
-    effects = (*finding.data.known, *laws_of(fitted.effects))
-    try:
-        start = {name: _start(record, name, finding.cutoff) for name in mechanism.coordinates}
-        fine = simulate_mechanism(mechanism, record.finer(FINER), effects, start=start).position
-        return {name: one[::FINER] for name, one in fine.items()}
-    except ArithmeticError:
-        lost = np.full(len(record.time), np.nan)
-        return {name: lost for name in mechanism.coordinates}
-
-
-def _start(record: Record, name: str, cutoff: float) -> tuple[float, float]:
-    """Return position and speed at the first sample, of a parabola through the first ones."""
-    count = max(_FEWEST, int(_QUARTER / (cutoff * record.step)))
-    time = record.time[:count] - record.time[0]
-    curve = Polynomial.fit(time, record.channels[name][:count], 2)
-    return float(curve(0.0)), float(curve.deriv()(0.0))
+        for name, measured in one.measured.items()
+    ]
 
 
 def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
@@ -186,11 +185,6 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
         )
         for place, name in enumerate(data.names)
     ]
-
-
-def laws_of(effects: Sequence[Any]) -> tuple[LawAt, ...]:
-    """Return the effects of a fit, which are laws at ports in a mechanism."""
-    return tuple(effects)
 
 
 def _size(difference: Values) -> float:

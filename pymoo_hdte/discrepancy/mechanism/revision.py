@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.discrepancy.mechanism.held_out import fitted_values, laws_of
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
-from pymoo_hdte.discrepancy.mechanism.proof import fitted_values, laws_of
 
 MODEL_FILE = "revised_model.toml"
 

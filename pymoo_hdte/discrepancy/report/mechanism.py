@@ -91,6 +91,7 @@ def _page(finding: MechanismFinding, document: dict[str, Any], gaps: Sequence[Me
         shown=shown,
         pictures=pictures,
         proof_sentence=proof_sentence(finding, gaps),
+        extent_sentence=extent_sentence(gaps),
         believed_effects=believed_in_words(document),
         believed={name: one.value for name, one in finding.mechanism.quantities.items()},
     )
@@ -108,7 +109,10 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
         return "No record was held out, so that nothing can be proved."
     if not finding.accepted.candidates:
         words = [f"{gap.quantity} by {gap.kind}: {gap.after:.3g}" for gap in gaps]
-        return f"Nothing was added; the model is off by {', '.join(words)} (SI)."
+        return (
+            f"Nothing was added; the model is off by {', '.join(words)} (SI). "
+            f"{extent_sentence(gaps)}"
+        )
     words = []
     for kind in ("simulation", "balance"):
         for quantity in dict.fromkeys(gap.quantity for gap in gaps if gap.kind == kind):
@@ -119,7 +123,20 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
             )
             change = _change(before, after)
             words.append(f"{quantity} by {kind} {change} from {before:.3g} to {after:.3g}")
-    return f"Root mean square errors (SI), before and after: {'; '.join(words)}."
+    return (
+        f"Root mean square errors (SI), before and after: {'; '.join(words)}. "
+        f"{extent_sentence(gaps)}"
+    )
+
+
+def extent_sentence(gaps: Sequence[MeasuredGap]) -> str:
+    """Return in words how much of the held-out records was simulated."""
+    of_records = {gap.record: gap.extent for gap in gaps if gap.extent is not None}
+    words = [
+        f"{extent.windows} of {extent.room} windows of {extent.length:.3g} s in {record}"
+        for record, extent in of_records.items()
+    ]
+    return f"Simulated, each from its measured state: {', '.join(words)}."
 
 
 def _change(before: float, after: float) -> str:

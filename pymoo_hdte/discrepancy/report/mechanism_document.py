@@ -12,7 +12,7 @@ import numpy as np
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN, Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
@@ -204,6 +204,7 @@ def limits(finding: MechanismFinding) -> list[str]:
         for one in finding.mechanism.inputs
         if not one.scaled
     ]
+    found += not_proven(finding)
     if not any(record.role == "held_out" for record in finding.records):
         found.append("No record was held out: the correction is not proved where it was not made.")
     if any(finding.accepted.bound_sides[: len(finding.data.base)]):
@@ -211,6 +212,21 @@ def limits(finding: MechanismFinding) -> list[str]:
         if names:
             found.append(f"At the bound of its tolerance: {', '.join(names)}.")
     return found
+
+
+def not_proven(finding: MechanismFinding) -> list[str]:
+    """Return a sentence on what the held-out records forbid to name, if they do."""
+    chosen = finding.verdict.chosen
+    if chosen is None or NOT_PROVEN not in finding.verdict.doubts:
+        return []
+    sizes = []
+    for name in finding.mechanism.coordinates:
+        before, after, _ = np.mean([one.powers(name) for one in finding.simulated], axis=0) ** 0.5
+        sizes.append(f"{name} by simulation {before:.3g} without it, {after:.3g} with it")
+    return [
+        f"{in_words(chosen.label)} would explain the records that were fitted, but "
+        f"{NOT_PROVEN}: {', '.join(sizes)} (root mean square, SI)."
+    ]
 
 
 def _by_bic(one: Hypothesis) -> float:
