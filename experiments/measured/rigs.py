@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
-from pymoo_hdte.discrepancy.report.mechanism import proof_sentence
+from pymoo_hdte.discrepancy.report.mechanism import extent_sentence, proof_sentence
 from pymoo_hdte.discrepancy.report.mechanism_document import (
     effects,
     limits,
@@ -143,12 +143,18 @@ def gaps_table(one: Study) -> Table:
             Column("before", "SI", 3),
             Column("after", "SI", 3),
             Column("sensors", "SI", 2),
+            Column("R2 before", digits=5),
+            Column("R2 after", digits=5),
         ),
         tuple(
-            (gap.record, gap.quantity, gap.kind, gap.before, gap.after, gap.noise_floor)
+            (
+                *(gap.record, gap.quantity, gap.kind, gap.before, gap.after, gap.noise_floor),
+                *(gap.determination or (None, None)),
+            )
             for gap in one.gaps
         ),
-        note="Before: the fitted model without the effects. A simulation has the measured inputs.",
+        note="Before: the fitted model without the effects. A simulation has the measured inputs. "
+        f"{extent_sentence(one.gaps)}",
     )
 
 

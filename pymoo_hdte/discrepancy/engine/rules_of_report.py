@@ -157,7 +157,7 @@ class ReportRules(RuleSet):
         "decay times of the slowest mode",
         "Length of a window where springs or loops let the measured state at its start be "
         "forgotten.",
-        "Closed form: the error builds up over one decay time, so that a tenth of the window has "
+        f"{BY_HAND}: the error builds up over one decay time, so that a tenth of the window has "
         "less of it than a simulation without a break.",
     )
     fewest_windows: int = rule(

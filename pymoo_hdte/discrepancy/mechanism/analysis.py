@@ -173,7 +173,7 @@ def examine_mechanism(
     verdict = _judged(sensors, data, candidates)
     fits = verdict.base, verdict.accepted
     simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
-    verdict = voted(verdict, data, records, simulated)
+    verdict = voted(verdict, simulated, rules)
     return MechanismFinding(mechanism, records, cutoff, data, verdict, simulated)
 
 

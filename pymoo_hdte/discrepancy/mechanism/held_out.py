@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN, Verdict
-from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.discrepancy.mechanism.windows import Reach, Windows, reach_of, windows_of
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.motion import SmoothedMotion, motion_of, smooth
@@ -60,6 +61,9 @@ class SimulatedRecord:
     extent : Extent
     independent : float
         Independent values that a window gives.
+    expected : dict of str to float
+        Mean square of the error by coordinate to be expected of the model after the verdict, from
+        what it leaves of the training records.
     """
 
     record: str
@@ -70,6 +74,7 @@ class SimulatedRecord:
     noise: dict[str, float]
     extent: Extent
     independent: float
+    expected: dict[str, float]
 
     def powers(self, name: str) -> tuple[float, float, float]:
         """Return mean squares of a coordinate's errors before and after, and of the change."""
@@ -119,11 +124,10 @@ def simulate_held_out(
     models = [
         _Model(fitted_mechanism(mechanism, one), (*known, *laws_of(one.effects))) for one in fits
     ]
-    last, cutoff, reach = models[1], data.spectra[0].cutoff, None
-    if not whole:
-        reach = reach_of(last.mechanism, data, fits[1].residuals, last.effects)
+    last, cutoff = models[1], data.spectra[0].cutoff
+    reach = reach_of(last.mechanism, data, fits[1].residuals, last.effects)
     rules = replace(data.rules, proof_samples=max(1, data.rules.proof_samples // len(records)))
-    windows = [windows_of(record, cutoff, reach, rules) for record in records]
+    windows = [windows_of(record, cutoff, None if whole else reach, rules) for record in records]
     total, done = sum(len(one.rows) for one in windows), 0
     found = []
     for record, these in zip(records, windows, strict=True):
@@ -175,7 +179,7 @@ class _Courses:
                 lost = np.full(len(part.time) - 1, np.nan)
                 parts.append({name: lost for name in self.names})
 
-    def found(self, reach: Reach | None) -> SimulatedRecord:
+    def found(self, reach: Reach) -> SimulatedRecord:
         """Return what was simulated."""
         rows = [np.arange(len(self.record.time))[one][1:] for one in self.windows.rows]
         every = np.concatenate(rows)
@@ -192,7 +196,8 @@ class _Courses:
             after,
             {name: self.record.noise_of(name) for name in self.names},
             Extent(length, len(rows), self.windows.count),
-            1.0 if reach is None else reach.independent(length),
+            reach.independent(length),
+            dict(zip(self.names, reach.expected(length).tolist(), strict=True)),
         )
 
 
@@ -200,67 +205,45 @@ def _state(motion: SmoothedMotion, row: int) -> tuple[float, float]:
     return float(motion.position[row]), float(motion.speed[row])
 
 
-def voted(
-    verdict: Verdict,
-    data: MeasuredData,
-    records: Sequence[Record],
-    simulated: Sequence[SimulatedRecord],
-) -> Verdict:
+def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord], rules: Rules) -> Verdict:
     """Return the verdict, ``unlisted`` where held-out records contradict what it names.
 
-    Their positions, simulated, or their force balances do not come nearer to the measured ones,
-    though the change is large enough to be seen in them.
+    Simulated, their positions do not come nearer to the measured ones, though the change is large
+    enough to be seen in them.
     """
     if verdict.accepted is verdict.base or not simulated:
         return verdict
-    votes = [_vote_of_positions(simulated), _vote_of_forces(verdict, data, records)]
-    counted = [one for one in votes if one.counts(data.rules)]
-    if not any(not one.after < one.before for one in counted):
-        return verdict if counted else replace(verdict, shown_in_held_out=False)
+    vote = _vote(simulated)
+    if not vote.counts(rules):
+        return replace(verdict, shown_in_held_out=False)
+    if vote.after < vote.before:
+        return verdict
     doubts = (*verdict.doubts, NOT_PROVEN)
     return replace(verdict, status="unlisted", equivalent=(), doubts=doubts, probability=None)
 
 
-def _vote_of_positions(simulated: Sequence[SimulatedRecord]) -> Vote:
-    """Return the vote of simulated positions, in units of what the model leaves in a window.
+def _vote(simulated: Sequence[SimulatedRecord]) -> Vote:
+    """Return the vote of simulated positions, in units of what was to be expected.
 
     A window of a free coordinate gives one independent value, since its error builds up.
     """
     sums = np.zeros(3)
-    for name in simulated[0].measured:
-        powers = np.array([one.powers(name) for one in simulated])
-        diverges = ~np.isfinite(powers[:, :2]).all(axis=0)
-        if diverges.any():
-            # Without a model that stays, nothing is said.
-            after, change = (np.inf, np.inf) if diverges[1] else (0.0, np.inf)
-            return Vote(1.0, after, 0.0 if diverges.all() else change)
-        floor = np.mean([one.noise[name] ** 2 for one in simulated])
-        left = max(float(np.mean(powers[:, 1])), floor)
-        values = np.array([one.extent.windows * one.independent for one in simulated])
-        sums += values @ powers / left
+    for one in simulated:
+        for name, expected in one.expected.items():
+            powers = np.array(one.powers(name))
+            diverges = ~np.isfinite(powers[:2])
+            if diverges.any():
+                # Where both diverge, nothing is said.
+                after, change = np.inf if diverges[1] else 0.0, 0.0 if diverges.all() else np.inf
+                return Vote(1.0, after, change)
+            values = one.extent.windows * one.independent
+            sums += values * powers / (expected + one.noise[name] ** 2)
     return Vote(*sums.tolist())
 
 
-def _vote_of_forces(verdict: Verdict, data: MeasuredData, records: Sequence[Record]) -> Vote:
-    """Return the vote of force balances, in units of what the model leaves in each of them."""
-    held = [record for record in records if record.role == "held_out"]
-    other = measured_data(data.mechanism, held, data.spectra[0].cutoff, data.known, data.rules)
-    first, last = (
-        other.residuals(one.values[: len(data.base)], laws_of(one.effects))
-        for one in (verdict.base, verdict.accepted)
-    )
-    before, after, change = np.zeros(3)
-    for rows in other.rows_of_parts():
-        left = max(float(np.mean(last[rows] ** 2)), 1.0)
-        before += np.sum(first[rows] ** 2) / left
-        after += np.sum(last[rows] ** 2) / left
-        change += np.sum((first[rows] - last[rows]) ** 2) / left
-    return Vote(float(before), float(after), float(change))
-
-
 def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:
-    """Return a mechanism with the values of a fit, as known ones."""
-    return mechanism.with_values(fitted_values(mechanism, fitted))
+    """Return a mechanism with the values of a fit."""
+    return mechanism.with_values(fitted_values(mechanism, fitted), exactly=False)
 
 
 def fitted_values(mechanism: Mechanism, fitted: Fit) -> dict[str, float]:

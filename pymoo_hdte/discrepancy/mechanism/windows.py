@@ -31,25 +31,31 @@ Values = NDArray[np.float64]
 _SAMPLES = 20
 """Samples of a simulation in a period of the cutoff: straight lines between them are off by 1 %."""
 _STARTS = 64
-"""Moments from which the drift is followed,"""
+"""Moments from which errors are followed,"""
 _FEWEST_STARTS = 16
 """as long as so many have not reached the end of the record."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Reach:
     """How far a simulation carries.
 
     Attributes
     ----------
     drift : float
-        Time after which unexplained forces have moved a coordinate, s.
+        Time after which unexplained forces have moved a coordinate, s; infinite if they never do.
     memory : float
         Decay time of the slowest mode, s; infinite for a free coordinate.
+    step : float
+        Of the following, s.
+    errors : ndarray, shape (n, coordinates)
+        Mean squares of what unexplained forces add to positions in that time from the start.
     """
 
     drift: float
     memory: float
+    step: float
+    errors: Values
 
     def free(self, duration: float, rules: Rules) -> bool:
         """Tell whether the start is remembered for most of a record of a duration in s."""
@@ -60,6 +66,11 @@ class Reach:
         if self.free(duration, rules):
             return min(self.drift, duration / rules.fewest_windows)
         return min(rules.window_decays * self.memory, duration)
+
+    def expected(self, window: float) -> Values:
+        """Return the mean squares that a window of that length in s should have, (coordinates,)."""
+        samples = max(1, round(window / self.step))
+        return np.asarray(self.errors[:samples].mean(axis=0))
 
     def independent(self, window: float) -> float:
         """Return how many independent values a window of that length in s gives, at least 1."""
@@ -101,13 +112,18 @@ def reach_of(
     effects : sequence of LawAt
         Of the model: their forces count by the straight lines that fit them best.
     """
-    drifts, parts = [], data.coefficients(residuals)
-    for balance, left in zip(data.spectra, parts, strict=True):
+    found = []
+    for balance, left in zip(data.spectra, data.coefficients(residuals), strict=True):
         forces = np.array([balance.in_time(one) for one in left[: len(mechanism.coordinates)]])
+        memory = _memory(_linearised(mechanism, balance, ()))
         matrix = _linearised(mechanism, balance, effects)
-        drifts.append(_drift(mechanism, balance, matrix, forces, data.rules))
-    memories = [_memory(_linearised(mechanism, balance, ())) for balance in data.spectra]
-    return Reach(min(drifts), max(memories))
+        step = float(balance.time[1] - balance.time[0])
+        errors = _errors(_inertias(mechanism), matrix, forces, step)
+        allowed = [balance.motions[name].position.std() for name in mechanism.coordinates]
+        beyond = np.any(errors > (data.rules.window_drift * np.array(allowed)) ** 2, axis=1)
+        drift = step * float(np.argmax(beyond)) if beyond.any() else np.inf
+        found.append(Reach(drift, memory, step, errors))
+    return min(found, key=lambda one: one.drift)
 
 
 def windows_of(record: Record, cutoff: float, reach: Reach | None, rules: Rules) -> Windows:
@@ -189,36 +205,24 @@ def _memory(matrix: Values) -> float:
     return float(-1.0 / slowest) if slowest < -1e-9 * abs(fastest) else np.inf
 
 
-def _drift(
-    mechanism: Mechanism,
-    balance: ForceBalance,
-    matrix: Values,
-    forces: Values,
-    rules: Rules,
-) -> float:
-    """Return the time in s after which unexplained forces (n, samples) have moved a coordinate.
+def _errors(inertias: Values, matrix: Values, forces: Values, step: float) -> Values:
+    """Return mean squares of the positions to which forces (n, samples) move a mechanism at rest.
 
-    By the stated share of its standard deviation, as a root mean square over windows that begin
-    all over the record; infinite if they never do.
+    Shape (k, n), after one, two ... steps from moments all over the record.
     """
     n, samples = forces.shape
-    step = float(balance.time[1] - balance.time[0])
     block = np.zeros((3 * n, 3 * n))
     block[: 2 * n, : 2 * n] = matrix
-    block[n : 2 * n, 2 * n :] = np.diag(1.0 / _inertias(mechanism))
+    block[n : 2 * n, 2 * n :] = np.diag(1.0 / inertias)
     both = expm(step * block)[: 2 * n]
     by_state, by_force = both[:, : 2 * n], both[:, 2 * n :]
-    allowed = rules.window_drift * np.array(
-        [balance.motions[name].position.std() for name in mechanism.coordinates]
-    )
     starts = np.unique(np.linspace(0, max(samples - 2, 0), _STARTS).astype(int))
-    state = np.zeros((2 * n, len(starts)))
+    state, found = np.zeros((2 * n, len(starts))), list[Values]()
     for passed in range(samples - 1):
         inside = starts + passed < samples
-        if np.count_nonzero(inside) < _FEWEST_STARTS:
+        if found and np.count_nonzero(inside) < _FEWEST_STARTS:
             break
         starts, state = starts[inside], state[:, inside]
         state = by_state @ state + by_force @ forces[:, starts + passed]
-        if np.any(np.sqrt(np.mean(state[:n] ** 2, axis=1)) > allowed):
-            return passed * step
-    return np.inf
+        found.append(np.mean(state[:n] ** 2, axis=1))
+    return np.array(found)
