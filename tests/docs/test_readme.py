@@ -22,8 +22,9 @@ from pymoo.optimize import minimize
 from experiments.blind.cases import all_cases
 from experiments.blind.data import read_outcomes
 from experiments.blind.experiment import OUTCOMES, SECONDS
-from experiments.comparison.paired import objectives, true_front
+from experiments.comparison.paired import objectives
 from experiments.comparison.quality import TrueFront
+from experiments.comparison.references import true_front
 from experiments.comparison.runs import ALGORITHMS, OptimisationRun
 from experiments.contest import swarm_parts
 from experiments.contest.peers_data import committed_scores

@@ -1,0 +1,63 @@
+"""95 % intervals from resampled seeds, of many cases at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import bootstrap
+
+RESAMPLES = 1000
+LEVEL = 0.95
+_AT_ONCE = 50
+"""Resamples of A12 held in memory: each compares all pairs of seeds of every case."""
+
+
+def mean_intervals(runs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return mean and both ends of its interval, shape (cases, 3), of runs (cases, seeds).
+
+    Runs without a value do not count in the mean, but leave no interval (NaN).
+    """
+    known = np.isfinite(runs)
+    means = np.full(len(runs), np.nan)
+    np.divide(np.where(known, runs, 0.0).sum(axis=1), known.sum(axis=1), out=means,
+              where=known.any(axis=1))  # fmt: skip
+    return np.column_stack([means, *_ends((runs,), lambda x, axis: x.mean(axis=axis))])
+
+
+def a12_intervals(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return A12 and both ends of its interval, shape (cases, 3), of runs (cases, seeds) each.
+
+    The runs are paired by their seeds, and resampled in pairs. A case in which a run has no value
+    has no A12 either (NaN).
+    """
+    return np.column_stack([_a12(first, second, -1), *_ends((first, second), _a12)])
+
+
+def _a12(first: NDArray[np.float64], second: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    """As `experiments.comparison.statistics.effect_size`, of many cases at once."""
+    a, b = (np.moveaxis(x, axis, -1) for x in (first, second))
+    difference = a[..., :, np.newaxis] - b[..., np.newaxis, :]
+    return 0.5 + 0.5 * np.sign(difference).mean(axis=(-2, -1))
+
+
+def _ends(
+    data: tuple[NDArray[np.float64], ...], statistic: Callable[..., NDArray[np.float64]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    if data[0].shape[1] < 2:
+        nothing = np.full(len(data[0]), np.nan)
+        return nothing, nothing
+    found = bootstrap(
+        data,
+        statistic,
+        axis=1,
+        paired=len(data) > 1,
+        n_resamples=RESAMPLES,
+        batch=_AT_ONCE,
+        confidence_level=LEVEL,
+        method="percentile",
+        # The same resamples everywhere: no table depends on what was made before it.
+        rng=np.random.default_rng(1),
+    ).confidence_interval
+    return found.low, found.high
