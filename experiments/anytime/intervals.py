@@ -45,19 +45,20 @@ def _a12(first: NDArray[np.float64], second: NDArray[np.float64], axis: int) -> 
 def _ends(
     data: tuple[NDArray[np.float64], ...], statistic: Callable[..., NDArray[np.float64]]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    if data[0].shape[1] < 2:
-        nothing = np.full(len(data[0]), np.nan)
-        return nothing, nothing
-    found = bootstrap(
-        data,
-        statistic,
-        axis=1,
-        paired=len(data) > 1,
-        n_resamples=RESAMPLES,
-        batch=_AT_ONCE,
-        confidence_level=LEVEL,
-        method="percentile",
-        # The same resamples everywhere: no table depends on what was made before it.
-        rng=np.random.default_rng(1),
-    ).confidence_interval
-    return found.low, found.high
+    low, high = np.full((2, len(data[0])), np.nan)
+    complete = np.all([np.isfinite(one).all(axis=1) for one in data], axis=0)
+    if complete.any() and data[0].shape[1] > 1:
+        found = bootstrap(
+            tuple(one[complete] for one in data),
+            statistic,
+            axis=1,
+            paired=len(data) > 1,
+            n_resamples=RESAMPLES,
+            batch=_AT_ONCE,
+            confidence_level=LEVEL,
+            method="percentile",
+            # The same resamples everywhere: no table depends on what was made before it.
+            rng=np.random.default_rng(1),
+        ).confidence_interval
+        low[complete], high[complete] = found.low, found.high
+    return low, high

@@ -107,13 +107,19 @@ def igd_of_runs(comparisons: Sequence[Comparison]) -> Figure:
     return figure
 
 
+class _PlainNumbers(LogFormatter):
+    """Labels what `LogFormatter` labels, without exponents."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
 def plain_log_scale(axis: Axes) -> None:
     """Make the vertical axis logarithmic, labelled without powers and not too densely."""
     axis.set_yscale("log")
-    for minor in (False, True):
-        # Above one decade and a half, only the powers of ten are labelled; below, all that fit.
-        labels = LogFormatter(labelOnlyBase=not minor, minor_thresholds=(1.5, 0.7))
-        (axis.yaxis.set_minor_formatter if minor else axis.yaxis.set_major_formatter)(labels)
+    axis.yaxis.set_major_formatter("{x:g}")
+    # Above one decade and a half, only the powers of ten are labelled; below, all that fit.
+    axis.yaxis.set_minor_formatter(_PlainNumbers(minor_thresholds=(1.5, 0.7)))
 
 
 def reference_line(axis: Axes, *values: NDArray[np.float64]) -> None:
