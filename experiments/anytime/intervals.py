@@ -19,11 +19,27 @@ def mean_intervals(runs: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Runs without a value do not count in the mean, but leave no interval (NaN).
     """
+    ends = _ends((runs,), lambda x, axis: x.mean(axis=axis))
+    return np.column_stack([mean_of_known(runs), *ends])
+
+
+def mean_of_known(runs: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the means over the last axis of what has a value; NaN where nothing has."""
     known = np.isfinite(runs)
-    means = np.full(len(runs), np.nan)
-    np.divide(np.where(known, runs, 0.0).sum(axis=1), known.sum(axis=1), out=means,
-              where=known.any(axis=1))  # fmt: skip
-    return np.column_stack([means, *_ends((runs,), lambda x, axis: x.mean(axis=axis))])
+    means = np.full(runs.shape[:-1], np.nan)
+    total = np.where(known, runs, 0.0).sum(axis=-1)
+    return np.divide(total, known.sum(axis=-1), out=means, where=known.any(axis=-1))
+
+
+def paired_interval(
+    runs: NDArray[np.float64], statistic: Callable[..., NDArray[np.float64]]
+) -> tuple[float, float]:
+    """Return the interval of a statistic of several samples (samples, seeds), paired by seed.
+
+    ``statistic`` takes each sample as one argument, and the axis of the seeds.
+    """
+    low, high = _ends(tuple(runs[:, np.newaxis]), statistic)
+    return float(low[0]), float(high[0])
 
 
 def a12_intervals(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.anytime.data import OF_TABLE_7, Case, Scores
+from experiments.anytime.intervals import mean_of_known, paired_interval
 from experiments.anytime.measures import EQUAL, RETURNED, SCALES, Scale
 from experiments.published_values import TABLE_7
 
@@ -18,11 +19,22 @@ PRINTED = np.array([[row.igd, row.spacing] for row in TABLE_7.values()])
 
 
 class Reading(NamedTuple):
-    """One way to read Table 7, and the means of our runs in it.
+    """One way to read Table 7, and our runs in it.
 
-    ``factor`` is by how much our six numbers are off the printed ones: exp of the root mean square
-    of the logarithm of their ratios. ``shape_factor`` is the same after all six were multiplied by
-    the number that brings them closest: it does not ask for the unit.
+    Attributes
+    ----------
+    model, moments, scale, counted, population, evaluations
+        The way.
+    runs : ndarray, shape (3, 2, seeds)
+        IGD and Spacing of NSGA-II, MOPSO and AMP-MOPSO.
+    means : ndarray, shape (3, 2)
+        Of the runs that have a value; a set of two designs has no Spacing.
+    factor : float
+        By how much our six means are off the printed ones: exp of the root mean square of the
+        logarithm of their ratios.
+    shape_factor : float
+        The same after all six were multiplied by the number that brings them closest: it does not
+        ask for the unit.
     """
 
     model: str
@@ -31,6 +43,7 @@ class Reading(NamedTuple):
     counted: str
     population: int
     evaluations: int
+    runs: NDArray[np.float64]
     means: NDArray[np.float64]
     factor: float
     shape_factor: float
@@ -39,6 +52,15 @@ class Reading(NamedTuple):
     def in_order(self) -> bool:
         """Whether NSGA-II, MOPSO and AMP-MOPSO come in the printed order in both indicators."""
         return bool(np.all(np.diff(self.means, axis=0) < 0.0))
+
+    def factor_interval(self) -> tuple[float, float]:
+        """Return the interval of the factor from resampled seeds; NaN if a run has no value."""
+
+        def factor(*runs: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+            means = np.stack([one.mean(axis=axis) for one in runs], axis=-1)
+            return np.exp(np.sqrt(np.mean(np.log(means / PRINTED.ravel()) ** 2, axis=-1)))
+
+        return paired_interval(self.runs.reshape(PRINTED.size, -1), factor)
 
 
 def readings(scores: Scores) -> list[Reading]:
@@ -65,19 +87,12 @@ def _reading(
     budget: int,
     scale: Scale,
 ) -> Reading:
-    means = np.array(
-        [
-            [
-                _mean(scores.of(case, f"{indicator}_{scale.suffix}"))
-                for indicator in ("igd", "spacing")
-            ]
-            for case in (
-                Case(model, moments, counted, population, budget, name) for name in OF_TABLE_7
-            )
-        ]
-    )
-    factor, shape_factor = factors(means)
-    return Reading(model, moments, scale, counted, population, budget, means, factor, shape_factor)
+    measures = [f"{indicator}_{scale.suffix}" for indicator in ("igd", "spacing")]
+    who = [Case(model, moments, counted, population, budget, name) for name in OF_TABLE_7]
+    runs = np.array([[scores.of(case, measure) for measure in measures] for case in who])
+    means = mean_of_known(runs)
+    way = model, moments, scale, counted, population, budget
+    return Reading(*way, runs, means, *factors(means))
 
 
 def factors(means: NDArray[np.float64]) -> tuple[float, float]:
@@ -85,9 +100,3 @@ def factors(means: NDArray[np.float64]) -> tuple[float, float]:
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = np.log(means / PRINTED)
     return float(np.exp(np.sqrt(np.mean(logs**2)))), float(np.exp(np.std(logs)))
-
-
-def _mean(runs: NDArray[np.float64]) -> float:
-    """Return the mean of the runs that have a value; a set of two designs has no Spacing."""
-    known = runs[np.isfinite(runs)]
-    return float(known.mean()) if len(known) else np.nan
