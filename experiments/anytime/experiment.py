@@ -20,14 +20,13 @@ from experiments.anytime.sentences import (
     opening,
     readings_findings,
 )
+from experiments.anytime.strategies import gains_table, strategies_table
 from experiments.anytime.tables import (
     contests,
     duels_table,
-    gains_table,
     means_table,
     readings_table,
     standings_table,
-    strategies_table,
 )
 from experiments.runner.committed import committed_file, read_origin, stored_outcome
 from experiments.runner.registry import Context

@@ -130,8 +130,8 @@ def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
     )
     best, stated = ranked[0], ranked[place]
     return (
-        f"Of the paper's Table 7, {OURS}'s advantage over both MOPSO and NSGA-II holds in IGD "
-        f"{igd}, and in Spacing {spacing}. At the stated 100 x 100 evaluations "
+        f"Of the paper's Table 7, {OURS}'s advantage over both MOPSO and NSGA-II holds, on "
+        f"{MODEL}, in IGD {igd}, and in Spacing {spacing}. At the stated 100 x 100 evaluations "
         f"{_at_stated(scores, standing(at_stated))} The printed numbers come closest with "
         f"{best.population} particles after {best.evaluations:,} evaluations (off by a factor of "
         f"{significant(best.factor, 2)}, against {significant(stated.factor, 2)} at 100 x 100)."

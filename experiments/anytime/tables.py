@@ -1,8 +1,8 @@
-"""Tables: who is ahead where, what each strategy gives, and the ranked readings of Table 7."""
+"""Tables: who is ahead where, the means, and the ranked readings of Table 7."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 from typing import NamedTuple
 
@@ -22,13 +22,6 @@ RIVALS = tuple(name for name in OF_TABLE_7 if name != OURS)
 STATED = 100, 10_000
 """Population and evaluations that the paper states."""
 NAMES = {"igd": "IGD", "spacing": "Spacing", "hypervolume": "hypervolume"}
-STRATEGIES = (
-    ("pyramid", "MP-MOPSO", "MOPSO"),
-    ("pyramid", "AMP-MOPSO", "A-MOPSO"),
-    ("entropy weight", "A-MOPSO", "MOPSO"),
-    ("entropy weight", "AMP-MOPSO", "MP-MOPSO"),
-)
-"""A strategy, an algorithm that has it, and the same without."""
 SHOWN = 12
 """Readings that the page lists, besides the closest at the stated setting."""
 
@@ -103,12 +96,12 @@ def duels_table(found: Contests) -> Table:
     columns = [Column(name) for name in ("problem", "population", "evaluations", "rival")]
     rows: dict[tuple[Cell, ...], list[Cell]] = {}
     for indicator in COMPARED:
-        columns += _duel_columns(NAMES[indicator])
+        columns += duel_columns(NAMES[indicator])
         for contest, entries in found.items():
             if contest[1:] == (indicator, RETURNED):
                 for duel in entries:
                     where = (contest.model, duel.population, duel.evaluations, duel.rival)
-                    rows.setdefault(where, []).extend(_duel_cells(duel))
+                    rows.setdefault(where, []).extend(duel_cells(duel))
     return Table(
         "duels",
         f"{OURS} against each rival: ratio of the means, A12 (0.5: no difference) with its 95 % "
@@ -119,7 +112,8 @@ def duels_table(found: Contests) -> Table:
     )
 
 
-def _duel_columns(group: str) -> list[Column]:
+def duel_columns(group: str) -> list[Column]:
+    """Return the columns that `duel_cells` fills."""
     return [
         Column("ratio", digits=3, group=group),
         Column("A12", digits=2, group=group),
@@ -128,7 +122,8 @@ def _duel_columns(group: str) -> list[Column]:
     ]
 
 
-def _duel_cells(duel: Duel) -> list[Cell]:
+def duel_cells(duel: Duel) -> list[Cell]:
+    """Return ratio of the means, A12 with its interval, and p."""
     return [duel.ratio, duel.better, _range(duel.low, duel.high), duel.p]
 
 
@@ -162,77 +157,6 @@ def _mean_cells(mean: float, low: float, high: float) -> tuple[Cell, Cell]:
 
 def _range(low: float, high: float) -> str | None:
     return f"{low:.3g}..{high:.3g}" if np.isfinite(low) else None
-
-
-def strategies_table(scores: Scores) -> Table:
-    """Say what the pyramid and the entropy weight give at every population and budget."""
-    rows: dict[tuple[Cell, ...], list[Cell]] = {}
-    columns = [Column(name) for name in ("problem", "population", "evaluations", "strategy")]
-    columns.append(Column("in"))
-    for indicator in ("igd", "spacing"):
-        columns += _duel_columns(NAMES[indicator])
-        for model, strategy, pair, entries in _strategies(scores, indicator):
-            for duel in entries:
-                where = (model, duel.population, duel.evaluations, strategy, pair)
-                rows.setdefault(where, []).extend(_duel_cells(duel))
-    return Table(
-        "strategies",
-        "The ablation at every budget: with the strategy against without",
-        tuple(columns),
-        tuple((*where, *cells) for where, cells in rows.items()),
-        note="A ratio of the means below 1 and an A12 above 0.5: better with the strategy.",
-        folded=True,
-    )
-
-
-def gains_table(scores: Scores) -> Table:
-    """Say in a word for every population and budget what each strategy gives by IGD."""
-    rows: list[tuple[Cell, ...]] = []
-    for model, strategy, pair, entries in _strategies(scores, "igd"):
-        for population, of_population in groupby(entries, key=lambda duel: duel.population):
-            rows.append((model, strategy, pair, population, *map(_gain, of_population)))
-    budgets = [Column(f"{budget:,}", group="evaluations") for budget in scores.budgets()]
-    first = (Column("problem"), Column("strategy"), Column("in"), Column("population"))
-    return Table(
-        "gains",
-        "The ablation at every budget: change of the mean IGD by a strategy",
-        (*first, *budgets),
-        tuple(rows),
-        note="A number where the difference is beyond chance (Wilcoxon with Holm, 5 %).",
-        findings=tuple(_gain_findings(scores)),
-    )
-
-
-def _gain_findings(scores: Scores) -> Iterator[Finding]:
-    """Say at how many populations and budgets a strategy gives anything by IGD."""
-    found = sorted(_strategies(scores, "igd"), key=lambda one: (one[0], one[1]))
-    for (model, strategy), group in groupby(found, key=lambda one: one[:2]):
-        entries = [duel for *_, of_pair in group for duel in of_pair]
-        better, worse = ([duel for duel in entries if duel.ahead == sign] for sign in (1, -1))
-        budgets = sorted({duel.evaluations for duel in better})
-        at = f", at {budgets[0]:,} to {budgets[-1]:,} evaluations" if len(budgets) > 1 else ""
-        at = f", at {budgets[0]:,} evaluations" if len(budgets) == 1 else at
-        yield Finding(
-            len(better) > len(worse),
-            f"On {model}, the {strategy} lowers the mean IGD beyond chance in {len(better)} of "
-            f"{len(entries)} comparisons (populations, budgets, with and without the other "
-            f"strategy){at}, and raises it in {len(worse)}; the paper has both strategies "
-            "contribute.",
-        )
-
-
-def _strategies(scores: Scores, indicator: str) -> Iterator[tuple[str, str, str, list[Duel]]]:
-    for model in models(scores):
-        for strategy, having, without in STRATEGIES:
-            entries = duels(scores, model, having, [without], indicator)
-            yield model, strategy, f"{having} against {without}", entries
-
-
-def _gain(duel: Duel) -> str:
-    if not duel.ahead:
-        return "none shown"
-    percent = 100.0 * (duel.ratio - 1.0)
-    return f"{percent:+.0f} %".replace("-", "\N{MINUS SIGN}")
 
 
 def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note: str) -> Table:

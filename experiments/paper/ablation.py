@@ -29,7 +29,8 @@ PARTS = (FULL, "A-MOPSO", "MP-MOPSO", "MOPSO")
 
 SETTING = (
     "A-MOPSO keeps only the entropy weight, MP-MOPSO only the pyramid, MOPSO neither. Budget, "
-    "seeds and measures are those of Table 7. The paper shows this ablation as one picture of each "
+    "seeds and measures are those of Table 7; the experiment anytime has other "
+    "budgets. The paper shows this ablation as one picture of each "
     "front and prints no numbers for A-MOPSO and MP-MOPSO."
 )
 

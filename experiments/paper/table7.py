@@ -32,7 +32,8 @@ CONFIRMED = 0.5
 
 SETTING = (
     "Every run spends 100 x 100 evaluations, the budget that the paper states; what is found holds "
-    "for this budget alone. The final set holds at most 50 designs, for NSGA-II its non-dominated "
+    "for this budget alone, and the picture above shows the others (experiment anytime). The "
+    "final set holds at most 50 designs, for NSGA-II its non-dominated "
     "population thinned by the crowding truncation that the archives use. IGD and Spacing come "
     "from pymoo, with ideal and nadir point of the true front of the order-3 surrogate, which none "
     "of the compared algorithms produced. The paper names neither its reference front nor its "
