@@ -174,10 +174,10 @@ def _comparison(
 
 def _found(job: Job, run: Run) -> tuple[NDArray[np.float64], int]:
     """Return the final set of a run, shape (n, m), and the evaluations that it spent."""
-    if isinstance(job, OptimisationRun):
-        return objectives(run), job.population * job.generations
-    F = run.values[:, -problem_named(job.problem).n_obj :]
-    return F[np.isfinite(F).all(axis=1)], int(run.values[0, 0])
+    if isinstance(job, OpenRun):
+        F = run.values[:, -problem_named(job.problem).n_obj :]
+        return F[np.isfinite(F).all(axis=1)], int(run.values[0, 0])
+    return objectives(run), job.population * job.generations
 
 
 def objectives(run: Run) -> NDArray[np.float64]:
