@@ -184,7 +184,7 @@ def readings_table(ranked: Sequence[Reading], findings: Sequence[Finding], note:
         columns,
         tuple(rows),
         note=f"With {len(ranked)} readings for six numbers, some come close by chance: the first "
-        f"places say what fits, not what was done.{note}",
+        f"places say what fits, not what was done. Intervals come from resampled seeds.{note}",
         findings=tuple(findings),
     )
 

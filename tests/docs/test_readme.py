@@ -24,7 +24,7 @@ from experiments.anytime.measures import EQUAL
 from experiments.anytime.readings import readings
 from experiments.anytime.sentences import settings_ahead
 from experiments.anytime.strategies import strategies
-from experiments.anytime.tables import Contest, contests
+from experiments.anytime.tables import Contest, contests, stated_place
 from experiments.blind.cases import all_cases
 from experiments.blind.data import read_outcomes
 from experiments.blind.experiment import OUTCOMES, SECONDS
@@ -284,6 +284,11 @@ class TestNumbersBesideThePaper:
         scores = anytime.committed_scores()
         found, best = contests(scores), readings(scores)[0]
         assert (best.population, best.evaluations) == (10, 200)
+        stated = readings(scores)[stated_place(readings(scores))]
+        off = (
+            f"(off by a factor of {best.factor:.1f}, at the stated budget by {stated.factor:.1f} or"
+        )
+        assert off in WORDS
         for model, words in (
             ("calibrated", "ahead of both by IGD {} in `calibrated`"),
             ("resonant", "in `resonant` only {}, and by Spacing nowhere"),
