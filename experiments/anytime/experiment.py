@@ -1,8 +1,8 @@
 """Table 7 and the ablation at every budget and population, and in every reading.
 
 Without an option the report is made from ``experiments/data/anytime.csv``, the committed outcome of
-the last full run; with ``--full`` it runs (some twenty minutes of one core) and leaves the same files in
-the results folder; with ``--quick`` a small one runs (a minute).
+the last full run; with ``--full`` it runs (some twenty minutes of one core) and leaves the same
+files in the results folder; with ``--quick`` a small one runs (a minute).
 """
 
 from __future__ import annotations
@@ -108,8 +108,8 @@ def _pictures(scores: Scores, ranked: Sequence[Reading]) -> list[Picture]:
         ),
         Picture(
             "ablation",
-            f"The ablation at every budget, measured as above on {MODEL}. A wide band stems from a few "
-            "runs that stay away from the front.",
+            f"The ablation at every budget, measured as above on {MODEL}. A wide band stems from a "
+            "few runs that stay away from the front.",
             over_budget(scores, MODEL, EXACT, VARIANTS, printed=False),
         ),
     ]
