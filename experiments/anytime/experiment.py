@@ -90,8 +90,9 @@ def _table_7(scores: Scores) -> Picture:
     return Picture(
         "anytime",
         f"Table 7 at every budget: means over the seeds on {MODEL}, exact moments, arcsec to the "
-        "true front; bands are 95 % intervals, dashed lines the printed numbers. The paper states "
-        "a population of 100 and 10,000 evaluations: the right end of the last column.",
+        "true front (hypervolume: normalised by it, up to 1.1); bands are 95 % intervals, dashed "
+        "lines the printed numbers. The paper states a population of 100 and 10,000 evaluations: "
+        "the right end of the last column.",
         over_budget(scores, MODEL, EXACT, OF_TABLE_7, printed=True),
     )
 

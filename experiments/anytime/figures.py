@@ -16,29 +16,32 @@ from experiments.anytime.readings import Reading
 from experiments.comparison.figures import ALGORITHM_STYLES, grid, plain_log_scale
 from experiments.published_values import TABLE_7
 
-LABELS = {"igd": "IGD [arcsec]", "spacing": "Spacing [arcsec]"}
+LABELS = {"igd": "IGD [arcsec]", "spacing": "Spacing [arcsec]", "hypervolume": "hypervolume"}
+PRINTED = ("igd", "spacing")
+"""What the paper prints."""
 
 
 def over_budget(
     scores: Scores, model: str, moments: str, algorithms: Sequence[str], *, printed: bool
 ) -> Figure:
-    """Draw mean IGD and Spacing with their 95 % intervals over the evaluations.
+    """Draw mean IGD, Spacing and hypervolume with their 95 % intervals over the evaluations.
 
     One column for each population; with ``printed``, a dashed line for what the paper prints.
     """
     populations = scores.populations()
-    figure, axes = grid(len(LABELS), len(populations), width=3.3, height=2.9, share_rows=True)
+    figure, axes = grid(len(LABELS), len(populations), width=3.3, height=2.6, share_rows=True)
     for row, indicator in zip(axes, LABELS, strict=True):
         for axis, population in zip(row, populations, strict=True):
             for algorithm in algorithms:
                 _curve(axis, scores, (model, moments, population, algorithm), indicator)
-                if printed:
+                if printed and indicator in PRINTED:
                     value = getattr(TABLE_7[algorithm], indicator)
                     colour = ALGORITHM_STYLES[algorithm][0]
                     axis.axhline(value, color=colour, linewidth=1.2, linestyle="--")
             axis.set_xscale("log")
             axis.xaxis.set_major_formatter("{x:,g}")
-            plain_log_scale(axis)
+            if indicator in PRINTED:
+                plain_log_scale(axis)
         row[0].set_ylabel(LABELS[indicator])
     for axis, population in zip(axes[0], populations, strict=True):
         axis.set_title(f"population {population}", fontsize=10)
