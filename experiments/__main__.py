@@ -119,7 +119,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--list", action="store_true", help="list the experiments and stop")
     parser.add_argument(
         "--seeds",
-        type=_seeds,
+        type=_counted,
         help=f"runs of every algorithm in {_names(SEEDED)} (default {SEEDS}), or their seeds: "
         "21-40",
     )
@@ -135,8 +135,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--cases",
-        type=_positive,
-        help=f"with --full, only the first so many cases of {_names(LIMITED)}",
+        type=_counted,
+        help=f"with --full, only the first so many cases of {_names(LIMITED)}, or some: 97-192",
     )
     extent = parser.add_mutually_exclusive_group()
     extent.add_argument(
@@ -184,14 +184,15 @@ def _listed(text: str) -> tuple[str, ...]:
     return names
 
 
-def _seeds(text: str) -> range:
+def _counted(text: str) -> range:
+    """Return what a number, from 1 on, or a range stands for."""
     first, dash, last = text.partition("-")
     if not dash:
         return range(1, _positive(text) + 1)
-    seeds = range(_positive(first), _positive(last) + 1)
-    if not seeds:
+    counted = range(_positive(first), _positive(last) + 1)
+    if not counted:
         raise argparse.ArgumentTypeError(f"{text!r} is not a range that rises, like 21-40")
-    return seeds
+    return counted
 
 
 def _positive(text: str) -> int:

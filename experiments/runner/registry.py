@@ -49,7 +49,7 @@ class Context:
     quick
         Whether to run a small version of those that have one.
     cases
-        How many cases, from the first on, of a full run of those that can be limited; None for all.
+        Which cases, counted from 1, of a full run of those that can be limited; None for all.
     setting
         What the comparisons of algorithms run, if not what the paper states.
     """
@@ -59,7 +59,7 @@ class Context:
     campaign: Campaign
     full: bool = False
     quick: bool = False
-    cases: int | None = None
+    cases: range | None = None
     setting: Setting = STATED
 
     @property
@@ -75,17 +75,21 @@ class Context:
 
     def comparison_command(self, experiment: str) -> str:
         """Return the command for this setting of an experiment that compares algorithms."""
-        first, last = self.seeds_to_run[0], self.seeds_to_run[-1]
-        seeds = f"{last}" if first == 1 else f"{first}-{last}"
-        options = " ".join(["--seeds", seeds, *self.setting.options()])
+        options = " ".join(["--seeds", _counted(self.seeds_to_run), *self.setting.options()])
         return f"python -m experiments {experiment} {options}"
 
     def command(self, experiment: str) -> str:
         """Return the command for this extent of an experiment."""
         option = " --full" if self.full else " --quick" if self.quick else ""
         if self.full and self.cases is not None:
-            option += f" --cases {self.cases}"
+            option += f" --cases {_counted(self.cases)}"
         return f"python -m experiments {experiment}{option}"
+
+
+def _counted(numbers: range) -> str:
+    """Return a range as the command line takes it."""
+    first, last = numbers[0], numbers[-1]
+    return f"{last}" if first == 1 else f"{first}-{last}"
 
 
 @dataclass(frozen=True)
