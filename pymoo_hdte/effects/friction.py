@@ -63,7 +63,12 @@ register(
         {"level": "torque"},
         "Dry friction at the {port}: a {force} that does not depend on speed.",
         lambda sizes: [Guess((unknown("level", 0.0, sizes.largest, sizes.force),))],
-        special_case_of=("stribeck_friction", "hysteresis", "position_dependent_friction"),
+        special_case_of=(
+            "stribeck_friction",
+            "hysteresis",
+            "position_dependent_friction",
+            "nonlinear_drag/sublinear",
+        ),
     )
 )
 

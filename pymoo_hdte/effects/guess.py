@@ -43,6 +43,8 @@ class Sizes:
     temperature : float
         Mean of the records, K, where their temperatures spread enough to show what depends on them;
         0 elsewhere.
+    turns : bool
+        Whether its position is the angle of a shaft at which gravity may pull.
     read : bool
         Whether it is the reading of a force sensor.
     slower : float
@@ -69,6 +71,7 @@ class Sizes:
     load: float = 0.0
     driven: bool = False
     temperature: float = 0.0
+    turns: bool = False
     read: bool = False
     slower: float = 1.0
     expected: tuple[float, ...] = ()

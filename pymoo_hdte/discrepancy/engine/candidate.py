@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.effects.effect import Effect, Place, place_of
+from pymoo_hdte.effects.effect import Effect, Place, is_contained, place_of
 from pymoo_hdte.effects.guess import Guess
 from pymoo_hdte.effects.sentences import out_of_tolerance_sentence, sentence_at
 from pymoo_hdte.effects.unknowns import Parameter, Values
@@ -78,6 +78,12 @@ class Candidate:
     def goes_with(self, other: Candidate) -> bool:
         """Tell whether a drive may have both: no two of their effects are at one place."""
         return not self.places & other.places
+
+    def holds(self, other: Candidate) -> bool:
+        """Tell whether another effect is a special case of this one, or of this form of it."""
+        return is_contained(other.name, self.name) or (
+            self.form != "" and is_contained(other.name, f"{self.name}/{self.form}")
+        )
 
     @property
     def linear(self) -> bool:

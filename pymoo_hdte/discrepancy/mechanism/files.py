@@ -9,6 +9,7 @@ the records have units of their own::
 
     [coordinates.q]
     inertia = { value = 100.0, tolerance = 0.5 }   # relative tolerance, 0 to 1; absent: known
+    angle = true                                   # optional: of a shaft; else the unit tells
     [ports.joint]
     motion = { q = 1.0 }                           # share of each coordinate
     damping = { value = 300.0, tolerance = 1.0 }   # optional, as stiffness
@@ -64,12 +65,13 @@ from pymoo_hdte.discrepancy.mechanism.models import (
     read_mechanism_model,
 )
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.layout import TableLayout, layout_from_fields, with_zeros
+from pymoo_hdte.io.layout import COUNTS, TableLayout, layout_from_fields, with_zeros
 from pymoo_hdte.io.tables import check_sha256, read_table
 from pymoo_hdte.io.text_lines import Progress, Seen, told
 from pymoo_hdte.io.toml import toml_with_lines
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.records import ROLES
+from pymoo_hdte.units import UNITS
 
 RIG_FILE = "rig.toml"
 
@@ -165,13 +167,13 @@ def read_rig(
         places = [f"{path.name}.records[{index}]" for index in range(len(entries))]
         pairs = list(zip(entries, places, strict=True))
         paths = [_path(entry, place, files) for entry, place in pairs]
-        seen = told(progress, paths)
+        seen, units = told(progress, paths), dict[str, set[str]]()
         for (entry, place), of_record in zip(pairs, paths, strict=True):
-            record = _record(entry, place, of_record, shared, records, noise, seen)
+            record = _record(entry, place, of_record, shared, records, noise, seen, units)
             records[record.name] = record
         _check_noise(noise, records, path.name)
     return MeasuredMechanism(
-        model.mechanism,
+        _with_angles(model.mechanism, units),
         tuple(records.values()),
         model.cutoff,
         model.effects,
@@ -187,6 +189,15 @@ def _model(top: Fields, path: Path) -> MechanismModel:
     model = read_mechanism_model(path.parent / top.text("model"))
     cutoff = top.number("cutoff", above=0.0) if top.has("cutoff") else model.cutoff
     return replace(model, title=top.text("title"), cutoff=cutoff)
+
+
+def _with_angles(mechanism: Mechanism, units: Mapping[str, set[str]]) -> Mechanism:
+    """Return a mechanism that knows its angles: as its file says, or else by units of columns."""
+    if mechanism.angles is not None:
+        return mechanism
+    turning = {COUNTS, *UNITS["angle"]}
+    angles = [name for name in mechanism.coordinates if units.get(name, {""}) <= turning]
+    return replace(mechanism, angles=angles or None)
 
 
 def _path(entry: Fields, place: str, folder: Path) -> Path:
@@ -206,7 +217,9 @@ def _record(
     taken: Collection[str],
     noise: Mapping[str, float],
     seen: Seen | None,
+    units: dict[str, set[str]],
 ) -> Record:
+    """Return one record, and add the units of its channels to those of the others."""
     role = entry.choice("role", ROLES)
     name = entry.text("name") if entry.has("name") else path.stem
     if name in taken:
@@ -214,6 +227,8 @@ def _record(
     layout = layout_from_fields(entry.table("table")) if entry.has("table") else shared
     if layout is None:
         raise InvalidInput(f"{place}.table", None, "a layout here, or [table] for all records")
+    for channel, column in layout.channels.items():
+        units.setdefault(channel, set()).add(column.unit)
     if entry.has("zero"):
         layout = with_zeros(entry.table("zero"), layout)
     expected = entry.text("sha256") if entry.has("sha256") else None
