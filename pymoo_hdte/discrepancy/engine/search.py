@@ -223,9 +223,9 @@ class Search:
         return one.candidates
 
     def _could_count(self, one: Hypothesis) -> bool:
-        """Tell whether a further effect beside a set could be justified at all."""
+        """Tell whether a further effect could be justified; one at a bound may stand for two."""
         if self.enough(one):
-            return False
+            return any(one.fit.bound_sides[one.fit.n_base :])
         return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
 
     def _extend(self, one: Hypothesis, by_part: bool = True) -> None:

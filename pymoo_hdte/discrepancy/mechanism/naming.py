@@ -34,7 +34,8 @@ def judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candi
     candidates : sequence of Candidate
     """
     base, rules = fit(data), data.rules
-    verdict = _simplest(data, judge(data, base, candidates))
+    verdict = _mostly_explained(sensors, data, judge(data, base, candidates))
+    verdict = _simplest(data, verdict)
     verdict = _with_true_rivals(data, _within_bounds(sensors, data, verdict))
     before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
     if verdict.chosen is None:
@@ -47,6 +48,32 @@ def judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candi
     if removed < least or out:
         return _as_unlisted(verdict, verdict.chosen)
     return verdict
+
+
+def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with a nearest effect that explains nearly enough for a name as partial.
+
+    What it leaves may be several effects, none of them large enough to be earned.
+    """
+    chosen, rules = verdict.chosen, data.rules
+    if chosen is None or verdict.status != "unlisted" or not chosen.listed:
+        return verdict
+    if any(one.frees is not None for one in chosen.candidates):
+        return verdict
+    removed = share_removed(sensors, data, verdict.base, chosen.fit)
+    if removed < rules.partial_share or unexplained(data, verdict.base, chosen.fit).any():
+        return verdict
+    most = rules.parsimony_ratio * data.power(chosen.fit.residuals)
+    rivals = [
+        one
+        for one in verdict.alternatives
+        if len(one.candidates) == len(chosen.candidates)
+        and one.names != chosen.names
+        and np.all(data.power(one.fit.residuals) <= most)
+    ]
+    doubt = f"it explains {100.0 * removed:.0f} % of the misfit, less than a name takes"
+    doubts = (*_doubts(data, verdict.base, chosen), doubt)
+    return _with_rivals(replace(verdict, doubts=doubts), rivals)
 
 
 def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:

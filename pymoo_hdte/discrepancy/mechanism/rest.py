@@ -7,6 +7,7 @@ as noise, with as many effects as a verdict names at most.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,19 +25,23 @@ from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 
 
-def with_rest(sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]) -> MeasuredData:
-    """Return the data with the residual of the best effects as the noise.
+def with_rest(
+    sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]
+) -> tuple[MeasuredData, Fit]:
+    """Return the data with the residual of the best effects as the noise, and their fit.
 
-    The best effects depend on the noise; after a few rounds they no longer change.
+    The residuals of that fit are in units of the noise of the sensors. The best effects depend on
+    the noise; after a few rounds they no longer change.
     """
     rules, degrees_of_freedom = sensors.rules, len(base.residuals) - len(base.values)
     if down_to_noise(base, degrees_of_freedom, rules):
-        return sensors
-    data = sensors.with_rest(base.residuals)
+        return sensors, base
+    data, best = sensors.with_rest(base.residuals), base
     for _ in range(rules.rest_rounds):
-        best = _best_few(data, candidates)
-        data = sensors.with_rest(in_units_of(sensors, data, best.fit.residuals))
-    return data
+        best = _best_few(data, candidates).fit
+        best = replace(best, residuals=in_units_of(sensors, data, best.residuals))
+        data = sensors.with_rest(best.residuals)
+    return data, best
 
 
 def _best_few(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis:

@@ -8,8 +8,12 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.discrepancy.report.mechanism_document import effects
+from pymoo_hdte.discrepancy.mechanism.files import read_rig
+from pymoo_hdte.discrepancy.mechanism.models import model_text, read_mechanism_model
+from pymoo_hdte.discrepancy.report.mechanism_document import effects, quantities
+from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
@@ -52,6 +56,12 @@ def found(load, angles=("q",), reach=HALF_TURN, seed=1, mechanism=None, **known)
     channels |= {name: one(angle, speed) for name, one in known.items()}
     record = Record("to and fro", "train", time, channels)
     return examine_mechanism(mechanism or joint(angles), [record])
+
+
+def believing(inertia, damping):
+    """Return the joint with other beliefs."""
+    port = Port("bearing", {"q": 1.0}, damping=damping)
+    return Mechanism({"q": inertia}, [port], [Input("torque", {"q": 1.0})], angles=["q"])
 
 
 def names(finding):
@@ -152,3 +162,121 @@ def test_friction_that_grows_slower_than_the_speed_is_known_as_a_curve(curve):
     speed = np.linspace(0.05, 1.0, 20) * fastest
     truth = DAMPING * speed + curve(speed)
     assert friction(finding, speed) == pytest.approx(truth, rel=0.05)
+
+
+def test_a_ripple_is_found_beside_gravity_and_friction_that_hide_it():
+    finding = found(lambda q, v: weight(q, v) + dry(q, v) + 1.2 * np.cos(16.0 * q + 0.5))
+    assert finding.verdict.status == "named"
+    assert names(finding) == ["coulomb_friction", "gravity", "torque_ripple/16"]
+    (ripple,) = [one.law for one in finding.accepted.effects if one.name == "torque_ripple"]
+    assert ripple.amplitude == pytest.approx(1.2, rel=0.02)
+
+
+def test_at_the_bound_of_a_form_no_name_is_plain():
+    finding = found(lambda q, v: 4.0 * np.sign(v) * np.abs(v) ** 0.12)
+    assert finding.verdict.status == "partial"
+    assert "coulomb_friction" in names(finding)
+    assert any("ended at a bound" in one for one in finding.verdict.doubts)
+    bounded = [one for each in effects(finding) for one in each["at_bound"]]
+    shown = [
+        key
+        for each in effects(finding)
+        for key, one in each["parameters"].items()
+        if one.get("at_bound")
+    ]
+    assert shown == bounded
+
+
+@pytest.mark.parametrize(
+    ("believed", "stuck"),
+    [
+        (
+            believing(BelievedValue(0.9, 0.2), BelievedValue(2.0, 1.0)),
+            "inertia of q",
+        ),
+        pytest.param(
+            believing(BelievedValue(0.6, 0.5), BelievedValue(2.0, 0.3)),
+            "damping of bearing",
+            marks=pytest.mark.nightly,
+        ),
+    ],
+)
+def test_a_belief_that_ends_at_its_tolerance_is_a_doubt(believed, stuck):
+    finding = found(dry, mechanism=believed)
+    assert finding.verdict.status == "partial"
+    assert f"{stuck} ended at the bound of its tolerance" in finding.verdict.doubts
+    assert quantities(finding)[stuck]["at_bound"]
+    assert "coulomb_friction" in names(finding)
+
+
+def test_a_value_of_zero_is_no_bound_but_a_part_that_is_not_there():
+    none = believing(BelievedValue(0.6, 0.5), BelievedValue(2.0, 1.0))
+    finding = found(lambda q, v: dry(q, v) - DAMPING * v, mechanism=none)
+    assert (finding.verdict.status, names(finding)) == ("named", ["coulomb_friction"])
+    assert quantities(finding)["damping of bearing"]["at_bound"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "said", "angles"),
+    [
+        ("deg", "", ("q",)),
+        ("mm", "", None),
+        ("mm", "angle = true", ("q",)),
+        ("rev", "angle = false", ()),
+    ],
+)
+def test_the_unit_of_a_column_tells_an_angle_unless_the_file_does(unit, said, angles, tmp_path):
+    rows = np.column_stack([np.arange(20) / 100.0, np.arange(20.0), np.ones(20)])
+    np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header="t,q,i", comments="")
+    (tmp_path / "rig.toml").write_text(RIG.replace("UNIT", unit).replace("ANGLE", said))
+    rig = read_rig(tmp_path)
+    assert rig.mechanism.angles == angles
+    (tmp_path / "model.toml").write_text(model_text(rig.model))
+    assert read_mechanism_model(tmp_path / "model.toml").mechanism.angles == angles
+
+
+RIG = """
+title = "A joint"
+[coordinates.q]
+inertia = { value = 0.5 }
+ANGLE
+[ports.bearing]
+motion = { q = 1.0 }
+[inputs.torque]
+acts = { q = 1.0 }
+gain = { value = 1.0 }
+[table]
+format = "csv"
+time = { column = "t", unit = "s" }
+channels.q = { column = "q", unit = "UNIT" }
+channels.torque = { column = "i", unit = "A" }
+[[records]]
+file = "run.csv"
+role = "train"
+"""
+
+
+def test_gravity_is_looked_for_where_one_shaft_turns():
+    angles = {"motor": BelievedValue(1.0), "link": BelievedValue(1.0), "slide": BelievedValue(1.0)}
+    ports = {
+        "geared": {"motor": 0.01},
+        "torsion": {"motor": 0.01, "link": -1.0},
+        "rail": {"slide": 1.0},
+    }
+    arm = Mechanism(angles, [Port(*one) for one in ports.items()], angles=["motor", "link"])
+    assert [port.name for port in arm.ports if arm.turns(port)] == ["geared"]
+    with pytest.raises(InvalidInput, match="angles"):
+        Mechanism(angles, angles=["elbow"])
+
+
+def test_gravity_is_the_slope_of_its_energy():
+    law = Gravity(3.0, -0.3)
+    angle, step = np.linspace(-4.0, 4.0, 50), 1e-6
+    state = PortState(angle, 0.0 * angle, periodic_phase(angle), np.zeros(1))
+    response = law.respond(state)
+    energy = [3.0 * np.sin(angle + by - 0.3) for by in (-step, step)]
+    assert response.torque == pytest.approx((energy[1] - energy[0]) / (2.0 * step), abs=1e-8)
+    # After a turn it is the same, and half a turn on the opposite.
+    turned = PortState(angle + np.pi, 0.0 * angle, periodic_phase(angle), np.zeros(1))
+    assert law.respond(turned).torque == pytest.approx(-response.torque)
+    assert law.respond(turned).slope == pytest.approx(-response.slope)
