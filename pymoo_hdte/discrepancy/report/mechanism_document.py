@@ -249,8 +249,7 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
             # The fit could not exceed its bounds.
             bounds = parameter.lower, parameter.upper
             found[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
-            if fitted.bound_sides[row] != 0.0:
-                found[name]["at_bound"] = True
+            found[name]["at_bound"] = bool(fitted.bound_sides[row])
             continue
         pair = slice(row, row + 2)
         cosine, sine = fitted.values[pair]
@@ -259,6 +258,8 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
         name = name.removesuffix("_cosine")
         found[name] = _with_interval(*amplitude, reach, lower=0.0)
         found[f"{name}_phase"] = _with_interval(*phase, reach)
+        for one in (name, f"{name}_phase"):
+            found[one]["at_bound"] = bool(np.any(fitted.bound_sides[pair]))
     return found
 
 

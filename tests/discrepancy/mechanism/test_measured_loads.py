@@ -182,7 +182,7 @@ def test_at_the_bound_of_a_form_no_name_is_plain():
         key
         for each in effects(finding)
         for key, one in each["parameters"].items()
-        if one.get("at_bound")
+        if one["at_bound"]
     ]
     assert shown == bounded
 
