@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,14 +149,7 @@ def examine_mechanism(
     sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
     base = fit(sensors)
-    candidates = _candidates(sensors, base, base)
-    data, best = with_rest(sensors, base, candidates)
-    # Beside a load or friction that is much larger, orders are seen in what these leave only.
-    known_labels = {one.label for one in candidates}
-    more = [one for one in _candidates(sensors, base, best) if one.label not in known_labels]
-    if more:
-        candidates = [*candidates, *more]
-        data, _ = with_rest(sensors, base, candidates)
+    data, candidates = with_rest(sensors, base, partial(_candidates, sensors, base))
     verdict = judged(sensors, data, candidates)
     return MechanismFinding(mechanism, records, cutoff, data, verdict)
 

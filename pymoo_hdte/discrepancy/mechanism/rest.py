@@ -6,7 +6,7 @@ as noise, with as many effects as a verdict names at most.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,22 +26,35 @@ from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 
 
 def with_rest(
-    sensors: MeasuredData, base: Fit, candidates: Sequence[Candidate]
-) -> tuple[MeasuredData, Fit]:
-    """Return the data with the residual of the best effects as the noise, and their fit.
+    sensors: MeasuredData, base: Fit, candidates_for: Callable[[Fit], list[Candidate]]
+) -> tuple[MeasuredData, list[Candidate]]:
+    """Return the data with the residual of the best effects as the noise, and all candidates.
 
-    The residuals of that fit are in units of the noise of the sensors. The best effects depend on
-    the noise; after a few rounds they no longer change.
+    The best effects depend on the noise; after a few rounds they no longer change.
+
+    Parameters
+    ----------
+    sensors : MeasuredData
+        With the noise of the sensors.
+    base : Fit
+        Of them, without effects.
+    candidates_for : callable
+        From a fit to the candidates for what it leaves. Orders beside a much larger load or
+        friction are seen in what the best effects of the first round leave only.
     """
     rules, degrees_of_freedom = sensors.rules, len(base.residuals) - len(base.values)
+    candidates = candidates_for(base)
     if down_to_noise(base, degrees_of_freedom, rules):
-        return sensors, base
-    data, best = sensors.with_rest(base.residuals), base
-    for _ in range(rules.rest_rounds):
+        return sensors, candidates
+    data = sensors.with_rest(base.residuals)
+    for turn in range(rules.rest_rounds):
         best = _best_few(data, candidates).fit
         best = replace(best, residuals=in_units_of(sensors, data, best.residuals))
         data = sensors.with_rest(best.residuals)
-    return data, best
+        if turn == 0:
+            labels = {one.label for one in candidates}
+            candidates += [one for one in candidates_for(best) if one.label not in labels]
+    return data, candidates
 
 
 def _best_few(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis:
