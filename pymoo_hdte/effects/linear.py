@@ -114,7 +114,7 @@ class LinearSpring(Aperiodic):
 
 
 def _spring(sizes: Sizes) -> list[Guess]:
-    """Guess a spring with its rest at position zero, or elsewhere.
+    """Guess a spring with its rest at position zero, or elsewhere where that may be gravity.
 
     Where a spring is believed to stand, its stiffness is a quantity of the machine.
     """
@@ -123,15 +123,21 @@ def _spring(sizes: Sizes) -> list[Guess]:
     typical, largest = sizes.force / sizes.travel, sizes.largest
     most = largest / sizes.travel
     found = [Guess((unknown("coefficient", 0.0, most, typical),))]
-    if sizes.both_ways:
+    if sizes.turns:
         # Far from zero a weak spring makes a large force there.
         unknowns = (
             unknown("coefficient", 0.0, most, typical, linear=True),
             unknown("force", -FURTHEST * largest, FURTHEST * largest, sizes.force, linear=True),
         )
-        sentence = "There is a spring at the {port} where none is believed, its rest not at zero."
         found.append(
-            Guess(unknowns, wave_starts(unknowns), _preloaded, None, "preloaded", sentence)
+            Guess(
+                unknowns,
+                wave_starts(unknowns),
+                _preloaded,
+                form="preloaded",
+                sentence="There is a spring at the {port}, its rest not at zero.",
+                instead_of="gravity",
+            )
         )
     return found
 

@@ -46,6 +46,8 @@ class Candidate:
         Base parameter that it frees of its tolerance.
     form : str
         In a word, where the library holds several forms of one effect.
+    instead_of : str
+        Name of the effect in whose place alone it is tried; a search leaves it out.
     unit : callable or None
         From an unknown, or the line whose cosine and sine parts two of them are, to its SI unit.
     """
@@ -61,6 +63,7 @@ class Candidate:
     listed: bool = True
     frees: str | None = None
     form: str = ""
+    instead_of: str = ""
     unit: Callable[[str], str] | None = None
 
     @property
@@ -139,6 +142,7 @@ def candidate_of(
         effect.exact,
         listed=not guess.name,
         form=guess.form,
+        instead_of=guess.instead_of,
         unit=effect.unit,
     )
 

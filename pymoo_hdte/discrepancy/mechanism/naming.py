@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     contains,
     down_to_noise,
+    hypothesis_of,
     label_of,
     unexplained,
 )
@@ -34,9 +35,11 @@ def judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candi
     candidates : sequence of Candidate
     """
     base, rules = fit(data), data.rules
-    verdict = _mostly_explained(sensors, data, judge(data, base, candidates))
+    searched = [one for one in candidates if not one.instead_of]
+    verdict = _mostly_explained(sensors, data, judge(data, base, searched))
     verdict = _simplest(data, verdict)
     verdict = _with_true_rivals(data, _within_bounds(sensors, data, verdict))
+    verdict = _with_substitutes(data, verdict, candidates)
     before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
     if verdict.chosen is None:
         quiet = np.all(before <= rules.noise_power_ratio * noise)
@@ -162,6 +165,27 @@ def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
         if np.all(data.power(one.fit.residuals) <= most) and not contains(one, chosen)
     )
     return _with_rivals(verdict, equivalent)
+
+
+def _with_substitutes(
+    data: MeasuredData, verdict: Verdict, candidates: Sequence[Candidate]
+) -> Verdict:
+    """Return the verdict with rivals that have something else in the place of an effect."""
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in _NAMING:
+        return verdict
+    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
+    rivals = list(verdict.equivalent)
+    for member in chosen.candidates:
+        kept = tuple(one for one in chosen.candidates if one is not member)
+        for other in candidates:
+            if (other.instead_of, other.port) == (member.name, member.port):
+                start = np.append(chosen.values_of(kept), other.starts[0])
+                fitted = fit(data, (*kept, other), start)
+                if np.all(data.power(fitted.residuals) <= most):
+                    excess = verdict.base.chi_square - verdict.degrees_of_freedom
+                    rivals.append(hypothesis_of(fitted, excess))
+    return _with_rivals(verdict, rivals) if len(rivals) > len(verdict.equivalent) else verdict
 
 
 def _with_rivals(verdict: Verdict, equivalent: Iterable[Hypothesis]) -> Verdict:

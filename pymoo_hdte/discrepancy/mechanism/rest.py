@@ -59,6 +59,7 @@ def with_rest(
 
 def _best_few(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis:
     """Return the best model with up to as many effects as a verdict has, by BIC."""
+    candidates = [one for one in candidates if not one.instead_of]
     base, rules = fit(data), data.rules
     excess = base.chi_square - (len(base.residuals) - len(base.values))
     promising = varied(screen(data, base, candidates), rules.most_of_one_name)
