@@ -7,7 +7,7 @@ verdict therefore names effects that are significant beyond this residual, and s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -149,13 +149,23 @@ def examine_mechanism(
     sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
     base = fit(sensors)
-    data, candidates = with_rest(sensors, base, partial(_candidates, sensors, base))
-    verdict = judged(sensors, data, candidates)
+    seen = position_orders(sensors, base)
+    candidates = partial(_candidates, sensors, base, seen)
+    data, every = with_rest(sensors, base, candidates)
+    verdict = judged(sensors, data, every)
     return MechanismFinding(mechanism, records, cutoff, data, verdict)
 
 
-def _candidates(data: MeasuredData, base: Fit, fitted: Fit) -> list[Candidate]:
-    """Return the candidates for the misfit of a base, with the orders that another fit leaves."""
+def _candidates(
+    data: MeasuredData, base: Fit, seen: Mapping[str, tuple[float, ...]], fitted: Fit
+) -> list[Candidate]:
+    """Return the candidates for the misfit of a base, with the orders ``seen`` in it by port.
+
+    Where a port shows none there, with those that it shows in what another fit leaves.
+    """
+    if fitted is not base and not all(seen.values()):
+        further = position_orders(data, fitted)
+        seen = {port: orders or further[port] for port, orders in seen.items()}
     residual = dict(zip(data.names, root_mean_square(data, base.residuals), strict=True))
     forces = {
         port.name: residual[port.name]
@@ -163,4 +173,4 @@ def _candidates(data: MeasuredData, base: Fit, fitted: Fit) -> list[Candidate]:
         else max(residual[name] / abs(share) for name, share in port.motion.items() if share)
         for port in data.mechanism.ports
     }
-    return mechanism_candidates(data, forces, position_orders(data, fitted))
+    return mechanism_candidates(data, forces, seen)
