@@ -19,7 +19,7 @@ from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import PORTS
 from pymoo_hdte.effects.quantities import si_unit, with_unit
-from pymoo_hdte.effects.sentences import check_sentence
+from pymoo_hdte.effects.sentence_blanks import check_sentence
 from pymoo_hdte.io.fields import Fields
 
 Place = tuple[str, str, float | None]

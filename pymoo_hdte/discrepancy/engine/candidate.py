@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.effects.effect import Effect, Place, is_contained, place_of
 from pymoo_hdte.effects.guess import Guess
-from pymoo_hdte.effects.sentences import out_of_tolerance_sentence, sentence_at
+from pymoo_hdte.effects.sentence_blanks import out_of_tolerance_sentence, sentence_at
 from pymoo_hdte.effects.unknowns import Parameter, Values
 
 

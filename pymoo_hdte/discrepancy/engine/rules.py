@@ -179,6 +179,16 @@ class Rules(ReportRules, RecordRules, RowRules):
         "Literature: beyond 10 the evidence is very strong (Kass and Raftery, J. Am. Stat. Assoc. "
         "90, 1995, Section 3.2).",
     )
+    form_accuracy: float = rule(
+        0.02,
+        "relative amplitude",
+        "Two laws of no exact form belong to one class if their predictions differ by no more than "
+        "this part of the amplitude of the misfit.",
+        f"{BY_HAND}, after foreign forms of 18 effects on a bench written apart: a play with a "
+        "soft skin is fitted better by a soft wind-up than by the listed play by up to 1.2e-2.",
+        at_least=0.0,
+        at_most=1.0,
+    )
     form_ratio: float = rule(
         2.0,
         "ratio of excess chi-squares",

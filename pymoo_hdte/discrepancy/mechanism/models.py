@@ -12,10 +12,8 @@ from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import toml_text, toml_with_lines
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
-from pymoo_hdte.mechanism.effects import (
-    law_effects,
-)
-from pymoo_hdte.mechanism.mechanism import NOTHING
+from pymoo_hdte.mechanism.believed import LARGEST_FACTOR, NOTHING
+from pymoo_hdte.mechanism.effects import law_effects
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,8 @@ def model_text(model: MechanismModel) -> str:
     }
     top["ports"] = {port.name: _port_table(port) for port in mechanism.ports}
     top["inputs"] = {
-        one.name: {"acts": one.acts, "gain": _believed_table(one.gain)} for one in mechanism.inputs
+        one.name: {"acts": one.acts} | ({"gain": _believed_table(one.gain)} if one.scaled else {})
+        for one in mechanism.inputs
     }
     # The reader takes finite numbers only: a loop without saturation has no limit there.
     loops = [
@@ -100,7 +99,10 @@ def model_text(model: MechanismModel) -> str:
 
 
 def _believed_table(one: BelievedValue) -> dict[str, float]:
-    return {"value": one.value} | ({"tolerance": one.tolerance} if one.tolerance else {})
+    limits = {"tolerance": one.tolerance, "factor": one.factor}
+    return {"value": one.value} | {
+        name: limit for name, limit in limits.items() if limit != getattr(NOTHING, name)
+    }
 
 
 def _port_table(port: Port) -> dict[str, Any]:
@@ -135,7 +137,9 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
     inputs = []
     for name, table in _named(top, "inputs", file).items():
         acts = _shares(table, "acts", f"{file}.inputs.{name}", inertias)
-        inputs.append(Input(name, acts, _believed(table, "gain", at_least=0.0)))
+        scaled = table.has("gain")
+        gain = _believed(table, "gain") if scaled else BelievedValue(1.0)
+        inputs.append(Input(name, acts, gain, scaled))
         table.finish()
     pushing = [one.name for one in inputs]
     ports = [
@@ -148,7 +152,9 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
     try:
         return Mechanism(inertias, ports, inputs, loops, turning)
     except InvalidInput as error:
-        raise InvalidInput(f"{file}: {error.field}", error.value, error.allowed) from None
+        gains = {f"gain of {one.name}": f"{file}.inputs.{one.name}.gain" for one in inputs}
+        place = gains.get(error.field, f"{file}: {error.field}")
+        raise InvalidInput(place, error.value, error.allowed) from None
 
 
 def _named(top: Fields, field: str, file: str) -> dict[str, Fields]:
@@ -164,10 +170,18 @@ def _named(top: Fields, field: str, file: str) -> dict[str, Fields]:
 def _believed(table: Fields, field: str, **limits: float) -> BelievedValue:
     inside = table.table(field)
     value = inside.number("value", **limits)
-    given = inside.has("tolerance")
-    tolerance = inside.number("tolerance", at_least=0.0, at_most=1.0) if given else 0.0
+    ranges = {"tolerance": (0.0, 1.0), "factor": (1.0, LARGEST_FACTOR)}
+    stated = {
+        name: inside.number(name, at_least=least, at_most=most)
+        for name, (least, most) in ranges.items()
+        if inside.has(name)
+    }
     inside.finish()
-    return BelievedValue(value, tolerance)
+    try:
+        return BelievedValue(value, **stated)
+    except InvalidInput as error:
+        place = inside._name(error.field.removeprefix("believed."))
+        raise InvalidInput(place, error.value, error.allowed) from None
 
 
 def _flag(table: Fields, field: str, place: str) -> bool:

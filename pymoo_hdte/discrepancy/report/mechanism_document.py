@@ -21,7 +21,7 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
 from pymoo_hdte.effects.effect import effect_named
-from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import line_with_variance
 from pymoo_hdte.mechanism.resampling import share_beyond
 
@@ -195,6 +195,14 @@ def limits(finding: MechanismFinding) -> list[str]:
         "out at the ends and interpolated inside."
         for record in finding.records
         if record.dropped
+    ]
+    found += [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
+    found += [
+        f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "
+        f"are told in units of {one.name}. Their ratios and the kind of effect are determined, "
+        "their sizes are not."
+        for one in finding.mechanism.inputs
+        if not one.scaled
     ]
     if not any(record.role == "held_out" for record in finding.records):
         found.append("No record was held out: the correction is not proved where it was not made.")
