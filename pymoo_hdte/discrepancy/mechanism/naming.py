@@ -116,7 +116,8 @@ def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) 
         one
         for one in verdict.alternatives
         if label_of(one.candidates) > label_of(chosen.candidates)
-        and not _bounded(one.fit)
+        and len(one.candidates) == len(chosen.candidates) + 1
+        and not _doubts(data, verdict.base, one)
         and down_to_noise(one.fit, degrees_of_freedom, data.rules)
     ]
     if larger:
