@@ -293,6 +293,15 @@ class Rules(ReportRules, RecordRules, RowRules):
         at_least=0.0,
         at_most=1.0,
     )
+    partial_share: float = rule(
+        0.75,
+        "share of the power beyond the sensors' noise",
+        "Least share that effects of a mechanism remove to be named as a part, where a name takes "
+        "more.",
+        f"{BY_HAND}: half of the amplitude. Several small effects may be left, such as ripples.",
+        at_least=0.0,
+        at_most=1.0,
+    )
     parsimony_ratio: float = rule(
         1.1,
         "ratio of powers left",
@@ -310,7 +319,8 @@ class Rules(ReportRules, RecordRules, RowRules):
     rest_seconds: int = rule(
         3,
         "1",
-        "Second effects tried beside each of as many first ones to find what no effect explains.",
+        "Second effects tried beside each of as many first ones, and further ones beside the best "
+        "set, to find what no effect explains.",
         "Simulation: as `most_fitted`, without its margin.",
     )
 
