@@ -74,7 +74,7 @@ class Effect:
     special_case_of, contains : tuple of str
         Effects of which this one is a special case, and effects that are special cases of this one:
         Coulomb friction is Stribeck friction without the excess. One that contains another and fits
-        no better is not a different explanation.
+        no better is not a different explanation. Of one ``"form"`` only: ``"name/form"``.
     exact : bool
         Whether its form is known exactly, so that it must explain records down to the noise; the
         curve of a friction law is only an approximation of a real one.

@@ -144,6 +144,9 @@ class Mechanism:
     loops : sequence of Loop
         Closed loops of records that have their references; an input without one is taken from its
         channel.
+    angles : sequence of str or None
+        Coordinates that are angles of a shaft, rad, at which gravity may pull; those of a linear
+        axis are not. None if it is not known, which counts as none; the units of files tell.
 
     Raises
     ------
@@ -157,6 +160,7 @@ class Mechanism:
     ports: Sequence[Port] = ()
     inputs: Sequence[Input] = ()
     loops: Sequence[Loop] = ()
+    angles: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         for name, value in (
@@ -164,6 +168,7 @@ class Mechanism:
             ("ports", tuple(self.ports)),
             ("inputs", tuple(self.inputs)),
             ("loops", tuple(self.loops)),
+            ("angles", None if self.angles is None else tuple(self.angles)),
         ):
             object.__setattr__(self, name, value)
         if not self.inertias:
@@ -187,6 +192,8 @@ class Mechanism:
                 real_number(f"load of {port.name}.{name}", share)
         for one in self.inputs:
             self._check_shares(f"acts of {one.name}", one.acts)
+        for name in self.angles or ():
+            one_of("mechanism.angles", name, self.coordinates)
         known = [name for name, one in self.quantities.items() if one.known]
         for driving in self.inputs:
             own = f"gain of {driving.name}"
@@ -215,6 +222,11 @@ class Mechanism:
     def port(self, name: str) -> Port:
         """Return the port of that name; raises `InvalidInput` where there is none."""
         return self.ports[self.port_names.index(one_of("port", name, self.port_names))]
+
+    def turns(self, port: Port) -> bool:
+        """Tell whether the motion of a port is the angle of one shaft, geared or not."""
+        moved = [name for name, share in port.motion.items() if share]
+        return len(moved) == 1 and moved[0] in (self.angles or ())
 
     @property
     def quantities(self) -> dict[str, BelievedValue]:
@@ -263,7 +275,7 @@ class Mechanism:
             for port in self.ports
         ]
         inputs = [replace(one, gain=known(f"gain of {one.name}", one.gain)) for one in self.inputs]
-        return Mechanism(inertias, ports, inputs, self.loops)
+        return Mechanism(inertias, ports, inputs, self.loops, self.angles)
 
     def _check_shares(self, name: str, shares: Mapping[str, float]) -> None:
         for coordinate, share in shares.items():

@@ -17,7 +17,6 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened
-from pymoo_hdte.effects.effect import is_contained
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,14 +164,19 @@ def contains(one: Hypothesis, other: Hypothesis) -> bool:
     """
     if len(one.candidates) != len(other.candidates):
         return False
+    same = one.names & other.names
     pairs = zip(
-        *(sorted(each.candidates, key=lambda c: c.port) for each in (one, other)), strict=True
+        *(
+            sorted((c for c in each.candidates if (c.name, c.port) not in same), key=_port)
+            for each in (one, other)
+        ),
+        strict=True,
     )
-    return all(
-        wide.port == special.port
-        and (wide.name == special.name or is_contained(special.name, wide.name))
-        for wide, special in pairs
-    )
+    return all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
+
+
+def _port(candidate: Candidate) -> str:
+    return candidate.port
 
 
 def fit_all(

@@ -143,38 +143,6 @@ class ReportRules(RuleSet):
         f"{BY_HAND}: below, both gaps print as the same number.",
         at_least=0.0,
     )
-    window_drift: float = rule(
-        0.1,
-        "share of the standard deviation of a position",
-        "A window in which a held-out record is simulated ends where the forces that the model of "
-        "a mechanism leaves unexplained have moved a coordinate by this much.",
-        f"{BY_HAND}: the error of such a model then has a hundredth of the power of the motion "
-        "(R2 of .99), and that of a worse model stands out of it.",
-        at_most=1.0,
-    )
-    window_decays: float = rule(
-        10.0,
-        "decay times of the slowest mode",
-        "Length of a window where springs or loops let the measured state at its start be "
-        "forgotten.",
-        f"{BY_HAND}: the error builds up over one decay time, so that a tenth of the window has "
-        "less of it than a simulation without a break.",
-    )
-    fewest_windows: int = rule(
-        10,
-        "windows in a record",
-        "A window of a coordinate that forgets nothing is no longer than this part of its record.",
-        f"{BY_HAND}: each gives one independent value of the error, and the mean square of ten is "
-        "known to 45 %.",
-    )
-    proof_samples: int = rule(
-        12_000,
-        "samples",
-        "Most samples for which one model is simulated over all held-out records; beyond, windows "
-        "are left out evenly, and the report says how many.",
-        f"{BY_HAND} as a budget of time: a sample of one coordinate takes 0.13 ms, so that both "
-        "models take some 3 s.",
-    )
     separated_chi_square: float = rule(
         9.0,
         "chi-square",

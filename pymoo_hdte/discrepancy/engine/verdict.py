@@ -276,7 +276,7 @@ def _stands_out(search: Search, chosen: Hypothesis) -> bool:
         and one.names != chosen.names
         and not contains(one, chosen)
     )
-    enough = chosen.explained >= rules.explained_share and gains_enough(chosen, search.base, rules)
+    enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
     return enough and all(
         one.fit.chi_square - degrees_of_freedom >= rules.form_ratio * left for one in others
     )

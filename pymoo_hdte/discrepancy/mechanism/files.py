@@ -9,6 +9,7 @@ the records have units of their own::
 
     [coordinates.q]
     inertia = { value = 100.0, tolerance = 0.5 }   # relative, 0 to 1; or factor = 3.0; or known
+    angle = true                                   # optional: of a shaft; else the unit tells
     [ports.joint]
     motion = { q = 1.0 }                           # share of each coordinate
     damping = { value = 300.0, tolerance = 1.0 }   # optional, as stiffness
@@ -69,10 +70,11 @@ from pymoo_hdte.discrepancy.mechanism.models import (
 )
 from pymoo_hdte.discrepancy.mechanism.record_files import ListedRecord, listed_record, read_records
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.layout import layout_from_fields
+from pymoo_hdte.io.layout import COUNTS, layout_from_fields
 from pymoo_hdte.io.text_lines import Progress, told
 from pymoo_hdte.io.toml import toml_with_lines
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+from pymoo_hdte.units import UNITS
 
 RIG_FILE = "rig.toml"
 
@@ -179,7 +181,7 @@ def read_rig(
         }
         _check_noise(noise, records, path.name)
     return MeasuredMechanism(
-        model.mechanism,
+        _with_angles(model.mechanism, listed),
         tuple(records.values()),
         model.cutoff,
         model.effects,
@@ -195,6 +197,20 @@ def _model(top: Fields, path: Path) -> MechanismModel:
     model = read_mechanism_model(path.parent / top.text("model"))
     cutoff = top.number("cutoff", above=0.0) if top.has("cutoff") else model.cutoff
     return replace(model, title=top.text("title"), cutoff=cutoff)
+
+
+def _with_angles(mechanism: Mechanism, listed: Sequence[ListedRecord]) -> Mechanism:
+    """Return a mechanism that knows its angles: as its file says, or else by units of columns."""
+    if mechanism.angles is not None:
+        return mechanism
+    turning = {COUNTS, *UNITS["angle"], *UNITS["speed"]}
+    tables = [one.layout.channels for one in listed]
+    angles = [
+        name
+        for name in mechanism.coordinates
+        if all(name in table and table[name].unit in turning for table in tables)
+    ]
+    return replace(mechanism, angles=angles or None)
 
 
 def _check_names(listed: Sequence[ListedRecord]) -> None:

@@ -73,7 +73,9 @@ def model_text(model: MechanismModel) -> str:
     if model.cutoff is not None:
         top["cutoff"] = model.cutoff
     top["coordinates"] = {
-        name: {"inertia": _believed_table(inertia)} for name, inertia in mechanism.inertias.items()
+        name: {"inertia": _believed_table(inertia)}
+        | ({} if mechanism.angles is None else {"angle": name in mechanism.angles})
+        for name, inertia in mechanism.inertias.items()
     }
     top["ports"] = {port.name: _port_table(port) for port in mechanism.ports}
     top["inputs"] = {
@@ -126,8 +128,11 @@ def model_from_fields(top: Fields, file: str) -> MechanismModel:
 
 def _mechanism(top: Fields, file: str) -> Mechanism:
     inertias: dict[str, BelievedValue] = {}
+    angles: dict[str, bool] = {}
     for name, table in _named(top, "coordinates", file).items():
         inertias[name] = _believed(table, "inertia", above=0.0)
+        if table.has("angle"):
+            angles[name] = _flag(table, "angle", f"{file}.coordinates.{name}")
         table.finish()
     inputs = []
     for name, table in _named(top, "inputs", file).items():
@@ -143,8 +148,9 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
     ]
     rows = top.tables("loops") if top.has("loops") else []
     loops = [_loop(row, [one.name for one in inputs], inertias) for row in rows]
+    turning = [name for name, turns in angles.items() if turns] if angles else None
     try:
-        return Mechanism(inertias, ports, inputs, loops)
+        return Mechanism(inertias, ports, inputs, loops, turning)
     except InvalidInput as error:
         gains = {f"gain of {one.name}": f"{file}.inputs.{one.name}.gain" for one in inputs}
         place = gains.get(error.field, f"{file}: {error.field}")
@@ -178,6 +184,13 @@ def _believed(table: Fields, field: str, **limits: float) -> BelievedValue:
         raise InvalidInput(place, error.value, error.allowed) from None
 
 
+def _flag(table: Fields, field: str, place: str) -> bool:
+    raw = table.take(field, "true or false") if table.has(field) else False
+    if not isinstance(raw, bool):
+        raise InvalidInput(f"{place}.{field}", raw, "true or false")
+    return raw
+
+
 def _shares(
     table: Fields, field: str, place: str, coordinates: Collection[str]
 ) -> dict[str, float]:
@@ -199,9 +212,7 @@ def _port(
         _believed(table, field, at_least=0.0) if table.has(field) else NOTHING
         for field in ("stiffness", "damping")
     )
-    read = table.take("read", "true or false") if table.has("read") else False
-    if not isinstance(read, bool):
-        raise InvalidInput(f"{place}.read", read, "true or false")
+    read = _flag(table, "read", place)
     lines = []
     for row in table.tables("error") if table.has("error") else []:
         coordinate = row.choice("coordinate", coordinates)
