@@ -223,6 +223,12 @@ EXPERIMENTS = (
         reads_outcome=True,
     ),
     Experiment(
+        "real",
+        "measured.real",
+        "Machines that others measured: verdicts beside known answers and other tools",
+        reads_outcome=True,
+    ),
+    Experiment(
         "emps", "measured.emps", "EMPS: friction of a positioning system, measured by others"
     ),
     Experiment(

@@ -59,6 +59,8 @@ class SimulatedRecord:
     noise : dict of str to float
         Of the sensors.
     extent : Extent
+    rows : tuple of slice
+        Of each window among those of the record, its start included.
     independent : float
         Independent values that a window gives.
     expected : dict of str to float
@@ -73,6 +75,7 @@ class SimulatedRecord:
     after: dict[str, Values]
     noise: dict[str, float]
     extent: Extent
+    rows: tuple[slice, ...]
     independent: float
     expected: dict[str, float]
 
@@ -196,6 +199,7 @@ class _Courses:
             after,
             {name: self.record.noise_of(name) for name in self.names},
             Extent(length, len(rows), self.windows.count),
+            self.windows.rows,
             reach.independent(length),
             dict(zip(self.names, reach.expected(length).tolist(), strict=True)),
         )

@@ -1,0 +1,239 @@
+"""What other tools make of a measured rig: sparse regression, NARMAX, and least squares.
+
+They get the smoothed motion and the force of the workflow, train on its training records and
+predict its held-out ones. Each imports its package when it is called.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.mechanism import Record
+from pymoo_hdte.mechanism.motion import margin_of, motion_of, smooth
+
+Values = NDArray[np.float64]
+
+_MOST_ROWS = 4000
+"""Of a record: what is sampled more finely is thinned."""
+_VALIDATED = 0.3
+"""Last share of the training rows, by which a threshold is chosen."""
+_THRESHOLDS = np.geomspace(1e-3, 0.3, 12)
+_LAGS, _DEGREE, _TERMS = 2, 3, 12
+"""Of NARMAX models: past samples, powers, and most terms."""
+
+TERMS: dict[str, Callable[[Values, Values, Values], Values]] = {
+    "a": lambda q, v, a: a,
+    "v": lambda q, v, a: v,
+    "q": lambda q, v, a: q,
+    "1": lambda q, v, a: np.ones(len(q)),
+    "sign v": lambda q, v, a: np.sign(v),
+    "v |v|": lambda q, v, a: v * np.abs(v),
+    "v^(1/3)": lambda q, v, a: np.cbrt(v),
+    "q^2": lambda q, v, a: q**2,
+    "q^3": lambda q, v, a: q**3,
+    "sin q": lambda q, v, a: np.sin(q),
+    "cos q": lambda q, v, a: np.cos(q),
+}
+MEANS = {
+    "1": "force_offset",
+    "sign v": "coulomb_friction",
+    "v |v|": "nonlinear_drag",
+    "v^(1/3)": "nonlinear_drag",
+    "q": "linear_stiffness",
+    "q^3": "hardening_stiffness",
+    "sin q": "gravity",
+    "cos q": "gravity",
+}
+"""The effect that a term stands for."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a tool says.
+
+    Attributes
+    ----------
+    tool : str
+    words : str
+        Its terms with their values.
+    names : frozenset of str or None
+        Effects that its terms stand for; None where they have no such meaning.
+    of_force, of_motion : float or None
+        R2 of the held-out force, and of the position simulated in the windows of the workflow.
+    seconds : float
+        CPU time.
+    """
+
+    tool: str
+    words: str
+    names: frozenset[str] | None
+    of_force: float | None
+    of_motion: float | None
+    seconds: float
+
+
+def answers(finding: MechanismFinding) -> list[Answer]:
+    """Return the answers of all tools on a mechanism of one coordinate and one input."""
+    found = []
+    for tool in (least_squares, sparse_regression, narmax):
+        began = time.process_time()
+        answer = tool(finding)
+        found.append(Answer(*answer, time.process_time() - began))
+    return found
+
+
+Said = tuple[str, str, frozenset[str] | None, float | None, float | None]
+
+
+def least_squares(finding: MechanismFinding) -> Said:
+    """Fit inertia, viscous and Coulomb friction, an offset, and the spring that is believed."""
+    names = ["a", "v", "sign v", "1", *(["q"] if _sprung(finding) else [])]
+    train, test = _regression(finding, "train", names), _regression(finding, "held_out", names)
+    values: Values = np.linalg.lstsq(*train, rcond=None)[0].astype(float)
+    of_force = _determination(test[1], test[0] @ values)
+    named = frozenset({"coulomb_friction"})
+    return "least squares", _in_words(names, values), named, of_force, None
+
+
+def sparse_regression(finding: MechanismFinding) -> Said:
+    """Name terms by sequentially thresholded least squares of the force (pysindy).
+
+    Brunton, Proctor, Kutz, PNAS 113, 2016. The threshold is the largest that predicts the last part
+    of the training rows within a tenth of the best one.
+    """
+    if find_spec("pysindy") is None:
+        return "pysindy", "not installed", None, None, None
+    from pysindy.optimizers import STLSQ
+
+    turning = any(finding.mechanism.turns(port) for port in finding.mechanism.ports)
+    names = [one for one in TERMS if turning or one not in ("sin q", "cos q")]
+    (columns, force), test = (_regression(finding, role, names) for role in ("train", "held_out"))
+    scale = columns.std(axis=0) + np.abs(columns.mean(axis=0))
+    size, first = force.std(), int((1.0 - _VALIDATED) * len(force))
+
+    def fitted(threshold: float, rows: slice) -> Values:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore")
+            model = STLSQ(threshold=threshold, alpha=1e-9)
+            model.fit(columns[rows] / scale, force[rows, None] / size)
+        return np.asarray(model.coef_[0] * size / scale)
+
+    missed = [
+        float(np.mean((force[first:] - columns[first:] @ fitted(one, slice(first))) ** 2))
+        for one in _THRESHOLDS
+    ]
+    chosen = max(
+        one for one, size_ in zip(_THRESHOLDS, missed, strict=True) if size_ <= 1.1 * min(missed)
+    )
+    values = fitted(float(chosen), slice(None))
+    kept = [name for name, value in zip(names, values, strict=True) if value != 0.0]
+    believed = {"linear_stiffness"} if _sprung(finding) else set()
+    named = frozenset(MEANS[one] for one in kept if one in MEANS) - believed
+    of_force = _determination(test[1], test[0] @ values)
+    return "pysindy", _in_words(names, values), named, of_force, None
+
+
+def narmax(finding: MechanismFinding) -> Said:
+    """Fit a polynomial NARMAX model by forward regression of orthogonal terms (sysidentpy).
+
+    Of the position from its past and that of the input, at the samples of our simulation, and
+    simulated in the same windows. Its terms stand for no effect.
+    """
+    if find_spec("sysidentpy") is None:
+        return "FROLS", "not installed", None, None, None
+    from sysidentpy.basis_function import Polynomial
+    from sysidentpy.model_structure_selection import FROLS
+    from sysidentpy.parameter_estimation import LeastSquares
+
+    simulated = {one.record: one for one in finding.simulated}
+    if not simulated:
+        return "FROLS", "nothing held out", None, None, None
+    stride = next(iter(simulated.values())).rows[0].step
+    (train, *_), held = (
+        [one for one in finding.records if one.role == role] for role in ("train", "held_out")
+    )
+    scales = [float(np.std(one)) for one in _signals(finding, train)]
+    model = FROLS(
+        order_selection=True,
+        n_info_values=_TERMS,
+        ylag=_LAGS,
+        xlag=_LAGS,
+        basis_function=Polynomial(degree=_DEGREE),
+        estimator=LeastSquares(),
+    )
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.filterwarnings("ignore")
+        last = min(len(train.time), _MOST_ROWS * stride)
+        force, angle = (
+            (one[:last:stride] / scale)[:, None]
+            for one, scale in zip(_signals(finding, train), scales, strict=True)
+        )
+        model.fit(X=force, y=angle)
+        measured, predicted = [], []
+        for record in held:
+            signals = _signals(finding, record)
+            for rows in simulated[record.name].rows:
+                x, y = (
+                    (one[rows] / scale)[:, None] for one, scale in zip(signals, scales, strict=True)
+                )
+                measured.append(y[_LAGS:, 0])
+                predicted.append(model.predict(X=x, y=y)[_LAGS:, 0])
+    of_motion = _determination(np.concatenate(measured), np.concatenate(predicted))
+    words = f"{len(model.final_model)} terms of a NARMAX model of degree {_DEGREE}"
+    return "FROLS", words, None, None, of_motion
+
+
+def _sprung(finding: MechanismFinding) -> bool:
+    return any(port.stiffness.value > 0.0 for port in finding.mechanism.ports if not port.read)
+
+
+def _signals(finding: MechanismFinding, record: Record) -> tuple[Values, Values]:
+    """Return force and position of a record, shape (n,), SI."""
+    (coordinate,) = finding.mechanism.coordinates
+    force = np.sum(
+        [
+            one.acts[coordinate] * one.gain.value * record.channels[one.name]
+            for one in finding.mechanism.inputs
+        ],
+        axis=0,
+    )
+    return smooth(force, record.step, finding.cutoff), record.channels[coordinate]
+
+
+def _regression(
+    finding: MechanismFinding, role: str, names: Sequence[str]
+) -> tuple[Values, Values]:
+    """Return terms (n, k) and force (n,) of all records of a role."""
+    columns, forces = [], []
+    for record in finding.records:
+        if record.role != role:
+            continue
+        force, angle = _signals(finding, record)
+        margin = margin_of(finding.cutoff, record.step)
+        stride = max(1, (len(force) - 2 * margin) // _MOST_ROWS)
+        rows = slice(margin, len(force) - margin, stride)
+        motion = motion_of(angle, record.step, finding.cutoff)
+        state = motion.position[rows], motion.speed[rows], motion.acceleration[rows]
+        columns.append(np.column_stack([TERMS[name](*state) for name in names]))
+        forces.append(force[rows])
+    return np.concatenate(columns), np.concatenate(forces)
+
+
+def _determination(measured: Values, predicted: Values) -> float:
+    """Return R2; minus infinity where a model diverges."""
+    with np.errstate(all="ignore"):
+        left = float(np.mean((measured - predicted) ** 2))
+    return 1.0 - left / float(np.var(measured)) if np.isfinite(left) else -np.inf
+
+
+def _in_words(names: Sequence[str], values: Values) -> str:
+    words = (f"{value:.3g} {name}" for name, value in zip(names, values, strict=True) if value)
+    return " + ".join(words)

@@ -1,0 +1,123 @@
+"""Numbers of a study of a measured rig: held-out errors, and distances from known values."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.measured.known_answers import KnownRig
+from experiments.measured.rigs import Study, fitted_values
+from pymoo_hdte.discrepancy.report.mechanism_document import effects
+from pymoo_hdte.effects.effect import place_of
+from pymoo_hdte.mechanism.motion import SmoothedMotion
+from pymoo_hdte.mechanism.port_motion import law_force
+
+Values = NDArray[np.float64]
+
+
+def determinations(one: Study) -> list[str]:
+    """Return R2 of force and simulated position by the accepted model, held out."""
+    finding, gaps = one.finding, [gap for gap in one.gaps if gap.kind == "balance"]
+    (name,) = finding.mechanism.coordinates
+    gaps = [gap for gap in gaps if gap.quantity == name]
+    if not gaps:
+        return ["", ""]
+    power = _held_out_force(one)
+    left = float(np.mean([gap.after**2 for gap in gaps]))
+    return [f"{1.0 - left / power:.5f}", f"{explained(one)[1]:.5f}"]
+
+
+def _held_out_force(one: Study) -> float:
+    """Return the variance of the force of the inputs in the held-out records."""
+    mechanism = one.finding.mechanism
+    (name,) = mechanism.coordinates
+    force = [
+        np.sum([i.acts[name] * i.gain.value * r.channels[i.name] for i in mechanism.inputs], axis=0)
+        for r in one.finding.records
+        if r.role == "held_out"
+    ]
+    return float(np.var(np.concatenate(force)))
+
+
+def explained(one: Study) -> tuple[float, float]:
+    """Return R2 of all simulated positions, before and after."""
+    gaps = [gap for gap in one.gaps if gap.extent is not None]
+    if not gaps:
+        return np.nan, np.nan
+    power = np.concatenate([gap.measured - gap.measured.mean() for gap in gaps])
+    left = (
+        np.concatenate([gap.measured - getattr(gap, side) for gap in gaps])
+        for side in ("predicted_before", "predicted_after")
+    )
+    before, after = (1.0 - float(np.mean(one**2) / np.mean(power**2)) for one in left)
+    return before, after
+
+
+def pooled(one: Study, kind: str, side: int) -> float | None:
+    """Return the root mean square over the held-out records, of the first coordinate."""
+    name = one.finding.mechanism.coordinates[0]
+    sizes = [
+        (gap.before, gap.after)[side]
+        for gap in one.gaps
+        if (gap.kind, gap.quantity) == (kind, name)
+    ]
+    return float(np.sqrt(np.mean(np.square(sizes)))) if sizes else None
+
+
+def farthest(rig: KnownRig, one: Study) -> float | None:
+    """Return the largest deviation from a known value or from the curve of friction, in %."""
+    found = fitted_values(one)
+    off = [
+        abs(found[name.replace("_", " ")]["value"] / value - 1.0)
+        for name, value in rig.values
+        if name.replace("_", " ") in found
+    ]
+    if rig.friction is not None:
+        speed = _speeds(one)
+        off.append(float(np.max(np.abs(_friction(one, speed) / rig.friction.at(speed) - 1.0))))
+    return 100.0 * max(off) if off else None
+
+
+def _speeds(one: Study) -> Values:
+    """Return speeds at which the records move, between the 10th and the 90th of a hundred."""
+    spectra = one.finding.data.spectra
+    (name,) = one.finding.mechanism.coordinates
+    speed = np.concatenate([np.abs(balance.motions[name].speed) for balance in spectra])
+    slowest, fastest = np.quantile(speed, (0.1, 0.9)).tolist()
+    return np.linspace(slowest, fastest, 30)
+
+
+def _friction(one: Study, speed: Values) -> Values:
+    """Return the friction of the accepted model, odd part, at speeds (n,)."""
+    finding = one.finding
+    damping = sum(
+        value
+        for parameter, value in zip(
+            finding.accepted.parameters, finding.accepted.values, strict=True
+        )
+        if parameter.name.startswith("damping of ")
+    )
+    force = damping * speed
+    for effect in finding.accepted.effects:
+        if effect.law.states or effect.law.orders:
+            continue
+        there, back = (
+            law_force(effect.law, SmoothedMotion(0.0 * speed, way * speed, 0.0 * speed), 0.0)
+            for way in (1.0, -1.0)
+        )
+        force = force + 0.5 * (there - back)
+    return np.asarray(force)
+
+
+def nearest_order(rig: KnownRig, one: Study) -> float | None:
+    """Return the order of a named ripple, that nearest to the known one."""
+    if rig.order is None:
+        return None
+    orders = [
+        effect["parameters"]["order"]["value"]
+        for effect in effects(one.finding)
+        if "order" in effect["parameters"]
+    ]
+    orders += [order for each in one.finding.accepted.effects if (order := place_of(each)[2])]
+    known = rig.order
+    return min(orders, key=lambda order: abs(order - known), default=None)
