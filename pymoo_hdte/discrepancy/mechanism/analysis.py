@@ -38,6 +38,7 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     fine_enough,
     usual_cutoff,
 )
+from pymoo_hdte.discrepancy.mechanism.ripple import NO_RIPPLES, Ripples, find_ripples
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 
@@ -59,6 +60,9 @@ class MechanismFinding:
     verdict : Verdict
         What is missing: its ``status`` is ``"adequate"``, ``"named"``, ``"class"``,
         ``"parameter"`` or ``"unlisted"``.
+    ripples : Ripples
+        What varies with the position beyond the cutoff. With one, a verdict is never
+        ``"adequate"``, but ``"named"`` without a chosen hypothesis.
     """
 
     mechanism: Mechanism
@@ -66,6 +70,7 @@ class MechanismFinding:
     cutoff: float
     data: MeasuredData
     verdict: Verdict
+    ripples: Ripples = NO_RIPPLES
 
     @property
     def accepted(self) -> Fit:
@@ -150,7 +155,7 @@ def examine_mechanism(
         raise InvalidInput("number of train records", 0, "at least 1")
     check_signals(mechanism, records)
     cutoff = usual_cutoff(mechanism, train, rules) if cutoff is None else cutoff
-    records = fine_enough(records, cutoff)
+    sampled, records = records, fine_enough(records, cutoff)
     check_sampling(mechanism, records, cutoff)
     train = [record for record in records if record.role == "train"]
     sensors = measured_data(mechanism, train, cutoff, known, rules)
@@ -159,7 +164,11 @@ def examine_mechanism(
     candidates = _candidates(sensors, base)
     data = _with_rest(sensors, base, candidates)
     verdict = _judged(sensors, data, candidates)
-    return MechanismFinding(mechanism, records, cutoff, data, verdict)
+    named = (*known, *verdict.accepted.effects)
+    ripples = find_ripples(mechanism, sampled, cutoff, named, rules)
+    if ripples.found and verdict.status == "adequate":
+        verdict = replace(verdict, status="named")
+    return MechanismFinding(mechanism, records, cutoff, data, verdict, ripples)
 
 
 def _candidates(data: MeasuredData, base: Fit) -> list[Candidate]:

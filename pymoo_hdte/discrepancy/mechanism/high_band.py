@@ -71,6 +71,11 @@ class HighBand:
         frequency = order * np.abs(self.speed) / (2.0 * np.pi)
         return np.interp(frequency, self._frequency, self._gain) * self.inside(order)
 
+    @property
+    def step(self) -> float:
+        """Time between samples, s."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
     def ways(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return where the port moves forward, and where backward, shape (n,) each."""
         return self.speed > 0.0, self.speed < 0.0

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
@@ -24,10 +25,14 @@ _BLOCK = 1.03
 """Ratio of the last to the first order of a block, for all of which the same rows are taken."""
 _SURROUNDINGS = 101
 """Number of orders whose median power estimates the noise at the middle one."""
-_FEWEST_ROWS = 30
+FEWEST_ROWS = 30
 """For sums of fewer the power of noise has no exponential distribution."""
 _BESIDE = 2.5
 """Distance in resolutions within which an order is a side line of a stronger one."""
+_SEGMENTS = 12
+"""Windows of a record with phases of their own."""
+_PADDED = 4
+"""Length of a transform over that of its signal, so that powers between its lines are known."""
 _CHANGES = 3
 """Powers of the position, 0 on, with which the amplitude of what is taken out may change."""
 _TRIES = 3
@@ -79,20 +84,23 @@ def seen_orders(
     orders, resolution = _tried(bands, rules)
     kept: list[SeenOrder] = []
     fixed: list[float] = []
+    undecided: list[float] = []
     for _ in range(_TRIES * rules.most_position_orders):
         if not orders.size or len(kept) == rules.most_position_orders:
             break
         power = _significance(bands, orders, expected, resolution, rules)
-        for taken in (*known, *(one.order for one in kept)):
+        for taken in (*known, *undecided, *(one.order for one in kept)):
             power[np.abs(orders - taken) <= _BESIDE * resolution] = 0.0
         place = int(np.argmax(power))
         if power[place] <= 1.0:
             break
         order = _refined(bands, float(orders[place]), 0.5 * resolution)
-        frequency = fixed_frequency(bands, order, rules)
-        if frequency is None:
+        alone, frequency = told_from_frequencies(bands, order, rules)
+        if alone:
             kept.append(SeenOrder(order, resolution, float(power[place])))
             bands = [_without_order(one, order) for one in bands]
+        elif frequency is None:
+            undecided.append(order)
         else:
             fixed.append(frequency)
             bands = [_without_frequency(one, frequency) for one in bands]
@@ -159,7 +167,7 @@ def _powers(band: HighBand, way: NDArray[np.bool_], orders: Values) -> Values:
         last = max(last, first + 1)
         gain = band.gain(float(orders[(first + last) // 2])) * way
         rows = np.flatnonzero(gain)
-        if len(rows) >= _FEWEST_ROWS:
+        if len(rows) >= FEWEST_ROWS:
             g, position = gain[rows], band.position[rows]
             sums = phasors(position, g * band.force[rows], orders[first:last])
             found[first:last] = np.abs(sums) ** 2 / np.sum(g**2)
@@ -187,46 +195,55 @@ def _refined(bands: Sequence[HighBand], order: float, step: float) -> float:
         gain = band.gain(order)
         for way in band.ways():
             rows = np.flatnonzero(gain * way)
-            if len(rows) >= _FEWEST_ROWS:
+            if len(rows) >= FEWEST_ROWS:
                 sums = phasors(band.position[rows], (gain * band.force)[rows], near)
                 power += np.abs(sums) ** 2 / np.sum(gain[rows] ** 2)
     return float(near[np.argmax(power)])
 
 
-def fixed_frequency(bands: Sequence[HighBand], order: float, rules: Rules) -> float | None:
-    """Return the frequency, Hz, that explains a force about as well as an order does, if any.
+def told_from_frequencies(
+    bands: Sequence[HighBand], order: float, rules: Rules
+) -> tuple[bool, float | None]:
+    """Return whether an order explains more than any frequency, and one in Hz that is significant.
 
-    Both have an amplitude and a phase of their own in every window. Where the speed changes from
-    window to window, or within, one of them explains clearly more.
+    Once over whole records, as mains are coherent for hours, and once with a phase of its own in
+    every window, as a switching frequency drifts. Where the speed changes, one of them explains
+    clearly more.
     """
-    span = max(one.window * (one.time[1] - one.time[0]) for one in bands)
     lowest, highest = min(one.lowest for one in bands), max(one.highest for one in bands)
-    frequencies = np.arange(lowest, highest, 0.5 / span)
-    of_order, of_frequency = 0.0, np.zeros(len(frequencies))
-    n_order, n_windows = 0, 0
-    for band in bands:
-        gain = band.gain(order)
-        for start in range(0, len(band.time) - band.window + 1, band.window):
-            rows = slice(start, start + band.window)
-            sums = phasors(2.0 * np.pi * band.time[rows], band.force[rows], frequencies)
-            of_frequency += np.abs(sums) ** 2 / band.window
-            n_windows += 1
-            for way in band.ways():
-                g = (gain * way)[rows]
-                if np.any(g):
-                    turned = np.exp(-1j * order * band.position[rows])
-                    of_order += abs((g * band.force[rows]) @ turned) ** 2 / float(np.sum(g**2))
-                    n_order += 1
-    if not n_windows:
-        return float(lowest)
-    # Of noise, the mean of many exponential variables.
-    noise = float(np.median(of_frequency)) / n_windows
-    strongest = int(np.argmax(of_frequency))
-    beyond = gamma.isf(rules.second_speed_chance, n_windows) - n_windows
-    gain_of_order = of_order - n_order * noise
-    if gain_of_order > of_frequency[strongest] + (beyond - n_windows) * noise:
-        return None
-    return float(frequencies[strongest])
+    for windows in (1, _SEGMENTS):
+        longest = max(len(one.time) // windows * one.step for one in bands)
+        frequencies = np.arange(lowest, highest, 0.25 / longest)
+        of_frequency, n_windows = np.zeros(len(frequencies)), 0
+        of_order, n_order = 0.0, 0
+        for band in bands:
+            turned = band.gain(order) * np.exp(-1j * order * band.position)
+            for rows in np.array_split(np.arange(len(band.time)), windows):
+                of_frequency += _line_power(band.force[rows], band.step, frequencies)
+                n_windows += 1
+                for way in band.ways():
+                    here = (turned * way)[rows]
+                    size = float(np.sum(np.abs(here) ** 2))
+                    if size > 0.0:
+                        of_order += abs(band.force[rows] @ here) ** 2 / size
+                        n_order += 1
+        noise = float(np.median(of_frequency)) / gamma.median(n_windows)
+        place = int(np.argmax(of_frequency))
+        gain_of_order = of_order / noise - n_order
+        gain_of_frequency = float(of_frequency[place]) / noise - n_windows
+        limit = gamma.isf(rules.position_order_chance / len(frequencies), n_windows) - n_windows
+        doubt = gamma.isf(rules.second_speed_chance, n_windows) - n_windows
+        significant = gain_of_frequency > limit
+        if gain_of_order <= gain_of_frequency + doubt and (windows == 1 or significant):
+            return False, float(frequencies[place]) if significant else None
+    return True, None
+
+
+def _line_power(force: Values, step: float, frequencies: Values) -> Values:
+    """Return the power of a force at frequencies, Hz, per unit of its noise, (n_frequencies,)."""
+    size = next_fast_len(_PADDED * len(force), real=True)
+    power = np.abs(np.fft.rfft(force, size)) ** 2 / len(force)
+    return np.interp(frequencies, np.fft.rfftfreq(size, step), power)
 
 
 def _without_order(band: HighBand, order: float) -> HighBand:
@@ -235,7 +252,7 @@ def _without_order(band: HighBand, order: float) -> HighBand:
     middle, half = np.mean(band.position), max(0.5 * float(np.ptp(band.position)), 1e-300)
     for way in band.ways():
         rows = np.flatnonzero(gain * way)
-        if len(rows) < _FEWEST_ROWS:
+        if len(rows) < FEWEST_ROWS:
             continue
         place = ((band.position[rows] - middle) / half)[:, None] ** np.arange(_CHANGES)
         angle = (order * band.position[rows])[:, None]
