@@ -56,7 +56,7 @@ class Gear:
                 # The output turns as well, the same way or, of a flexible spline, the other way.
                 for output in (-1.0, 1.0):
                     order = count * (self.ratio + output)
-                    found[order] = f"{count} per turn of the input against the output"
+                    found[order] = f"{count} per input turn against the output"
         for count in _PER_FIELD if self.pole_pairs else ():
             words = f"{count * self.pole_pairs} per input turn, {count} per pole pair"
             found.setdefault(count * self.pole_pairs * self.ratio, words)

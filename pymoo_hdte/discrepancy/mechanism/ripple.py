@@ -25,7 +25,7 @@ from pymoo_hdte.discrepancy.mechanism.ripple_size import (
     trend_of,
 )
 from pymoo_hdte.effects.effect import effect_named, place_of
-from pymoo_hdte.effects.sentences import sentence_at
+from pymoo_hdte.effects.sentences import listed, sentence_at
 from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.gear import Gear
 
@@ -58,9 +58,11 @@ class Ripple:
         Speed, amplitude, and its standard deviation, SI.
     trend : str
         How the amplitude changes with the speed, in words.
+    fitted : (float, float)
+        Root mean square beyond the band before and after the ripple is taken away, N or N.m, while
+        its frequency is between those.
     held_out : (float, float) or None
-        Root mean square beyond the band before and after the ripple was taken away, N or N.m, in
-        records that were not fitted.
+        The same in records that were not fitted.
     """
 
     port: str
@@ -71,7 +73,13 @@ class Ripple:
     parts: tuple[Part, ...]
     speeds: Values
     trend: str
+    fitted: Pair
     held_out: Pair | None
+
+    @property
+    def words(self) -> str:
+        """Its order, and what the gear says of it."""
+        return f"{self.order:.5g}{f' ({self.meaning})' if self.meaning else ''}"
 
     @property
     def sentence(self) -> str:
@@ -82,7 +90,7 @@ class Ripple:
         if len(names) > 1:
             told.append(f"A part of it {_OTHER[names[1]]}.")
         if self.meaning:
-            told.append(f"Within the resolution of the travel that is {self.meaning}.")
+            told.append(f"Within the resolution of the travel it is {self.meaning}.")
         low, high = self.frequencies
         told.append(f"It was seen from {low:.3g} to {high:.3g} Hz. {self.trend}")
         return " ".join(told)
@@ -106,6 +114,7 @@ class Ripple:
                     "frequencies_Hz": list(self.frequencies),
                     "resolution": self.resolution,
                     "amplitude_over_speed": self.speeds.tolist(),
+                    "fitted": list(self.fitted),
                     "held_out": None if self.held_out is None else list(self.held_out),
                 },
             }
@@ -136,9 +145,13 @@ class Ripples:
     @property
     def sentence(self) -> str:
         """What was found, in words; empty for nothing."""
-        if not self.found:
-            return ""
-        return " ".join(["Beyond the band of the motion:", *(one.sentence for one in self.found)])
+        ports = dict.fromkeys(one.port for one in self.found)
+        orders = {p: [one.words for one in self.found if one.port == p] for p in ports}
+        return " ".join(
+            f"Beyond the band of the motion the force at the {port} varies with its position, "
+            f"order{'s'[: len(here) - 1]} {listed(here)}."
+            for port, here in orders.items()
+        )
 
 
 NO_RIPPLES = Ripples()
@@ -186,15 +199,16 @@ def find_ripples(
         lost = []
         for one in seen:
             ripple = _ripple(port, one, train, held_out, rules)
-            before, after = ripple.held_out or (1.0, 0.0)
-            if after < before:
+            if _share(ripple.fitted) < rules.ripple_share:
+                continue
+            if ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share:
                 found.append(ripple)
             else:
-                lost.append(f"{one.order:.4g}")
+                lost.append(f"{one.order:.5g}")
         if lost:
             limits.append(
-                f"Ripple at the {port.name}, order {', '.join(lost)}, is seen, but taken away it "
-                "does not make the held-out records smaller: it is not named."
+                f"Ripple at the {port.name}, order {', '.join(lost)}, is seen, but to take it "
+                "away makes the forces of the held-out records no smaller: it is not named."
             )
         if fixed:
             limits.append(
@@ -237,8 +251,15 @@ def _ripple(
         parts,
         speeds,
         trend_of(speeds, rules),
+        gap_of(seen.order, laws, train) or (0.0, 0.0),
         gap_of(seen.order, laws, held_out),
     )
+
+
+def _share(gap: Pair) -> float:
+    """Return the share of the power that is taken away between two root mean squares."""
+    before, after = gap
+    return 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
 
 
 def _meaning(gear: Gear | None, seen: SeenOrder) -> str:
@@ -246,7 +267,7 @@ def _meaning(gear: Gear | None, seen: SeenOrder) -> str:
     expected = gear.expected if gear else {}
     off = {order: abs(order - seen.order) for order in expected}
     near = sorted((order for order in off if off[order] <= seen.resolution), key=off.__getitem__)
-    return " or ".join(f"{expected[order]} ({order:.5g})" for order in near)
+    return " or ".join(f"{expected[order]}: {order:.5g}" for order in near)
 
 
 def _value(value: float, half: float) -> dict[str, Any]:

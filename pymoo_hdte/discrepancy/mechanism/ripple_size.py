@@ -167,6 +167,8 @@ def gap_of(order: float, laws: Sequence[LawAt], bands: Sequence[HighBand]) -> Pa
     count = 0
     for band in bands:
         rows = band.inside(order)
+        if not rows.any():
+            continue
         motion = PortMotion(band.position[rows], band.speed[rows])
         force = band.plain[rows]
         left = force - np.sum([law_force(one.law, motion, 0.0) for one in laws], axis=0)
