@@ -94,18 +94,23 @@ def _amplitude(
     (complex, float) or None
         None with too few rows.
     """
-    orders = seen.order + seen.resolution * np.concatenate([np.zeros(1), _NEIGHBOURS])
-    sums, count = np.zeros(len(orders), dtype=complex), 0
+    turned, force = [], []
     for band in bands:
         speed = way * band.speed
         rows = band.inside(seen.order) & (speed > slowest) & (speed <= fastest)
-        sums += np.exp(-1j * np.outer(orders, band.position[rows])) @ band.plain[rows]
-        count += int(rows.sum())
-    if count < FEWEST_ROWS:
+        turned.append(band.position[rows])
+        force.append(band.plain[rows])
+    position, signal = np.concatenate(turned), np.concatenate(force)
+    if len(signal) < FEWEST_ROWS:
         return None
+    line = np.exp(1j * seen.order * position)
+    amplitude = complex(2.0 * np.mean(signal * line.conj()))
+    # Without the line, which would leak into its neighbours.
+    left = signal - (amplitude * line).real
+    orders = seen.order + seen.resolution * _NEIGHBOURS
+    around = np.abs(np.exp(-1j * np.outer(orders, position)) @ left) ** 2
     # Powers of noise are exponential, with a median of log 2.
-    noise = float(np.median(np.abs(sums[1:]) ** 2)) / np.log(2.0)
-    return complex(2.0 * sums[0] / count), 4.0 * noise / count**2
+    return amplitude, 4.0 * float(np.median(around)) / np.log(2.0) / len(signal) ** 2
 
 
 def over_speed(seen: SeenOrder, bands: Sequence[HighBand], speed: Values) -> Values:

@@ -56,7 +56,7 @@ def mechanism_verdict_document(
         **with_believed_effects(
             [
                 {"name": one.name, "port": one.port, **effect_named(one.name).numbers_of(one.law)}
-                for one in finding.data.known
+                for one in finding.believed
             ]
         ),
         "band": band(finding),
