@@ -1,3 +1,4 @@
+from pymoo_hdte.mechanism.gear import Gear
 from pymoo_hdte.mechanism.mechanism import (
     BelievedValue,
     ErrorLine,
@@ -13,6 +14,7 @@ from pymoo_hdte.mechanism.simulation import SimulatedCourse, simulate_mechanism
 __all__ = [
     "BelievedValue",
     "ErrorLine",
+    "Gear",
     "Input",
     "LawAt",
     "Loop",

@@ -90,7 +90,7 @@ class Ripple:
         if len(names) > 1:
             told.append(f"A part of it {_OTHER[names[1]]}.")
         if self.meaning:
-            told.append(f"Within the resolution of the travel it is {self.meaning}.")
+            told.append(f"Within the resolution of the travel, {self.meaning}.")
         low, high = self.frequencies
         told.append(f"It was seen from {low:.3g} to {high:.3g} Hz. {self.trend}")
         return " ".join(told)
@@ -267,7 +267,7 @@ def _meaning(gear: Gear | None, seen: SeenOrder) -> str:
     expected = gear.expected if gear else {}
     off = {order: abs(order - seen.order) for order in expected}
     near = sorted((order for order in off if off[order] <= seen.resolution), key=off.__getitem__)
-    return " or ".join(f"{expected[order]}: {order:.5g}" for order in near)
+    return "; ".join(f"{order:.5g} is {expected[order]}" for order in near)
 
 
 def _value(value: float, half: float) -> dict[str, Any]:
