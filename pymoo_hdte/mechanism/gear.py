@@ -21,7 +21,7 @@ class Gear:
     Attributes
     ----------
     ratio : float
-        Turns of the input per turn of the output; at least 1.
+        Turns of the input per turn of the output, dimensionless; at least 1.
     kind : {"harmonic drive", "other"}
     pole_pairs : int
         Of the motor at the input; 0 if unknown.
