@@ -23,6 +23,8 @@ from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, Phasors, Values
 _MOST_TRIED = 20_000
 _BLOCK = 1.03
 """Ratio of the last to the first order of a block, for all of which the same rows are taken."""
+NEIGHBOURS = np.concatenate([np.arange(-14.0, -3.5, 0.5), np.arange(4.0, 14.5, 0.5)])
+"""Distances, in resolutions, of the orders the power of which is the noise of one between them."""
 _SURROUNDINGS = 101
 """Number of orders whose median power estimates the noise at the middle one."""
 FEWEST_ROWS = 30
@@ -65,16 +67,15 @@ def seen_orders(
     expected: Sequence[float],
     known: Sequence[float],
     rules: Rules,
-) -> tuple[list[SeenOrder], list[float]]:
-    """Return orders, the strongest first, and frequencies in Hz that are none.
+) -> tuple[list[SeenOrder], list[float], list[float]]:
+    """Return orders, the strongest first, orders that may be frequencies, and frequencies in Hz.
 
     Parameters
     ----------
     bands : sequence of HighBand
         Of one port.
     expected : sequence of float
-        Orders that a gear is known to have: as long as they are, they share a chance of a false
-        alarm of their own, which all the others do not dilute.
+        Orders that a gear is known to have, which share a chance of a false alarm of their own.
     known : sequence of float
         Orders that are known already, and not looked for.
     rules : Rules
@@ -95,16 +96,17 @@ def seen_orders(
         if power[place] <= 1.0:
             break
         order = _refined(bands, float(orders[place]), 0.5 * resolution)
+        one = SeenOrder(order, resolution, float(power[place]))
         alone, frequency = told_from_frequencies(bands, order, rules)
-        if alone:
-            kept.append(SeenOrder(order, resolution, float(power[place])))
+        if alone and _at_two_speeds(bands, one, rules):
+            kept.append(one)
             bands = [_without_order(one, order) for one in bands]
         elif frequency is None:
             undecided.append(order)
         else:
             fixed.append(frequency)
             bands = [_without_frequency(one, frequency) for one in bands]
-    return kept, sorted(set(fixed))
+    return kept, undecided, sorted(set(fixed))
 
 
 def _tried(bands: Sequence[HighBand], rules: Rules) -> tuple[Values, float]:
@@ -237,6 +239,32 @@ def told_from_frequencies(
         if gain_of_order <= gain_of_frequency + doubt and (windows == 1 or significant):
             return False, float(frequencies[place]) if significant else None
     return True, None
+
+
+def _at_two_speeds(bands: Sequence[HighBand], seen: SeenOrder, rules: Rules) -> bool:
+    """Tell whether an order is seen without the rows of its commonest speed, too.
+
+    What rings at a frequency after a start, and starts at the same places again and again, follows
+    the position as well as an order does, but at one speed only.
+    """
+    speed = np.sort(np.concatenate([np.abs(one.speed)[one.inside(seen.order)] for one in bands]))
+    width = rules.fixed_frequency_range * float(speed[-1])
+    commonest = int(np.argmax(np.searchsorted(speed, speed + width) - np.arange(len(speed))))
+    slowest = float(speed[commonest])
+    orders = seen.order + seen.resolution * np.concatenate([np.zeros(1), NEIGHBOURS])
+    total, counted = 0.0, 0
+    for band in bands:
+        size = np.abs(band.speed)
+        gain = band.gain(seen.order) * ((size < slowest) | (size > slowest + width))
+        for way in band.ways():
+            rows = np.flatnonzero(gain * way)
+            if len(rows) < FEWEST_ROWS:
+                continue
+            turned = np.exp(-1j * np.outer(orders, band.position[rows]))
+            power = np.abs(turned @ (gain * band.force)[rows]) ** 2
+            total += float(power[0] / np.median(power[1:])) * np.log(2.0)
+            counted += 1
+    return bool(counted) and total > gamma.isf(rules.second_speed_chance, counted)
 
 
 def _line_power(force: Values, step: float, frequencies: Values) -> Values:

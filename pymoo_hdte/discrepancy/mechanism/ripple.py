@@ -195,7 +195,7 @@ def find_ripples(
             and dict(mechanism.port(one.port).motion) == dict(port.motion)
         ]
         expected = port.gear.expected if port.gear else {}
-        seen, fixed = seen_orders(train, tuple(expected), known, rules)
+        seen, undecided, fixed = seen_orders(train, tuple(expected), known, rules)
         lost = []
         for one in seen:
             ripple = _ripple(port, one, train, held_out, rules)
@@ -209,6 +209,12 @@ def find_ripples(
             limits.append(
                 f"Ripple at the {port.name}, order {', '.join(lost)}, is seen, but to take it "
                 "away makes the forces of the held-out records no smaller: it is not named."
+            )
+        if undecided:
+            limits.append(
+                f"Ripple at the {port.name}, order "
+                f"{', '.join(f'{one:.5g}' for one in undecided)}, is seen at one speed or "
+                "is weak, so that these records do not tell it from a frequency: it is not named."
             )
         if fixed:
             limits.append(

@@ -12,7 +12,7 @@ from scipy.stats import t
 
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.mechanism.high_band import HighBand
-from pymoo_hdte.discrepancy.mechanism.order_search import FEWEST_ROWS, SeenOrder
+from pymoo_hdte.discrepancy.mechanism.order_search import FEWEST_ROWS, NEIGHBOURS, SeenOrder
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.unknowns import line_with_variance
 from pymoo_hdte.mechanism import LawAt
@@ -21,8 +21,6 @@ from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 Values = NDArray[np.float64]
 Pair = tuple[float, float]
 
-_NEIGHBOURS = np.concatenate([np.arange(-14.0, -3.5, 0.5), np.arange(4.0, 14.5, 0.5)])
-"""Distances, in resolutions, of the orders the power of which is the noise of one between them."""
 _SPEEDS = 6
 """Groups of equally many rows by speed."""
 
@@ -107,7 +105,7 @@ def _amplitude(
     amplitude = complex(2.0 * np.mean(signal * line.conj()))
     # Without the line, which would leak into its neighbours.
     left = signal - (amplitude * line).real
-    orders = seen.order + seen.resolution * _NEIGHBOURS
+    orders = seen.order + seen.resolution * NEIGHBOURS
     around = np.abs(np.exp(-1j * np.outer(orders, position)) @ left) ** 2
     # Powers of noise are exponential, with a median of log 2.
     return amplitude, 4.0 * float(np.median(around)) / np.log(2.0) / len(signal) ** 2

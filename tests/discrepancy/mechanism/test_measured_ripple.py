@@ -13,6 +13,8 @@ from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.high_band import high_bands
 from pymoo_hdte.discrepancy.mechanism.order_search import (
+    SeenOrder,
+    _at_two_speeds,
     _significance,
     _tried,
     told_from_frequencies,
@@ -149,6 +151,17 @@ def test_at_one_speed_an_order_and_a_frequency_look_alike_and_neither_is_an_orde
         bands = bands_of(q, torque, generator)
         assert not told_from_frequencies(bands, 202.0, RULES)[0]
         assert find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found == ()
+
+
+def test_what_follows_the_position_at_one_speed_only_is_no_order():
+    generator = np.random.default_rng(4)
+    q = trapezoids(0.4, 0.8)
+    noise = 0.05 * generator.standard_normal(len(TIME))
+    fast = np.abs(np.gradient(q, STEP)) > 0.78
+    resolution = 2.0 * np.pi / float(np.ptp(q))
+    for rows, seen in ((fast, False), (np.ones_like(fast), True)):
+        bands = bands_of(q, 0.2 * rows * np.cos(202.0 * q) + noise, generator)
+        assert _at_two_speeds(bands, SeenOrder(202.0, resolution, 2.0), RULES) == seen
 
 
 def test_two_records_of_one_speed_each_tell_an_order_from_a_frequency():
