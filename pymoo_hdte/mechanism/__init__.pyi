@@ -1,6 +1,6 @@
+from pymoo_hdte.mechanism.believed import BelievedValue
 from pymoo_hdte.mechanism.gear import Gear
 from pymoo_hdte.mechanism.mechanism import (
-    BelievedValue,
     ErrorLine,
     Input,
     LawAt,

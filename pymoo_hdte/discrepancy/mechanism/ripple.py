@@ -25,7 +25,7 @@ from pymoo_hdte.discrepancy.mechanism.ripple_size import (
     trend_of,
 )
 from pymoo_hdte.effects.effect import effect_named, place_of
-from pymoo_hdte.effects.sentences import listed, sentence_at
+from pymoo_hdte.effects.sentence_blanks import listed, sentence_at
 from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.gear import Gear
 
