@@ -277,4 +277,5 @@ def _meaning(gear: Gear | None, seen: SeenOrder) -> str:
 
 
 def _value(value: float, half: float) -> dict[str, Any]:
-    return {"value": value, "unit": "SI", "interval95": [value - half, value + half]}
+    interval = [value - half, value + half]
+    return {"value": value, "unit": "SI", "interval95": interval, "at_bound": False}

@@ -12,6 +12,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.high_band import high_bands
+from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.order_search import (
     SeenOrder,
     _at_two_speeds,
@@ -21,7 +22,7 @@ from pymoo_hdte.discrepancy.mechanism.order_search import (
 )
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.discrepancy.mechanism.ripple import find_ripples
-from pymoo_hdte.discrepancy.report.mechanism_document import mechanism_verdict_document
+from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
 from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
 from tests.helpers.places import SHARED
 
@@ -213,7 +214,7 @@ def test_what_is_known_already_is_not_found_again():
     assert not find_ripples(JOINT, [one], CUTOFF, [part.law for part in ripple.parts]).found
 
 
-def test_a_model_that_lacks_a_ripple_only_is_not_adequate_and_gets_it():
+def test_a_model_that_lacks_a_ripple_only_is_not_adequate_and_gets_it(tmp_path):
     generator = np.random.default_rng(12)
     q = swings(generator)
     speed = np.gradient(q, STEP)
@@ -225,8 +226,7 @@ def test_a_model_that_lacks_a_ripple_only_is_not_adequate_and_gets_it():
     finding = examine_mechanism(JOINT, [record(q, rippled, generator)], CUTOFF)
     assert finding.verdict.status == "named"
     assert finding.accepted.values == pytest.approx(plain.accepted.values, rel=0.02)
-    test = type("Test", (), {"as_dict": lambda self: {}})()
-    document = mechanism_verdict_document("joint", finding, (), test)
+    document = write_mechanism_report("joint", finding, (), next_test(finding), tmp_path / "out")
     (effect,) = document["effects"]
     assert (effect["name"], effect["port"]) == ("torque_ripple", "bearing")
     lower, upper = effect["parameters"]["amplitude"]["interval95"]
