@@ -21,7 +21,7 @@ from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, Phasors, Values
 
 _MOST_TRIED = 20_000
-_BLOCK = 1.03
+_BLOCK = 1.1
 """Ratio of the last to the first order of a block, for all of which the same rows are taken."""
 NEIGHBOURS = np.concatenate([np.arange(-14.0, -3.5, 0.5), np.arange(4.0, 14.5, 0.5)])
 """Distances, in resolutions, of the orders the power of which is the noise of one between them."""
