@@ -143,7 +143,8 @@ def _simulated(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
 def _positions(finding: MechanismFinding, record: Record, fitted: Fit) -> dict[str, Values]:
     """Return the simulated positions at the samples of a record, nan where a model diverges."""
     mechanism = fitted_mechanism(finding.mechanism, fitted)
-    effects = (*finding.data.known, *laws_of(fitted.effects))
+    # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
+    effects = (*finding.believed, *laws_of(fitted.effects))
     try:
         start = {name: _start(record, name, finding.cutoff) for name in mechanism.coordinates}
         fine = simulate_mechanism(mechanism, record.finer(FINER), effects, start=start).position
