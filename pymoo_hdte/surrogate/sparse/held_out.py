@@ -1,0 +1,95 @@
+"""The error of a surrogate at points that it does not use, and what it means for mean and std."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from pymoo_hdte.surrogate.sparse.axes import Axis
+
+Array = NDArray[np.float64]
+
+COVERAGE = 2.0
+"""Root mean squares within which 95 % of normal errors lie."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Points not used in the fit: two draws of the scatter around each of v designs.
+
+    Without a designed variable the 2 v draws belong to one design.
+
+    Attributes
+    ----------
+    designs : ndarray, shape (v, m)
+    points : ndarray, shape (2 v, d)
+        In -1..1; first the first draw of every design, then the second.
+    """
+
+    designs: Array
+    points: Array
+
+    @classmethod
+    def draw(cls, axes: list[Axis], count: int, random_state: np.random.Generator) -> HeldOut:
+        """Draw v = ``count`` designs, evenly over the design box, and their scatter."""
+        designs = draw_designs(axes, count, random_state)
+        p = qmc.LatinHypercube(len(axes), rng=random_state).random(2 * count)
+        points, column = np.empty((2 * count, len(axes))), 0
+        for j, axis in enumerate(axes):
+            own = np.tile(designs[:, column], 2) if axis.designed else None
+            column += axis.designed
+            offset, factor, _, _ = axis.around(own)
+            points[:, j] = offset + factor * axis.sample(p[:, j])
+        return cls(designs, np.clip(points, -1.0, 1.0))
+
+    def errors(self, error: Array, deviation: Array, scale: Array) -> tuple[Array, Array, float]:
+        """Return the errors of mean and std as shares of the scatter, shape (r,), and their root.
+
+        With designs these are twice the root mean square over the designs, an upper estimate as
+        each draw holds what the average over the scatter would lose. Without designs the average
+        over all draws is the error itself; twice its standard error is added.
+
+        Parameters
+        ----------
+        error : ndarray, shape (2 v, r)
+            Function minus surrogate, NaN where the function failed.
+        deviation : ndarray, shape (2 v, r)
+            Surrogate minus its mean at the design.
+        scale : ndarray, shape (v, r)
+            Scatter of each design.
+
+        Returns
+        -------
+        mean, std : ndarray, shape (r,)
+        largest : float
+            Root mean square of the error itself over the scatter, worst response.
+        """
+        whole = np.tile(scale, (2, 1))
+        rms = np.sqrt(np.nanmean((error / whole) ** 2, axis=0))
+        if not self.designs.shape[1]:
+            of_mean = error / whole
+            of_std = error * deviation / whole**2 + 0.5 * (error / whole) ** 2
+            return _average(of_mean), _average(of_std), float(rms.max())
+        half = len(self.designs)
+        apart = 0.5 * (error[:half] - error[half:])
+        of_mean = 0.5 * (error[:half] + error[half:]) / scale
+        of_std = apart * (deviation[:half] - deviation[half:]) / scale**2 + (apart / scale) ** 2
+        sizes = [COVERAGE * np.sqrt(np.nanmean(one**2, axis=0)) for one in (of_mean, of_std)]
+        return sizes[0], sizes[1], float(rms.max())
+
+
+def _average(values: Array) -> Array:
+    count = np.sum(np.isfinite(values), axis=0)
+    return np.abs(np.nanmean(values, axis=0)) + COVERAGE * np.nanstd(values, axis=0) / np.sqrt(count)
+
+
+def draw_designs(axes: list[Axis], count: int, random_state: np.random.Generator) -> Array:
+    """Return designs spread evenly over the box of those axes that have one, shape (count, m)."""
+    bounds = np.array([axis.design for axis in axes if axis.design is not None])
+    if not len(bounds):
+        return np.empty((count, 0))
+    share = qmc.LatinHypercube(len(bounds), rng=random_state).random(count)
+    return bounds[:, 0] + (bounds[:, 1] - bounds[:, 0]) * share
