@@ -17,8 +17,10 @@ from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 
 Array = NDArray[np.float64]
 
-HELD_OUT_DESIGNS = 12
+HELD_OUT_DESIGNS = 16
 """Designs with two points each at which the error is measured."""
+HELD_OUT_SHARE = 0.2
+"""Share of the runs at which that number is doubled."""
 JUDGED_DESIGNS = 32
 """Designs at which the size of a surplus is judged."""
 SMALLEST_SCATTER = 0.1
@@ -47,6 +49,10 @@ class AdaptiveFit:
         What a smaller scatter is judged as, in the responses' units.
     failed : ndarray, shape (k, d)
         Points in -1..1 at which the function failed.
+    held_out_points : ndarray, shape (v, d)
+        Points not used.
+    held_out_error : ndarray, shape (v, r)
+        Function minus surrogate there, as a share of the scatter.
     """
 
     polynomial: SparsePolynomial
@@ -56,6 +62,8 @@ class AdaptiveFit:
     n_runs: int
     smallest_scatter: Array
     failed: Array
+    held_out_points: Array
+    held_out_error: Array
 
 
 class _Growth:
@@ -67,7 +75,7 @@ class _Growth:
         function: Callable[[Array], Array],
         random_state: np.random.Generator,
     ) -> None:
-        self.axes, self.function = axes, function
+        self.axes, self.function, self.random_state = axes, function, random_state
         self.grown = GrowingInterpolation(axes)
         self.held_out = HeldOut.draw(axes, HELD_OUT_DESIGNS, random_state)
         self.influence = Influence(axes, draw_designs(axes, JUDGED_DESIGNS, random_state))
@@ -104,12 +112,36 @@ class _Growth:
         self.scale = np.maximum(judged, least)
         mean, std = moments(self.held_out.designs)
         found = polynomial(self.held_out.points)
-        errors = self.held_out.errors(
-            self.truth - found, found - np.tile(mean, (2, 1)), np.maximum(std, least)
+        scale = np.maximum(std, least)
+        left = self.truth - found
+        of_mean, of_std, self.unexplained = self.held_out.errors(
+            left, found - np.tile(mean, (2, 1)), scale
         )
-        self.unexplained = errors[2]
-        failed = np.array(self.failed).reshape(-1, len(self.axes))
-        return AdaptiveFit(polynomial, moments, *errors[:2], self.n_runs, least, failed)
+        return AdaptiveFit(
+            polynomial,
+            moments,
+            of_mean,
+            of_std,
+            self.n_runs,
+            least,
+            np.array(self.failed).reshape(-1, len(self.axes)),
+            self.held_out.points,
+            left / np.tile(scale, (2, 1)),
+        )
+
+    def hold_out_more(self, budget: int) -> None:
+        """Keep the points not used in step with the set: more of them tell errors better."""
+        wanted = min(HELD_OUT_SHARE * self.n_runs, budget - self.n_runs) / 2.0
+        count = int(wanted) - len(self.held_out.designs)
+        if count < len(self.held_out.designs):
+            return
+        more = HeldOut.draw(self.axes, count, self.random_state)
+        truth = self.run(more.points)
+        half, new = len(self.held_out.designs), len(more.designs)
+        self.truth = np.concatenate(
+            [self.truth[:half], truth[:new], self.truth[half:], truth[new:]]
+        )
+        self.held_out = self.held_out.joined(more)
 
     def next_indices(self, most: int) -> list[tuple[int, ...]]:
         """Return the candidates that are expected to matter most."""
@@ -126,6 +158,7 @@ def fit_adaptively(
     budget: int,
     random_state: np.random.Generator,
     acceptable: Callable[[AdaptiveFit], bool] = lambda fit: True,
+    at_once: int = 1,
 ) -> AdaptiveFit:
     """Grow a surrogate until mean and standard deviation are accurate, or the budget is spent.
 
@@ -142,6 +175,8 @@ def fit_adaptively(
         Places the points that are not used.
     acceptable : callable
         A further condition to stop.
+    at_once : int
+        Least number of indices to add together.
 
     Returns
     -------
@@ -150,13 +185,16 @@ def fit_adaptively(
     """
     growth = _Growth(axes, function, random_state)
     growth.grow(growth.grown.candidates())
+    if not growth.grown.members:
+        raise ValueError("the function failed at the centre of its inputs")
     growth.grow(growth.grown.candidates())
     while True:
         fit = growth.judge()
         accurate = max(fit.mean_error.max(), fit.std_error.max()) <= accuracy
         if accurate and acceptable(fit):
             return fit
-        batch = max(1, int(BATCH * len(growth.grown.members)))
+        growth.hold_out_more(budget)
+        batch = max(at_once, int(BATCH * len(growth.grown.members)))
         wanted = growth.next_indices(min(batch, budget - growth.n_runs))
         if not wanted:
             return fit

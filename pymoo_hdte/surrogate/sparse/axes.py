@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+
+# Its statistics load when they are first used.
+import scipy
 from numpy.typing import NDArray
 from scipy.special import ndtr
-from scipy.stats import norm
 
 from pymoo_hdte.surrogate.sparse.leja import grid, leja_points
 from pymoo_hdte.surrogate.sparse.measures import Distribution, Measure
@@ -28,6 +30,12 @@ is the standard normal variable of the same probability.
 """
 START = 0.15
 """First point as a share of the interval, off its centre: many functions are even or odd there."""
+INWARD = 0.25
+"""Exponent of 1 - z^2 in the weight for noise: its ends are no likelier than what lies inside.
+
+Tried at 0, 0.25 and 0.5 on Ishigami, wing weight and piston: 80, 70, 82; 88, 76, 78; 298, 171, 376
+runs for an error of 1 % of the scatter.
+"""
 
 Array = NDArray[np.float64]
 
@@ -71,7 +79,7 @@ class Scatter:
 
 def standard_normal() -> Scatter:
     """Return the scatter of a normal variable of mean 0 and deviation 1."""
-    distribution = Distribution("standard normal", norm())
+    distribution = Distribution("standard normal", scipy.stats.norm())
     return Scatter(distribution, Measure.of("standard normal", distribution))
 
 
@@ -152,7 +160,8 @@ class Axis:
         density = np.where(np.isfinite(density), density, 0.0)
         median = (float(self.scatter.distribution.quantile(0.5)) - self.centre) / self.half_width
         start = median + START * (1.0 - abs(median))
-        return leja_points(np.sqrt(density / density.max()), start)
+        weight = np.sqrt(density / density.max()) * (1.0 - grid() ** 2) ** INWARD
+        return leja_points(weight, start)
 
     def cube(self, values: Array) -> Array:
         """Return the coordinate of values of a designed variable, same shape."""

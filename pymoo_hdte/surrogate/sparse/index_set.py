@@ -107,6 +107,4 @@ def neighbours(index: tuple[int, ...]) -> list[tuple[int, ...]]:
 
 def parents(index: tuple[int, ...]) -> list[tuple[int, tuple[int, ...]]]:
     """Return axis and index of all that are one step below."""
-    return [
-        (j, (*index[:j], index[j] - 1, *index[j + 1 :])) for j in range(len(index)) if index[j]
-    ]
+    return [(j, (*index[:j], index[j] - 1, *index[j + 1 :])) for j in range(len(index)) if index[j]]

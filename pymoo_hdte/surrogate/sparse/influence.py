@@ -100,7 +100,7 @@ def _decays(grown: GrowingInterpolation, sizes: Array) -> tuple[Array, Array]:
         top = max(by_degree, default=1)
         # The larger of the last two: every second one vanishes if the function is even or odd.
         last = max(by_degree.get(top, 0.0), by_degree.get(top - 1, 0.0) if top > 2 else 0.0)
-        if top > 1:
-            largest = max(by_degree.values())
-            decay[j] = np.clip((last / largest) ** (1.0 / (top - 1)), 0.05, 1.0) if largest else 0.05
+        largest = max(by_degree.values(), default=0.0)
+        if top > 1 and largest > 0.0:
+            decay[j] = np.clip((last / largest) ** (1.0 / (top - 1)), 0.05, 1.0)
     return first, decay

@@ -61,7 +61,5 @@ def hierarchical_to_chebyshev(points: NDArray[np.float64]) -> NDArray[np.float64
     """Return the triangular matrix of shape (k + 1, k + 1): column j holds h_j in T_0 .. T_k."""
     size = len(points)
     nodes = np.cos((2 * np.arange(size) + 1) * np.pi / (2 * size))
-    matrix = np.linalg.solve(
-        chebvander(nodes, size - 1), hierarchical_basis(points, nodes).T
-    )
+    matrix = np.linalg.solve(chebvander(nodes, size - 1), hierarchical_basis(points, nodes).T)
     return np.triu(matrix)

@@ -1,16 +1,20 @@
 """Distributions of one variable as weighted nodes, and polynomials that are orthonormal there.
 
 Any continuous distribution of `chaospy` or frozen one of `scipy.stats` will do. Its density is
-integrated on panels that are halved until that changes nothing, so that kinks and infinite densities
-at an end do no harm.
+integrated on panels that are halved until that changes nothing, so that kinks and infinite
+densities at an end do no harm.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
+
+# Its statistics load when they are first used.
+import scipy
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import ArrayLike, NDArray
 
@@ -80,9 +84,7 @@ class Distribution:
 
 
 def _truncated(normal: TruncatedNormal) -> Any:
-    from scipy.stats import truncnorm
-
-    return truncnorm(-normal.cut, normal.cut, loc=normal.mean, scale=normal.std)
+    return scipy.stats.truncnorm(-normal.cut, normal.cut, loc=normal.mean, scale=normal.std)
 
 
 def _panel(distribution: Distribution, low: float, high: float) -> NDArray[np.float64]:
@@ -113,7 +115,7 @@ class Measure:
         """
         inner = distribution.quantile(_FIRST_QUANTILES)
         edges = np.unique([distribution.lower, *inner, distribution.upper])
-        panels = list(zip(edges, edges[1:], strict=False))
+        panels = list(pairwise(edges.tolist()))
         shortest = _SHORTEST_PANEL * (distribution.upper - distribution.lower)
         kept = []
         while panels:

@@ -52,7 +52,8 @@ class SparsePolynomial:
         for axis, nested in enumerate(points):
             columns = int(indices[:, axis].max()) + 1
             step = AxisMap(indices, axis, columns)
-            coefficients = step.forward(coefficients, hierarchical_to_chebyshev(nested[:columns])[None])
+            matrix = hierarchical_to_chebyshev(nested[:columns])
+            coefficients = step.forward(coefficients, matrix[None])
         return cls(indices, coefficients[0])
 
     @property
@@ -83,4 +84,5 @@ class SparsePolynomial:
         if size > 1:
             matrix[:-1] = chebder(np.eye(size))
         step = AxisMap(self.indices, axis, size)
-        return SparsePolynomial(self.indices, step.forward(self.coefficients[None], matrix[None])[0])
+        coefficients = step.forward(self.coefficients[None], matrix[None])
+        return SparsePolynomial(self.indices, coefficients[0])

@@ -1,0 +1,73 @@
+"""Whether a surrogate may be trusted: otherwise the reason, and where it may not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems.simulator.inputs import Inputs
+from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
+from pymoo_hdte.surrogate.sparse.held_out import HeldOut
+from pymoo_hdte.surrogate.trust import region_of
+
+Array = NDArray[np.float64]
+
+_LOOKED_AT = 1024
+"""Designs, with two draws of the scatter each, at which the sign of a response is looked at."""
+
+Refusal = tuple[str, float, str, dict[str, tuple[float, float]]]
+
+
+def inaccurate(
+    inputs: Inputs, fit: AdaptiveFit, accuracy: float, responses: tuple[str, ...]
+) -> Refusal | None:
+    """Return why and where the surrogate is less accurate than asked for, or None."""
+    errors = np.array([fit.mean_error, fit.std_error])
+    which, place = np.unravel_index(np.argmax(errors), errors.shape)
+    if errors[which, place] <= accuracy:
+        return None
+    moment = ("mean", "standard deviation")[which]
+    share = np.abs(fit.held_out_error[:, place])
+    worst = fit.held_out_points[share > max(accuracy, np.nanmedian(share))]
+    region = region_of(inputs.names, inputs.values(worst), reach(inputs)) if len(worst) else {}
+    field = f"error of the {moment} of {responses[place]!r} after {fit.n_runs} runs"
+    allowed = f"at most {accuracy:g} of the scatter; more runs, a narrower box or accuracy="
+    return field, float(errors[which, place]), allowed, region
+
+
+def positive_places(positive: Sequence[str] | bool, responses: tuple[str, ...]) -> list[int]:
+    """Return the positions of the responses that cannot be negative.
+
+    Raises
+    ------
+    InvalidInput
+        If there is no response of such a name.
+    """
+    if isinstance(positive, bool):
+        return list(range(len(responses))) if positive else []
+    for name in positive:
+        if name not in responses:
+            raise InvalidInput("positive", name, f"one of {responses}")
+    return [responses.index(name) for name in positive]
+
+
+def negative_somewhere(inputs: Inputs, fit: AdaptiveFit, places: list[int]) -> Refusal | None:
+    """Return why and where a positive response becomes negative, or None."""
+    if not places:
+        return None
+    points = HeldOut.draw(inputs.axes, _LOOKED_AT, np.random.default_rng(0)).points
+    values = fit.polynomial(points)[:, places]
+    if values.min() >= 0.0:
+        return None
+    bad = np.flatnonzero((values < 0.0).any(axis=1))
+    region = region_of(inputs.names, inputs.values(points[bad]), reach(inputs))
+    field = f"surrogate after {fit.n_runs} runs of a positive response"
+    return field, float(values.min()), "at least 0; more runs or a narrower box", region
+
+
+def reach(inputs: Inputs) -> Array:
+    """Return the smallest and largest value of every input, shape (2, d)."""
+    return np.array(list(inputs.reach().values())).T
