@@ -11,7 +11,7 @@ from pymoo_hdte.checks import InvalidInput
 
 Array = NDArray[np.float64]
 
-TELLING_SHARE = 0.8
+TELLING_SHARE = 0.7
 """A variable is named in a region that covers less than this share of its range."""
 
 
@@ -23,16 +23,15 @@ class UntrustedSurrogate(InvalidInput):
     field, value, allowed
         As in `InvalidInput`: what is wrong, its size and what was asked for.
     region : dict of str to tuple of float
-        Interval of each variable, in its unit, in which that is so.
+        Interval of those variables, in their units, in which that is so; empty if all over the box.
     """
 
     def __init__(
         self, field: str, value: float, allowed: str, region: Mapping[str, tuple[float, float]]
     ) -> None:
-        where = " and ".join(
-            f"{name} is {low:.4g} to {high:.4g}" for name, (low, high) in region.items()
-        )
-        super().__init__(field, value, f"{allowed}; so where {where}" if where else allowed)
+        ends = [f"{name} is {low:.4g} to {high:.4g}" for name, (low, high) in region.items()]
+        where = f"so where {' and '.join(ends)}" if ends else "so all over the box"
+        super().__init__(field, value, f"{allowed}; {where}")
         self.region = dict(region)
         self._arguments = (field, value, allowed, self.region)
 
@@ -56,11 +55,9 @@ def region_of(
     Returns
     -------
     dict of str to tuple of float
-        All variables if none is told apart.
+        Empty if they lie all over the box.
     """
     low, high = points.min(axis=0), points.max(axis=0)
     share = (high - low) / np.maximum(everywhere[1] - everywhere[0], np.finfo(float).tiny)
     telling = share < TELLING_SHARE
-    if not telling.any():
-        telling[:] = True
     return {name: (float(low[j]), float(high[j])) for j, name in enumerate(names) if telling[j]}

@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 COVERAGE = 2.5
 """Root mean squares within which 95 % of the errors lie.
 
-2 for a normal error of known size; more, as the size is taken from 16 designs and growth stops at the
-first set of them that passes.
+2 for a normal error of known size; more, as the size is taken from 16 designs and growth stops as
+soon as they pass.
 """
 
 
@@ -89,7 +89,9 @@ class HeldOut:
         half = len(self.designs)
         apart = 0.5 * (error[:half] - error[half:])
         of_mean = 0.5 * (error[:half] + error[half:]) / scale
-        of_std = apart * (deviation[:half] - deviation[half:]) / scale**2 + (apart / scale) ** 2
+        product = apart * (deviation[:half] - deviation[half:]) / scale**2 + (apart / scale) ** 2
+        # The deviation of the error bounds the error of the deviation, and scatters less.
+        of_std = np.maximum(np.abs(product), np.sqrt(2.0) * np.abs(apart) / scale)
         return _of_most(of_mean), _of_most(of_std), float(rms.max())
 
 
