@@ -121,6 +121,7 @@ class Simulator:
         self.file, self.progress = file, progress
         self.responses: tuple[str, ...] = ()
         self.n_calls = 0
+        self._ran = False
         self._last_error: BaseException | None = None
 
     def __call__(self, values: Array) -> Array:
@@ -129,7 +130,7 @@ class Simulator:
         Raises
         ------
         SimulatorFailed
-            If all of these runs fail.
+            If all of these runs fail, and no run before did not.
         InvalidInput
             If what it returns is no set of numbers, or another one than before.
         """
@@ -146,7 +147,8 @@ class Simulator:
                     self.file.keep(row, gave)
         if self.progress is not None:
             self.progress.update(len(rows))
-        if not any(self._good(found[row]) for row in rows):
+        self._ran = self._ran or any(self._good(found[row]) for row in rows)
+        if not self._ran:
             where = ", ".join(f"{n} = {v:g}" for n, v in zip(self.names, rows[0], strict=True))
             message = f"the simulator failed in all of {len(rows)} runs, the first at {where}"
             raise SimulatorFailed(message) from self._last_error

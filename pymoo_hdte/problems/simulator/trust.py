@@ -15,6 +15,8 @@ from pymoo_hdte.surrogate.trust import region_of
 
 Array = NDArray[np.float64]
 
+_LIKE_THE_WORST = 0.3
+"""Share of the largest error above which a point belongs to the region of the error."""
 _LOOKED_AT = 1024
 """Designs, with two draws of the scatter each, at which the sign of a response is looked at."""
 
@@ -31,8 +33,8 @@ def inaccurate(
         return None
     moment = ("mean", "standard deviation")[which]
     share = np.abs(fit.held_out_error[:, place])
-    worst = fit.held_out_points[share > max(accuracy, np.nanmedian(share))]
-    region = region_of(inputs.names, inputs.values(worst), reach(inputs)) if len(worst) else {}
+    worst = fit.held_out_points[share > _LIKE_THE_WORST * np.nanmax(share)]
+    region = region_of(inputs.names, inputs.values(worst), reach(inputs))
     field = f"error of the {moment} of {responses[place]!r} after {fit.n_runs} runs"
     allowed = f"at most {accuracy:g} of the scatter; more runs, a narrower box or accuracy="
     return field, float(errors[which, place]), allowed, region

@@ -96,13 +96,11 @@ class _Growth:
         """Run the function for these indices and add them."""
         values = self.run(np.array([self.grown.point(index) for index in wanted]))
         for index, row in zip(wanted, values, strict=True):
-            if np.isfinite(row).all():
-                self.grown.add(index, row)
-            else:
-                self.grown.excluded.add(index)
+            self.grown.add(index, row)
 
     def judge(self) -> AdaptiveFit:
         """Measure the surrogate as it stands."""
+        self.grown.complete()
         polynomial = self.grown.polynomial()
         moments = SparseMoments(polynomial, self.axes)
         _, judged = moments(self.influence.designs)
@@ -185,8 +183,6 @@ def fit_adaptively(
     """
     growth = _Growth(axes, function, random_state)
     growth.grow(growth.grown.candidates())
-    if not growth.grown.members:
-        raise ValueError("the function failed at the centre of its inputs")
     growth.grow(growth.grown.candidates())
     while True:
         fit = growth.judge()

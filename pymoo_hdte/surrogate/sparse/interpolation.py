@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.index_set import neighbours, parents
@@ -18,6 +19,9 @@ from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 
 Array = NDArray[np.float64]
 Index = tuple[int, ...]
+
+ROUGHNESS = 4.0
+"""Weight of a surplus for each degree, where values are missing."""
 
 
 class GrowingInterpolation:
@@ -31,18 +35,16 @@ class GrowingInterpolation:
     ----------
     members : list of tuple of int
         The set, in the order of growth.
-    excluded : set of tuple of int
-        Indices whose run failed; nothing above them is asked for.
     """
 
     def __init__(self, axes: list[Axis]) -> None:
         self.axes = axes
         self.members: list[Index] = []
-        self.excluded: set[Index] = set()
         self._points = [axis.points for axis in axes]
         self._tables = [hierarchical_basis(points, points) for points in self._points]
         self._place: dict[Index, int] = {}
         self._surpluses: list[Array] = []
+        self._values: list[Array] = []
 
     @property
     def surpluses(self) -> Array:
@@ -59,13 +61,44 @@ class GrowingInterpolation:
         return np.array([points[k] for points, k in zip(self._points, index, strict=True)])
 
     def add(self, index: Index, values: Array) -> None:
-        """Add an index with the r values of the function at its point."""
+        """Add an index with the r values of the function at its point, NaN where it failed.
+
+        A failed one adds nothing until `complete` is called.
+        """
         surplus = np.array(values, dtype=float)
+        self._values.append(surplus.copy())
         if self.members:
             surplus -= self._at_member(index) @ self.surpluses
+        surplus = np.where(np.isfinite(surplus), surplus, 0.0)
         self._place[index] = len(self.members)
         self.members.append(index)
         self._surpluses.append(surplus)
+
+    def complete(self) -> None:
+        """Give failed points the values that make surpluses of high degree least.
+
+        Their sum of squares is made least, each weighted by `ROUGHNESS` to the power of its degree:
+        the polynomial then goes on smoothly where the function is not known.
+        """
+        values, indices = np.array(self._values), self.indices
+        failed = np.flatnonzero(np.isnan(values).any(axis=1))
+        if not len(failed):
+            return
+        matrix = np.ones((len(values), len(values)))
+        for j, table in enumerate(self._tables):
+            matrix *= table[indices[:, j]][:, indices[:, j]].T
+        unknown = np.zeros((len(values), len(failed)))
+        unknown[failed, np.arange(len(failed))] = 1.0
+        values[failed] = 0.0
+        # Members stand in an order in which each is below none before it.
+        given, moved = np.split(
+            solve_triangular(matrix, np.hstack([values, unknown]), lower=True),
+            [values.shape[1]],
+            axis=1,
+        )
+        weight = ROUGHNESS ** indices.sum(axis=1)[:, None].astype(float)
+        found = np.linalg.lstsq(weight * moved, -weight * given, rcond=None)[0]
+        self._surpluses = list(given + moved @ found)
 
     def _at_member(self, index: Index) -> Array:
         indices = self.indices
@@ -83,7 +116,6 @@ class GrowingInterpolation:
             new
             for new in sorted(above)
             if new not in self._place
-            and new not in self.excluded
             and max(new) <= HIGHEST_DEGREE
             and all(parent in self._place for _, parent in parents(new))
         ]
