@@ -14,12 +14,10 @@ from pymoo_hdte.problems.simulator.inputs import Design
 from pymoo_hdte.problems.simulator.problem import SimulatorProblem
 from pymoo_hdte.problems.simulator.robust_problem import robust_problem
 from pymoo_hdte.problems.simulator.runs import SimulatorFailed
+from pymoo_hdte.problems.simulator.sampled_statistics import CVaR, FailureProbability, Quantile
 from pymoo_hdte.problems.simulator.statistics import (
-    CVaR,
-    FailureProbability,
     Mean,
     MeanPlusStd,
-    Quantile,
     RobustConstraint,
     Std,
     WorstCase,

@@ -20,8 +20,10 @@ class UntrustedSurrogate(InvalidInput):
 
     Attributes
     ----------
-    field, value, allowed
-        As in `InvalidInput`: what is wrong, its size and what was asked for.
+    field, allowed : str
+        What is wrong, and what was asked for.
+    value : float
+        Size of what is wrong: an error as a share of the scatter, a mean in the response's unit.
     region : dict of str to tuple of float
         Interval of those variables, in their units, in which that is so; empty if all over the box.
     """

@@ -61,8 +61,8 @@ def Robust(
         Statistics of the responses ``F1``, .., ``G1``, .., in the place of those above.
     k : float
         Standard deviations by which constraints have to hold, dimensionless.
-    **options
-        As for `robust_problem`: accuracy, budget, noise, seed and the others.
+    options : dict
+        Other arguments of `robust_problem`: accuracy, budget, noise, seed and the others.
 
     Returns
     -------

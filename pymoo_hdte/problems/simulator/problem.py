@@ -58,6 +58,10 @@ class SimulatorProblem(Problem):
         Inputs in their units at which the simulator failed; the fit goes on without them.
     var_names, obj_names : tuple of str
         Names in the order of X and F.
+    input_names : tuple of str
+        Of all inputs of the simulator, the designs first.
+    design_box : Box
+        The search space.
     """
 
     def __init__(

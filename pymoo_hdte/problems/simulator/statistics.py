@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.checks import one_of, real_number
 from pymoo_hdte.problems.simulator.around import Around
 from pymoo_hdte.surrogate.moments import divide_or_zero
 
@@ -27,13 +27,12 @@ class Statistic:
     ----------
     response : str or None
         Name of the response; None for the only one.
+    sign : float
+        Dimensionless factor: -1 to maximise, which ``-statistic`` sets.
     """
 
     response: str | None = field(default=None, kw_only=True)
     sign: float = field(default=1.0, kw_only=True, repr=False)
-
-    has_gradient: ClassVar[bool] = True
-    relative_to_scatter: ClassVar[bool] = True
 
     def __neg__(self: S) -> S:
         return replace(self, sign=-self.sign)
@@ -49,6 +48,16 @@ class Statistic:
         """What it is called as an objective."""
         words = [type(self).__name__.lower(), *([self.response] if self.response else [])]
         return ("-" if self.sign < 0 else "") + "_".join(words)
+
+    @property
+    def has_gradient(self) -> bool:
+        """Whether it is smooth enough for a gradient in the design."""
+        return True
+
+    @property
+    def relative_to_scatter(self) -> bool:
+        """Whether its error is told as a share of the scatter."""
+        return True
 
     def value(self, around: Around) -> tuple[Array, Array]:
         """Return its values, without the sign, and their slopes in the response's expansion.
@@ -96,7 +105,7 @@ class RobustConstraint:
     bound : float
         In the statistic's unit.
     side : float
-        1 where the statistic must not be above the bound, -1 where not below.
+        Dimensionless: 1 where the statistic must not be above the bound, -1 where not below.
     """
 
     statistic: Statistic
@@ -106,7 +115,15 @@ class RobustConstraint:
 
 @dataclass(frozen=True)
 class Mean(Statistic):
-    """The mean of a response, exact for the surrogate."""
+    """The mean of a response, exact for the surrogate.
+
+    Parameters
+    ----------
+    response : str or None
+        Name of the response; None for the only one.
+    sign : float
+        Dimensionless factor: -1 to maximise, which ``-statistic`` sets.
+    """
 
     def _of(self, around: Around) -> tuple[Array, Array]:
         slope = np.zeros_like(around.expansion)
@@ -116,7 +133,15 @@ class Mean(Statistic):
 
 @dataclass(frozen=True)
 class Std(Statistic):
-    """The standard deviation of a response, exact for the surrogate."""
+    """The standard deviation of a response, exact for the surrogate.
+
+    Parameters
+    ----------
+    response : str or None
+        Name of the response; None for the only one.
+    sign : float
+        Dimensionless factor: -1 to maximise, which ``-statistic`` sets.
+    """
 
     def _of(self, around: Around) -> tuple[Array, Array]:
         slope = divide_or_zero(around.expansion, np.repeat(around.std[:, None], around.size, 1))
@@ -135,6 +160,15 @@ class MeanPlusStd(Statistic):
     ----------
     k : float
         Dimensionless; negative for a lower limit.
+    response : str or None
+        Name of the response; None for the only one.
+    sign : float
+        Dimensionless factor: -1 to maximise, which ``-statistic`` sets.
+
+    Raises
+    ------
+    InvalidInput
+        If an argument is not in its range.
     """
 
     k: float = 3.0
@@ -151,67 +185,6 @@ class MeanPlusStd(Statistic):
 
 
 @dataclass(frozen=True)
-class Quantile(Statistic):
-    """The value below which a response stays with a given probability, sampled on the surrogate.
-
-    Parameters
-    ----------
-    p : float
-        Probability, above 0 and below 1.
-    """
-
-    p: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "p", real_number("p", self.p, above=0.0, below=1.0))
-
-    def _of(self, around: Around) -> tuple[Array, Array]:
-        values, basis = around.samples
-        place = self.p * len(basis) - 0.5
-        low = int(np.clip(np.floor(place), 0, len(basis) - 2))
-        share = np.clip(place - low, 0.0, 1.0)
-        order = np.argpartition(values, (low, low + 1), axis=1)[:, [low, low + 1]]
-        chosen = np.take_along_axis(values, order, axis=1)
-        slope = (1.0 - share) * basis[order[:, 0]] + share * basis[order[:, 1]]
-        return chosen @ np.array([1.0 - share, share]), slope
-
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return _sampled_error(self, mean_error, std_error, around)
-
-
-@dataclass(frozen=True)
-class CVaR(Statistic):
-    """The mean of the largest values of a response, beyond its p-quantile, sampled.
-
-    The conditional value at risk of Rockafellar and Uryasev, Journal of Risk 2, 2000.
-
-    Parameters
-    ----------
-    p : float
-        Probability of the values that are left out, above 0 and below 1.
-    """
-
-    p: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "p", real_number("p", self.p, above=0.0, below=1.0))
-
-    def _of(self, around: Around) -> tuple[Array, Array]:
-        values, basis = around.samples
-        count = (1.0 - self.p) * len(basis)
-        whole = min(int(np.floor(count)), len(basis) - 1)
-        order = np.argsort(-values, axis=1)[:, : whole + 1]
-        weights = np.ones(whole + 1)
-        weights[-1] = count - whole
-        weights /= count
-        largest = np.take_along_axis(values, order, axis=1)
-        return largest @ weights, np.einsum("nkq,k->nq", basis[order], weights)
-
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return _sampled_error(self, mean_error, std_error, around)
-
-
-@dataclass(frozen=True)
 class WorstCase(Statistic):
     """The largest value of a response in the box of the scatter around the design.
 
@@ -221,6 +194,15 @@ class WorstCase(Statistic):
     ----------
     side : {"largest", "smallest"}
         Which value is worst.
+    response : str or None
+        Name of the response; None for the only one.
+    sign : float
+        Dimensionless factor: -1 to maximise, which ``-statistic`` sets.
+
+    Raises
+    ------
+    InvalidInput
+        If an argument is not in its range.
     """
 
     side: str = "largest"
@@ -232,58 +214,9 @@ class WorstCase(Statistic):
         return around.extreme(1.0 if self.side == "largest" else -1.0)
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return mean_error + _farthest(self._of(around)[0], around) * std_error
+        return mean_error + reach_of(self._of(around)[0], around) * std_error
 
 
-@dataclass(frozen=True)
-class FailureProbability(Statistic):
-    """The probability that a response is above, or below, a limit; sampled, without a gradient.
-
-    Parameters
-    ----------
-    above, below : float or None
-        The limit, in the response's unit; exactly one of both.
-    """
-
-    above: float | None = None
-    below: float | None = None
-
-    has_gradient: ClassVar[bool] = False
-    relative_to_scatter: ClassVar[bool] = False
-
-    def __post_init__(self) -> None:
-        if (self.above is None) == (self.below is None):
-            raise InvalidInput("above and below", (self.above, self.below), "exactly one of both")
-        for name in ("above", "below"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, real_number(name, getattr(self, name)))
-
-    def _of(self, around: Around) -> tuple[Array, Array]:
-        return self._share(around, np.zeros(len(around.mean))), np.zeros((0, 0))
-
-    def _share(self, around: Around, shift: Array) -> Array:
-        values = around.samples[0] + shift[:, None]
-        if self.above is not None:
-            return np.mean(values > self.above, axis=1)
-        return np.mean(values < float(self.below or 0.0), axis=1)
-
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        # How far it moves if the response is off by its error, plus the error of sampling.
-        shift = mean_error + std_error
-        ends = [self._share(around, side * shift) for side in (-1.0, 1.0)]
-        found = self._share(around, 0.0 * shift)
-        count = len(around.samples[1])
-        sampling = 2.0 * np.sqrt(np.maximum(found * (1.0 - found), 1.0 / count) / count)
-        return np.max(np.abs(np.array(ends) - found), axis=0) + sampling
-
-
-def _farthest(values: Array, around: Around) -> Array:
+def reach_of(values: Array, around: Around) -> Array:
+    """Return how many deviations values lie from the mean, shape (n,), 0 without scatter."""
     return np.abs(divide_or_zero(values - around.mean, around.std))
-
-
-def _sampled_error(statistic: Any, mean_error: Array, std_error: Array, around: Around) -> Array:
-    """Return the error by that of the surrogate and by the spread of four parts of the sample."""
-    value = statistic.value(around)[0]
-    parts = np.array([statistic.value(part)[0] for part in around.quarters()])
-    sampling = 2.0 * parts.std(axis=0, ddof=1) / np.sqrt(len(parts))
-    return mean_error + _farthest(value, around) * std_error + sampling

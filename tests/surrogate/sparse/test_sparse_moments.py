@@ -39,7 +39,8 @@ def test_a_measure_has_the_moments_of_its_distribution(name):
 
 
 @pytest.mark.parametrize(
-    "wrong", [1.0, None, scipy.stats.poisson(3), chaospy.Binomial(5, 0.5), scipy.stats.norm(0, np.nan)]
+    "wrong",
+    [1.0, None, scipy.stats.poisson(3), chaospy.Binomial(5, 0.5), scipy.stats.norm(0, np.nan)],
 )
 def test_what_is_no_continuous_distribution_is_refused_by_name(wrong):
     with pytest.raises(InvalidInput, match="noise of x"):
