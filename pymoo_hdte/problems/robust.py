@@ -116,10 +116,10 @@ class RobustProblem(Problem):
         if wrong.any():
             region = region_of(box.names, designs[wrong], np.array([box.lower, box.upper]))
             worst = float(sign * np.min(sign * mean))
-            share = f"in {100.0 * wrong.mean():.0f} % of the designs"
-            allowed = f"{'above' if sign > 0 else 'below'} 0 ({share} it is not; a higher order"
-            field = f"mean {self.obj_names[0]!r} on the surrogate"
-            raise UntrustedSurrogate(field, worst, allowed + ", or a narrower box)", region)
+            side = "above" if sign > 0.0 else "below"
+            allowed = f"{side} 0, but {100.0 * wrong.mean():.0f} % of the designs are not"
+            field = f"{self.obj_names[0]} on the surrogate"
+            raise UntrustedSurrogate(field, worst, allowed, region)
 
     def _evaluate(
         self, x: NDArray[np.float64], out: dict[str, Any], *args: Any, **kwargs: Any

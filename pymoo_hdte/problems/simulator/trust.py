@@ -36,7 +36,7 @@ def inaccurate(
     worst = fit.held_out_points[share > _LIKE_THE_WORST * np.nanmax(share)]
     region = region_of(inputs.names, inputs.values(worst), reach(inputs))
     field = f"error of the {moment} of {responses[place]!r} after {fit.n_runs} runs"
-    allowed = f"at most {accuracy:g} of the scatter; more runs, a narrower box or accuracy="
+    allowed = f"at most {accuracy:g} of the scatter"
     return field, float(errors[which, place]), allowed, region
 
 
@@ -67,7 +67,7 @@ def negative_somewhere(inputs: Inputs, fit: AdaptiveFit, places: list[int]) -> R
     bad = np.flatnonzero((values < 0.0).any(axis=1))
     region = region_of(inputs.names, inputs.values(points[bad]), reach(inputs))
     field = f"surrogate after {fit.n_runs} runs of a positive response"
-    return field, float(values.min()), "at least 0; more runs or a narrower box", region
+    return field, float(values.min()), "at least 0", region
 
 
 def reach(inputs: Inputs) -> Array:
