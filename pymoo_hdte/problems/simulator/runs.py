@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
@@ -45,6 +46,7 @@ class RunFile:
         self._path = Path(path)
         self._names = names
         self.runs: dict[tuple[float, ...], Any] = {}
+        self.responses: tuple[str, ...] = ()
         if self._path.exists() and self._path.stat().st_size:
             self._read()
         else:
@@ -60,15 +62,22 @@ class RunFile:
         if found != list(self._names):
             raise InvalidInput("cache", str(self._path), f"runs of the inputs {self._names}")
         for line in lines:
-            if line.endswith("\n"):
-                run = json.loads(line)
+            if not line.endswith("\n"):
+                continue
+            run = json.loads(line)
+            if "responses" in run:
+                self.responses = tuple(run["responses"])
+            else:
                 self.runs[tuple(map(float.fromhex, run["at"]))] = run["gave"]
         if lines and not lines[-1].endswith("\n"):
             whole = text[: -len(lines[-1])]
             self._path.write_text(whole, encoding="utf-8")
 
-    def keep(self, at: tuple[float, ...], gave: Any) -> None:
-        """Write a run to the disk."""
+    def keep(self, at: tuple[float, ...], gave: Any, responses: tuple[str, ...]) -> None:
+        """Write a run to the disk, before the first the names of the responses."""
+        if not self.responses:
+            self.responses = responses
+            self._append({"responses": list(responses)})
         self.runs[at] = gave
         self._append({"at": [value.hex() for value in at], "gave": gave})
 
@@ -119,7 +128,7 @@ class Simulator:
         self.function, self.names, self.vectorised = function, names, vectorised
         self.executor, self.tries = executor, tries
         self.file, self.progress = file, progress
-        self.responses: tuple[str, ...] = ()
+        self.responses = file.responses if file else ()
         self.n_calls = 0
         self._ran = False
         self._last_error: BaseException | None = None
@@ -144,7 +153,7 @@ class Simulator:
             for row, gave in self._run(missing):
                 found[row] = gave
                 if self.file and self._good(gave):
-                    self.file.keep(row, gave)
+                    self.file.keep(row, gave, self.responses)
         if self.progress is not None:
             self.progress.update(len(rows))
         self._ran = self._ran or any(self._good(found[row]) for row in rows)
@@ -158,8 +167,6 @@ class Simulator:
     def _good(self, gave: Any) -> bool:
         if gave is None:
             return False
-        if not self.responses and self.file:
-            self.responses = tuple(f"response_{k + 1}" for k in range(len(gave)))
         return bool(np.all(np.isfinite(gave)))
 
     def _run(self, rows: Sequence[tuple[float, ...]]) -> Iterable[tuple[tuple[float, ...], Any]]:
@@ -172,14 +179,24 @@ class Simulator:
             for row in rows:
                 yield row, self._one(lambda row=row: self._call(row))  # type: ignore[misc]
         else:
-            futures = [
-                self.executor.submit(
-                    call_by_name, self.function, dict(zip(self.names, row, strict=True))
-                )
-                for row in rows
-            ]
-            for row, future in zip(rows, futures, strict=True):
-                yield row, self._one(future.result)
+            yield from self._on_workers(rows)
+
+    def _on_workers(
+        self, rows: Sequence[tuple[float, ...]]
+    ) -> Iterable[tuple[tuple[float, ...], Any]]:
+        """Yield runs as they end, so that a finished one is kept whatever happens to the others."""
+        # Dask would return the stored failure of a run that is made again.
+        options = {"pure": False} if hasattr(self.executor, "scheduler_info") else {}
+        done: SimpleQueue[Any] = SimpleQueue()
+        waiting = {}
+        for row in rows:
+            inputs = dict(zip(self.names, row, strict=True))
+            future = self.executor.submit(call_by_name, self.function, inputs, **options)
+            waiting[future] = row
+            future.add_done_callback(done.put)
+        for _ in rows:
+            future = done.get()
+            yield waiting.pop(future), self._one(future.result)
 
     def _call(self, row: tuple[float, ...]) -> Any:
         return call_by_name(self.function, dict(zip(self.names, row, strict=True)))
@@ -206,8 +223,7 @@ class Simulator:
         except (TypeError, ValueError):
             wanted = "numbers" if count is None else f"arrays of shape ({count},)"
             raise InvalidInput("what the simulator returns", gave, wanted) from None
-        unknown = all(name.startswith("response_") for name in self.responses)
-        if self.responses and not unknown and names != self.responses:
+        if self.responses and names != self.responses:
             raise InvalidInput("names of the responses", names, str(self.responses))
         self.responses = names
         return np.column_stack(arrays)

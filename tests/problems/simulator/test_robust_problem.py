@@ -247,15 +247,42 @@ def test_a_killed_study_goes_on_without_a_run_made_twice(tmp_path):
     assert np.array_equal(found, expected)
     assert not set(first.calls[:39]) & set(second.calls)
     assert len(second.calls) == len(set(whole.calls)) - 39
+    third = Flaky()
+    quiet(third, *PLAIN, cache=file, objectives=[Mean(response="response")])
+    assert not third.calls
     with pytest.raises(InvalidInput, match="cache"):
         quiet(cantilever, noise={"F": FORCE, "E": MODULUS}, cache=file)
 
 
-def test_an_executor_gives_the_same():
-    with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        problem = quiet(Flaky(), *PLAIN, executor=pool)
+@pytest.fixture(params=["threads", "dask"])
+def workers(request):
+    if request.param == "threads":
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            yield pool
+        return
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(processes=False, dashboard_address=None, n_workers=1) as client:
+        yield client
+
+
+FAILED_ONCE = set()
+
+
+def fails_once_everywhere(x, a):
+    """Fail at the first call at every seventh point; what Dask sends holds no state."""
+    if int(1e6 * x) % 7 == 3 and x not in FAILED_ONCE:
+        FAILED_ONCE.add(x)
+        raise RuntimeError("no licence")
+    return np.exp(x * a)
+
+
+def test_workers_give_the_same_and_make_failed_runs_again(workers):
+    FAILED_ONCE.clear()
+    problem = quiet(fails_once_everywhere, *PLAIN, executor=workers)
     X = np.array([[0.7]])
     assert np.array_equal(problem.evaluate(X), quiet(Flaky(), *PLAIN).evaluate(X))
+    assert FAILED_ONCE
+    assert not len(problem.failed)
 
 
 def test_runs_and_memory_are_told_before_the_first_run(capsys):
