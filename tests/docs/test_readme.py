@@ -67,7 +67,7 @@ SAID = re.findall(r"prints `(.*?)`", README)
 
 def test_anyones_simulator_prints_what_the_readme_says():
     assert SAID[0] == output_of(SNIPPETS[0])
-    assert len(SNIPPETS[0].splitlines()) <= 12
+    assert len([line for line in SNIPPETS[0].splitlines() if line]) <= 12
 
 
 def test_study_prints_what_the_readme_says():

@@ -16,8 +16,8 @@ COVERAGE = 3.0
 """Root mean squares within which 95 % of the errors lie.
 
 2 for a normal error of known size. The size is taken from 16 designs, growth stops as soon as they
-pass, and errors grow towards corners: on cantilever, OTL circuit, borehole and wing weight with four
-seeds each, 2.5 covered as few as 91 % of the designs, 3 at least 96 %, at 10 % more runs.
+pass, and errors grow towards corners: on cantilever, OTL circuit, borehole and wing weight with
+four seeds each, 2.5 covered as few as 91 % of the designs, 3 at least 96 %, at 10 % more runs.
 """
 
 Array = NDArray[np.float64]

@@ -108,7 +108,7 @@ def test_prediction_is_near_the_simulator(beam):
     ("options", "words"),
     [
         ({"budget": 60, "accuracy": 1e-3}, "error of the .* after 60 runs is .* at most 0.001"),
-        ({"budget": 60, "positive": True, "accuracy": 9.0}, "positive response is -"),
+        ({"budget": 60, "positive": True, "accuracy": 99.0}, "positive response is -"),
     ],
 )
 def test_what_cannot_be_trusted_is_refused_with_the_region(options, words):
