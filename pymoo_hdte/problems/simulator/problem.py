@@ -14,6 +14,8 @@ from pymoo_hdte.problems.simulator.around import Around, CommonSamples
 from pymoo_hdte.problems.simulator.inputs import Inputs
 from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.surrogate.box import Box
+from pymoo_hdte.surrogate.moments import divide_or_zero
+from pymoo_hdte.surrogate.sensitivity import SobolIndices
 from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate.sparse.held_out import draw_designs
 
@@ -139,6 +141,45 @@ class SimulatorProblem(Problem):
         points = finite_array("values", values, (None, len(self.input_names)))
         columns = [axis.cube(v) for axis, v in zip(self._inputs_axes, points.T, strict=True)]
         return self._fit.polynomial(np.column_stack(columns))
+
+    def sobol_indices(self, design: ArrayLike, response: str | None = None) -> SobolIndices:
+        """Return how the variance of a response around a design divides among its inputs.
+
+        From the squared coefficients of the expansion (Sudret, Reliability Engineering and System
+        Safety 93, 2008). Dependent noise is divided by the independent normal variables that make
+        it, in the order of their names.
+
+        Parameters
+        ----------
+        design : array_like, shape (n_var,)
+            In the variables' units.
+        response : str, optional
+            Its name, where there are several.
+
+        Returns
+        -------
+        SobolIndices
+            Exact for the surrogate.
+
+        Raises
+        ------
+        ExtrapolationError
+            If the design lies outside the box.
+        InvalidInput
+            If there is no such response, or the design has another shape.
+        """
+        place = place_of(Statistic(response=response), self.responses)
+        point = finite_array("design", design, (self.n_var,))[None]
+        self.design_box.check_inside(point)
+        moments = self._fit.moments
+        expansion = moments.expansion(point)[0, place]
+        shares = expansion[1:] ** 2
+        variance = float(shares.sum())
+        shares = divide_or_zero(shares, np.full_like(shares, variance))
+        takes_part = moments.indices[1:] > 0
+        alone = takes_part.sum(axis=1) == 1
+        first, total = shares * alone @ takes_part, shares @ takes_part
+        return SobolIndices(self.input_names, float(expansion[0]), variance, first, total)
 
     def _around(self, X: Array) -> list[Around]:
         """Return the expansion of each response around the designs."""

@@ -208,5 +208,14 @@ def noise_axis(name: str, scatter: Scatter) -> Axis:
     """Return the axis of a noise variable, in the normal coordinate if its tail is heavy."""
     if not scatter.is_heavy:
         return Axis(name, scatter)
-    quantile = scatter.distribution.quantile
-    return Axis(name, standard_normal(), from_normal=lambda w: quantile(ndtr(w)))
+    return Axis(name, standard_normal(), from_normal=_FromNormal(scatter.distribution))
+
+
+class _FromNormal:
+    """The value of a variable at that of the standard normal one of the same probability."""
+
+    def __init__(self, distribution: Distribution) -> None:
+        self._distribution = distribution
+
+    def __call__(self, w: Array) -> Array:
+        return self._distribution.quantile(ndtr(w))

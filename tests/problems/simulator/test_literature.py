@@ -27,6 +27,13 @@ def test_ishigami():
     assert mean == pytest.approx(3.5, abs=0.01 * np.sqrt(variance))
     assert std == pytest.approx(np.sqrt(variance), rel=0.01)
     assert problem.n_runs < 150
+    indices = problem.sobol_indices([0.0])
+    of_first, of_second = 0.5 * (1.0 + b * np.pi**4 / 5.0) ** 2, 49.0 / 8.0
+    alone = np.array([of_first, of_second, 0.0]) / variance
+    with_others = np.array([variance - of_second, of_second, variance - of_second - of_first])
+    assert indices.first == pytest.approx(alone, abs=0.01)
+    assert indices.total == pytest.approx(with_others / variance, abs=0.01)
+    assert indices.variance == pytest.approx(std**2)
 
 
 def test_g_function():

@@ -162,6 +162,16 @@ def test_bad_arguments_are_refused_by_name(options, words):
         quiet(lambda b, h: b + h, **given)
 
 
+def test_a_heavy_tail_goes_through_its_normal_coordinate():
+    """A log-normal factor of deviation 1: its moments are closed form, its polynomials huge."""
+    noise = {"a": chaospy.LogNormal(0.0, 1.0)}
+    problem = quiet(lambda x, a: x * a, {"x": Design(1.0, 2.0)}, noise, accuracy=0.02)
+    mean = np.exp(0.5)
+    std = mean * np.sqrt(np.e - 1.0)
+    again = pickle.loads(pickle.dumps(problem))
+    assert again.evaluate(np.array([1.5])) == pytest.approx([1.5 * mean, 1.5 * std], rel=0.02)
+
+
 def two_responses(x, a):
     return {"deflection": x + a, "stress": x**2 * a}
 
