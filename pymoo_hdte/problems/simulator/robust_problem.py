@@ -17,7 +17,12 @@ from pymoo_hdte.problems.simulator.inputs import Design, Inputs
 from pymoo_hdte.problems.simulator.problem import SimulatorProblem, place_of
 from pymoo_hdte.problems.simulator.runs import RunFile, Simulator
 from pymoo_hdte.problems.simulator.statistics import Mean, RobustConstraint, Statistic, Std
-from pymoo_hdte.problems.simulator.trust import inaccurate, negative_somewhere, positive_places
+from pymoo_hdte.problems.simulator.trust import (
+    failing,
+    inaccurate,
+    negative_somewhere,
+    positive_places,
+)
 from pymoo_hdte.surrogate.sparse.adaptive import HELD_OUT_DESIGNS, AdaptiveFit, fit_adaptively
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
@@ -95,8 +100,8 @@ def robust_problem(
     InvalidInput
         For an argument that is not allowed.
     UntrustedSurrogate
-        If the budget is spent and the error is still larger than asked for, or a positive response
-        becomes negative; tells where.
+        If the budget is spent and the error is still larger than asked for, a positive response
+        becomes negative, or more than a fifth of the runs fail; tells where.
     SimulatorFailed
         If all runs of a batch fail.
 
@@ -129,8 +134,10 @@ def robust_problem(
     responses = simulate.responses
     for one in [*objectives, *(limit.statistic for limit in constraints)]:
         place_of(one, responses)
-    refusal = inaccurate(inputs, fit, accuracy, responses) or negative_somewhere(
-        inputs, fit, positive_places(positive, responses)
+    refusal = (
+        failing(inputs, fit)
+        or inaccurate(inputs, fit, accuracy, responses)
+        or negative_somewhere(inputs, fit, positive_places(positive, responses))
     )
     if refusal:
         raise UntrustedSurrogate(*refusal)

@@ -18,6 +18,10 @@ from pymoo_hdte.checks import InvalidInput
 Array = NDArray[np.float64]
 
 
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Sizes of responses, in any unit, the squares of which keep their digits."""
+
+
 class SimulatorFailed(RuntimeError):
     """The simulator fails where no surrogate can do without it; the message names the place."""
 
@@ -130,7 +134,7 @@ class Simulator:
         self.file, self.progress = file, progress
         self.responses = file.responses if file else ()
         self.n_calls = 0
-        self._ran = False
+        self._ran = self._sized = False
         self._last_error: BaseException | None = None
 
     def __call__(self, values: Array) -> Array:
@@ -160,9 +164,21 @@ class Simulator:
         if not self._ran:
             where = ", ".join(f"{n} = {v:g}" for n, v in zip(self.names, rows[0], strict=True))
             message = f"the simulator failed in all of {len(rows)} runs, the first at {where}"
+            message += f": {self._last_error!r}" if self._last_error else ""
             raise SimulatorFailed(message) from self._last_error
         bad = [np.nan] * len(self.responses)
-        return np.array([found[row] if self._good(found[row]) else bad for row in rows])
+        table = np.array([found[row] if self._good(found[row]) else bad for row in rows])
+        if not self._sized:
+            self._check_sizes(table)
+        return table
+
+    def _check_sizes(self, table: Array) -> None:
+        """Refuse the first runs if squares of their responses would lose digits."""
+        self._sized = True
+        for name, size in zip(self.responses, np.nanmax(np.abs(table), axis=0), strict=True):
+            if size and not (size > SMALLEST and size < LARGEST):
+                allowed = f"0 or {SMALLEST:g} to {LARGEST:g}: choose another unit"
+                raise InvalidInput(f"size of {name!r}", float(size), allowed)
 
     def _good(self, gave: Any) -> bool:
         if gave is None:
@@ -213,7 +229,7 @@ class Simulator:
         """Return what the simulator gave as (n, r), and learn the names of its responses."""
         if isinstance(gave, Mapping):
             names, parts = tuple(gave), list(gave.values())
-        elif isinstance(gave, tuple | list):
+        elif isinstance(gave, tuple | list) or (count is None and np.ndim(gave) == 1):
             names, parts = tuple(f"response_{k + 1}" for k in range(len(gave))), list(gave)
         else:
             names, parts = ("response",), [gave]

@@ -15,12 +15,24 @@ from pymoo_hdte.surrogate.trust import region_of
 
 Array = NDArray[np.float64]
 
+MOST_FAILED = 0.2
+"""Largest share of failed runs that are left out: what they would have given is extrapolated."""
 _LIKE_THE_WORST = 0.3
 """Share of the largest error above which a point belongs to the region of the error."""
 _LOOKED_AT = 1024
 """Designs, with two draws of the scatter each, at which the sign of a response is looked at."""
 
 Refusal = tuple[str, float, str, dict[str, tuple[float, float]]]
+
+
+def failing(inputs: Inputs, fit: AdaptiveFit) -> Refusal | None:
+    """Return where the simulator fails, if it does so too often to leave the runs out, or None."""
+    bad = np.isnan(fit.held_out_error).any(axis=1)
+    if bad.mean() <= MOST_FAILED:
+        return None
+    points = inputs.values(fit.held_out_points[bad])
+    region = region_of(inputs.names, points, reach(inputs))
+    return "share of runs that failed", float(bad.mean()), f"at most {MOST_FAILED:g}", region
 
 
 def inaccurate(

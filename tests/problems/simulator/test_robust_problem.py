@@ -232,9 +232,38 @@ def test_runs_that_always_fail_are_left_out_and_told():
 
 
 def test_a_simulator_that_never_runs_says_why():
-    with pytest.raises(SimulatorFailed, match="failed in all") as failure:
+    with pytest.raises(SimulatorFailed, match=r"failed in all .*no convergence") as failure:
         quiet(Flaky(lambda call, x: True), *PLAIN)
     assert "no convergence" in str(failure.value.__cause__)
+
+
+def test_a_simulator_that_fails_in_half_of_the_box_is_refused_with_its_region():
+    with pytest.raises(UntrustedSurrogate, match=r"runs that failed is .* so where x is 0\.[45]"):
+        quiet(Flaky(lambda call, x: x < 0.72), *PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("gives", "words"),
+    [
+        (lambda x: "a", "what the simulator returns is 'a'"),
+        (lambda x: 1j * x, "what the simulator returns"),
+        (lambda x: 1e200 * x, "choose another unit"),
+        (lambda x: {"y" if x < 0.7 else "z": x}, "names of the responses"),
+    ],
+)
+def test_what_is_no_response_is_refused(gives, words):
+    with pytest.raises(InvalidInput, match=words):
+        quiet(gives, PLAIN[0])
+
+
+def test_responses_without_scatter_are_no_trouble():
+    asked = {"objectives": [Mean(response="response_1"), Std(response="response_2")]}
+    problem = quiet(
+        lambda x, y: np.array([3.0, x * y]), {"x": Design(0, 1), "y": Design(1, 2)}, **asked
+    )
+    F, dF = problem.evaluate(np.array([[0.5, 1.5]]), return_values_of=["F", "dF"])
+    assert pytest.approx(np.array([[3.0, 0.0]]), abs=1e-12) == F
+    assert dF == pytest.approx(np.zeros((1, 2, 2)), abs=1e-9)
 
 
 def test_a_killed_study_goes_on_without_a_run_made_twice(tmp_path):
