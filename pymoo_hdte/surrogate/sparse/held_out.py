@@ -106,9 +106,8 @@ def _of_most(values: Array) -> Array:
 
 def _average(values: Array) -> Array:
     count = np.sum(np.isfinite(values), axis=0)
-    return np.abs(np.nanmean(values, axis=0)) + COVERAGE * np.nanstd(values, axis=0) / np.sqrt(
-        count
-    )
+    own_error = np.nanstd(values, axis=0) / np.sqrt(count)
+    return np.abs(np.nanmean(values, axis=0)) + STANDARD_ERRORS * own_error
 
 
 def draw_designs(axes: list[Axis], count: int, random_state: np.random.Generator) -> Array:
