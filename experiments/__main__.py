@@ -15,6 +15,7 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.machine import usable_cores
 from experiments.runner.registry import EXPERIMENTS, Context, Experiment, ExtraMissing
 from experiments.runner.report import check_page, write_report
+from experiments.runner.setting import Setting
 from experiments.runner.store import save
 from experiments.runner.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
@@ -28,6 +29,13 @@ SEEDED = [one for one in EXPERIMENTS if one.takes_seeds]
 LIMITED = [one for one in EXPERIMENTS if one.takes_cases]
 SEEDS = 20
 """Runs of every algorithm: the paper's number, and the default here."""
+OPEN = {
+    "evaluations": "--evaluations",
+    "population": "--pop",
+    "problems": "--problems",
+    "algorithms": "--algorithms",
+}
+"""Fields of a setting, and the options that give them."""
 INTERRUPTED = 130
 """Exit code that a shell expects of a program ended by Ctrl-C."""
 
@@ -46,9 +54,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"--full is for {_names(STORED)}")
     if options.seeds and options.name and not chosen[0].takes_seeds:
         parser.error(f"--seeds is for {_names(SEEDED)}")
+    given = {name: getattr(options, name) for name in OPEN if getattr(options, name) is not None}
+    if given and not (options.name and chosen[0].takes_seeds):
+        parser.error(f"{OPEN[next(iter(given))]} is for {_names(SEEDED)}")
     if options.cases and not (options.full and options.name and chosen[0].takes_cases):
         parser.error(f"--cases is for {_names(LIMITED)} with --full")
+    seeds = options.seeds or range(1, SEEDS + 1)
     try:
+        setting = Setting(first_seed=seeds[0], **given)
+        if given:
+            chosen[0].check(setting)
         check_page(options.out)
     except (InvalidInput, OSError) as error:
         parser.error(str(error))
@@ -63,8 +78,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(str(error))
     with executor or nullcontext():
         campaign = Campaign(options.out, executor)
-        seeds = options.seeds or SEEDS
-        context = Context(seeds, options.out, campaign, options.full, options.quick, options.cases)
+        extent = options.full, options.quick, options.cases
+        context = Context(len(seeds), options.out, campaign, *extent, setting)
         return _run(chosen, context)
 
 
@@ -104,9 +119,11 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--list", action="store_true", help="list the experiments and stop")
     parser.add_argument(
         "--seeds",
-        type=_positive,
-        help=f"runs of every algorithm in {_names(SEEDED)} (default {SEEDS})",
+        type=_counted,
+        help=f"runs of every algorithm in {_names(SEEDED)} (default {SEEDS}), or their seeds: "
+        "21-40",
     )
+    _add_open_options(parser)
     parser.add_argument(
         "--workers",
         type=_positive,
@@ -118,8 +135,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--cases",
-        type=_positive,
-        help=f"with --full, only the first so many cases of {_names(LIMITED)}",
+        type=_counted,
+        help=f"with --full, only the first so many cases of {_names(LIMITED)}, or some: 97-192",
     )
     extent = parser.add_mutually_exclusive_group()
     extent.add_argument(
@@ -137,6 +154,45 @@ def _parser() -> argparse.ArgumentParser:
         "--dask", metavar="ADDRESS", help="run the jobs on this Dask scheduler instead"
     )
     return parser
+
+
+def _add_open_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that open a comparison to other problems, algorithms and budgets."""
+    opened = parser.add_argument_group(
+        f"another setting than the paper's, for {_names(SEEDED)}",
+        "Names are those of this package (calibrated, resonant, toy, the members of "
+        "robust_dte_family; AMP-MOPSO, MOPSO, NSGA-II, A-MOPSO, MP-MOPSO, ElitistSwarm), those of "
+        "pymoo (zdt1; NSGA2), or module:name of a module of yours. The first algorithm is tested "
+        "against the others.",
+    )
+    opened.add_argument("--evaluations", type=_positive, help="of every run (default 10000)")
+    opened.add_argument(
+        "--pop", type=_positive, dest="population", help="size of the population (default 100)"
+    )
+    opened.add_argument(
+        "--problems", type=_listed, metavar="A,B", help="default calibrated,resonant"
+    )
+    opened.add_argument(
+        "--algorithms", type=_listed, metavar="A,B", help="default those of the paper's table"
+    )
+
+
+def _listed(text: str) -> tuple[str, ...]:
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list of names like a,b")
+    return names
+
+
+def _counted(text: str) -> range:
+    """Return what a number, from 1 on, or a range stands for."""
+    first, dash, last = text.partition("-")
+    if not dash:
+        return range(1, _positive(text) + 1)
+    counted = range(_positive(first), _positive(last) + 1)
+    if not counted:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a range that rises, like 21-40")
+    return counted
 
 
 def _positive(text: str) -> int:

@@ -266,11 +266,11 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 
 # %%
 # Of another machine than a drive, no model meets the noise of its sensors. There all of this
-# is measured in units of the *rest*, which is what the two best effects leave, and three rules
-# are added (``pymoo_hdte.discrepancy.mechanism.analysis``): a named effect removes at least half
-# of the power of the misfit beyond the noise of the sensors; of models that leave about as much,
-# the one with the fewest unknowns is named; and a law that merely contains the named one is no
-# other explanation.
+# is measured in units of the *rest*, which is what up to three effects leave, and four rules are
+# added (``pymoo_hdte.discrepancy.mechanism.naming``): a named effect removes at least half of the
+# power of the misfit beyond the noise of the sensors; of models that leave about as much, the one
+# with the fewest unknowns is named; a law that ended at a bound gives way to its special case; and
+# a law that merely contains the named one is no other explanation.
 
 # %%
 # Change a rule

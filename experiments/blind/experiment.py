@@ -1,8 +1,8 @@
 """Blind campaigns: how often the discrepancy workflow finds what a bench hides.
 
 Without ``--full`` the report is made from ``experiments/data/blind.csv``, the committed outcome of
-the cases that have been run, which is a beginning of the list; with it the list is run (the first
-``--cases N`` of it), goes on where it was interrupted, and leaves the same file, and that of the
+the cases that have been run, which stand together in the list; with it the list is run (of it
+``--cases 97-192``), goes on where it was interrupted, and leaves the same file, and that of the
 seconds, in the results folder.
 """
 
@@ -97,10 +97,16 @@ def _extent(outcomes: list[Outcome]) -> str:
     total = len(all_cases())
     if not outcomes:
         return f"None of the {total} cases of the list is stored yet: all figures are missing."
-    what = f"{len(outcomes)} of the {total} cases of the list have been run"
     if len(outcomes) == total:
-        return f"{what}."
-    return f"{what}: its beginning, in which kinds, effects, forms and stresses are mixed evenly."
+        return f"All {total} cases of the list have been run."
+    first = all_cases().index(outcomes[0].case) + 1
+    what = (
+        f"Cases {first} to {first + len(outcomes) - 1} of the {total} of the list are shown, in "
+        "which kinds, effects, forms and stresses are mixed evenly."
+    )
+    if first == 1:
+        return what
+    return f"{what} Those before them were run earlier and have led to changes of the rules."
 
 
 def score_cases(chosen: list[Case], campaign: Campaign, title: str) -> list[Outcome]:
@@ -112,7 +118,8 @@ def score_cases(chosen: list[Case], campaign: Campaign, title: str) -> list[Outc
 def _campaign(context: Context) -> list[Outcome]:
     # Only the jobs import it, and the error of a job ends the command with a traceback.
     require("pysindy", "blind")
-    chosen = all_cases()[: context.cases]
+    cases = all_cases()
+    chosen = [cases[number - 1] for number in context.cases or range(1, len(cases) + 1)]
     outcomes = score_cases(chosen, context.campaign, "blind campaigns")
     target, seconds = context.out / "blind", context.out / TIMES / "blind"
     write_atomically(target / OUTCOMES, format_outcomes(outcomes).encode())

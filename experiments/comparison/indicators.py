@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from moocore import is_nondominated
 from numpy.typing import ArrayLike, NDArray
 from pymoo.indicators.hv import Hypervolume
 from pymoo.indicators.igd import IGD
@@ -39,6 +40,9 @@ class IndicatorsAgainst:
     ----------
     front
         Non-dominated objectives, shape (n, m).
+    normalised
+        False to measure in the units of the objectives; the hypervolume then counts up to the
+        same point, and is in their product.
 
     Raises
     ------
@@ -46,7 +50,7 @@ class IndicatorsAgainst:
         A value is not finite, or an objective does not vary: such a front cannot normalise.
     """
 
-    def __init__(self, front: ArrayLike) -> None:
+    def __init__(self, front: ArrayLike, *, normalised: bool = True) -> None:
         front = finite_array("true front", front, (None, None))
         self.ideal = front.min(axis=0)
         self.nadir = front.max(axis=0)
@@ -54,6 +58,8 @@ class IndicatorsAgainst:
             raise InvalidInput("extent of the true front", self.nadir - self.ideal, "above 0")
         scale = {"zero_to_one": True, "ideal": self.ideal, "nadir": self.nadir}
         corner = np.full(front.shape[1], CORNER)
+        if not normalised:
+            scale, corner = {}, self.ideal + CORNER * (self.nadir - self.ideal)
         self._igd = IGD(front, **scale)
         self._igd_plus = IGDPlus(front, **scale)
         self._hypervolume = Hypervolume(ref_point=corner, norm_ref_point=False, **scale)
@@ -84,3 +90,12 @@ class IndicatorsAgainst:
     def normalise(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map the ideal point to 0 and the nadir point to 1."""
         return (F - self.ideal) / (self.nadir - self.ideal)
+
+
+def front_among(F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the different, finite, non-dominated rows of ``F`` (n, m), in rising order."""
+    F = F[np.isfinite(F).all(axis=1)]
+    if not len(F):
+        return F
+    front = F[is_nondominated(F)]
+    return front[np.lexsort(front.T[::-1])]

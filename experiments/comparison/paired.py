@@ -1,4 +1,4 @@
-"""Algorithms compared on the same problems and seeds, against the true fronts of the surrogates."""
+"""Algorithms compared on the same problems and seeds, against true fronts or the union of runs."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.comparison.named import problem_named, source_of
+from experiments.comparison.open_runs import OpenRun
 from experiments.comparison.quality import Quality, TrueFront
-from experiments.comparison.runs import OptimisationRun, robust_problem
+from experiments.comparison.references import MODELS, objective_names, reference
+from experiments.comparison.runs import ALGORITHMS, OptimisationRun
 from experiments.comparison.statistics import effect_size, holm, wilcoxon_p
 from experiments.runner.campaign import Run
 from experiments.runner.registry import Context
-
-MODELS = ("calibrated", "resonant")
-"""Drive models on which algorithms are compared."""
+from experiments.runner.setting import Setting
 
 SMALLER_IS_BETTER = {"igd": True, "spacing": True, "hypervolume": False, "lost_pieces": True}
 
@@ -55,10 +56,35 @@ def too_few_seeds(comparisons: Sequence[Comparison]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Runs of several algorithms on one problem, in the order of their seeds."""
+    """Runs of several algorithms on one problem, in the order of their seeds.
+
+    Attributes
+    ----------
+    model
+        Name of the problem.
+    truth
+        The front against which they are measured.
+    is_true
+        Whether it is the problem's own; otherwise it is the union of all these runs.
+    seeds
+        Seeds of the runs of every algorithm.
+    objectives
+        Names of the objectives.
+    fronts
+        Final sets of every algorithm, each of shape (n, m).
+    spent
+        Evaluations of every run.
+    runs, qualities
+        Where they come from, and what they are worth.
+    """
 
     model: str
     truth: TrueFront
+    is_true: bool
+    seeds: range
+    objectives: tuple[str, ...]
+    fronts: dict[str, list[NDArray[np.float64]]]
+    spent: dict[str, list[int]]
     runs: dict[str, list[Run]]
     qualities: dict[str, list[Quality]]
 
@@ -81,9 +107,9 @@ class Comparison:
         return np.array([run.seconds for run in self.runs[algorithm]])
 
     def median_front(self, algorithm: str) -> NDArray[np.float64]:
-        """Return the objectives (n, 2) of the run whose IGD is the (lower) median."""
+        """Return the objectives (n, m) of the run whose IGD is the (lower) median."""
         order = np.argsort(self.values(algorithm, "igd"), kind="stable")
-        return objectives(self.runs[algorithm][order[(len(order) - 1) // 2]])
+        return self.fronts[algorithm][order[(len(order) - 1) // 2]]
 
     def paired_tests(self, algorithm: str, indicator: str) -> list[PairedTest]:
         """Test ``algorithm`` against each of the others on one indicator."""
@@ -98,32 +124,60 @@ class Comparison:
         return [PairedTest(*entry) for entry in zip(rivals, adjusted.tolist(), better, strict=True)]
 
 
+Job = OptimisationRun | OpenRun
+
+
 def compare(context: Context, algorithms: Sequence[str], title: str) -> list[Comparison]:
-    """Run every algorithm on every problem with seeds 1..seeds and measure the final sets."""
-    seeds = range(1, context.seeds + 1)
-    truths = {model: TrueFront(true_front(model)) for model in MODELS}
-    jobs = [OptimisationRun(*entry) for entry in product(MODELS, algorithms, seeds)]
-    finished = dict(zip(jobs, context.campaign.run(jobs, title), strict=True))
-    comparisons = []
-    for model, truth in truths.items():
-        runs = {
-            algorithm: [finished[OptimisationRun(model, algorithm, seed)] for seed in seeds]
-            for algorithm in algorithms
-        }
-        qualities = {
-            algorithm: [truth.quality(objectives(run)) for run in of_algorithm]
-            for algorithm, of_algorithm in runs.items()
-        }
-        comparisons.append(Comparison(model, truth, runs, qualities))
-    return comparisons
+    """Run every algorithm on every problem of the setting with its seeds; measure the final sets.
+
+    ``algorithms`` are those of the table, unless the setting names others.
+    """
+    setting, seeds = context.setting, context.seeds_to_run
+    names = setting.algorithms or tuple(algorithms)
+    entries = list(product(setting.problems, names, seeds))
+    jobs = [_job(setting, *entry) for entry in entries]
+    runs = context.campaign.run(jobs, title)
+    finished = {entry: (job, run) for entry, job, run in zip(entries, jobs, runs, strict=True)}
+    return [
+        _comparison(problem, {a: [finished[problem, a, s] for s in seeds] for a in names}, seeds)
+        for problem in setting.problems
+    ]
 
 
-def true_front(model: str) -> NDArray[np.float64]:
-    """Return the stored true front of the surrogate of a drive model, shape (n, 2)."""
-    front = robust_problem(model).pareto_front()
-    if front is None:
-        raise RuntimeError(f"no stored front of {model}: run python -m experiments reference_front")
-    return front
+def _job(setting: Setting, problem: str, algorithm: str, seed: int) -> Job:
+    if problem not in MODELS or algorithm not in ALGORITHMS:
+        budget = setting.population, setting.evaluations
+        return OpenRun(problem, algorithm, seed, *budget, source_of(problem, algorithm))
+    if (setting.population, setting.evaluations) == (Setting.population, Setting.evaluations):
+        return OptimisationRun(problem, algorithm, seed)
+    return OptimisationRun(problem, algorithm, seed, setting.population, setting.generations)
+
+
+def _comparison(
+    problem: str, finished: dict[str, list[tuple[Job, Run]]], seeds: range
+) -> Comparison:
+    found = {a: [_found(job, run) for job, run in of_one] for a, of_one in finished.items()}
+    fronts = {a: [F for F, _ in of_one] for a, of_one in found.items()}
+    truth, is_true = reference(problem, [F for of_one in fronts.values() for F in of_one])
+    return Comparison(
+        problem,
+        truth,
+        is_true,
+        seeds,
+        objective_names(problem),
+        fronts,
+        {a: [spent for _, spent in of_one] for a, of_one in found.items()},
+        {a: [run for _, run in of_one] for a, of_one in finished.items()},
+        {a: [truth.quality(F) for F in of_one] for a, of_one in fronts.items()},
+    )
+
+
+def _found(job: Job, run: Run) -> tuple[NDArray[np.float64], int]:
+    """Return the final set of a run, shape (n, m), and the evaluations that it spent."""
+    if isinstance(job, OpenRun):
+        F = run.values[:, -problem_named(job.problem).n_obj :]
+        return F[np.isfinite(F).all(axis=1)], int(run.values[0, 0])
+    return objectives(run), job.population * job.generations
 
 
 def objectives(run: Run) -> NDArray[np.float64]:

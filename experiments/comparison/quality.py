@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from moocore import is_nondominated
 from numpy.typing import ArrayLike, NDArray
 
 from experiments.comparison.indicators import IndicatorsAgainst
@@ -12,6 +13,9 @@ from pymoo_hdte.checks import finite_array
 
 GAP = 0.02
 """Neighbours on the reference front further apart than this belong to two pieces."""
+
+N_POINTS = 1000
+"""Of a front with two objectives; those with three have thousands."""
 
 REACH = 0.05
 """A piece with no solution within this distance is lost."""
@@ -37,8 +41,11 @@ class TrueFront:
     Parameters
     ----------
     F
-        Non-dominated objectives, shape (n, 2), dense enough that neighbours on one piece are
-        closer than `GAP` after normalisation.
+        Non-dominated objectives, shape (n, m), with two objectives dense enough that neighbours on
+        one piece are closer than `GAP` after normalisation.
+    in_pieces
+        Whether it falls into pieces at gaps. Otherwise it counts as one piece, as every front of
+        more objectives does: lost only if nothing comes near any of it.
 
     Raises
     ------
@@ -46,10 +53,11 @@ class TrueFront:
         A value is not finite, or an objective does not vary: such a front cannot normalise.
     """
 
-    def __init__(self, F: ArrayLike) -> None:
-        front = finite_array("true front", F, (None, 2))
+    def __init__(self, F: ArrayLike, *, in_pieces: bool = True) -> None:
+        front = finite_array("true front", F, (None, None))
         front = front[np.argsort(front[:, 0], kind="stable")]
         self.F = front
+        self._in_pieces = in_pieces and front.shape[1] == 2
         self._indicators = IndicatorsAgainst(front)
 
     def normalise(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -58,12 +66,14 @@ class TrueFront:
 
     @property
     def pieces(self) -> list[NDArray[np.float64]]:
-        """The connected pieces of the front, each of shape (n, 2), by rising first objective."""
+        """The connected pieces of the front, each of shape (n, m), by rising first objective."""
+        if not self._in_pieces:
+            return [self.F]
         steps = np.linalg.norm(np.diff(self.normalise(self.F), axis=0), axis=1)
         return np.split(self.F, np.flatnonzero(steps > GAP) + 1)
 
     def quality(self, F: ArrayLike) -> Quality:
-        """Measure the front ``F``, shape (n, 2).
+        """Measure the front ``F``, shape (n, m).
 
         As `IndicatorsAgainst`; an empty front loses every piece.
 
@@ -72,7 +82,7 @@ class TrueFront:
         InvalidInput
             An objective is not finite.
         """
-        front = finite_array("F", F, (None, 2))
+        front = finite_array("F", F, (None, self.F.shape[1]))
         measured = self._indicators(front)
         lost = self._lost(front) if len(front) else len(self.pieces)
         return Quality(measured.igd, measured.spacing, measured.hypervolume, lost)
@@ -84,3 +94,19 @@ class TrueFront:
             for piece in self.pieces
         ]
         return sum(bool(distance > REACH) for distance in nearest)
+
+
+def even_curve(F: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return some `N_POINTS` of the non-dominated rows of a curve of more, even in arc length.
+
+    Distances are in objectives normalised by the front, and steps of over `GAP` are gaps.
+    """
+    front = F[is_nondominated(F)]
+    front = front[front[:, 0].argsort()]
+    normal = (front - front.min(axis=0)) / np.ptp(front, axis=0)
+    steps = np.linalg.norm(np.diff(normal, axis=0), axis=1)
+    arc = np.concatenate([[0.0], np.cumsum(np.where(steps > GAP, 0.0, steps))])
+    wanted = np.linspace(0.0, arc[-1], N_POINTS)
+    ends = np.flatnonzero(steps > GAP)
+    rows = np.unique(np.concatenate([np.searchsorted(arc, wanted), ends, ends + 1]))
+    return front[rows.clip(max=len(front) - 1)]

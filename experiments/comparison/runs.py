@@ -16,6 +16,9 @@ from pymoo_hdte.algorithms import AMOPSO, AMPMOPSO, MOPSO, MPMOPSO
 from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.problems import RobustDTE
 
+FINAL_SIZE = 50
+"""Most designs of a final set: the size of the paper's archive."""
+
 ALGORITHMS: dict[str, Callable[[int, int], Algorithm]] = {
     "NSGA-II": lambda population, _: NSGA2(pop_size=population),
     "MOPSO": lambda population, size: MOPSO(pop_size=population, archive_size=size),
@@ -41,7 +44,7 @@ class OptimisationRun:
     seed: int
     population: int = 100
     generations: int = 100
-    final_size: int = 50
+    final_size: int = FINAL_SIZE
 
     @property
     def key(self) -> str:

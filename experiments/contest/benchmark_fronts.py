@@ -18,12 +18,9 @@ from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 from scipy.optimize import minimize
 
-from experiments.comparison.quality import GAP
+from experiments.comparison.quality import N_POINTS, even_curve
 from experiments.contest.problems import BENCHMARKS, problem_of
 from experiments.runner.committed import DATA
-
-N_POINTS = 1000
-"""Of a front with two objectives; those with three have thousands."""
 
 _PARTITIONS = 99
 
@@ -155,22 +152,6 @@ def _least_cost(
     )
     x = np.clip(result.x, problem.xl, problem.xu)
     return (float(result.fun) if np.min(slack(x)) > -1e-7 else np.inf), x
-
-
-def even_curve(F: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return some `N_POINTS` of the non-dominated rows of a curve of more, even in arc length.
-
-    Distances are in objectives normalised by the front, and steps of over `GAP` are gaps.
-    """
-    front = F[is_nondominated(F)]
-    front = front[front[:, 0].argsort()]
-    normal = (front - front.min(axis=0)) / np.ptp(front, axis=0)
-    steps = np.linalg.norm(np.diff(normal, axis=0), axis=1)
-    arc = np.concatenate([[0.0], np.cumsum(np.where(steps > GAP, 0.0, steps))])
-    wanted = np.linspace(0.0, arc[-1], N_POINTS)
-    ends = np.flatnonzero(steps > GAP)
-    rows = np.unique(np.concatenate([np.searchsorted(arc, wanted), ends, ends + 1]))
-    return front[rows.clip(max=len(front) - 1)]
 
 
 @cache

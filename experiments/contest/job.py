@@ -6,9 +6,8 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from moocore import is_nondominated
-from numpy.typing import NDArray
 
+from experiments.comparison.indicators import front_among
 from experiments.contest.contestants import EVERYONE
 from experiments.contest.problems import problem_of
 from experiments.runner.campaign import Run
@@ -51,12 +50,3 @@ class ContestRun:
             rows.append(np.column_stack([np.tile([budget, offer.spent], (len(front), 1)), front]))
         columns = (EVALUATIONS, SPENT, *(f"f{1 + i}" for i in range(problem.n_obj)))
         return Run(columns, np.concatenate(rows), seconds)
-
-
-def front_among(F: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the different, finite, non-dominated rows of ``F`` (n, m), in rising order."""
-    F = F[np.isfinite(F).all(axis=1)]
-    if not len(F):
-        return F
-    front = F[is_nondominated(F)]
-    return front[np.lexsort(front.T[::-1])]

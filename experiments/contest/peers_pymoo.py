@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any
-from unittest.mock import patch
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +16,7 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
+from experiments.comparison.open_runs import seeded_default_rng
 from experiments.contest.offer import POPULATION, Offer
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
 
@@ -88,20 +86,3 @@ def _feasible(algorithm: Algorithm, problem: Problem) -> NDArray[np.float64]:
         return F
     # Some keep no violations: what is offered is judged by the problem itself.
     return F[np.all(problem.evaluate(X, return_values_of=["G"]) <= 0.0, axis=1)]
-
-
-@contextmanager
-def seeded_default_rng(seed: int) -> Iterator[None]:
-    """Seed the generators that pymoo's MOPSO_CD and CMOPSO make without a seed.
-
-    Both truncate their archive with ``numpy.random.default_rng(None)``, so that the same seed would
-    not give the same run.
-    """
-    original = np.random.default_rng
-    children = np.random.SeedSequence(seed)
-
-    def seeded(given: Any = None) -> np.random.Generator:
-        return original(children.spawn(1)[0] if given is None else given)
-
-    with patch.object(np.random, "default_rng", seeded):
-        yield

@@ -7,24 +7,30 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from experiments.comparison.figures import fronts, igd_of_runs
+from experiments.comparison.named import check_setting
 from experiments.comparison.paired import Comparison, compare, too_few_seeds
 from experiments.paper.comparison_tables import (
     change,
     coverage_table,
+    open_paragraphs,
     paired_tests_table,
     quality_table,
     runs_table,
+    subject,
 )
 from experiments.published_values import TABLE_7
 from experiments.runner.registry import Context
 from experiments.runner.result import Finding, Picture, Result, significant
+
+__all__ = ["check_setting", "run"]
 
 FULL = "AMP-MOPSO"
 PARTS = (FULL, "A-MOPSO", "MP-MOPSO", "MOPSO")
 
 SETTING = (
     "A-MOPSO keeps only the entropy weight, MP-MOPSO only the pyramid, MOPSO neither. Budget, "
-    "seeds and measures are those of Table 7. The paper shows this ablation as one picture of each "
+    "seeds and measures are those of Table 7; the experiment anytime has other "
+    "budgets. The paper shows this ablation as one picture of each "
     "front and prints no numbers for A-MOPSO and MP-MOPSO."
 )
 
@@ -36,27 +42,30 @@ FLOWCHART = (
 
 
 def run(context: Context) -> Result:
-    """Compare AMP-MOPSO with variants that lack one or both strategies."""
+    """Compare AMP-MOPSO with variants that lack strategies, or what the setting names."""
+    stated = context.setting.is_stated
     comparisons = compare(context, PARTS, "ablation")
+    found = [list(find(comparisons)) if stated else [] for find in (_evenness, _gaps)]
     return Result(
-        title=f"Fig. 17: ablation of AMP-MOPSO, seeds 1 to {context.seeds}",
-        command=f"python -m experiments ablation --seeds {context.seeds}",
-        paragraphs=(SETTING, FLOWCHART),
+        title=f"Fig. 17: ablation of AMP-MOPSO{'' if stated else ', open'}, "
+        f"{context.seeds_in_words}",
+        command=context.comparison_command("ablation"),
+        paragraphs=(SETTING, FLOWCHART) if stated else open_paragraphs(context, comparisons),
         tables=(
-            quality_table(comparisons, TABLE_7, list(_evenness(comparisons))),
-            coverage_table(comparisons, list(_gaps(comparisons))),
-            paired_tests_table(comparisons, FULL),
+            quality_table(comparisons, TABLE_7 if stated else {}, found[0]),
+            coverage_table(comparisons, found[1]),
+            paired_tests_table(comparisons, subject(context, FULL)),
             runs_table(comparisons),
         ),
         pictures=(
             Picture(
                 "fronts",
-                "As Fig. 17: for every variant the run of median IGD over the surrogate's front.",
+                "As Fig. 17: for every variant the run of median IGD over the reference front.",
                 fronts(comparisons),
             ),
             Picture("igd", "IGD of every run; bars mark the medians.", igd_of_runs(comparisons)),
         ),
-        notes=too_few_seeds(comparisons),
+        notes=too_few_seeds(comparisons) if stated else (),
     )
 
 

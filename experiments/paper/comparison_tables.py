@@ -2,16 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from experiments.comparison.paired import Comparison
+from experiments.comparison.runs import FINAL_SIZE
 from experiments.comparison.statistics import summary
 from experiments.paper.models import model_sentences
 from experiments.published_values import AlgorithmQuality
+from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Table, significant
+from pymoo_hdte.drive import PRESETS
 
 WHO = (Column("problem"), Column("algorithm"))
 INDICATOR_NAMES = {"igd": "IGD", "spacing": "Spacing", "hypervolume": "hypervolume"}
+
+
+def open_paragraphs(context: Context, comparisons: Sequence[Comparison]) -> tuple[str, ...]:
+    """Say what differs from the setting that the paper states; nothing if only the seeds do."""
+    setting = context.setting
+    if setting.is_stated:
+        return ()
+    unions = [one.model for one in comparisons if not one.is_true]
+    sentences = [
+        "Not the setting of the paper, whose numbers are therefore left out: "
+        f"{'; '.join(setting.differences())}.",
+        f"Every run may spend {setting.evaluations:,} evaluations with a population of "
+        f"{setting.population}, and its feasible, non-dominated designs are thinned to at most "
+        f"{FINAL_SIZE} by crowding.",
+        "IGD and Spacing come from pymoo, with ideal and nadir point of the reference front.",
+    ]
+    if unions:
+        sentences.append(f"No true front is known of {', '.join(unions)}: the union of all runs.")
+    return (" ".join(sentences), *_other_budgets(setting.evaluations, comparisons))
+
+
+def _other_budgets(evaluations: int, comparisons: Sequence[Comparison]) -> Iterator[str]:
+    for comparison in comparisons:
+        for algorithm, spent in comparison.spent.items():
+            if set(spent) != {evaluations}:
+                few, many = min(spent), max(spent)
+                found = f"{few:,}" if few == many else f"{few:,} to {many:,}"
+                yield (
+                    f"No fair comparison: on {comparison.model}, {algorithm} spent {found} "
+                    f"evaluations instead of {evaluations:,}."
+                )
+
+
+def subject(context: Context, of_the_paper: str) -> str:
+    """Return the algorithm that the others are tested against: the first that was asked for."""
+    return context.setting.algorithms[0] if context.setting.algorithms else of_the_paper
 
 
 def quality_table(
@@ -25,25 +64,26 @@ def quality_table(
         paper = published.get(algorithm)
         for indicator in ("igd", "spacing"):
             yield from summary(comparison.values(algorithm, indicator))
-            yield getattr(paper, indicator) if paper else None
+            if published:
+                yield getattr(paper, indicator) if paper else None
 
     columns = [
         column
         for name in ("IGD", "Spacing")
-        for column in (*_summary_columns(name), _paper_column(name))
+        for column in (*_summary_columns(name), *_paper_columns(name, published))
     ]
     return Table(
         "quality",
-        "IGD and Spacing of the final sets, normalised by the surrogate's front; smaller is better",
+        "IGD and Spacing of the final sets, normalised by the reference front; smaller is better",
         (*WHO, *columns),
         _rows(comparisons, cells),
-        note=" ".join(model_sentences(*(comparison.model for comparison in comparisons))),
+        note=" ".join(model_sentences(*(c.model for c in comparisons if c.model in PRESETS))),
         findings=tuple(findings),
     )
 
 
 def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding] = ()) -> Table:
-    """Hypervolume, and pieces of the surrogate's front that no solution comes near."""
+    """Hypervolume, and pieces of the reference front that no solution comes near."""
 
     def cells(comparison: Comparison, algorithm: str) -> Iterable[Cell]:
         lost = comparison.values(algorithm, "lost_pieces")
@@ -54,7 +94,7 @@ def coverage_table(comparisons: Sequence[Comparison], findings: Sequence[Finding
 
     columns = (
         *_summary_columns("hypervolume", digits=5),
-        Column("of the surrogate's front", group="pieces"),
+        Column("of the reference front", group="pieces"),
         Column("lost in all runs", group="pieces"),
         Column("runs that lose one", group="pieces"),
     )
@@ -85,12 +125,15 @@ def paired_tests_table(comparisons: Sequence[Comparison], algorithm: str) -> Tab
 def runs_table(comparisons: Sequence[Comparison]) -> Table:
     """Every single run."""
     rows = [
-        (comparison.model, algorithm, seed, *quality)
+        (comparison.model, algorithm, seed, spent, *quality)
         for comparison in comparisons
         for algorithm, qualities in comparison.qualities.items()
-        for seed, quality in enumerate(qualities, start=1)
+        for seed, spent, quality in zip(
+            comparison.seeds, comparison.spent[algorithm], qualities, strict=True
+        )
     ]
-    columns = [Column(name) for name in ("seed", "IGD", "Spacing", "hypervolume", "lost pieces")]
+    names = ("seed", "evaluations", "IGD", "Spacing", "hypervolume", "lost pieces")
+    columns = [Column(name) for name in names]
     return Table("runs", "Every run", (*WHO, *columns), tuple(rows), folded=True)
 
 
@@ -98,15 +141,17 @@ def times_table(
     comparisons: Sequence[Comparison],
     published: Mapping[str, AlgorithmQuality],
     findings: Sequence[Finding],
+    evaluations: int,
 ) -> Table:
     """Wall time of a run, which no two executions repeat."""
 
     def cells(comparison: Comparison, algorithm: str) -> Iterable[Cell]:
         yield from summary(comparison.seconds(algorithm))
-        yield published[algorithm].seconds if algorithm in published else None
+        if published:
+            yield published[algorithm].seconds if algorithm in published else None
 
-    columns = (*_summary_columns("time", "s"), _paper_column("time", "s", digits=4))
-    title = "Wall time of one run of 10,000 evaluations, other runs going on beside it"
+    columns = (*_summary_columns("time", "s"), *_paper_columns("time", published, "s", digits=4))
+    title = f"Wall time of one run of {evaluations:,} evaluations, other runs going on beside it"
     rows = _rows(comparisons, cells)
     found = tuple(findings)
     return Table("times", title, (*WHO, *columns), rows, findings=found, wall_times=True)
@@ -128,8 +173,11 @@ def _summary_columns(group: str, unit: str = "", digits: int = 3) -> tuple[Colum
     )
 
 
-def _paper_column(group: str, unit: str = "", digits: int = 3) -> Column:
-    return Column("paper", unit, digits, group, paper=True)
+def _paper_columns(
+    group: str, published: Mapping[str, AlgorithmQuality], unit: str = "", digits: int = 3
+) -> tuple[Column, ...]:
+    """Return the column of the paper's numbers, or none if they are not to stand here."""
+    return (Column("paper", unit, digits, group, paper=True),) if published else ()
 
 
 def _rows(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from experiments.runner.campaign import Campaign
 from experiments.runner.result import Result
+from experiments.runner.setting import Setting
 
 
 class ExtraMissing(RuntimeError):
@@ -27,6 +28,9 @@ def require(package: str, extra: str) -> None:
         raise ExtraMissing(f"{package} is not installed: pip install '.[{extra}]'")
 
 
+STATED = Setting()
+
+
 @dataclass(frozen=True)
 class Context:
     """What an experiment may use.
@@ -34,8 +38,8 @@ class Context:
     Attributes
     ----------
     seeds
-        Number of independent runs of every algorithm, seeds 1..seeds, of the experiments that take
-        it.
+        Number of independent runs of every algorithm of the experiments that take it, with seeds
+        from ``setting.first_seed`` on.
     out
         Folder of the results.
     campaign
@@ -45,7 +49,9 @@ class Context:
     quick
         Whether to run a small version of those that have one.
     cases
-        How many cases, from the first on, of a full run of those that can be limited; None for all.
+        Which cases, counted from 1, of a full run of those that can be limited; None for all.
+    setting
+        What the comparisons of algorithms run, if not what the paper states.
     """
 
     seeds: int
@@ -53,14 +59,37 @@ class Context:
     campaign: Campaign
     full: bool = False
     quick: bool = False
-    cases: int | None = None
+    cases: range | None = None
+    setting: Setting = STATED
+
+    @property
+    def seeds_to_run(self) -> range:
+        """The seeds of the experiments that take their number."""
+        return range(self.setting.first_seed, self.setting.first_seed + self.seeds)
+
+    @property
+    def seeds_in_words(self) -> str:
+        """The seeds for a title."""
+        first, last = self.seeds_to_run[0], self.seeds_to_run[-1]
+        return f"seeds {first} to {last}" if first < last else f"seed {first}"
+
+    def comparison_command(self, experiment: str) -> str:
+        """Return the command for this setting of an experiment that compares algorithms."""
+        options = " ".join(["--seeds", _counted(self.seeds_to_run), *self.setting.options()])
+        return f"python -m experiments {experiment} {options}"
 
     def command(self, experiment: str) -> str:
         """Return the command for this extent of an experiment."""
         option = " --full" if self.full else " --quick" if self.quick else ""
         if self.full and self.cases is not None:
-            option += f" --cases {self.cases}"
+            option += f" --cases {_counted(self.cases)}"
         return f"python -m experiments {experiment}{option}"
+
+
+def _counted(numbers: range) -> str:
+    """Return a range as the command line takes it."""
+    first, last = numbers[0], numbers[-1]
+    return f"{last}" if first == 1 else f"{first}-{last}"
 
 
 @dataclass(frozen=True)
@@ -84,7 +113,8 @@ class Experiment:
     takes_cases
         Whether ``--cases`` limits its full run.
     takes_seeds
-        Whether ``--seeds`` says how many runs it makes; others have numbers of their own.
+        Whether ``--seeds`` says how many runs it makes, and further options which; others have
+        numbers of their own.
     """
 
     name: str
@@ -100,6 +130,16 @@ class Experiment:
         """Import the module and run it; nothing is imported for ``--list``."""
         return import_module(f"experiments.{self.module}").run(context)
 
+    def check(self, setting: Setting) -> None:
+        """Refuse a setting that the experiment cannot run; for those that take seeds.
+
+        Raises
+        ------
+        InvalidInput
+            For a name that is unknown or does not fit, or a budget that cannot be spent.
+        """
+        import_module(f"experiments.{self.module}").check_setting(setting)
+
 
 EXPERIMENTS = (
     Experiment(
@@ -113,6 +153,13 @@ EXPERIMENTS = (
         "paper.ablation",
         "Fig. 17: AMP-MOPSO without its pyramid, its entropy weight, or both",
         takes_seeds=True,
+    ),
+    Experiment(
+        "anytime",
+        "anytime.experiment",
+        "Table 7 and Fig. 17 at every budget, and what the printed numbers may mean",
+        reads_outcome=True,
+        has_small_version=True,
     ),
     Experiment(
         "table5",

@@ -113,18 +113,20 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure with the caption that says what to see on it."""
+    """A figure with the caption that says what to see on it; a leading one precedes the tables."""
 
     name: str
     caption: str
     figure: Figure
+    leading: bool = False
 
 
 @dataclass(frozen=True)
 class Result:
     """Everything that one experiment found, ready for the report.
 
-    ``headline`` names the table that the report's first screen repeats, if any.
+    ``headline`` names the table that the report's first screen repeats, if any; ``opening`` is a
+    sentence that the report begins with.
     """
 
     title: str
@@ -134,6 +136,7 @@ class Result:
     pictures: tuple[Picture, ...] = ()
     notes: tuple[str, ...] = ()
     headline: str = ""
+    opening: str = ""
 
 
 def significant(value: float, digits: int) -> str:

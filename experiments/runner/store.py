@@ -27,6 +27,7 @@ class StoredPicture:
     name: str
     caption: str
     png: bytes
+    leading: bool = False
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class StoredResult:
     pictures: tuple[StoredPicture, ...]
     notes: tuple[str, ...]
     headline: str
+    opening: str
     made_by: str
 
 
@@ -70,9 +72,12 @@ def save(out: Path, name: str, result: Result) -> None:
         "command": result.command,
         "paragraphs": result.paragraphs,
         "tables": [asdict(table) for table in steady],
-        "pictures": [{"name": p.name, "caption": p.caption} for p in result.pictures],
+        "pictures": [
+            {"name": p.name, "caption": p.caption, "leading": p.leading} for p in result.pictures
+        ],
         "notes": result.notes,
         "headline": result.headline,
+        "opening": result.opening,
         "made_by": report_fingerprint(),
     }
     _write_json(out / TIMES / name / RESULT, [asdict(table) for table in timed])
@@ -94,11 +99,12 @@ def load(out: Path, name: str) -> StoredResult | None:
         paragraphs=tuple(described["paragraphs"]),
         tables=tuple(_table(entry) for entry in described["tables"] + timed),
         pictures=tuple(
-            StoredPicture(p["name"], p["caption"], (out / name / f"{p['name']}.png").read_bytes())
+            StoredPicture(png=(out / name / f"{p['name']}.png").read_bytes(), **p)
             for p in described["pictures"]
         ),
         notes=tuple(described["notes"]),
         headline=described["headline"],
+        opening=described.get("opening", ""),
         made_by=described["made_by"],
     )
 

@@ -113,7 +113,7 @@ def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
 
 
 def _summary(document: dict[str, Any], out: Path) -> str:
-    from pymoo_hdte.effects.sentences import in_words
+    from pymoo_hdte.effects.sentence_blanks import in_words
 
     names = " + ".join(_name(one) for one in document["effects"])
     lines = [

@@ -2,6 +2,7 @@
 
 from pymoo_hdte.effects import (
     friction,
+    gravity,
     hysteresis,
     linear,
     load_friction,
@@ -23,6 +24,7 @@ __all__ = [
     "Sizes",
     "effect_named",
     "friction",
+    "gravity",
     "hysteresis",
     "known_effects",
     "linear",

@@ -19,7 +19,7 @@ from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import PORTS
 from pymoo_hdte.effects.quantities import si_unit, with_unit
-from pymoo_hdte.effects.sentences import check_sentence
+from pymoo_hdte.effects.sentence_blanks import check_sentence
 from pymoo_hdte.io.fields import Fields
 
 Place = tuple[str, str, float | None]
@@ -74,7 +74,7 @@ class Effect:
     special_case_of, contains : tuple of str
         Effects of which this one is a special case, and effects that are special cases of this one:
         Coulomb friction is Stribeck friction without the excess. One that contains another and fits
-        no better is not a different explanation.
+        no better is not a different explanation. Of one ``"form"`` only: ``"name/form"``.
     exact : bool
         Whether its form is known exactly, so that it must explain records down to the noise; the
         curve of a friction law is only an approximation of a real one.

@@ -63,7 +63,12 @@ register(
         {"level": "torque"},
         "Dry friction at the {port}: a {force} that does not depend on speed.",
         lambda sizes: [Guess((unknown("level", 0.0, sizes.largest, sizes.force),))],
-        special_case_of=("stribeck_friction", "hysteresis", "position_dependent_friction"),
+        special_case_of=(
+            "stribeck_friction",
+            "hysteresis",
+            "position_dependent_friction",
+            "nonlinear_drag/sublinear",
+        ),
     )
 )
 
@@ -165,7 +170,8 @@ class NonlinearDrag(Aperiodic):
 def _drag(sizes: Sizes) -> list[Guess]:
     """Guess drags by their torque at the largest speed, with exponents above and below 1.
 
-    Exponents near 1 are left out, where a drag is the damping of the port.
+    Exponents near 1 are left out, where a drag is the damping of the port, and those below a
+    quarter, where it is dry friction: it takes sixteen times the speed to double.
     """
     speed = sizes.speed
 
@@ -174,7 +180,7 @@ def _drag(sizes: Sizes) -> list[Guess]:
         return (NonlinearDrag(level / speed**2, exponent, speed),)
 
     level = unknown("level", 0.0, sizes.largest, sizes.force)
-    faster, slower = unknown("exponent", 1.2, 4.0, 2.0), unknown("exponent", 0.2, 0.85, 0.6)
+    faster, slower = unknown("exponent", 1.2, 4.0, 2.0), unknown("exponent", 0.25, 0.85, 0.6)
     sentence = "A friction at the {port} that grows, but slower than the speed."
     return [
         Guess((level, faster), [(level.start, power) for power in (2.0, 3.0, 1.5)], build),

@@ -43,6 +43,8 @@ class Sizes:
     temperature : float
         Mean of the records, K, where their temperatures spread enough to show what depends on them;
         0 elsewhere.
+    turns : bool
+        Whether its position is the angle of a shaft at which gravity may pull.
     read : bool
         Whether it is the reading of a force sensor.
     slower : float
@@ -69,6 +71,7 @@ class Sizes:
     load: float = 0.0
     driven: bool = False
     temperature: float = 0.0
+    turns: bool = False
     read: bool = False
     slower: float = 1.0
     expected: tuple[float, ...] = ()
@@ -115,6 +118,9 @@ class Guess:
         Word for the form, where there are several.
     sentence : str
         Replaces that of the effect.
+    instead_of : str
+        Name of the effect in whose place alone it is tried: what a small motion may not tell from
+        it, and what several effects together would be.
     name : str
         Replaces that of the effect, and no verdict names it: for what a campaign cannot separate
         from the machine.
@@ -126,6 +132,7 @@ class Guess:
     family: Family | None = None
     form: str = ""
     sentence: str = ""
+    instead_of: str = ""
     name: str = ""
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,11 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.friction import SMOOTHING_SPEED
 from pymoo_hdte.effects.guess import Guess, Sizes
-from pymoo_hdte.effects.law import Aperiodic, PortState, Response
-from pymoo_hdte.effects.unknowns import unknown
+from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.unknowns import unknown, wave_starts
+
+FURTHEST = 20.0
+"""Largest force of a spring at position zero, in units of the largest one on its travel."""
 
 
 @dataclass(frozen=True)
@@ -110,9 +114,36 @@ class LinearSpring(Aperiodic):
 
 
 def _spring(sizes: Sizes) -> list[Guess]:
-    typical, most = sizes.force / sizes.travel, sizes.largest / sizes.travel
-    # Where a spring is believed to stand, its stiffness is a quantity of the machine.
-    return [] if sizes.stiffness else [Guess((unknown("coefficient", 0.0, most, typical),))]
+    """Guess a spring with its rest at position zero, or elsewhere where that may be gravity.
+
+    Where a spring is believed to stand, its stiffness is a quantity of the machine.
+    """
+    if sizes.stiffness:
+        return []
+    typical, largest = sizes.force / sizes.travel, sizes.largest
+    most = largest / sizes.travel
+    found = [Guess((unknown("coefficient", 0.0, most, typical),))]
+    if sizes.turns:
+        # Far from zero a weak spring makes a large force there.
+        unknowns = (
+            unknown("coefficient", 0.0, most, typical, linear=True),
+            unknown("force", -FURTHEST * largest, FURTHEST * largest, sizes.force, linear=True),
+        )
+        found.append(
+            Guess(
+                unknowns,
+                wave_starts(unknowns),
+                _preloaded,
+                form="preloaded",
+                sentence="There is a spring at the {port}, its rest not at zero.",
+                instead_of="gravity",
+            )
+        )
+    return found
+
+
+def _preloaded(values: Sequence[float]) -> tuple[Law, ...]:
+    return (LinearSpring(values[0]), ConstantForce(values[1]))
 
 
 register(
@@ -123,6 +154,7 @@ register(
         {"coefficient": "stiffness"},
         "There is a spring at the {port} where none is believed.",
         _spring,
+        of_fit={"force": "torque"},
     )
 )
 

@@ -118,6 +118,10 @@ class Fields:
         """Tell whether a remaining field is a table."""
         return isinstance(self._left.get(field), Mapping)
 
+    def is_number(self, field: str) -> bool:
+        """Tell whether a remaining field is a number."""
+        return isinstance(self._left.get(field), int | float)
+
     def finish(self) -> None:
         """Raise `InvalidInput` if a field was not asked for: it is misspelt or misplaced."""
         if self._left:

@@ -6,8 +6,9 @@ A campaign and a rig of any other machine state it in the same words, in ``[tabl
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.io.fields import Fields
@@ -40,7 +41,8 @@ class Channel:
     unit : str
         One of `CHANNEL_UNITS`, or `COUNTS`.
     scale : float
-        A factor after the unit; -1 turns the sign.
+        A factor after the unit; -1 turns the sign. In a file ``divided_by``, such as a gear ratio,
+        divides it.
     unwrap : bool
         For angles that jump by a turn.
     wraps : float, optional
@@ -49,6 +51,8 @@ class Channel:
         With `COUNTS` only.
     zero : float
         Reading where the channel is zero, in the unit.
+    integrated : bool
+        Whether the readings are the rates of what is wanted, which is zero in the first row.
 
     Raises
     ------
@@ -63,6 +67,7 @@ class Channel:
     wraps: float | None = None
     counts_per_turn: float | None = None
     zero: float = 0.0
+    integrated: bool = False
 
     def __post_init__(self) -> None:
         units = (COUNTS, *(UNITS["angle"] if self.unwrap else CHANNEL_UNITS))
@@ -117,6 +122,8 @@ class TableLayout:
 def layout_from_fields(table: Fields, usual: TableLayout | None = None) -> TableLayout:
     """Return the layout in a table ``[table]``.
 
+    Without a format it is a CSV file, or a plain one if columns are called by numbers.
+
     Parameters
     ----------
     table : Fields
@@ -129,13 +136,15 @@ def layout_from_fields(table: Fields, usual: TableLayout | None = None) -> Table
     InvalidInput
         With the field.
     """
-    form = usual.format if usual and not table.has("format") else table.choice("format", FORMATS)
+    form = usual.format if usual else None
+    form = table.choice("format", FORMATS) if table.has("format") else form
     mapped = _channels(table, form, usual)
     time = usual.time if usual else None
     if table.has("time"):
         time = _channel(table.table("time"), form, UNITS["time"])
         if table.has("sample_rate"):
             raise InvalidInput(table._name("time"), time.column, "absent if sample_rate is given")
+    form = form or _form_of(table, [*mapped.values(), *([time] if time else [])])
     rate = usual.sample_rate if usual else None
     if table.has("sample_rate") or (time is None and rate is None):
         time, rate = None, table.number("sample_rate", at_least=1e-3, at_most=1e9)
@@ -166,7 +175,16 @@ def with_zeros(table: Fields, layout: TableLayout) -> TableLayout:
     return replace(layout, channels=channels)
 
 
-def _channels(table: Fields, form: str, usual: TableLayout | None) -> dict[str, Channel]:
+def _form_of(table: Fields, channels: Sequence[Channel]) -> str:
+    """Return the format of a file whose columns have titles, or numbers."""
+    numbered = {isinstance(one.column, int) for one in channels}
+    if len(numbered) > 1:
+        columns = [one.column for one in channels]
+        raise InvalidInput(table._name("columns"), columns, "titles for all, or numbers for all")
+    return "plain" if True in numbered else "csv"
+
+
+def _channels(table: Fields, form: str | None, usual: TableLayout | None) -> dict[str, Channel]:
     known = usual.channels if usual else {}
     if usual and not table.has("channels"):
         return dict(known)
@@ -191,18 +209,24 @@ def _units_beside(channel: Channel) -> Collection[str]:
     return next(UNITS[one] for one in MEASURED if channel.unit in UNITS[one])
 
 
-def _channel(table: Fields, form: str, units: Collection[str]) -> Channel:
-    column = table.whole("column", 0) if form == "plain" else table.text("column")
+def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel:
+    numbered = table.is_number("column") if form is None else form == "plain"
+    column = table.whole("column", 0) if numbered else table.text("column")
     unwrap = table.take("unwrap", "") if table.has("unwrap") else False
     if not isinstance(unwrap, bool):
         raise InvalidInput(table._name("unwrap"), unwrap, "true or false")
     units = UNITS["angle"] if unwrap else units
     unit = table.choice("unit", (COUNTS, *units) if set(UNITS["angle"]) <= set(units) else units)
-    options = {
+    options: dict[str, Any] = {
         name: table.number(name, at_least=-LARGEST, at_most=LARGEST)
         for name in ("scale", "wraps", "counts_per_turn", "zero")
         if table.has(name)
     }
+    if table.has("divided_by"):
+        divisor = table.number("divided_by", at_least=-LARGEST, at_most=LARGEST)
+        if divisor == 0.0:
+            raise InvalidInput(table._name("divided_by"), divisor, "another number than 0")
+        options["scale"] = options.get("scale", 1.0) / divisor
     table.finish()
     try:
         return Channel(column, unit, unwrap=unwrap, **options)

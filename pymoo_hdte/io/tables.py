@@ -10,10 +10,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, real_number
+from pymoo_hdte.io.even_steps import LONGEST_STEP, even_steps, is_even
 from pymoo_hdte.io.layout import CHANNEL_UNITS, Channel, TableLayout, layout_from_fields
 from pymoo_hdte.io.matlab import read_vectors
+from pymoo_hdte.io.parts import Part
 from pymoo_hdte.io.text_columns import TextTable, column_label
 from pymoo_hdte.io.text_lines import Seen
 from pymoo_hdte.io.text_table import LARGEST, read_text_table
@@ -22,7 +25,6 @@ from pymoo_hdte.units import ORIGINS
 __all__ = ["CHANNEL_UNITS", "LARGEST", "Channel", "TableLayout", "layout_from_fields"]
 
 FEWEST_ROWS = 16
-STEP_SPREAD = 0.01  # Relative, of a time step from the median step.
 ROWS_PER_FILLED = 100  # Interpolated values may stand in fewer than one row in this many.
 LONGEST_GAP = 2  # Rows: across more of them a straight line is no motion.
 
@@ -50,9 +52,11 @@ class Columns:
     length: int
 
     def si(self, channel: Channel, rows: slice = slice(None)) -> NDArray[np.float64]:
-        """Return a channel in SI, shape (n,); what is not finite is interpolated."""
+        """Return a channel in SI, shape (n,); what is not finite is interpolated if any is."""
         raw = self.raw[channel.column][rows]
         at = np.flatnonzero(np.isfinite(raw))
+        if at.size == 0:
+            return np.full(raw.size, np.nan)
         # Unwrapped before interpolation, which is invalid across a jump of the angle.
         values = raw if at.size == raw.size else raw[at]
         if channel.wraps is not None:
@@ -60,6 +64,27 @@ class Columns:
         values = (values - channel.zero if channel.zero else values) * channel.factor
         values = (np.unwrap(values) if channel.unwrap else values) * channel.scale + channel.origin
         return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
+
+    def signal(self, channel: Channel, rows: slice) -> NDArray[np.float64]:
+        """Return some rows of a channel as they are used, shape (n,); their times rise.
+
+        Turns of an angle that wraps, and rates, count from the first row of the file.
+        """
+        values = self.si(channel)
+        if not channel.integrated:
+            return values[rows]
+        time = self.time
+        before = float(np.trapezoid(values[: rows.start + 1], time[: rows.start + 1]))
+        within = make_interp_spline(time[rows], values[rows], 3).antiderivative()(time[rows])
+        return within - within[0] + before
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Of each row, s, shape (n,): as measured, or row of the file / sample rate."""
+        if self.layout.time:
+            return self.si(self.layout.time)
+        rate = real_number("sample_rate", self.layout.sample_rate, above=0.0)
+        return (self.layout.skip_rows + np.arange(self.length)) / rate
 
     def place(self, row: int, what: str | None = None) -> str:
         """Return where in the file a row stands, for errors about it or about one of its cells."""
@@ -83,25 +108,32 @@ class Table:
 
     Time is as measured, or row / sample rate counted from the first row of the file. ``dropped``
     counts rows with mapped values that were not finite: left out at the ends, interpolated inside.
+    ``remark`` says what else was done to the rows, empty if they are as they were measured.
     """
 
     time: NDArray[np.float64]
     channels: dict[str, NDArray[np.float64]]
     dropped: int
+    remark: str = ""
 
 
-def read_table(path: Path, layout: TableLayout, seen: Seen | None = None) -> Table:
+def read_table(
+    path: Path, layout: TableLayout, seen: Seen | None = None, part: Part | None = None
+) -> Table:
     """Read the mapped columns; a constant one is allowed, since the caller knows which must vary.
+
+    Rows at uneven times are brought to even steps, as `even_steps` has it.
 
     Raises `OSError` if the file cannot be read and `InvalidInput`, with file and line (MATLAB:
     row), if it is damaged, a column is missing, ragged or holds text or a huge number, too few
-    rows are finite or too many at a time are not, or time does not rise in equal steps.
+    rows are finite or too many at a time are not, or time does not rise or leaves a gap.
     """
     read = read_columns(path, layout, gaps=True, seen=seen)
-    columns = read.raw
+    rows = _part_of(read, part)
+    columns = {name: raw[rows] for name, raw in read.raw.items()}
 
     def refuse(row: int, column: str | int, allowed: str) -> InvalidInput:
-        field = read.place(row, column_label(column))
+        field = read.place(rows.start + row, column_label(column))
         return InvalidInput(field, float(columns[column][row]), allowed)
 
     for column, raw in columns.items():
@@ -110,7 +142,8 @@ def read_table(path: Path, layout: TableLayout, seen: Seen | None = None) -> Tab
     finite = np.all([np.isfinite(raw) for raw in columns.values()], axis=0)
     whole = np.flatnonzero(finite)
     if whole.size < FEWEST_ROWS:
-        place = f"{path.name}: finite rows after skip_rows = {layout.skip_rows}"
+        of = f" in {part.by} = {[part.first, part.last]}" if part else ""
+        place = f"{path.name}: finite rows after skip_rows = {layout.skip_rows}{of}"
         raise InvalidInput(place, whole.size, f"at least {FEWEST_ROWS}")
 
     def missing(row: int, allowed: str) -> InvalidInput:
@@ -125,19 +158,28 @@ def read_table(path: Path, layout: TableLayout, seen: Seen | None = None) -> Tab
     for at in np.flatnonzero(gaps > LONGEST_GAP)[:1]:
         allowed = f"gaps of at most {LONGEST_GAP} rows; here are {gaps[at]}"
         raise missing(int(whole[at]) + 1, allowed)
-    kept = slice(start, stop)
-    if layout.time:
-        time = read.si(layout.time, kept)
-        steps = np.diff(time)
-        step = float(np.median(steps))
-        for row in start + 1 + np.flatnonzero(np.abs(steps - step) >= STEP_SPREAD * step)[:1]:
-            allowed = f"rising by the median step, {step:g} s, within 1 %; or take a sample_rate"
-            raise refuse(row, layout.time.column, allowed)
-    else:
-        rate = real_number("sample_rate", layout.sample_rate, above=0.0)
-        time = (layout.skip_rows + np.arange(start, stop)) / rate
-    channels = {name: read.si(channel, kept) for name, channel in layout.channels.items()}
-    return Table(time, channels, int(np.count_nonzero(~finite)))
+    kept = slice(rows.start + start, rows.start + stop)
+    time, dropped = read.time[kept], int(np.count_nonzero(~finite))
+    steps = np.diff(time)
+    mean, usual = float(np.mean(steps)), float(np.median(steps))
+    for row in np.flatnonzero((steps <= 0.0) | (steps > LONGEST_STEP * mean))[:1]:
+        allowed = (
+            f"rising by the median step, {usual:g} s, within 1 %, or unevenly, by at most "
+            f"{LONGEST_STEP * mean:.4g} s, {LONGEST_STEP:g} mean steps; or take a sample_rate, or "
+            "a record for each part"
+        )
+        column = layout.time.column if layout.time else next(iter(columns))
+        raise refuse(start + int(row) + 1, column, allowed)
+    channels = {name: read.signal(channel, kept) for name, channel in layout.channels.items()}
+    if layout.time is None or is_even(time):
+        return Table(time, channels, dropped)
+    even = even_steps(time, channels)
+    return Table(even.time, even.signals, dropped, even.remark)
+
+
+def _part_of(read: Columns, part: Part | None) -> slice:
+    """Return the rows of a part of a file."""
+    return slice(0, read.length) if part is None else part.rows_of(read.time)
 
 
 def check_sha256(path: Path, expected: str) -> None:
@@ -172,7 +214,7 @@ def read_columns(
     """
     mapped = [*([layout.time] if layout.time else []), *layout.channels.values()]
     names: list[Any] = list(dict.fromkeys(channel.column for channel in mapped))
-    if layout.format == "matlab":
+    if layout.format == "matlab" or (layout.format == "csv" and path.suffix == ".mat"):
         vectors = read_vectors(path, names)
         if seen:
             seen(path.stat().st_size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cached_property
 from itertools import repeat
 from typing import Any, cast
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.io.text_header import AROUND
+from pymoo_hdte.io.text_header import AROUND, begins_as_number
 from pymoo_hdte.io.text_lines import Block, Row
 
 DECIMALS = {"point": ".", "comma": ","}
@@ -59,7 +60,18 @@ class TextTable:
         there = all(self.titles.count(name) == 1 for name in names)
         if not there or (no_others and len(self.titles) != len(names)):
             field = f"{self.file}, line {self.title_line}: columns"
-            raise InvalidInput(field, self.titles, f"{', '.join(map(str, names))}, each once")
+            allowed = f"{', '.join(map(str, names))}, each once{self._hint(names)}"
+            raise InvalidInput(field, self.titles, allowed)
+
+    def _hint(self, names: Sequence[Any]) -> str:
+        """Return what may help where columns are missing, as the end of a sentence."""
+        missing = [name for name in names if name not in self.titles]
+        titles = [one for one in self.titles if isinstance(one, str)]
+        if titles and all(map(begins_as_number, titles)):
+            return "; a file without titles has columns that are called by numbers, from 0"
+        near = [(name, get_close_matches(str(name), titles, 1, 0.4)) for name in missing]
+        found = [f"is {name} {one[0]!r}?" for name, one in near if one]
+        return f"; {' '.join(found)}" if found else ""
 
     def numbers(
         self, names: Sequence[Any], *, gaps: bool = False

@@ -55,7 +55,7 @@ def titled_header(
     """Return the titles of a CSV file among its first lines.
 
     They are on the first line that has each of the wanted once; without such a line on the one that
-    has most of them, of these on the one with most cells, so that an error can show it; without
+    has most of them, of these on the one with most words, so that an error can show it; without
     wanted ones on the first line.
 
     Raises
@@ -64,11 +64,12 @@ def titled_header(
         For a line that is no CSV text.
     """
     best, at = Header([], 1, ",", skip_rows), 0
-    most = (-1, -1)
+    most = (-1, -1)  # Titles that are wanted, words.
     for place in range(min(len(lines), MOST_LINES_ABOVE if wanted else 1)):
         for mark in _marks(lines[place], delimiter):
             titles = cells_of(file, numbers[place], lines[place], mark)
-            found = sum(titles.count(name) == 1 for name in wanted), len(titles)
+            words = sum(bool(cell) and not begins_as_number(cell) for cell in titles)
+            found = sum(titles.count(name) == 1 for name in wanted), words
             if found > most:
                 most, at = found, place
                 best = Header(titles, numbers[place], mark, skip_rows)
@@ -105,11 +106,11 @@ def _units(header: Header, below: str, wanted: Sequence[str], file: str) -> dict
     if len(cells) != len(header.titles) or any(name not in header.titles for name in wanted):
         return {}
     of_wanted = [cells[header.titles.index(name)].strip(AROUND) for name in wanted]
-    if not any(of_wanted) or any(map(_begins_as_number, of_wanted)):
+    if not any(of_wanted) or any(map(begins_as_number, of_wanted)):
         return {}
     return dict(zip(header.titles, cells, strict=True))
 
 
-def _begins_as_number(cell: str) -> bool:
+def begins_as_number(cell: str) -> bool:
     """Tell whether a cell is a number, or meant to be one: 0_002, 1,5 or nan."""
     return cell[:3].lower() in ("nan", "inf") or cell.lstrip("+-.,")[:1].isdigit()

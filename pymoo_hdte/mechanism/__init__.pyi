@@ -1,5 +1,5 @@
+from pymoo_hdte.mechanism.believed import BelievedValue
 from pymoo_hdte.mechanism.mechanism import (
-    BelievedValue,
     ErrorLine,
     Input,
     LawAt,

@@ -13,34 +13,7 @@ from types import MappingProxyType
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.effects.law import Law
-
-
-@dataclass(frozen=True)
-class BelievedValue:
-    """A value that is believed within a relative tolerance, which a fit must not leave.
-
-    Attributes
-    ----------
-    value : float
-        SI; at least 0.
-    tolerance : float
-        Relative, 0 for a value that is known; 1 allows everything from zero to twice the value.
-
-    Raises
-    ------
-    InvalidInput
-        For a number that is not finite or out of range.
-    """
-
-    value: float
-    tolerance: float = 0.0
-
-    def __post_init__(self) -> None:
-        real_number("believed.value", self.value, at_least=0.0)
-        real_number("believed.tolerance", self.tolerance, at_least=0.0, at_most=1.0)
-
-
-NOTHING = BelievedValue(0.0)
+from pymoo_hdte.mechanism.believed import NOTHING, BelievedValue
 
 
 @dataclass(frozen=True)
@@ -117,11 +90,15 @@ class Input:
         Share with which it acts on each coordinate, by name.
     gain : BelievedValue
         Force, N, or torque, N.m, per unit of the signal.
+    scaled : bool
+        False where the gain is not known at all. It is then 1, and inertias, stiffnesses, dampings
+        and forces are told in units of the signal: their ratios are determined, their sizes not.
     """
 
     name: str
     acts: Mapping[str, float]
     gain: BelievedValue = field(default=BelievedValue(1.0))
+    scaled: bool = True
 
 
 @dataclass(frozen=True)
@@ -167,18 +144,23 @@ class Mechanism:
     loops : sequence of Loop
         Closed loops of records that have their references; an input without one is taken from its
         channel.
+    angles : sequence of str or None
+        Coordinates that are angles of a shaft, rad, at which gravity may pull; those of a linear
+        axis are not. None if it is not known, which counts as none; the units of files tell.
 
     Raises
     ------
     InvalidInput
-        For a name that is used twice or refers to nothing, an inertia that is not positive, or a
-        port or input that touches no coordinate.
+        For a name that is used twice or refers to nothing, an inertia that is not positive, a
+        stiffness or damping that is negative, a port or input that touches no coordinate, or a gain
+        that is not stated where another quantity is known exactly.
     """
 
     inertias: Mapping[str, BelievedValue]
     ports: Sequence[Port] = ()
     inputs: Sequence[Input] = ()
     loops: Sequence[Loop] = ()
+    angles: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         for name, value in (
@@ -186,12 +168,16 @@ class Mechanism:
             ("ports", tuple(self.ports)),
             ("inputs", tuple(self.inputs)),
             ("loops", tuple(self.loops)),
+            ("angles", None if self.angles is None else tuple(self.angles)),
         ):
             object.__setattr__(self, name, value)
         if not self.inertias:
             raise InvalidInput("mechanism.inertias", {}, "at least one coordinate")
         for name, inertia in self.inertias.items():
             real_number(f"inertia of {name}", inertia.value, above=0.0)
+        for port in self.ports:
+            for what, element in (("stiffness", port.stiffness), ("damping", port.damping)):
+                real_number(f"{what} of {port.name}", element.value, at_least=0.0)
         named = [*self.inertias, *self.port_names, *(one.name for one in self.inputs)]
         for name in named:
             if not isinstance(name, str) or not name or named.count(name) > 1:
@@ -206,6 +192,15 @@ class Mechanism:
                 real_number(f"load of {port.name}.{name}", share)
         for one in self.inputs:
             self._check_shares(f"acts of {one.name}", one.acts)
+        for name in self.angles or ():
+            one_of("mechanism.angles", name, self.coordinates)
+        known = [name for name, one in self.quantities.items() if one.known]
+        for driving in self.inputs:
+            own = f"gain of {driving.name}"
+            for other in known if not driving.scaled else ():
+                if other != own:
+                    allowed = f"a number, with a tolerance or factor: {other} is known exactly"
+                    raise InvalidInput(own, None, allowed)
         for loop in self.loops:
             one_of("loop.input", loop.input, [one.name for one in self.inputs])
             one_of("loop.coordinate", loop.coordinate, self.coordinates)
@@ -228,6 +223,11 @@ class Mechanism:
         """Return the port of that name; raises `InvalidInput` where there is none."""
         return self.ports[self.port_names.index(one_of("port", name, self.port_names))]
 
+    def turns(self, port: Port) -> bool:
+        """Tell whether the motion of a port is the angle of one shaft, geared or not."""
+        moved = [name for name, share in port.motion.items() if share]
+        return len(moved) == 1 and moved[0] in (self.angles or ())
+
     @property
     def quantities(self) -> dict[str, BelievedValue]:
         """Believed values, SI, by the names that fits use; those that are 0 are left out."""
@@ -237,7 +237,7 @@ class Mechanism:
             found[f"damping of {port.name}"] = port.damping
         for one in self.inputs:
             found[f"gain of {one.name}"] = one.gain
-        return {name: one for name, one in found.items() if one.value > 0.0}
+        return {name: one for name, one in found.items() if one.value != 0.0}
 
     def with_values(self, values: Mapping[str, float], exactly: bool = True) -> Mechanism:
         """Return the mechanism with other values of `quantities`.
@@ -247,7 +247,7 @@ class Mechanism:
         values : mapping of str to float
             SI, by name as in `quantities`; all others are unchanged.
         exactly : bool
-            Whether they are known exactly; otherwise each keeps its relative tolerance.
+            Whether they are known exactly; otherwise each keeps its tolerance or factor.
 
         Returns
         -------
@@ -256,12 +256,14 @@ class Mechanism:
         Raises
         ------
         InvalidInput
-            For a value that is not finite or negative, or an inertia that is not above 0.
+            For a value that is not finite, an inertia that is not above 0, or another value but a
+            gain that is negative.
         """
 
         def known(name: str, before: BelievedValue) -> BelievedValue:
-            tolerance = 0.0 if exactly else before.tolerance
-            return BelievedValue(float(values[name]), tolerance) if name in values else before
+            if name not in values:
+                return before
+            return replace(NOTHING if exactly else before, value=float(values[name]))
 
         inertias = {name: known(f"inertia of {name}", one) for name, one in self.inertias.items()}
         ports = [
@@ -273,7 +275,7 @@ class Mechanism:
             for port in self.ports
         ]
         inputs = [replace(one, gain=known(f"gain of {one.name}", one.gain)) for one in self.inputs]
-        return Mechanism(inertias, ports, inputs, self.loops)
+        return Mechanism(inertias, ports, inputs, self.loops, self.angles)
 
     def _check_shares(self, name: str, shares: Mapping[str, float]) -> None:
         for coordinate, share in shares.items():

@@ -14,9 +14,12 @@ from scipy.ndimage import median_filter
 from scipy.signal import butter, savgol_filter, sosfiltfilt, welch
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.io.even_steps import STEP_SPREAD
 
 Values = NDArray[np.float64]
 
+RATE_SLACK = 1.0 + STEP_SPREAD / 2.0
+"""Ratio up to which rates count as equal: steps of a record may deviate by twice as much."""
 _STANDS_OUT = 4.0
 """Least ratio of the power of a position to that of its noise."""
 _FEWEST = 4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number, whole_number
+from pymoo_hdte.io.even_steps import STEP_SPREAD
 from pymoo_hdte.mechanism.motion import noise_of, timing_noise
 
 ROLES = ("train", "held_out")
 FEWEST_SAMPLES = 16
 FINER = 4
 """Samples of a simulation per sample of a record."""
-_JITTER = 0.01
-"""Largest deviation of a step from the mean one, relative."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +40,8 @@ class Record:
     dropped : int
         Rows of its file that had values that are not finite: left out at the ends, interpolated
         inside. A report states their number.
+    remarks : tuple of str
+        What else was done to the signals, in sentences, which a report repeats.
 
     Raises
     ------
@@ -56,6 +57,7 @@ class Record:
     channels: Mapping[str, NDArray[np.float64]]
     noise: Mapping[str, float]
     dropped: int
+    remarks: tuple[str, ...]
 
     def __init__(
         self,
@@ -65,6 +67,7 @@ class Record:
         channels: Mapping[str, ArrayLike],
         noise: Mapping[str, float] | None = None,
         dropped: int = 0,
+        remarks: Sequence[str] = (),
     ) -> None:
         if not isinstance(name, str):
             raise InvalidInput("name of a record", name, "a text")
@@ -77,11 +80,12 @@ class Record:
         steps = np.diff(moments)
         step = (moments[-1] - moments[0]) / len(steps)
         worst = int(np.argmax(np.abs(steps - step)))
-        if not (step > 0.0 and abs(steps[worst] - step) <= _JITTER * step):
+        if not (step > 0.0 and abs(steps[worst] - step) <= STEP_SPREAD * step):
             raise InvalidInput(
                 f"step {worst} of the time of record {name}",
                 float(steps[worst]),
-                f"{step:g} s within {_JITTER:.0%}, as the mean of the record",
+                f"{step:g} s within {STEP_SPREAD:.0%}, as the mean of the record; "
+                "pymoo_hdte.io.even_steps brings signals to even steps",
             )
         for what, given in (("channels", channels), ("noise", {} if noise is None else noise)):
             if not isinstance(given, Mapping):
@@ -98,6 +102,7 @@ class Record:
         for attribute, value in (
             ("noise", known),
             ("dropped", whole_number(f"dropped of record {name}", dropped, at_least=0)),
+            ("remarks", tuple(remarks)),
             ("name", name),
             ("role", role),
             ("time", moments),

@@ -8,7 +8,7 @@ from scipy.fft import prev_fast_len
 
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.mechanism.mechanism import Mechanism
-from pymoo_hdte.mechanism.motion import highest_share, margin_of, stride_of
+from pymoo_hdte.mechanism.motion import RATE_SLACK, highest_share, margin_of, stride_of
 from pymoo_hdte.mechanism.records import Record
 
 _FEWEST_BINS = 8
@@ -30,7 +30,7 @@ def working_rows(mechanism: Mechanism, record: Record, cutoff: float) -> slice:
         If the record is too short, or the cutoff beyond ten samples in a period.
     """
     real_number("cutoff", cutoff, above=0.0)
-    if cutoff > highest_share(record.step):
+    if cutoff > RATE_SLACK * highest_share(record.step):
         least = cutoff / highest_share(1.0)
         raise InvalidInput(
             f"sampling rate of record {record.name}",
@@ -45,10 +45,12 @@ def working_rows(mechanism: Mechanism, record: Record, cutoff: float) -> slice:
     rows = slice(margin, margin + (n - 1) * stride + 1, stride)
     if np.count_nonzero(frequencies(n, record.step * stride) <= cutoff) < _FEWEST_BINS:
         shortest = _FEWEST_BINS / (2.0 * cutoff) + 2.0 * margin * record.step
+        duration = float(record.time[-1] - record.time[0])
         raise InvalidInput(
             f"duration of record {record.name}",
-            float(record.time[-1] - record.time[0]),
-            f"at least {shortest:.3g} s, to say anything below {cutoff:.3g} Hz",
+            duration,
+            f"at least {shortest:.3g} s, to say anything below {cutoff:.3g} Hz; or a cutoff of at "
+            f"least {1.02 * cutoff * shortest / duration:.3g} Hz",
         )
     return rows
 

@@ -19,11 +19,18 @@ from pymoo.indicators.igd import IGD
 from pymoo.indicators.spacing import SpacingIndicator
 from pymoo.optimize import minimize
 
+from experiments.anytime import data as anytime
+from experiments.anytime.measures import EQUAL
+from experiments.anytime.readings import readings
+from experiments.anytime.sentences import settings_ahead
+from experiments.anytime.strategies import strategies
+from experiments.anytime.tables import Contest, contests, stated_place
 from experiments.blind.cases import all_cases
 from experiments.blind.data import read_outcomes
 from experiments.blind.experiment import OUTCOMES, SECONDS
-from experiments.comparison.paired import objectives, true_front
+from experiments.comparison.paired import objectives
 from experiments.comparison.quality import TrueFront
+from experiments.comparison.references import true_front
 from experiments.comparison.runs import ALGORITHMS, OptimisationRun
 from experiments.contest import swarm_parts
 from experiments.contest.peers_data import committed_scores
@@ -279,6 +286,38 @@ class TestNumbersBesideThePaper:
             for column in zip(*found.values(), strict=True)
         )
         assert f"have an IGD of {of_igd} and a Spacing of {of_spacing}" in WORDS
+
+    def test_comparison_at_every_budget(self):
+        scores = anytime.committed_scores()
+        found, best = contests(scores), readings(scores)[0]
+        assert (best.population, best.evaluations) == (10, 200)
+        stated = readings(scores)[stated_place(readings(scores))]
+        off = (
+            f"(off by a factor of {best.factor:.1f}, at the stated budget by {stated.factor:.1f} or"
+        )
+        assert off in WORDS
+        for model, words in (
+            ("calibrated", "ahead of both by IGD {} in `calibrated`"),
+            ("resonant", "in `resonant` only {}, and by Spacing nowhere"),
+        ):
+            assert words.format(settings_ahead(found[Contest(model, "igd")])) in WORDS
+            assert not settings_ahead(found[Contest(model, "spacing")])
+            equal = found[Contest(model, "igd", EQUAL)]
+            assert {duel.rival for duel in equal if duel.ahead} == {"NSGA-II"}
+            assert all(duel.ahead >= 0 for duel in equal)
+        of_calibrated = [
+            (strategy, duel)
+            for model, strategy, _, entries in strategies(scores, "igd")
+            for duel in entries
+            if model == "calibrated"
+        ]
+        better = [duel for strategy, duel in of_calibrated if duel.ahead > 0]
+        assert all(strategy == "entropy weight" for strategy, d in of_calibrated if d.ahead > 0)
+        assert f"in {len(better)} of {len(of_calibrated) // 2} comparisons" in WORDS
+        assert {min(d.evaluations for d in better), max(d.evaluations for d in better)} == {
+            200,
+            1000,
+        }
 
     def test_random_designs_dominate_the_published_optima(self):
         for model, words in (

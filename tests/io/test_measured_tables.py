@@ -142,14 +142,15 @@ def test_rows_that_are_not_finite_are_dropped_filled_and_counted(form, tmp_path)
     refused(write(tmp_path, form, columns), given, place, "is nan", "1 % of rows; here 3 are not")
 
 
-def test_a_missing_time_is_filled_but_time_must_rise_uniformly(tmp_path):
+def test_a_missing_time_is_filled_but_time_must_rise_without_gaps(tmp_path):
     for value in (math.nan, TIME[50] + 0.5e-5):
         time = np.concatenate([TIME[:50], [value], TIME[51:]])
         table = tables.read_table(write(tmp_path, "csv", {"t": time, "q": WAVE}), wave())
         np.testing.assert_allclose(table.time, TIME, atol=0.6e-5)
-    falling, late, lost = TIME.copy(), TIME.copy(), np.delete(TIME, 50)
-    falling[50], late[50:] = falling[49], TIME[50:] + 2e-5
-    for time in (falling, late, lost):
+        assert not table.remark
+    falling, late = TIME.copy(), TIME.copy()
+    falling[50], late[50:] = falling[49], TIME[50:] + 5e-3
+    for time in (falling, late, np.delete(TIME, range(50, 55))):
         path = write(tmp_path, "csv", {"t": time, "q": WAVE[: len(time)]})
         refused(path, wave(), "line 52: t", f"is {float(time[50])}", "0.001 s, within 1 %")
     for time in (TIME[::-1], np.zeros(300)):
@@ -222,6 +223,15 @@ def test_a_matlab_variable_that_is_no_vector_of_numbers(tmp_path):
         refused(path, wave("matlab"), f"KeyError({kind})")
 
 
+def test_an_error_shows_the_titles_of_the_file_and_what_comes_near(tmp_path):
+    rows = "".join(f"{row / 100:.3f};{row * 1.25:.3f};0,5\n" for row in range(30)).replace(".", ",")
+    (tmp_path / "a.csv").write_text("Logger; 1\nZeit;Winkel [deg];Moment\n" + rows)
+    asked = layout(q=Channel("winkel", "deg"), u=Channel("Moment", "N.m"))
+    refused(tmp_path / "a.csv", asked, "line 2", "'Zeit', 'Winkel [deg]', 'Moment'", "is winkel '")
+    (tmp_path / "a.csv").write_text(rows)
+    refused(tmp_path / "a.csv", asked, "line 1", "called by numbers, from 0")
+
+
 LAYOUT = """format = "csv"
 skip_rows = 3
 time = { column = "t", unit = "ms" }
@@ -239,6 +249,26 @@ def test_a_layout_is_read_from_its_table():
     assert parsed(LAYOUT) == layout("csv", skip=3, time=Channel("t", "ms"), q=angle)
     plain = 'format = "plain"\nsample_rate = 990\nchannels.q = { column = 1, unit = "mV" }'
     assert parsed(plain) == layout("plain", 990.0, q=Channel(1, "mV"))
+    # Columns with titles are those of a CSV file, others of a plain one.
+    assert parsed(LAYOUT.removeprefix('format = "csv"\n')) == parsed(LAYOUT)
+    assert parsed(plain.removeprefix('format = "plain"')) == parsed(plain)
+
+
+def test_a_gear_ratio_divides_a_reading(tmp_path):
+    text = 'sample_rate = 100\nchannels.q = { column = "a", unit = "deg", divided_by = -48 }'
+    path = write(tmp_path, "csv", {"a": np.arange(20.0)})
+    angle = tables.read_table(path, parsed(text)).channels["q"]
+    np.testing.assert_allclose(angle, np.deg2rad(np.arange(20.0)) / -48.0, rtol=1e-14)
+    with pytest.raises(InvalidInput, match=r"q\.divided_by is 0\.0"):
+        parsed(text.replace("-48", "0"))
+
+
+def test_a_matlab_file_is_known_by_its_name(tmp_path):
+    path = write(tmp_path, "matlab", {"q": WAVE}).rename(tmp_path / "a.mat")
+    found = tables.read_table(
+        path, parsed('sample_rate = 9\nchannels.q = {column = "q", unit="m"}')
+    )
+    np.testing.assert_array_equal(found.channels["q"], WAVE)
 
 
 BAD_LAYOUTS = [

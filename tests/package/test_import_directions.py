@@ -33,7 +33,7 @@ LOWEST_FIRST = (
 The modules of `discrepancy` itself are what users call, above all that they put together.
 """
 LOWEST_EXPERIMENTS_FIRST = (
-    *("published_values", "runner", "__main__", "comparison", "fronts"),
+    *("published_values", "runner", "__main__", "comparison", "fronts", "anytime"),
     *("paper.static_error", "paper.prototypes", "paper", "paper.calibrating"),
     *("contest", "blind.rig", "blind", "measured", "reliability", "studies"),
 )

@@ -112,7 +112,7 @@ def elastic_torque(
         elif kind == el.SOFT_PIECES:
             further -= row[1] * min(max(d, -row[2]), row[2])
         elif kind == el.SOFT_EXPONENTIAL:
-            further += row[1] * row[2] * math.copysign(math.expm1(-size / row[2]), d)
+            further -= row[1] * row[2] * math.copysign(-math.expm1(-size / row[2]), d)
         elif kind == el.SOFT_ARCTANGENT:
             reach = 2.0 * row[2] / math.pi
             further -= row[1] * reach * math.atan(d / reach)

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.effects.effect import Effect, Place, place_of
+from pymoo_hdte.effects.effect import Effect, Place, is_contained, place_of
 from pymoo_hdte.effects.guess import Guess
-from pymoo_hdte.effects.sentences import out_of_tolerance_sentence, sentence_at
+from pymoo_hdte.effects.sentence_blanks import out_of_tolerance_sentence, sentence_at
 from pymoo_hdte.effects.unknowns import Parameter, Values
 
 
@@ -46,6 +46,8 @@ class Candidate:
         Base parameter that it frees of its tolerance.
     form : str
         In a word, where the library holds several forms of one effect.
+    instead_of : str
+        Name of the effect in whose place alone it is tried; a search leaves it out.
     unit : callable or None
         From an unknown, or the line whose cosine and sine parts two of them are, to its SI unit.
     """
@@ -61,6 +63,7 @@ class Candidate:
     listed: bool = True
     frees: str | None = None
     form: str = ""
+    instead_of: str = ""
     unit: Callable[[str], str] | None = None
 
     @property
@@ -78,6 +81,12 @@ class Candidate:
     def goes_with(self, other: Candidate) -> bool:
         """Tell whether a drive may have both: no two of their effects are at one place."""
         return not self.places & other.places
+
+    def holds(self, other: Candidate) -> bool:
+        """Tell whether another effect is a special case of this one, or of this form of it."""
+        return is_contained(other.name, self.name) or (
+            self.form != "" and is_contained(other.name, f"{self.name}/{self.form}")
+        )
 
     @property
     def linear(self) -> bool:
@@ -133,6 +142,7 @@ def candidate_of(
         effect.exact,
         listed=not guess.name,
         form=guess.form,
+        instead_of=guess.instead_of,
         unit=effect.unit,
     )
 

@@ -294,4 +294,6 @@ def places(candidates: Sequence[Candidate], first: int = 0) -> list[tuple[Candid
 
 
 def _without_tolerance(parameter: Parameter) -> Parameter:
-    return replace(parameter, lower=parameter.start / _FREED, upper=parameter.start * _FREED)
+    # A gain may be negative.
+    lower, upper = sorted((parameter.start / _FREED, parameter.start * _FREED))
+    return replace(parameter, lower=lower, upper=upper)

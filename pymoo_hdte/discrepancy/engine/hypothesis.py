@@ -17,7 +17,6 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened
-from pymoo_hdte.effects.effect import is_contained
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,11 +30,14 @@ class Hypothesis:
         Chi-square + parameters x ln(residuals).
     explained : float
         Share of the base's excess chi-square that it removes; 1 leaves nothing but noise.
+    removed : float
+        By how much its chi-square is less than the base's.
     """
 
     fit: Fit
     bic: float
     explained: float
+    removed: float = 0.0
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -87,7 +89,7 @@ def hypothesis_of(fitted: Fit, of_base: float) -> Hypothesis:
     bic = fitted.chi_square + unknowns * np.log(len(fitted.residuals))
     gain = of_base + (len(fitted.residuals) - n_base) - fitted.chi_square
     share = gain / max(of_base, gain) if gain > 0.0 else 0.0
-    return Hypothesis(fitted, float(bic), float(share))
+    return Hypothesis(fitted, float(bic), float(share), float(gain))
 
 
 def adequate(degrees_of_freedom: int, rules: Rules) -> float:
@@ -115,36 +117,44 @@ def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     return np.asarray(before.significant(rules) & plain & residual)
 
 
+def gains_enough(one: Hypothesis, base: Fit, rules: Rules) -> bool:
+    """Tell whether a set of effects reduces the criterion of the base enough for a name."""
+    unknowns = sum(candidate.unknowns for candidate in one.candidates)
+    gain = base.chi_square - one.fit.chi_square
+    return bool(gain - unknowns * np.log(len(base.residuals)) >= rules.bic_gain)
+
+
 def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int) -> bool:
     """Tell whether a set of effects explains the misfit of the base, in all parts of the data."""
     rules, limit = data.rules, adequate(degrees_of_freedom, data.rules)
-    gain = base.chi_square - one.fit.chi_square
-    unknowns = sum(candidate.unknowns for candidate in one.candidates)
     share = rules.exact_share if one.exact else rules.explained_share
     limit = max(limit, rules.exact_chi_square) if one.exact else limit
-    if gain - unknowns * np.log(len(base.residuals)) < rules.bic_gain:
+    if not gains_enough(one, base, rules):
         return False
     if one.fit.chi_square <= limit * degrees_of_freedom:
         return True
     return one.explained >= share and not unexplained(data, base, one.fit).any()
 
 
-def alike(
-    one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules, margin: float = 1.0
-) -> bool:
+def alike(one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules) -> bool:
     """Tell whether another hypothesis is indistinguishable from the chosen one with these data.
 
-    Where even the chosen form leaves more than noise, differences of chi-square are compared with
-    this residual: the true form of an effect may differ from the listed one.
+    The true form of an effect may differ from the listed one. Two laws of no exact form whose
+    predictions differ by less than such forms do are therefore alike, unless one is a special case
+    of the other. Where even the chosen form leaves more than noise, differences of chi-square are
+    compared with this residual.
     """
     if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
         return False
     misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
-    near = one.fit.evidence - chosen.fit.evidence < margin * rules.evidence_distance * misfit
+    near = one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
+    residual = chosen.fit.chi_square - degrees_of_freedom
+    if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
+        further = one.fit.chi_square - chosen.fit.chi_square
+        near = further < rules.form_accuracy**2 * (chosen.removed + residual)
     if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
         return near
-    residual = chosen.fit.chi_square - degrees_of_freedom
-    return one.fit.chi_square - degrees_of_freedom < margin * rules.form_ratio * residual
+    return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
 
 
 def contains(one: Hypothesis, other: Hypothesis) -> bool:
@@ -154,14 +164,19 @@ def contains(one: Hypothesis, other: Hypothesis) -> bool:
     """
     if len(one.candidates) != len(other.candidates):
         return False
+    same = one.names & other.names
     pairs = zip(
-        *(sorted(each.candidates, key=lambda c: c.port) for each in (one, other)), strict=True
+        *(
+            sorted((c for c in each.candidates if (c.name, c.port) not in same), key=_port)
+            for each in (one, other)
+        ),
+        strict=True,
     )
-    return all(
-        wide.port == special.port
-        and (wide.name == special.name or is_contained(special.name, wide.name))
-        for wide, special in pairs
-    )
+    return all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
+
+
+def _port(candidate: Candidate) -> str:
+    return candidate.port
 
 
 def fit_all(

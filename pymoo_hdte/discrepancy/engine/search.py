@@ -24,7 +24,6 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 from pymoo_hdte.discrepancy.engine.membership import ill_explained, is_earned
 from pymoo_hdte.discrepancy.engine.screening import Screened, screen
 from pymoo_hdte.discrepancy.engine.starts import best_fit
-from pymoo_hdte.effects.effect import is_contained
 
 Vector = NDArray[np.float64]
 Effects = tuple[Candidate, ...]
@@ -224,9 +223,9 @@ class Search:
         return one.candidates
 
     def _could_count(self, one: Hypothesis) -> bool:
-        """Tell whether a further effect beside a set could be justified at all."""
+        """Tell whether a further effect could be justified; one at a bound may stand for two."""
         if self.enough(one):
-            return False
+            return any(one.fit.bound_sides[one.fit.n_base :])
         return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
 
     def _extend(self, one: Hypothesis, by_part: bool = True) -> None:
@@ -291,7 +290,7 @@ class Search:
         """Fit sets in which one member is replaced by a special case of it at the same port."""
         for member in one.candidates:
             for other in self.candidates:
-                if other.port != member.port or not is_contained(other.name, member.name):
+                if other.port != member.port or not member.holds(other):
                     continue
                 kept = tuple(each for each in one.candidates if each is not member)
                 if all(other.goes_with(each) for each in kept):

@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     contains,
     down_to_noise,
     explains,
+    gains_enough,
 )
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.screening import screen
@@ -125,7 +126,11 @@ def judge(
     vote = data.held_out_vote(base, chosen.fit)
     shown = vote is None or vote.counts(rules)
     doubts = doubts_of(search, chosen, vote if shown else None)
-    status = _status(chosen, _explains(search, chosen), equivalent, doubts)
+    certain = _explains(search, chosen)
+    if not certain and _stands_out(search, chosen):
+        certain, left = True, _left_by(chosen.fit.chi_square / degrees_of_freedom)
+        doubts += [left] if left not in doubts else []
+    status = _status(chosen, certain, equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()
     sure = probability.of_names(status, chosen, rivals, search.found, degrees_of_freedom, rules)
     return Verdict(
@@ -209,8 +214,13 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
         found.append(NOT_PROVEN)
     per_degree = fitted.chi_square / search.degrees_of_freedom
     if per_degree > search.data.rules.contradicting_chi_square:
-        found.append(f"what is left is {np.sqrt(per_degree):.3g} times the noise")
+        found.append(_left_by(per_degree))
     return found
+
+
+def _left_by(per_degree: float) -> str:
+    """Say what a chi-square per degree of freedom means."""
+    return f"what is left is {np.sqrt(per_degree):.3g} times the noise"
 
 
 def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
@@ -251,11 +261,32 @@ def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: 
     return all(parameter.lower > 0.0 for parameter in candidate.parameters)
 
 
+def _stands_out(search: Search, chosen: Hypothesis) -> bool:
+    """Tell whether a set that leaves more than the noise is certain as far as it goes.
+
+    It removes most of the misfit, and all other sets of its size leave plainly more: what is left
+    may be the form of a law, or a further effect.
+    """
+    rules, degrees_of_freedom = search.data.rules, search.degrees_of_freedom
+    left = chosen.fit.chi_square - degrees_of_freedom
+    others = (
+        one
+        for one in search.found
+        if len(one.members) == len(chosen.members)
+        and one.names != chosen.names
+        and not contains(one, chosen)
+    )
+    enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
+    return enough and all(
+        one.fit.chi_square - degrees_of_freedom >= rules.form_ratio * left for one in others
+    )
+
+
 def _status(
-    chosen: Hypothesis, explains: bool, equivalent: Sequence[Hypothesis], doubts: Sequence[str]
+    chosen: Hypothesis, certain: bool, equivalent: Sequence[Hypothesis], doubts: Sequence[str]
 ) -> str:
     """Return the status of the best set: what it may be called."""
-    if not chosen.listed or not explains or NOT_PROVEN in doubts:
+    if not chosen.listed or not certain or NOT_PROVEN in doubts:
         return "unlisted"
     if equivalent:
         return "class"

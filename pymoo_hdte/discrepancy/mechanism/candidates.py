@@ -17,7 +17,8 @@ from pymoo_hdte.mechanism.effects import law_effects
 from pymoo_hdte.mechanism.port_motion import PortMotion
 
 LARGEST = 5.0
-"""Largest force of an effect, in units of the largest residual of the base in a balance."""
+"""Largest force of an effect, in units of the largest residual of the base in a balance, where no
+larger force acts: of a misfit the root mean square says little about what the base absorbs."""
 
 
 def mechanism_candidates(
@@ -84,7 +85,7 @@ def port_sizes(data: MeasuredData, port: Port, force: float, seen: Sequence[floa
     return Sizes(
         force=force,
         residual=force,
-        largest=LARGEST * force,
+        largest=max(LARGEST * force, _peak_force(data, port)),
         speed=max(float(np.abs(one.speed).max()) for one in here),
         travel=travel,
         stiffness=port.stiffness.value,
@@ -92,10 +93,27 @@ def port_sizes(data: MeasuredData, port: Port, force: float, seen: Sequence[floa
         both_ways=turns_back(data, port.name),
         load=max(0.0 if one.load is None else float(np.abs(one.load).max()) for one in here),
         driven=_driven(data, here),
+        turns=data.mechanism.turns(port),
         read=port.read,
         seen=tuple(seen),
         together=True,
     )
+
+
+def _peak_force(data: MeasuredData, port: Port) -> float:
+    """Return the largest force of the inputs on the motion of a port, or that its sensor reads."""
+    peaks = [0.0]
+    for record in (one.record for one in data.spectra):
+        if port.read:
+            peaks.append(float(np.abs(record.channels[port.name]).max()))
+        for name, share in port.motion.items():
+            parts = [
+                one.acts.get(name, 0.0) * one.gain.value * record.channels[one.name]
+                for one in data.mechanism.inputs
+            ]
+            if share and parts and not port.read:
+                peaks.append(float(np.abs(np.sum(parts, axis=0)).max()) / abs(share))
+    return max(peaks)
 
 
 def _driven(data: MeasuredData, here: Sequence[PortMotion]) -> bool:

@@ -69,11 +69,9 @@ class MeasuredData:
         """Quantities that are not known exactly, within their tolerances, and sensors' zeros."""
         found = []
         for name, one in self.mechanism.quantities.items():
-            if one.tolerance > 0.0:
-                reach = one.tolerance * one.value
-                found.append(
-                    Parameter(name, one.value, one.value - reach, one.value + reach, reach)
-                )
+            if not one.known:
+                least, most = one.limits
+                found.append(Parameter(name, one.value, least, most, (most - least) / 2.0))
         for port in self.mechanism.ports:
             if port.read:
                 largest = max(

@@ -8,7 +8,8 @@ the records have units of their own::
     cutoff = 40.0                                  # optional, Hz
 
     [coordinates.q]
-    inertia = { value = 100.0, tolerance = 0.5 }   # relative tolerance, 0 to 1; absent: known
+    inertia = { value = 100.0, tolerance = 0.5 }   # relative, 0 to 1; or factor = 3.0; or known
+    angle = true                                   # optional: of a shaft; else the unit tells
     [ports.joint]
     motion = { q = 1.0 }                           # share of each coordinate
     damping = { value = 300.0, tolerance = 1.0 }   # optional, as stiffness
@@ -21,7 +22,7 @@ the records have units of their own::
     phase = 0.0
     [inputs.vir]
     acts = { q = 1.0 }
-    gain = { value = 35.15 }
+    gain = { value = 35.15 }                       # absent: forces are in units of the signal
     [[loops]]                                      # optional, as `Loop`
     input = "vir"
     reference = "qg"
@@ -43,7 +44,11 @@ the records have units of their own::
     ...
     [[records]]
     file = "DATA_EMPS.mat"                         # in the folder of the data
-    role = "train"                                 # or "held_out"
+    files = { vir = "voltage.csv" }                # optional: channels that have files of their own
+    role = "train"                                 # or "held_out"; absent: first 60 %, last 40 %
+    share = [0.0, 0.5]                             # optional, with a role: part of the rows; or
+    rows = [0, 12000]                              # instead: first row, and the first after it; or
+    seconds = [0.0, 12.0]                          # instead: as in the column of time
     name = "trapezoids"                            # optional: without it the name of the file
     sha256 = "6cf6814ae14618"                      # optional: first 8 or more digits
     zero = { q = 12.5 }                            # optional: readings at zero, unit of the column
@@ -53,9 +58,9 @@ the records have units of their own::
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
 from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.discrepancy.mechanism.models import (
@@ -63,13 +68,13 @@ from pymoo_hdte.discrepancy.mechanism.models import (
     model_from_fields,
     read_mechanism_model,
 )
+from pymoo_hdte.discrepancy.mechanism.record_files import ListedRecord, listed_record, read_records
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.layout import TableLayout, layout_from_fields, with_zeros
-from pymoo_hdte.io.tables import check_sha256, read_table
-from pymoo_hdte.io.text_lines import Progress, Seen, told
+from pymoo_hdte.io.layout import COUNTS, layout_from_fields
+from pymoo_hdte.io.text_lines import Progress, told
 from pymoo_hdte.io.toml import toml_with_lines
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
-from pymoo_hdte.mechanism.records import ROLES
+from pymoo_hdte.units import UNITS
 
 RIG_FILE = "rig.toml"
 
@@ -161,17 +166,22 @@ def read_rig(
         noise = _noise(top)
         entries = top.tables("records")
         top.finish()
-        records: dict[str, Record] = {}
-        places = [f"{path.name}.records[{index}]" for index in range(len(entries))]
-        pairs = list(zip(entries, places, strict=True))
-        paths = [_path(entry, place, files) for entry, place in pairs]
-        seen = told(progress, paths)
-        for (entry, place), of_record in zip(pairs, paths, strict=True):
-            record = _record(entry, place, of_record, shared, records, noise, seen)
-            records[record.name] = record
+        listed = [
+            listed_record(entry, f"{path.name}.records[{index}]", files, shared)
+            for index, entry in enumerate(entries)
+        ]
+        _check_names(listed)
+        # Each part is read on its own, so that a fault outside of it does no harm.
+        seen = told(progress, [file for one in listed for _ in one.parts for file in one.paths])
+        coordinates = model.mechanism.coordinates
+        records = {
+            record.name: record
+            for one in listed
+            for record in read_records(one, coordinates, noise, seen)
+        }
         _check_noise(noise, records, path.name)
     return MeasuredMechanism(
-        model.mechanism,
+        _with_angles(model.mechanism, listed),
         tuple(records.values()),
         model.cutoff,
         model.effects,
@@ -189,43 +199,27 @@ def _model(top: Fields, path: Path) -> MechanismModel:
     return replace(model, title=top.text("title"), cutoff=cutoff)
 
 
-def _path(entry: Fields, place: str, folder: Path) -> Path:
-    file = entry.text("file")
-    # As a Windows path, which accepts both separators and drive letters.
-    parts = PureWindowsPath(file)
-    if parts.anchor or ".." in parts.parts or not (folder / file).is_file():
-        raise InvalidInput(f"{place}.file", file, f"a file inside {folder}")
-    return folder / file
+def _with_angles(mechanism: Mechanism, listed: Sequence[ListedRecord]) -> Mechanism:
+    """Return a mechanism that knows its angles: as its file says, or else by units of columns."""
+    if mechanism.angles is not None:
+        return mechanism
+    turning = {COUNTS, *UNITS["angle"], *UNITS["speed"]}
+    tables = [one.layout.channels for one in listed]
+    angles = [
+        name
+        for name in mechanism.coordinates
+        if all(name in table and table[name].unit in turning for table in tables)
+    ]
+    return replace(mechanism, angles=angles or None)
 
 
-def _record(
-    entry: Fields,
-    place: str,
-    path: Path,
-    shared: TableLayout | None,
-    taken: Collection[str],
-    noise: Mapping[str, float],
-    seen: Seen | None,
-) -> Record:
-    role = entry.choice("role", ROLES)
-    name = entry.text("name") if entry.has("name") else path.stem
-    if name in taken:
-        raise InvalidInput(f"{place}.name", name, "a name of its own for each record")
-    layout = layout_from_fields(entry.table("table")) if entry.has("table") else shared
-    if layout is None:
-        raise InvalidInput(f"{place}.table", None, "a layout here, or [table] for all records")
-    if entry.has("zero"):
-        layout = with_zeros(entry.table("zero"), layout)
-    expected = entry.text("sha256") if entry.has("sha256") else None
-    entry.finish()
-    if expected is not None:
-        _check_sha256(path, expected, place)
-    table = read_table(path, layout, seen)
-    try:
-        of_channels = {one: noise[one] for one in noise if one in table.channels}
-        return Record(name, role, table.time, table.channels, of_channels, table.dropped)
-    except InvalidInput as error:
-        raise InvalidInput(f"{path.name}: {error.field}", error.value, error.allowed) from None
+def _check_names(listed: Sequence[ListedRecord]) -> None:
+    taken = set[str]()
+    for one in listed:
+        for name, _, _ in one.parts:
+            if name in taken:
+                raise InvalidInput(f"{one.place}.name", name, "a name of its own for each record")
+            taken.add(name)
 
 
 def _noise(top: Fields) -> dict[str, float]:
@@ -239,13 +233,3 @@ def _check_noise(noise: Mapping[str, float], records: Mapping[str, Record], file
     channels = {channel for record in records.values() for channel in record.channels}
     for name in noise:
         one_of(f"{file}: name in noise", name, sorted(channels))
-
-
-def _check_sha256(path: Path, expected: str, place: str) -> None:
-    try:
-        check_sha256(path, expected)
-    except InvalidInput as error:
-        if error.field.startswith(path.name):
-            raise
-        # The digits themselves are invalid, and they are in the rig's file.
-        raise InvalidInput(f"{place}.sha256", error.value, error.allowed) from None

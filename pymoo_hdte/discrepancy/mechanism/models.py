@@ -12,10 +12,8 @@ from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import toml_text, toml_with_lines
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
-from pymoo_hdte.mechanism.effects import (
-    law_effects,
-)
-from pymoo_hdte.mechanism.mechanism import NOTHING
+from pymoo_hdte.mechanism.believed import LARGEST_FACTOR, NOTHING
+from pymoo_hdte.mechanism.effects import law_effects
 
 
 @dataclass(frozen=True)
@@ -75,11 +73,14 @@ def model_text(model: MechanismModel) -> str:
     if model.cutoff is not None:
         top["cutoff"] = model.cutoff
     top["coordinates"] = {
-        name: {"inertia": _believed_table(inertia)} for name, inertia in mechanism.inertias.items()
+        name: {"inertia": _believed_table(inertia)}
+        | ({} if mechanism.angles is None else {"angle": name in mechanism.angles})
+        for name, inertia in mechanism.inertias.items()
     }
     top["ports"] = {port.name: _port_table(port) for port in mechanism.ports}
     top["inputs"] = {
-        one.name: {"acts": one.acts, "gain": _believed_table(one.gain)} for one in mechanism.inputs
+        one.name: {"acts": one.acts} | ({"gain": _believed_table(one.gain)} if one.scaled else {})
+        for one in mechanism.inputs
     }
     # The reader takes finite numbers only: a loop without saturation has no limit there.
     loops = [
@@ -98,7 +99,10 @@ def model_text(model: MechanismModel) -> str:
 
 
 def _believed_table(one: BelievedValue) -> dict[str, float]:
-    return {"value": one.value} | ({"tolerance": one.tolerance} if one.tolerance else {})
+    limits = {"tolerance": one.tolerance, "factor": one.factor}
+    return {"value": one.value} | {
+        name: limit for name, limit in limits.items() if limit != getattr(NOTHING, name)
+    }
 
 
 def _port_table(port: Port) -> dict[str, Any]:
@@ -124,13 +128,18 @@ def model_from_fields(top: Fields, file: str) -> MechanismModel:
 
 def _mechanism(top: Fields, file: str) -> Mechanism:
     inertias: dict[str, BelievedValue] = {}
+    angles: dict[str, bool] = {}
     for name, table in _named(top, "coordinates", file).items():
         inertias[name] = _believed(table, "inertia", above=0.0)
+        if table.has("angle"):
+            angles[name] = _flag(table, "angle", f"{file}.coordinates.{name}")
         table.finish()
     inputs = []
     for name, table in _named(top, "inputs", file).items():
         acts = _shares(table, "acts", f"{file}.inputs.{name}", inertias)
-        inputs.append(Input(name, acts, _believed(table, "gain", at_least=0.0)))
+        scaled = table.has("gain")
+        gain = _believed(table, "gain") if scaled else BelievedValue(1.0)
+        inputs.append(Input(name, acts, gain, scaled))
         table.finish()
     pushing = [one.name for one in inputs]
     ports = [
@@ -139,10 +148,13 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
     ]
     rows = top.tables("loops") if top.has("loops") else []
     loops = [_loop(row, [one.name for one in inputs], inertias) for row in rows]
+    turning = [name for name, turns in angles.items() if turns] if angles else None
     try:
-        return Mechanism(inertias, ports, inputs, loops)
+        return Mechanism(inertias, ports, inputs, loops, turning)
     except InvalidInput as error:
-        raise InvalidInput(f"{file}: {error.field}", error.value, error.allowed) from None
+        gains = {f"gain of {one.name}": f"{file}.inputs.{one.name}.gain" for one in inputs}
+        place = gains.get(error.field, f"{file}: {error.field}")
+        raise InvalidInput(place, error.value, error.allowed) from None
 
 
 def _named(top: Fields, field: str, file: str) -> dict[str, Fields]:
@@ -158,10 +170,25 @@ def _named(top: Fields, field: str, file: str) -> dict[str, Fields]:
 def _believed(table: Fields, field: str, **limits: float) -> BelievedValue:
     inside = table.table(field)
     value = inside.number("value", **limits)
-    given = inside.has("tolerance")
-    tolerance = inside.number("tolerance", at_least=0.0, at_most=1.0) if given else 0.0
+    ranges = {"tolerance": (0.0, 1.0), "factor": (1.0, LARGEST_FACTOR)}
+    stated = {
+        name: inside.number(name, at_least=least, at_most=most)
+        for name, (least, most) in ranges.items()
+        if inside.has(name)
+    }
     inside.finish()
-    return BelievedValue(value, tolerance)
+    try:
+        return BelievedValue(value, **stated)
+    except InvalidInput as error:
+        place = inside._name(error.field.removeprefix("believed."))
+        raise InvalidInput(place, error.value, error.allowed) from None
+
+
+def _flag(table: Fields, field: str, place: str) -> bool:
+    raw = table.take(field, "true or false") if table.has(field) else False
+    if not isinstance(raw, bool):
+        raise InvalidInput(f"{place}.{field}", raw, "true or false")
+    return raw
 
 
 def _shares(
@@ -185,9 +212,7 @@ def _port(
         _believed(table, field, at_least=0.0) if table.has(field) else NOTHING
         for field in ("stiffness", "damping")
     )
-    read = table.take("read", "true or false") if table.has("read") else False
-    if not isinstance(read, bool):
-        raise InvalidInput(f"{place}.read", read, "true or false")
+    read = _flag(table, "read", place)
     lines = []
     for row in table.tables("error") if table.has("error") else []:
         coordinate = row.choice("coordinate", coordinates)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
-from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 
 Values = NDArray[np.float64]

@@ -11,7 +11,7 @@ from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.mechanism import Mechanism, Record
 from pymoo_hdte.mechanism.balances import balance_names
-from pymoo_hdte.mechanism.motion import highest_frequency, highest_share
+from pymoo_hdte.mechanism.motion import RATE_SLACK, highest_frequency, highest_share
 from pymoo_hdte.mechanism.resampling import COARSEST_SHARE, noise_between, refined, share_beyond
 from pymoo_hdte.mechanism.working_rate import working_rows
 
@@ -21,7 +21,10 @@ def check_signals(mechanism: Mechanism, records: Sequence[Record]) -> None:
     if not mechanism.ports:
         raise InvalidInput("mechanism.ports", (), "at least one: effects are looked for there")
     if not _scales(mechanism):
-        allowed = "none for at least one inertia, stiffness or gain, or only ratios are known"
+        allowed = (
+            "none for at least one inertia, stiffness or gain, or only ratios are known; where no "
+            "gain is known, leave it out of the only input, and all is told in units of its signal"
+        )
         raise InvalidInput("tolerances of the mechanism", "on all", allowed)
     needed = (*balance_names(mechanism), *(one.name for one in mechanism.inputs))
     names = [record.name for record in records]
@@ -82,7 +85,7 @@ def fine_enough(records: Sequence[Record], cutoff: float) -> tuple[Record, ...]:
     found = []
     for record in records:
         fine, most = highest_share(record.step), highest_share(record.step, COARSEST_SHARE)
-        if cutoff > most:
+        if cutoff > RATE_SLACK * most:
             raise InvalidInput(
                 f"sampling rate of record {record.name}",
                 round(1.0 / record.step, 6),
@@ -90,7 +93,8 @@ def fine_enough(records: Sequence[Record], cutoff: float) -> tuple[Record, ...]:
                 f"cutoff of {cutoff:.4g} Hz; or a cutoff of at most {most:.4g} Hz",
             )
         # Finer than the ratio asks for, so that rounding refuses no record afterwards.
-        found.append(record if cutoff <= fine else refined(record, int(cutoff / fine) + 1))
+        coarse = cutoff > RATE_SLACK * fine
+        found.append(refined(record, int(cutoff / fine) + 1) if coarse else record)
     return tuple(found)
 
 
@@ -109,7 +113,7 @@ def check_scale(data: MeasuredData) -> None:
     A gain that is known sets the scale only where its input drives the mechanism. Where all
     quantities are known, no scale has to be determined.
     """
-    if all(one.tolerance == 0.0 for one in data.mechanism.quantities.values()):
+    if all(one.known for one in data.mechanism.quantities.values()):
         return
     ratio, least = data.known_over_noise(), data.rules.noise_power_ratio
     if not ratio > least:
@@ -124,5 +128,5 @@ def check_scale(data: MeasuredData) -> None:
 
 def _scales(mechanism: Mechanism) -> list[str]:
     """Return the exactly known quantities, relative to which all others are determined."""
-    known = [name for name, one in mechanism.quantities.items() if one.tolerance == 0.0]
+    known = [name for name, one in mechanism.quantities.items() if one.known]
     return [name for name in known if name.startswith(("inertia", "stiffness", "gain"))]

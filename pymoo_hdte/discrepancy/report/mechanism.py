@@ -136,6 +136,7 @@ def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             "value": parameter["value"],
             "lower": parameter["interval95"][0],
             "upper": parameter["interval95"][1],
+            "at_bound": parameter["at_bound"],
         }
         for one in effects
         for name, parameter in one["parameters"].items()

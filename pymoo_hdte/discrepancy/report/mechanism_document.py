@@ -11,7 +11,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, label_of
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
@@ -21,7 +21,7 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
 from pymoo_hdte.effects.effect import effect_named
-from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import line_with_variance
 from pymoo_hdte.mechanism.resampling import share_beyond
 
@@ -109,21 +109,21 @@ def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
 
 
 def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
-    """Return second effects beside the named one for which the data are weak evidence.
+    """Return further effects beside the named ones for which the data are weak evidence.
 
     They improve the fit significantly, but remove too little to be named.
     """
     chosen, rules = finding.verdict.chosen, finding.data.rules
-    if chosen is None or finding.accepted is not chosen.fit or len(chosen.candidates) > 1:
+    if chosen is None or finding.accepted is not chosen.fit:
         return []
-    found = []
+    found, named = [], label_of(chosen.candidates)
     for one in sorted(finding.verdict.alternatives, key=_by_bic):
-        seconds = [c for c in one.candidates if c is not chosen.candidates[0]]
+        more = [each for each in one.candidates if each.label not in named]
         removes = 1.0 - one.fit.chi_square / chosen.fit.chi_square
-        if len(seconds) == 1 < len(one.candidates):
+        if len(more) == 1 and named < label_of(one.candidates):
             gain = chosen.bic - one.bic
             if gain > rules.bic_gain and removes > rules.offered_share:
-                found.append({"name": seconds[0].name, "port": seconds[0].port, "removes": removes})
+                found.append({"name": more[0].name, "port": more[0].port, "removes": removes})
     return found
 
 
@@ -196,6 +196,14 @@ def limits(finding: MechanismFinding) -> list[str]:
         for record in finding.records
         if record.dropped
     ]
+    found += [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
+    found += [
+        f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "
+        f"are told in units of {one.name}. Their ratios and the kind of effect are determined, "
+        "their sizes are not."
+        for one in finding.mechanism.inputs
+        if not one.scaled
+    ]
     if not any(record.role == "held_out" for record in finding.records):
         found.append("No record was held out: the correction is not proved where it was not made.")
     if any(finding.accepted.bound_sides[: len(finding.data.base)]):
@@ -235,7 +243,10 @@ def quantities(finding: MechanismFinding) -> dict[str, Any]:
 
 
 def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
-    """Return values with intervals, SI; cosine and sine parts as amplitude and phase."""
+    """Return values with intervals, SI; cosine and sine parts as amplitude and phase.
+
+    The interval of a value that ended at a bound ends there too, and does not hold: it says so.
+    """
     found: dict[str, Any] = {}
     for row in rows:
         parameter, value = fitted.parameters[row], float(fitted.values[row])
@@ -246,6 +257,7 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
             # The fit could not exceed its bounds.
             bounds = parameter.lower, parameter.upper
             found[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
+            found[name]["at_bound"] = bool(fitted.bound_sides[row])
             continue
         pair = slice(row, row + 2)
         cosine, sine = fitted.values[pair]
@@ -254,6 +266,8 @@ def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
         name = name.removesuffix("_cosine")
         found[name] = _with_interval(*amplitude, reach, lower=0.0)
         found[f"{name}_phase"] = _with_interval(*phase, reach)
+        for one in (name, f"{name}_phase"):
+            found[one]["at_bound"] = bool(np.any(fitted.bound_sides[pair]))
     return found
 
 

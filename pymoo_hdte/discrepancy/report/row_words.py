@@ -10,7 +10,7 @@ from pymoo_hdte.discrepancy.campaign.rows.findings import (
     RowFault,
     RowFindings,
 )
-from pymoo_hdte.effects.sentences import listed
+from pymoo_hdte.effects.sentence_blanks import listed
 from pymoo_hdte.units import ARCSEC
 
 _MOST_FAULTS = 50

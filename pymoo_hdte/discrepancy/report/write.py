@@ -41,7 +41,7 @@ from pymoo_hdte.discrepancy.report.tables import (
 )
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
-from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.reports.figures import data_uri
 from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.html import page

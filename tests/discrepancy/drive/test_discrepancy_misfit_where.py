@@ -13,7 +13,7 @@ from pymoo_hdte.discrepancy.drive.misfit.map import Location, WithinNoise
 from pymoo_hdte.discrepancy.drive.misfit.nature import StrayLines, stray_lines
 from pymoo_hdte.discrepancy.drive.misfit.where import sentences
 from pymoo_hdte.discrepancy.engine.rules import RULES
-from pymoo_hdte.effects.sentences import in_words
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 CONDITIONS = [(rpm, load) for rpm in (10.0, 200.0, 1000.0, 2000.0) for load in (0.0, 10.0, 40.0)]

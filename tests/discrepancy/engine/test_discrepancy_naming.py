@@ -253,10 +253,11 @@ def test_a_line_too_small_for_the_whole_chi_square_is_found_by_its_gain():
 
 
 def test_a_line_must_explain_down_to_the_noise():
-    """Most of an excess is not enough for a form that leaves nothing open."""
+    """Most of an excess is no plain name for a form that leaves nothing open."""
     data = disturbed(planted({RIPPLE: (5e-4, 0.0)}), 1000.0)
     verdict = verdict_on(data, [RIPPLE, LINE])
-    assert verdict.status == "unlisted"
+    assert (verdict.status, labels_of(verdict)) == ("partial", {RIPPLE})
+    assert any("times the noise" in doubt for doubt in verdict.doubts)
     assert RULES.explained_share < verdict.chosen.explained < RULES.exact_share
     found = verdict_on(data, [RIPPLE, LINE], exact_chi_square=10.0)
     assert (found.status, labels_of(found)) == ("named", {RIPPLE})
@@ -271,17 +272,17 @@ def test_a_curve_need_explain_its_share_only():
 
 
 @pytest.mark.nightly
-def test_what_explains_one_channel_is_not_the_cause_of_what_another_shows():
+def test_what_explains_one_channel_is_no_plain_name_for_what_another_shows():
     data = planted({CUBIC: (6e9,)})
     for record in (1, 3):
         data = disturbed(data, 1500.0, record)
     verdict = verdict_on(data, [CUBIC, RIPPLE])
-    assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
+    assert (verdict.status, labels_of(verdict)) == ("partial", {CUBIC})
     assert verdict.chosen.explained > RULES.explained_share
     left = hypothesis.unexplained(data, verdict.base, verdict.chosen.fit)
     assert left.tolist() == [False, True, False, False, False]
-    # What is left is more than three times the noise: certain, but not all.
-    assert verdict_on(data, [CUBIC, RIPPLE], explained_part_share=0.0).status == "partial"
+    # If another law leaves no more than a multiple of this, neither is certain.
+    assert verdict_on(data, [CUBIC, RIPPLE], form_ratio=1e9).status == "unlisted"
 
 
 @pytest.mark.nightly
@@ -335,6 +336,17 @@ def test_rivals_are_compared_by_their_evidence():
         assert hypothesis.alike(other, chosen, 1000, RULES) == equal
 
 
+def test_a_second_effect_that_leaves_only_noise_is_earned():
+    """A drift beside an eccentricity of another form took four fifths of what this one left."""
+    data = disturbed(planted({RIPPLE: (3e-3, 0.0), LINE: (0.04 * ARCSEC, 0.0)}), 40.0)
+    verdict = verdict_on(data, [RIPPLE, LINE])
+    assert (verdict.status, labels_of(verdict)) == ("named", {RIPPLE, LINE})
+    (alone,) = (one for one in verdict.alternatives if one.label == RIPPLE)
+    left = alone.fit.chi_square - verdict.degrees_of_freedom
+    removed = alone.fit.chi_square - verdict.chosen.fit.chi_square
+    assert 0.5 * left < removed < RULES.explained_share * left
+
+
 def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent():
     data = planted({CUBIC: (2e9,)})
     variances = np.diagonal(data.covariance, axis1=1, axis2=2)
@@ -351,11 +363,11 @@ def test_the_excess_of_all_parts_is_that_of_the_fit_where_cells_are_independent(
 
 
 def test_a_second_effect_must_remove_most_of_what_is_left():
-    # The first leaves 200 beyond the noise, of which the second takes 100.
-    data = disturbed(planted({RIPPLE: (3e-3, 0.0), LINE: (0.04 * ARCSEC, 0.0)}), 110.0)
+    """Unless nothing but noise is left: here it is three times what noise may leave."""
+    data = disturbed(planted({RIPPLE: (3e-3, 0.0), LINE: (0.08 * ARCSEC, 0.0)}), 300.0)
     lenient = {"exact_chi_square": 10.0}
     assert labels_of(verdict_on(data, [RIPPLE, LINE], **lenient)) == {RIPPLE}
-    lenient["explained_share"] = 0.4
+    lenient["explained_share"] = 0.5
     assert labels_of(verdict_on(data, [RIPPLE, LINE], **lenient)) == {RIPPLE, LINE}
 
 
@@ -370,11 +382,11 @@ def test_a_second_effect_is_looked_for_where_the_first_explains_least():
     left = hypothesis.unexplained(data, verdict.base, alone.fit)
     assert left.tolist() == [False, True, False, False, False]
     verdict = verdict_on(data, [CUBIC, DRAG, RIPPLE], second_hope_share=1e9)
-    assert (verdict.status, labels_of(verdict)) == ("unlisted", {CUBIC})
+    assert (verdict.status, labels_of(verdict)) == ("partial", {CUBIC})
 
 
-@pytest.mark.parametrize("looked_at", [True, pytest.param(False, marks=pytest.mark.nightly)])
 @pytest.mark.nightly
+@pytest.mark.parametrize("looked_at", [True, False])
 def test_a_second_effect_is_looked_for_in_the_sweep_alone(looked_at, monkeypatch):
     """The first leaves so much of a running record that the whole hides what the sweep shows."""
     conditions = [(rpm, load) for rpm in (10.0, 1000.0, 2000.0) for load in (0.0, 20.0, 40.0)]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.discrepancy.engine import verdict
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.verdict import doubts_of
 
@@ -60,7 +61,7 @@ def test_what_is_left_in_multiples_of_the_noise_is_a_doubt():
 def law(name, *, bounded=False, chi_square=1000.0):
     """A set of one law at the input with one unknown, which may have ended at its upper bound."""
     level = SimpleNamespace(name="level", linear=False, lower=0.0)
-    only = SimpleNamespace(name=name, port="input", exact=False, parameters=(level,))
+    only = Candidate(name, "input", (level,), ((0.0,),), lambda values: (), "")
     fitted = SimpleNamespace(
         chi_square=chi_square,
         bound_sides=np.array([1.0 if bounded else 0.0]),

@@ -230,12 +230,17 @@ def test_mistake_is_named_with_its_line(folder, old, new, message):
     assert str(caught.value).startswith(("rig.toml", "first.csv", "second.csv"))
 
 
-def test_jitter_that_only_the_record_sees_names_its_file(folder):
+def test_uneven_times_are_brought_to_even_steps_and_the_record_says_so(folder):
     # Steps within 1 % of the median, but one of them not within 1 % of the mean.
     steps = np.r_[0.0, np.full(10, 1.0), np.full(9, 1.0099), 0.9901]
     rows = "".join(f"{one:.6f},{index}\n" for index, one in enumerate(np.cumsum(steps)))
     (folder / "more/second.csv").write_text("t,q\n" + rows)
-    with pytest.raises(InvalidInput, match=r"^second\.csv: step \d+ of the time of record another"):
+    first, second = read_rig(folder).records
+    assert not first.remarks
+    assert "every 1004 ms" in second.remarks[0]
+    assert np.ptp(np.diff(second.time)) < 1e-9
+    (folder / "more/second.csv").write_text("t,q\n" + rows + "40.0,1\n")
+    with pytest.raises(InvalidInput, match=r"^second\.csv, line 23: t is 40\.0"):
         read_rig(folder)
 
 

@@ -46,9 +46,9 @@ def test_every_effect_survives_the_file(known, tmp_path):
     assert through_file(tmp_path, "x", RIG, [effect]) == MechanismModel("x", RIG, (effect,))
 
 
-def test_registry_is_that_of_the_drive_and_five_more():
+def test_registry_is_that_of_the_drive_and_six_more():
     extra = {"force_offset", "direction_dependent_friction", "kinematic_error"}
-    extra |= {"linear_stiffness", "viscous_friction"}
+    extra |= {"linear_stiffness", "viscous_friction", "gravity"}
     # Ports of a mechanism know no temperature.
     of_motion = set(LAWS) - {"temperature_dependent_friction"}
     assert {one.name for one in law_effects()} == of_motion | extra

@@ -227,6 +227,20 @@ def test_a_gap_is_lost_torsion_and_elements_without_size_change_nothing():
     assert same == pytest.approx(plain, abs=1e-12)
 
 
+@pytest.mark.parametrize("form", range(FORMS["soft_windup"]))
+def test_a_soft_windup_is_softer_near_zero_and_loses_a_torsion_beyond(form):
+    """Every form begins with the stiffness less the lost one and ends a fixed torsion behind."""
+    effect = draw_effect("soft_windup", form, np.random.default_rng(1)).hidden
+    lost, wound = effect.elements[0][1:3]
+    machine = replace(MACHINE, elements=effect.elements)
+    softened = MACHINE.stiffness - lost
+    torque = np.array([0.0, 1e-3 * softened * wound, 1e3 * MACHINE.stiffness * wound])
+    torsion = locked_torsion(machine, torque, 0.1)
+    assert torsion[1] == pytest.approx(torque[1] / softened, rel=2e-3)
+    behind = torsion[2] - torque[2] / MACHINE.stiffness
+    assert behind == pytest.approx(lost * wound / MACHINE.stiffness, rel=2e-3)
+
+
 def test_the_motor_carries_friction_from_the_start():
     row = element(el.DRY, 0.03, 0.2, 0)
     machine = replace(MACHINE, elements=(row,))

@@ -470,9 +470,9 @@ def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
     monkeypatch.setattr(blind_scoring, "other_tools", dict)
     # No rival is asked, so none need be installed.
     monkeypatch.setattr(blind, "require", lambda *_: None)
-    context = Context(1, tmp_path, Campaign(tmp_path), full=True, cases=len(MADE_UP))
+    context = Context(1, tmp_path, Campaign(tmp_path), full=True, cases=range(1, len(MADE_UP) + 1))
     first = blind.run(context)
-    assert "16 of the 2400 cases" in " ".join(first.paragraphs)
+    assert "Cases 1 to 16 of the 2400" in " ".join(first.paragraphs)
     assert "a step too far" in capsys.readouterr().err
     # A second run finds every case on disk.
     monkeypatch.setattr(blind_scoring, "score", None)

@@ -48,6 +48,31 @@ def test_a_quarter_of_a_record_shows_the_friction_of_a_real_rig():
     assert found == {"coulomb_friction", "direction_dependent_friction"}
 
 
+RAW_LOGS = {
+    "ur10e_joint_1": "ur10e",
+    "ur10e_joint_4": "ur10e",
+    "ur10e_joint_6": "ur10e",
+    "tx40_joint_4": "tx40_j4",
+    "silverbox": "silverbox",
+    "bouc_wen": "bouc_wen",
+    "lara8_joint_3": "lara8_j3",
+}
+
+
+@pytest.mark.parametrize(("name", "folder"), RAW_LOGS.items())
+def test_a_raw_log_needs_25_lines_and_no_script(name, folder):
+    path = measured_rigs.RIGS / f"{name}.toml"
+    assert len(path.read_text().splitlines()) <= 25
+    if not (MEASURED / folder).is_dir():
+        pytest.skip(f"the measurements are not at {MEASURED}")
+    rig = read_rig(path, MEASURED / folder)
+    assert {record.role for record in rig.records} == {"train", "held_out"}
+    needed = {*rig.mechanism.coordinates, *(one.name for one in rig.mechanism.inputs)}
+    assert all(set(record.channels) == needed for record in rig.records)
+    uneven = folder in ("ur10e", "lara8_j3")
+    assert all(bool(record.remarks) == uneven for record in rig.records)
+
+
 @pytest.mark.parametrize("experiment", [emps, kinova], ids=["emps", "kinova"])
 def test_without_the_measurements_the_report_says_so(experiment, tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.measured.rigs.MEASURED", tmp_path / "nowhere")

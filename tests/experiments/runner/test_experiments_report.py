@@ -140,7 +140,9 @@ def test_whatever_reads_a_stored_outcome_says_so(experiment):
 def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["table5", "--full", "--out", str(tmp_path / "out")])
-    assert "--full is for calibration, blind, sealed_rigs, peers" in capsys.readouterr().err
+    assert (
+        "--full is for anytime, calibration, blind, sealed_rigs, peers" in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda one: one.name)
@@ -233,6 +235,21 @@ def test_the_first_screen_repeats_the_headline_and_sorts_the_findings(out):
     assert re.findall(r"<b>([^<]+)</b>", rest) == [
         "Agrees.", "Differs.", "Fitted.", "Missed by the fit.", "Holds.", "Fails.",
     ]  # fmt: skip
+
+
+def test_the_page_begins_with_an_opening_and_its_section_with_a_leading_picture(tmp_path):
+    result = example()
+    (picture,) = result.pictures
+    leading = replace(picture, name="first", caption="Look here first.", leading=True)
+    opened = replace(result, opening="This holds, that does not.", pictures=(picture, leading))
+    save(tmp_path, "table7", opened)
+    page = write_report(tmp_path).read_text()
+    begin, section = page.split("<main>")[1].split('<section id="table7">')
+    assert re.match(r"\s*<h1>[^<]+</h1>\s*<p [^>]+>This holds, that does not\.", begin)
+    places = [
+        section.index(words) for words in ("Look here first.</fig", "<table>", picture.caption)
+    ]
+    assert places == sorted(places)
 
 
 def test_a_finding_is_judged_in_one_way():

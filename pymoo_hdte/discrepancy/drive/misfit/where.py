@@ -16,7 +16,7 @@ from pymoo_hdte.discrepancy.drive.misfit.nature import (
     stray_lines,
 )
 from pymoo_hdte.discrepancy.drive.misfit.trend import broad_band, in_words, strongest, trends
-from pymoo_hdte.effects.sentences import listed
+from pymoo_hdte.effects.sentence_blanks import listed
 
 _WORDS = [name.replace("_", " ") for name in CHANNELS]
 # Length of the lists in sentences; thresholds of flagging and of statements are in `Rules`.

@@ -1,0 +1,1 @@
+"""Table 7 and the ablation at every budget, population and reading of the paper."""

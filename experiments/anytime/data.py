@@ -1,0 +1,221 @@
+"""Scores of all runs: measured, and as the CSV that the repo keeps with the seconds apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.anytime.job import AnytimeRun
+from experiments.anytime.measures import MEASURES, RETURNED, measure
+from experiments.anytime.moments import COMMON, EXACT, FRESH
+from experiments.comparison.references import true_front
+from experiments.published_values import TABLE_7
+from experiments.runner.campaign import Campaign
+from experiments.runner.committed import committed_file, read_rows, table_with_origin
+from experiments.runner.registry import Context
+from experiments.runner.store import TIMES, write_atomically
+from pymoo_hdte.io.text_table import csv_text
+
+NAME = "anytime"
+OF_TABLE_7 = tuple(TABLE_7)
+EVERYONE = (*OF_TABLE_7, "A-MOPSO", "MP-MOPSO")
+DIGITS = 4
+"""Digits kept of an indicator; the paper prints three or four."""
+
+
+class Part(NamedTuple):
+    """Algorithms on one drive model with one kind of moments, seeds from 1."""
+
+    model: str
+    moments: str
+    algorithms: tuple[str, ...]
+    seeds: int
+
+
+class Extent(NamedTuple):
+    """How much is run."""
+
+    parts: tuple[Part, ...]
+    populations: tuple[int, ...]
+    budgets: tuple[int, ...]
+
+
+FULL = Extent(
+    parts=(
+        Part("calibrated", EXACT, EVERYONE, 20),
+        Part("resonant", EXACT, EVERYONE, 20),
+        Part("calibrated", COMMON, OF_TABLE_7, 20),
+        # Every evaluation costs a thousand of the surrogate: fewer seeds.
+        Part("calibrated", FRESH, OF_TABLE_7, 6),
+    ),
+    populations=(10, 20, 50, 100),
+    budgets=(100, 200, 500, 1000, 2000, 5000, 10_000),
+)
+QUICK = Extent(
+    parts=(
+        Part("calibrated", EXACT, EVERYONE, 7),
+        Part("calibrated", COMMON, OF_TABLE_7, 7),
+        Part("calibrated", FRESH, OF_TABLE_7, 7),
+    ),
+    populations=(10, 20),
+    budgets=(100, 200, 500),
+)
+
+
+class Case(NamedTuple):
+    """What all seeds of one algorithm share."""
+
+    model: str
+    moments: str
+    counted: str
+    population: int
+    evaluations: int
+    algorithm: str
+
+
+@dataclass(frozen=True)
+class Scores:
+    """The `MEASURES` of every run.
+
+    Attributes
+    ----------
+    values : dict of ndarray, shape (seeds, measures)
+        By case, in the order of the seeds.
+    seconds : dict of float
+        Median of a run over all budgets, by model, moments, population and algorithm.
+    """
+
+    values: dict[Case, NDArray[np.float64]]
+    seconds: dict[tuple[str, str, int, str], float]
+
+    def of(self, case: Case, name: str) -> NDArray[np.float64]:
+        """Return one of the `MEASURES` of every run, shape (seeds,)."""
+        return self.values[case][:, MEASURES.index(name)]
+
+    def problems(self) -> list[tuple[str, str]]:
+        """Drive models and kinds of moments, in the order of the table."""
+        return list(dict.fromkeys((case.model, case.moments) for case in self.values))
+
+    def algorithms(self, model: str, moments: str) -> list[str]:
+        """Names of the algorithms that ran on a problem."""
+        found = (c.algorithm for c in self.values if (c.model, c.moments) == (model, moments))
+        return list(dict.fromkeys(found))
+
+    def populations(self) -> list[int]:
+        """All sizes of the population, ascending."""
+        return sorted({case.population for case in self.values})
+
+    def budgets(self) -> list[int]:
+        """All budgets of evaluations, ascending."""
+        return sorted({case.evaluations for case in self.values})
+
+
+def scores_for(context: Context) -> Scores:
+    """Return the committed scores, or those of a full or quick run.
+
+    A run leaves its two files where the committed ones can be replaced by them.
+    """
+    if not (context.full or context.quick):
+        return committed_scores()
+    scores = run_scores(context.campaign, FULL if context.full else QUICK)
+    write_atomically(context.out / NAME / f"{NAME}.csv", format_scores(scores).encode())
+    seconds = context.out / TIMES / NAME / f"{NAME}_seconds.csv"
+    write_atomically(seconds, format_seconds(scores).encode())
+    return scores
+
+
+def committed_scores() -> Scores:
+    """Return the scores of the last full run; errors as `committed_file`."""
+    names = f"{NAME}.csv", f"{NAME}_seconds.csv"
+    return read_scores(*(committed_file(file, NAME) for file in names))
+
+
+def run_scores(campaign: Campaign, extent: Extent) -> Scores:
+    """Run every part of an extent, and measure its sets."""
+    values: dict[Case, NDArray[np.float64]] = {}
+    seconds = {}
+    for part in extent.parts:
+        jobs = _jobs(part, extent)
+        runs = dict(zip(jobs, campaign.run(jobs, f"{part.model}, {part.moments}"), strict=True))
+        for population, algorithm in product(extent.populations, part.algorithms):
+            times = [r.seconds for j, r in runs.items() if _is(j, population, algorithm)]
+            seconds[part.model, part.moments, population, algorithm] = float(np.median(times))
+        for population, budget in product(extent.populations, extent.budgets):
+            chosen = {(j.algorithm, j.seed): r for j, r in runs.items() if _is(j, population)}
+            found = measure(chosen, budget, population, true_front(part.model))
+            for counted, algorithm in dict.fromkeys(key[:2] for key in found):
+                case = Case(part.model, part.moments, counted, population, budget, algorithm)
+                rows = [found[counted, algorithm, 1 + seed] for seed in range(part.seeds)]
+                values[case] = np.vectorize(_rounded)(np.array(rows))
+    return Scores(values, seconds)
+
+
+def _jobs(part: Part, extent: Extent) -> list[AnytimeRun]:
+    entries = product(range(1, part.seeds + 1), part.algorithms, extent.populations)
+    return [
+        AnytimeRun(part.model, part.moments, algorithm, population, seed, extent.budgets)
+        for seed, algorithm, population in entries
+    ]
+
+
+def _is(job: AnytimeRun, population: int, algorithm: str | None = None) -> bool:
+    return job.population == population and algorithm in (None, job.algorithm)
+
+
+def _rounded(value: float) -> float:
+    """Return the number that the CSV keeps, so that both ways to the report give the same."""
+    return float(f"{value:.{DIGITS}g}")
+
+
+def format_scores(scores: Scores) -> str:
+    """Return the CSV text of the scores, with date and versions in a first comment line."""
+    rows = (
+        [*case, seed, *(f"{value:.{DIGITS}g}" for value in row)]
+        for case, runs in scores.values.items()
+        for seed, row in enumerate(runs, start=1)
+    )
+    return table_with_origin([*Case._fields, "seed", *MEASURES], rows)
+
+
+def format_seconds(scores: Scores) -> str:
+    """Return the CSV text of the seconds."""
+    rows = ([*key, f"{value:.3g}"] for key, value in scores.seconds.items())
+    return csv_text(["model", "moments", "population", "algorithm", "seconds"], rows)
+
+
+def read_scores(path: Path, seconds_path: Path) -> Scores:
+    """Read what `format_scores` and `format_seconds` wrote."""
+    found: dict[Case, list[list[float]]] = {}
+    for row in read_rows(path):
+        found.setdefault(_case(row), []).append([float(row[name]) for name in MEASURES])
+    seconds = {
+        (row["model"], row["moments"], int(row["population"]), row["algorithm"]): float(
+            row["seconds"]
+        )
+        for row in read_rows(seconds_path)
+    }
+    return Scores({case: np.array(rows) for case, rows in found.items()}, seconds)
+
+
+def _case(row: dict[str, str]) -> Case:
+    numbers = int(row["population"]), int(row["evaluations"])
+    return Case(row["model"], row["moments"], row["counted"], *numbers, row["algorithm"])
+
+
+def cases(
+    scores: Scores, model: str, moments: str, algorithms: Sequence[str], counted: str = RETURNED
+) -> Iterable[tuple[int, int, list[Case]]]:
+    """Yield every population and budget with the cases of some algorithms on a problem.
+
+    Those at which nothing was counted this way are left out.
+    """
+    for population, budget in product(scores.populations(), scores.budgets()):
+        found = [Case(model, moments, counted, population, budget, name) for name in algorithms]
+        if all(case in scores.values for case in found):
+            yield population, budget, found

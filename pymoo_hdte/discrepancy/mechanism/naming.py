@@ -1,0 +1,227 @@
+"""Which explanation of a mechanism's records is named, and what forbids to name it plainly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    contains,
+    down_to_noise,
+    hypothesis_of,
+    label_of,
+    unexplained,
+)
+from pymoo_hdte.discrepancy.engine.search import Search
+from pymoo_hdte.discrepancy.engine.verdict import Verdict, bounded_unknowns, doubts_of, judge
+from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
+from pymoo_hdte.discrepancy.mechanism.rest import share_removed
+
+_NAMING = ("named", "class", "partial")
+
+
+def judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
+    """Return the verdict in units of the residual, if it also holds against the sensors' noise.
+
+    Parameters
+    ----------
+    sensors, data : MeasuredData
+        With the noise of the sensors, and with the unexplained residual as noise.
+    candidates : sequence of Candidate
+    """
+    base, rules = fit(data), data.rules
+    searched = [one for one in candidates if not one.instead_of]
+    verdict = _mostly_explained(sensors, data, judge(data, base, searched))
+    verdict = _simplest(data, verdict)
+    verdict = _with_true_rivals(data, _within_bounds(sensors, data, verdict))
+    verdict = _with_substitutes(data, verdict, candidates)
+    before, noise = data.power(base.residuals), sensors.power(np.ones_like(base.residuals))
+    if verdict.chosen is None:
+        quiet = np.all(before <= rules.noise_power_ratio * noise)
+        return verdict if quiet else _as_unlisted(verdict, None)
+    removed = share_removed(sensors, data, base, verdict.chosen.fit)
+    freed = [one.frees for one in verdict.chosen.candidates]
+    out = any(one in verdict.chosen.fit.at_bounds for one in freed if one)
+    least = rules.explained_share if verdict.status == "parameter" else rules.main_share
+    if removed < least or out:
+        return _as_unlisted(verdict, verdict.chosen)
+    return verdict
+
+
+def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with a nearest effect that explains nearly enough for a name as partial.
+
+    What it leaves may be several effects, none of them large enough to be earned.
+    """
+    chosen, rules = verdict.chosen, data.rules
+    if chosen is None or verdict.status != "unlisted" or not chosen.listed:
+        return verdict
+    if any(one.frees is not None for one in chosen.candidates):
+        return verdict
+    removed = share_removed(sensors, data, verdict.base, chosen.fit)
+    if removed < rules.partial_share or unexplained(data, verdict.base, chosen.fit).any():
+        return verdict
+    most = rules.parsimony_ratio * data.power(chosen.fit.residuals)
+    rivals = [
+        one
+        for one in verdict.alternatives
+        if len(one.candidates) == len(chosen.candidates)
+        and one.names != chosen.names
+        and np.all(data.power(one.fit.residuals) <= most)
+    ]
+    doubt = f"it explains {100.0 * removed:.0f} % of the misfit, less than a name takes"
+    doubts = (*_doubts(data, verdict.base, chosen), doubt)
+    return _with_rivals(replace(verdict, doubts=doubts), rivals)
+
+
+def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with the model of fewest unknowns that fits nearly as well as the best.
+
+    With many samples the evidence prefers a richer law, or a second effect, for a minimal reduction
+    of a residual that is no noise.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in _NAMING:
+        return verdict
+    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
+    near = [
+        one
+        for one in verdict.alternatives
+        if all(candidate.frees is None for candidate in one.candidates)
+        and _unknowns(one) < _unknowns(chosen)
+        and np.all(data.power(one.fit.residuals) <= most)
+    ]
+    if not near:
+        return _choosing(data, verdict, chosen)
+    return _choosing(data, verdict, min(near, key=lambda one: (_unknowns(one), one.bic)))
+
+
+def _within_bounds(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict with another set than one that ended at a bound, if there is one.
+
+    A further effect that takes it off the bound and leaves nothing is earned by that. Else, at the
+    bound of a law lies a simpler one, or one that these records do not show. What is certain is the
+    simpler one, as long as it explains most of the misfit; what it leaves is a doubt.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in _NAMING or not _bounded(chosen.fit):
+        return verdict
+    degrees_of_freedom = verdict.degrees_of_freedom
+    larger = [
+        one
+        for one in verdict.alternatives
+        if label_of(one.candidates) > label_of(chosen.candidates)
+        and len(one.candidates) == len(chosen.candidates) + 1
+        and not _doubts(data, verdict.base, one)
+        and down_to_noise(one.fit, degrees_of_freedom, data.rules)
+    ]
+    if larger:
+        return _choosing(data, verdict, min(larger, key=lambda one: one.bic))
+    simpler = [
+        one
+        for one in verdict.alternatives
+        if one.names != chosen.names
+        and contains(chosen, one)
+        and not _bounded(one.fit)
+        and share_removed(sensors, data, verdict.base, one.fit) >= data.rules.main_share
+        and not unexplained(data, verdict.base, one.fit).any()
+    ]
+    if not simpler:
+        return verdict
+    bounded = ", ".join(_bounded(chosen.fit))
+    doubt = f"{chosen.label} leaves less, but its {bounded} ended at a bound"
+    return _choosing(data, verdict, min(simpler, key=lambda one: one.bic), doubt)
+
+
+def _choosing(data: MeasuredData, verdict: Verdict, one: Hypothesis, *doubts: str) -> Verdict:
+    """Return the verdict with another of its sets as the chosen one, and further doubts."""
+    assert verdict.chosen is not None
+    others = tuple(each for each in (verdict.chosen, *verdict.alternatives) if each is not one)
+    rivals = (
+        each
+        for each in verdict.equivalent
+        if each is not one and len(each.candidates) == len(one.candidates)
+    )
+    found = (*_doubts(data, verdict.base, one), *doubts)
+    return _with_rivals(replace(verdict, chosen=one, alternatives=others, doubts=found), rivals)
+
+
+def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
+    """Return the verdict without hypotheses that fit a balance worse, or contain the chosen one.
+
+    A law that contains the chosen one and fits no better is not a different explanation.
+    """
+    chosen = verdict.chosen
+    if chosen is None or verdict.status != "class":
+        return verdict
+    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
+    equivalent = (
+        one
+        for one in verdict.equivalent
+        if np.all(data.power(one.fit.residuals) <= most) and not contains(one, chosen)
+    )
+    return _with_rivals(verdict, equivalent)
+
+
+def _with_substitutes(
+    data: MeasuredData, verdict: Verdict, candidates: Sequence[Candidate]
+) -> Verdict:
+    """Return the verdict with rivals that have something else in the place of an effect."""
+    chosen = verdict.chosen
+    if chosen is None or verdict.status not in _NAMING:
+        return verdict
+    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
+    rivals = list(verdict.equivalent)
+    for member in chosen.candidates:
+        kept = tuple(one for one in chosen.candidates if one is not member)
+        for other in candidates:
+            if (other.instead_of, other.port) == (member.name, member.port):
+                start = np.append(chosen.values_of(kept), other.starts[0])
+                fitted = fit(data, (*kept, other), start)
+                if np.all(data.power(fitted.residuals) <= most):
+                    excess = verdict.base.chi_square - verdict.degrees_of_freedom
+                    rivals.append(hypothesis_of(fitted, excess))
+    return _with_rivals(verdict, rivals) if len(rivals) > len(verdict.equivalent) else verdict
+
+
+def _with_rivals(verdict: Verdict, equivalent: Iterable[Hypothesis]) -> Verdict:
+    """Return the verdict with other hypotheses that explain as much, which make it a class.
+
+    Without any, doubts make it partial.
+    """
+    rivals = tuple(equivalent)
+    status = "class" if rivals else "partial" if verdict.doubts else "named"
+    return replace(verdict, status=status, equivalent=rivals)
+
+
+def _doubts(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[str]:
+    """Return what forbids to name a set plainly: of its effects, and bounds of believed values.
+
+    A value that ended at zero is a part that the machine does not have.
+    """
+    fitted = chosen.fit
+    stuck = [
+        parameter.name
+        for parameter, side in zip(data.base, fitted.bound_sides, strict=False)
+        if side > 0.0 or (side < 0.0 and parameter.lower != 0.0)
+    ]
+    found = doubts_of(Search(data, base, ()), chosen, None)
+    return found + [f"{name} ended at the bound of its tolerance" for name in stuck]
+
+
+def _bounded(fitted: Fit) -> list[str]:
+    """Return the unknowns of effects that ended at a bound."""
+    return [name for _, names in bounded_unknowns(fitted) for name in names]
+
+
+def _unknowns(one: Hypothesis) -> int:
+    return sum(candidate.unknowns for candidate in one.candidates)
+
+
+def _as_unlisted(verdict: Verdict, nearest: Hypothesis | None) -> Verdict:
+    return replace(verdict, status="unlisted", chosen=nearest, equivalent=())

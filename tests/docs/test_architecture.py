@@ -1,0 +1,21 @@
+"""The page on architecture names files that exist."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "architecture.md"
+NAMED = sorted(set(re.findall(r"`([\w/]+/\w+\.py)[` ]", PAGE.read_text())))
+
+
+def test_the_page_names_files_with_their_rooms():
+    assert len(NAMED) > 10
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_a_named_file_exists(name):
+    assert any((root / name).is_file() for root in (ROOT, ROOT / "pymoo_hdte"))
