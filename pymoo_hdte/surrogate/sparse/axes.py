@@ -34,8 +34,8 @@ INWARD = 0.25
 """Exponent of 1 - z^2 in the weight for noise: its ends are no likelier than what lies inside.
 
 Chosen among 0, 0.25 and 0.5 on three functions, one seed each: runs until growth stopped at 1 %
-were 80, 70, 82 for Ishigami's and 88, 76, 78 for wing weight; piston did not stop within 400, its true
-error stayed below 1 % from 298 and from 171 runs at 0 and 0.25, and not yet after 376 at 0.5.
+were 80, 70, 82 for Ishigami's and 88, 76, 78 for wing weight; piston did not stop within 400, its
+true error stayed below 1 % from 298 and from 171 runs at 0 and 0.25, and not yet after 376 at 0.5.
 """
 
 Array = NDArray[np.float64]
