@@ -16,7 +16,7 @@ from pymoo_hdte.drive import hs_20_100, preset
 from pymoo_hdte.drive.model import KinematicError
 from pymoo_hdte.identification import NoLoadRun, TorsionLoop
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Gear, Record
-from pymoo_hdte.problems import RobustDTE
+from pymoo_hdte.problems import Design, Quantile, RobustDTE
 from pymoo_hdte.problems.operating_conditions import OperatingCondition
 from pymoo_hdte.surrogate import Box
 
@@ -71,6 +71,8 @@ VALID = {
         {"name": "a", "role": "train", "time": TIME, "channels": {"q": WAVE}}
         | {"noise": {"q": 1e-3}},
     ),
+    "Design": (Design, {"lower": 1.0, "upper": 2.0, "tolerance": 0.1, "scale": "log"}),
+    "Quantile": (Quantile, {"p": 0.5}),
     "WeightedUtopia": (WeightedUtopia, {"weights": (0.5, 0.5)}),
     **{
         kind.__name__: (kind, {"pop_size": 10, "archive_size": 10})
