@@ -1,4 +1,5 @@
 from pymoo_hdte.mechanism.believed import BelievedValue
+from pymoo_hdte.mechanism.gear import Gear
 from pymoo_hdte.mechanism.mechanism import (
     ErrorLine,
     Input,
@@ -13,6 +14,7 @@ from pymoo_hdte.mechanism.simulation import SimulatedCourse, simulate_mechanism
 __all__ = [
     "BelievedValue",
     "ErrorLine",
+    "Gear",
     "Input",
     "LawAt",
     "Loop",

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.effects.law import Law
 from pymoo_hdte.mechanism.believed import NOTHING, BelievedValue
+from pymoo_hdte.mechanism.gear import Gear
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,8 @@ class Port:
     load : mapping of str to float
         Share of the force of inputs, by name, in the load that the port passes on, on which laws
         may depend; positive where it opposes a positive motion.
+    gear : Gear or None
+        Whose output is the port.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Port:
     read: bool = False
     error: tuple[ErrorLine, ...] = ()
     load: Mapping[str, float] = field(default_factory=dict)
+    gear: Gear | None = None
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,43 @@ from pymoo_hdte.problems.operating_conditions import (
 from pymoo_hdte.problems.robust import RobustProblem
 from pymoo_hdte.problems.robust_dte import RobustDTE
 from pymoo_hdte.problems.robust_dte_tolerance import RobustDTETolerance
+from pymoo_hdte.problems.simulator.existing import Robust
+from pymoo_hdte.problems.simulator.inputs import Design
+from pymoo_hdte.problems.simulator.problem import SimulatorProblem
+from pymoo_hdte.problems.simulator.robust_problem import robust_problem
+from pymoo_hdte.problems.simulator.runs import SimulatorFailed
+from pymoo_hdte.problems.simulator.sampled_statistics import CVaR, FailureProbability, Quantile
+from pymoo_hdte.problems.simulator.statistics import (
+    Mean,
+    MeanPlusStd,
+    RobustConstraint,
+    Std,
+    WorstCase,
+)
 from pymoo_hdte.problems.toy import RobustToy
+from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
 __all__ = [
+    "CVaR",
+    "Design",
+    "FailureProbability",
+    "Mean",
+    "MeanPlusStd",
     "OperatingCondition",
+    "Quantile",
+    "Robust",
+    "RobustConstraint",
     "RobustDTE",
     "RobustDTETolerance",
     "RobustProblem",
     "RobustToy",
+    "SimulatorFailed",
+    "SimulatorProblem",
+    "Std",
+    "UntrustedSurrogate",
+    "WorstCase",
     "hs_20_100_duty_cycle",
     "load_conditions",
     "robust_dte_family",
+    "robust_problem",
 ]

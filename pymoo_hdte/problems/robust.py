@@ -18,9 +18,15 @@ from pymoo_hdte.surrogate import (
     TruncatedNormal,
     UniformBand,
     VariableBandMoments,
+    latin_hypercube,
 )
+from pymoo_hdte.surrogate.sign import sign_at_nodes
+from pymoo_hdte.surrogate.trust import UntrustedSurrogate, region_of
 
 MOMENTS = ("exact", "sample")
+
+_LOOKED_AT = 256
+"""Designs, beside the corners of the box, at which the sign of the mean is looked at."""
 
 
 def make_moments(
@@ -58,13 +64,24 @@ class RobustProblem(Problem):
         Names of the objectives: of these two, and of those that a subclass adds.
     units : dict of str
         Unit of every variable and objective, by name.
+    positive : bool or None
+        Whether the response cannot be negative. Then a mean below 0 is refused. Without a word
+        on it, a mean is refused whose sign is none of those that the response has at any node of
+        its surrogate; False refuses nothing.
 
     Attributes
     ----------
+    positive : bool or None
+        As given.
     var_names, obj_names : tuple of str
         Names in the order of X, shape (n, n_var), and F, shape (n, n_obj).
     units : dict of str
         Unit of each, by name.
+
+    Raises
+    ------
+    UntrustedSurrogate
+        If the mean of some design has a sign that the response cannot have; tells where.
 
     Notes
     -----
@@ -76,14 +93,33 @@ class RobustProblem(Problem):
         moments: ExactMoments | SampledMoments | VariableBandMoments,
         obj_names: tuple[str, ...],
         units: dict[str, str],
+        positive: bool | None = None,
     ) -> None:
         box: Box = moments.design_box
+        self.positive = positive
         n_obj = len(obj_names)
         super().__init__(n_var=len(box), n_obj=n_obj, xl=box.lower.copy(), xu=box.upper.copy())
         self.moments = moments
         self.var_names = box.names
         self.obj_names = obj_names
         self.units = units
+        self._refuse_wrong_sign()
+
+    def _refuse_wrong_sign(self) -> None:
+        sign = 1.0 if self.positive else sign_at_nodes(self.moments.surrogate)
+        if self.positive is False or not sign:
+            return
+        box: Box = self.moments.design_box
+        designs = np.vstack([_some_corners(box), latin_hypercube(box, _LOOKED_AT, 0)])
+        mean, _ = self.moments(designs)
+        wrong = sign * mean < 0.0
+        if wrong.any():
+            region = region_of(box.names, designs[wrong], np.array([box.lower, box.upper]))
+            worst = float(sign * np.min(sign * mean))
+            side = "above" if sign > 0.0 else "below"
+            allowed = f"{side} 0, but {100.0 * wrong.mean():.0f} % of the designs are not"
+            field = f"{self.obj_names[0]} on the surrogate"
+            raise UntrustedSurrogate(field, worst, allowed, region)
 
     def _evaluate(
         self, x: NDArray[np.float64], out: dict[str, Any], *args: Any, **kwargs: Any
@@ -99,3 +135,12 @@ class RobustProblem(Problem):
         out["F"] = np.column_stack(self.moments(x))
         if "dF" in out:
             out["dF"] = np.stack(self.moments.gradient(x), axis=1)
+
+
+def _some_corners(box: Box) -> NDArray[np.float64]:
+    """Return the corners of the box, or those of the first eight variables from its centre."""
+    corners = np.tile(box.centre, (2 ** min(len(box), 8), 1))
+    for axis in range(min(len(box), 8)):
+        upper = (np.arange(len(corners)) >> axis) & 1 == 1
+        corners[:, axis] = np.where(upper, box.upper[axis], box.lower[axis])
+    return corners

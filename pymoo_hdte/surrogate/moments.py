@@ -40,6 +40,8 @@ class ExactMoments:
     ----------
     uncertainty : Uncertainty
         The inputs, checked against the boxes.
+    surrogate : ChebyshevSurrogate
+        As given.
 
     Raises
     ------
@@ -53,6 +55,7 @@ class ExactMoments:
     ) -> None:
         self.uncertainty = Uncertainty(surrogate.box, inputs, design_box)
         self.design_box = design_box
+        self.surrogate = surrogate
         moments = _moments_on_grid(surrogate.coefficients, self.uncertainty)
         self._polynomial = TensorPolynomial(np.array([coefficients_from_nodes(m) for m in moments]))
         self._derivatives = self._polynomial.derivatives(range(len(design_box)))

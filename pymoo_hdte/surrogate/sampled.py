@@ -38,6 +38,8 @@ class SampledMoments:
     ----------
     uncertainty : Uncertainty
         The inputs, checked against the boxes.
+    surrogate : ChebyshevSurrogate
+        As given.
 
     Raises
     ------
@@ -61,7 +63,7 @@ class SampledMoments:
         self._samples = np.array(
             [entry.sample(random_state, self.n_samples) for entry in self.uncertainty.inputs]
         )
-        self._surrogate = surrogate
+        self.surrogate = surrogate
 
     def __call__(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return mean and standard deviation of the samples, shape (n,) each, in the output's unit.
@@ -83,7 +85,7 @@ class SampledMoments:
         checked = self._checked(designs)
         mean, std = np.empty((2, len(checked)))
         for block, points in self._blocks(checked):
-            values = self._surrogate(points).reshape(-1, self.n_samples)
+            values = self.surrogate(points).reshape(-1, self.n_samples)
             mean[block] = values.mean(axis=1)
             std[block] = values.std(axis=1)
         return mean, std
@@ -98,8 +100,8 @@ class SampledMoments:
         dmean, dstd = np.empty((2, *checked.shape))
         axes = list(self.uncertainty.design_axes)
         for block, points in self._blocks(checked):
-            values = self._surrogate(points).reshape(-1, self.n_samples)
-            slopes = self._surrogate.gradient(points)[:, axes].T
+            values = self.surrogate(points).reshape(-1, self.n_samples)
+            slopes = self.surrogate.gradient(points)[:, axes].T
             slopes = slopes.reshape(len(axes), -1, self.n_samples)
             slopes *= self._samples[axes, None]
             deviation = values - values.mean(axis=1, keepdims=True)

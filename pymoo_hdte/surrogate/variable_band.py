@@ -65,6 +65,7 @@ class VariableBandMoments:
         designs = Box(design_box.names[:-1], design_box.lower[:-1], design_box.upper[:-1])
         uncertainty = Uncertainty(surrogate.box, inputs, designs)
         self.design_box = design_box
+        self.surrogate = surrogate
         axes = list(uncertainty.design_axes)
         self._centre = surrogate.box.centre[axes]
         self._half_width = surrogate.box.half_width[axes]

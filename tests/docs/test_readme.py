@@ -69,20 +69,27 @@ def output_of(snippet: str) -> str:
     return text.getvalue().strip()
 
 
+SAID = re.findall(r"prints `(.*?)`", README)
+
+
+def test_anyones_simulator_prints_what_the_readme_says():
+    assert SAID[0] == output_of(SNIPPETS[0])
+    assert len([line for line in SNIPPETS[0].splitlines() if line]) <= 12
+
+
 def test_study_prints_what_the_readme_says():
-    assert re.search(r"prints `(.*?)`", README).group(1) == output_of(SNIPPETS[0])
+    assert SAID[1] == output_of(SNIPPETS[1])
 
 
 def test_the_friction_of_another_machine_is_named():
-    printed = output_of(SNIPPETS[1])
-    said = re.findall(r"prints `(.*?)`", README)[1]
-    beginning, _ = said.split("...")
+    printed = output_of(SNIPPETS[2])
+    beginning, _ = SAID[2].split("...")
     assert printed.startswith(beginning)
     assert float(beginning.split("=")[1]) == pytest.approx(0.3, rel=0.01)
 
 
 def test_both_solvers_of_the_drive_snippet_agree():
-    steady, integrated = (float(line.strip("[]")) for line in output_of(SNIPPETS[2]).split("\n"))
+    steady, integrated = (float(line.strip("[]")) for line in output_of(SNIPPETS[3]).split("\n"))
     assert integrated == pytest.approx(steady, rel=5e-3)
     assert integrated != pytest.approx(steady, rel=1e-4)
 
@@ -104,7 +111,7 @@ def test_how_much_the_input_angle_fluctuates(name, words):
 
 
 def test_every_snippet_is_run_here():
-    assert len(SNIPPETS) == 3
+    assert len(SNIPPETS) == 4
 
 
 def commands_for_a_design():

@@ -15,8 +15,8 @@ from pymoo_hdte.discrepancy import BelievedDrive, Rig, RunningRecord, TorsionRec
 from pymoo_hdte.drive import hs_20_100, preset
 from pymoo_hdte.drive.model import KinematicError
 from pymoo_hdte.identification import NoLoadRun, TorsionLoop
-from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Record
-from pymoo_hdte.problems import RobustDTE
+from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Gear, Record
+from pymoo_hdte.problems import Design, Quantile, RobustDTE
 from pymoo_hdte.problems.operating_conditions import OperatingCondition
 from pymoo_hdte.surrogate import Box
 
@@ -64,12 +64,15 @@ VALID = {
     ),
     "NoLoadRun": (NoLoadRun, {"speed": np.arange(1.0, 6.0), "torque": np.arange(5.0)}),
     "BelievedValue": (BelievedValue, {"value": 1.0, "tolerance": 0.1}),
+    "Gear": (Gear, {"ratio": 101.0, "kind": "other", "pole_pairs": 7}),
     "ErrorLine": (ErrorLine, {"coordinate": "q", "order": 2.0, "amplitude": 1e-4, "phase": 0.0}),
     "Record": (
         Record,
         {"name": "a", "role": "train", "time": TIME, "channels": {"q": WAVE}}
         | {"noise": {"q": 1e-3}},
     ),
+    "Design": (Design, {"lower": 1.0, "upper": 2.0, "tolerance": 0.1, "scale": "log"}),
+    "Quantile": (Quantile, {"p": 0.5}),
     "WeightedUtopia": (WeightedUtopia, {"weights": (0.5, 0.5)}),
     **{
         kind.__name__: (kind, {"pop_size": 10, "archive_size": 10})

@@ -13,7 +13,8 @@ EXPERIMENTS = Path(experiments.__file__).parent
 TESTS = Path(__file__).parents[1]
 LOWEST_FIRST = (
     *("checks", "lazy", "units", "compilation", "io", "effects", "reports"),
-    *("drive.solve", "drive.effects", "drive", "mechanism", "surrogate", "validation"),
+    *("drive.solve", "drive.effects", "drive", "mechanism", "surrogate", "surrogate.sparse"),
+    "validation",
     "identification",
     *(
         "discrepancy.engine",
@@ -25,7 +26,7 @@ LOWEST_FIRST = (
         "discrepancy.mechanism",
     ),
     *("discrepancy.report", "virtual"),
-    *("problems", "algorithms", "decision", "discrepancy", "cli"),
+    *("problems.simulator", "problems", "algorithms", "decision", "discrepancy", "cli"),
 )
 """Rooms of the package; a folder stands for the modules in it, not for the folders below it.
 

@@ -1,4 +1,4 @@
-"""Rules for machines other than a drive, whose models never fit down to the noise of the sensors."""
+"""Rules for machines other than a drive: their models never fit down to the noise of sensors."""
 
 from __future__ import annotations
 

@@ -206,7 +206,8 @@ class RecordRules(RuleSet):
         "probability",
         "Chance that noise alone shows an order in the middle of those that are looked at.",
         "Test level: the power over that of its surroundings follows a gamma distribution; all "
-        "orders share the chance (Bonferroni). Near the ends it is larger.",
+        "orders share the chance (Bonferroni). Near the ends it is larger. Orders that a gear is "
+        "known to have share a chance of their own.",
         at_most=1.0,
     )
     most_position_orders: int = rule(
@@ -214,6 +215,16 @@ class RecordRules(RuleSet):
         "1",
         "Most orders of one port.",
         f"{BY_HAND} as a budget of time.",
+    )
+    ripple_share: float = rule(
+        1e-3,
+        "share of the power beyond the band",
+        "A ripple beyond the band of the motion is named if it takes away at least this share of "
+        "the force where it was seen.",
+        f"{BY_HAND}: 3 % of the amplitude. Long records show lines of a thousandth of it, which no "
+        "use of a machine would notice.",
+        at_least=0.0,
+        at_most=1.0,
     )
     reverse_share: float = rule(
         0.01,

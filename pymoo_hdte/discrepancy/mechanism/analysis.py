@@ -37,6 +37,7 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     usual_cutoff,
 )
 from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square, share_removed, with_rest
+from pymoo_hdte.discrepancy.mechanism.ripple import NO_RIPPLES, Ripples, find_ripples
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 
@@ -58,6 +59,9 @@ class MechanismFinding:
     verdict : Verdict
         What is missing: its ``status`` is ``"adequate"``, ``"named"``, ``"class"``,
         ``"parameter"``, ``"partial"`` or ``"unlisted"``.
+    ripples : Ripples
+        What varies with the position beyond the cutoff. With one, a verdict is never
+        ``"adequate"``, but ``"named"`` without a chosen hypothesis.
     simulated : tuple of SimulatedRecord
         The held-out records by the base and by what the training records named.
     """
@@ -67,12 +71,18 @@ class MechanismFinding:
     cutoff: float
     data: MeasuredData
     verdict: Verdict
+    ripples: Ripples = NO_RIPPLES
     simulated: tuple[SimulatedRecord, ...] = ()
 
     @property
     def accepted(self) -> Fit:
         """The fit with the effects that the verdict names, or that of the base."""
         return self.verdict.accepted
+
+    @property
+    def believed(self) -> tuple[LawAt, ...]:
+        """Effects that the mechanism was known to have."""
+        return tuple(one for one in self.data.known if one not in self.ripples.laws)
 
     @property
     def sensors(self) -> MeasuredData:
@@ -155,20 +165,33 @@ def examine_mechanism(
         raise InvalidInput("number of train records", 0, "at least 1")
     check_signals(mechanism, records)
     cutoff = usual_cutoff(mechanism, train, rules) if cutoff is None else cutoff
-    records = fine_enough(records, cutoff)
+    sampled, records = records, fine_enough(records, cutoff)
     check_sampling(mechanism, records, cutoff)
     train = [record for record in records if record.role == "train"]
     sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
+    data, verdict = _examined(sensors)
+    ripples = find_ripples(mechanism, sampled, cutoff, (*known, *verdict.accepted.effects), rules)
+    if ripples.found and verdict.status == "unlisted":
+        # While the port moves slowly, a ripple is within the band as well.
+        again = _examined(replace(sensors, known=(*known, *ripples.laws)))
+        data, verdict = (data, verdict) if again[1].status == "unlisted" else again
+    if ripples.found and verdict.status == "adequate":
+        verdict = replace(verdict, status="named")
+    # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
+    fits = verdict.base, verdict.accepted
+    simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
+    verdict = voted(verdict, simulated, rules)
+    return MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated)
+
+
+def _examined(sensors: MeasuredData) -> tuple[MeasuredData, Verdict]:
+    """Return the verdict on force balances, and the data with the residual as their noise."""
     base = fit(sensors)
     seen = position_orders(sensors, base)
     candidates = partial(_candidates, sensors, base, seen)
     data, every = with_rest(sensors, base, candidates)
-    verdict = judged(sensors, data, every)
-    fits = verdict.base, verdict.accepted
-    simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
-    verdict = voted(verdict, simulated, rules)
-    return MechanismFinding(mechanism, records, cutoff, data, verdict, simulated)
+    return data, judged(sensors, data, every)
 
 
 def _candidates(

@@ -36,6 +36,8 @@ def locate_in_mechanism(finding: MechanismFinding) -> MechanismLocation:
     noise = dict(zip(names, finding.sensor_noise.tolist(), strict=True))
     if finding.verdict.status == "adequate":
         words = "Nowhere: what the model leaves is that of its sensors, or near it."
+    elif finding.verdict.chosen is None and finding.verdict.status == "named":
+        words = "Nowhere up to the cutoff, but in the forces beyond it."
     else:
         parts = [
             f"the {finding.data.what(name)} (off by {misfit[name]:.3g}, sensors {noise[name]:.2g})"

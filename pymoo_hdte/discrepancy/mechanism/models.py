@@ -14,6 +14,7 @@ from pymoo_hdte.io.toml import toml_text, toml_with_lines
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Loop, Mechanism, Port
 from pymoo_hdte.mechanism.believed import LARGEST_FACTOR, NOTHING
 from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.gear import KINDS, Gear
 
 
 @dataclass(frozen=True)
@@ -109,8 +110,10 @@ def _port_table(port: Port) -> dict[str, Any]:
     elements = {"stiffness": port.stiffness, "damping": port.damping}
     there = {name: _believed_table(one) for name, one in elements.items() if one != NOTHING}
     error = {"error": [vars(line) for line in port.error]} if port.error else {}
-    load = {"load": dict(port.load)} if port.load else {}
-    return {"motion": port.motion, **there} | ({"read": True} if port.read else {}) | error | load
+    more: dict[str, Any] = {"load": dict(port.load)} if port.load else {}
+    if port.gear:
+        more["gear"] = vars(port.gear)
+    return {"motion": port.motion, **there} | ({"read": True} if port.read else {}) | error | more
 
 
 def model_from_fields(top: Fields, file: str) -> MechanismModel:
@@ -219,8 +222,20 @@ def _port(
         numbers = {one: row.number(one) for one in ("order", "amplitude", "phase")}
         lines.append(ErrorLine(coordinate, **numbers))
         row.finish()
+    gear = _gear(table.table("gear"), place) if table.has("gear") else None
     table.finish()
-    return Port(name, motion, stiffness, damping, read, tuple(lines), load)
+    return Port(name, motion, stiffness, damping, read, tuple(lines), load, gear)
+
+
+def _gear(table: Fields, place: str) -> Gear:
+    kind = table.choice("kind", KINDS) if table.has("kind") else "other"
+    pairs = table.take("pole_pairs", "a whole number") if table.has("pole_pairs") else 0
+    ratio = table.number("ratio", at_least=1.0)
+    table.finish()
+    try:
+        return Gear(ratio, kind, pairs)
+    except InvalidInput as error:
+        raise InvalidInput(f"{place}.{error.field}", error.value, error.allowed) from None
 
 
 def _loop(row: Fields, inputs: Collection[str], coordinates: Collection[str]) -> Loop:

@@ -12,6 +12,7 @@ from scipy.stats import gamma
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
+from pymoo_hdte.discrepancy.mechanism.order_search import phasors
 
 Values = NDArray[np.float64]
 
@@ -116,24 +117,12 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rule
         seen &= orders <= _finest(position)
         if not seen.any():
             continue
-        power = np.abs(_phasors(position, signal, orders[seen])) ** 2
+        power = np.abs(phasors(position, signal, orders[seen])) ** 2
         around = median_filter(power, min(_SURROUNDINGS, len(power)), mode="reflect")
         total[seen] += power / np.maximum(around, 1e-300) * np.log(2.0)
         counted += seen
     limit = gamma.isf(rules.position_order_chance / max(len(orders), 1), np.maximum(counted, 1))
     return np.asarray(total / limit)
-
-
-def _phasors(position: Values, signal: Values, orders: Values) -> NDArray[np.complex128]:
-    """Return the sum of a signal times exp(-i order position) at evenly spaced orders, (n_orders,).
-
-    Every order is one of a coarse grid and one of a fine grid within its steps, so that the
-    exponentials of about two square roots of n_orders are enough.
-    """
-    fine = int(np.ceil(np.sqrt(len(orders))))
-    coarse = np.exp(-1j * np.outer(orders[::fine], position)) * signal
-    within = np.exp(-1j * np.outer(orders[:fine] - orders[0], position))
-    return (coarse @ within.T).ravel()[: len(orders)]
 
 
 def _without(signal: Values, angle: Values) -> Values:

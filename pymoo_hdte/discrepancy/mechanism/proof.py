@@ -126,7 +126,7 @@ def prove_measured(finding: MechanismFinding, whole: bool = False) -> tuple[Meas
     simulated = finding.simulated
     if whole:
         fits = finding.verdict.base, finding.accepted
-        known = finding.data.known
+        known = finding.believed
         simulated = simulate_held_out(
             finding.mechanism, finding.records, finding.data, fits, known, whole=True
         )

@@ -25,6 +25,6 @@ def revised_mechanism(title: str, finding: MechanismFinding) -> MechanismModel:
     return MechanismModel(
         f"{title}, revised",
         finding.mechanism.with_values(values, exactly=False),
-        (*finding.data.known, *laws_of(accepted.effects)),
+        (*finding.believed, *laws_of(accepted.effects), *finding.ripples.laws),
         finding.cutoff,
     )

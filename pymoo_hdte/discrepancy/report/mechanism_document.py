@@ -12,7 +12,7 @@ import numpy as np
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, label_of
-from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN, Verdict
+from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
@@ -44,8 +44,11 @@ def mechanism_verdict_document(
         "schema_version": SCHEMA_VERSION,
         "campaign": title,
         "status": verdict.status,
-        "sentence": _sentence(verdict),
-        "effects": effects(finding),
+        "sentence": _sentence(finding),
+        "effects": [
+            *effects(finding),
+            *(effect for one in finding.ripples.found for effect in one.as_dicts()),
+        ],
         "offered": offered(finding),
         "alternatives": [
             _evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
@@ -54,7 +57,7 @@ def mechanism_verdict_document(
         **with_believed_effects(
             [
                 {"name": one.name, "port": one.port, **effect_named(one.name).numbers_of(one.law)}
-                for one in finding.data.known
+                for one in finding.believed
             ]
         ),
         "band": band(finding),
@@ -71,12 +74,15 @@ def mechanism_verdict_document(
     }
 
 
-def _sentence(verdict: Verdict) -> str:
+def _sentence(finding: MechanismFinding) -> str:
+    verdict, beyond = finding.verdict, finding.ripples.sentence
     if verdict.status == "adequate":
         return (
             "Nothing is missing: the believed mechanism explains the records within its tolerances."
         )
-    return sentence(verdict)
+    if verdict.status == "named" and verdict.chosen is None:
+        return beyond
+    return f"{sentence(verdict)} {beyond}".strip()
 
 
 def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
@@ -211,7 +217,7 @@ def limits(finding: MechanismFinding) -> list[str]:
         names = [n for n in finding.accepted.at_bounds if n in finding.mechanism.quantities]
         if names:
             found.append(f"At the bound of its tolerance: {', '.join(names)}.")
-    return found
+    return [*found, *finding.ripples.limits]
 
 
 def not_proven(finding: MechanismFinding) -> list[str]:

@@ -18,6 +18,7 @@ from measured_oscillator import (
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
@@ -310,6 +311,16 @@ def test_play_takes_the_stiffness_that_is_fitted_and_not_the_believed_one():
     simulated, balanced = prove_measured(finding)
     assert simulated.shrinkage > 0.9
     assert balanced.shrinkage > 0.9
+
+
+def test_an_effect_that_removes_less_than_the_rule_asks_for_is_not_named():
+    finding = finding_on(dry)
+    assert finding.verdict.status == "named"
+    removed = finding.share_removed
+    assert removed < 1.0
+    stricter = replace(RULES, main_share=(1.0 + removed) / 2.0)
+    again = examine_mechanism(OSCILLATOR, [rig.record_of(dry, seed=1)], rules=stricter)
+    assert again.verdict.status == "unlisted"
 
 
 def test_a_sign_that_is_swapped_is_no_parameter_out_of_tolerance():

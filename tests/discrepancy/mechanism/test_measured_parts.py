@@ -14,7 +14,8 @@ from pymoo_hdte.discrepancy.mechanism.candidates import mechanism_candidates
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
-from pymoo_hdte.discrepancy.mechanism.orders import _phasors, position_orders
+from pymoo_hdte.discrepancy.mechanism.order_search import phasors
+from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.report.mechanism_document import effects, limits
 from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
@@ -76,7 +77,7 @@ def test_phasors_at_many_orders_are_the_sums_that_define_them(n, rng):
     position, signal = np.cumsum(rng.random(400)), rng.standard_normal(400)
     orders = 3.5 + 0.37 * np.arange(n)
     expected = np.exp(-1j * np.outer(orders, position)) @ signal
-    np.testing.assert_allclose(_phasors(position, signal, orders), expected, atol=1e-9)
+    np.testing.assert_allclose(phasors(position, signal, orders), expected, atol=1e-9)
 
 
 def test_a_ripple_is_one_effect_with_its_orders():

@@ -13,6 +13,7 @@ from pymoo_hdte.effects.stiffness import PeriodicClearance
 from pymoo_hdte.mechanism import (
     BelievedValue,
     ErrorLine,
+    Gear,
     Input,
     LawAt,
     Loop,
@@ -20,6 +21,7 @@ from pymoo_hdte.mechanism import (
     Port,
 )
 from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.gear import KINDS
 
 RIG = Mechanism(
     {"q": BelievedValue(2.0)},
@@ -69,9 +71,11 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
     share=FINITE.filter(bool),
     limit=st.floats(0.0, exclude_min=True),
     read=st.booleans(),
+    gear=st.none()
+    | st.builds(Gear, st.floats(1.0, 1e300), st.sampled_from(KINDS), st.integers(0, 99)),
 )
 def test_any_model_survives_the_file(
-    tmp_path_factory, names, title, values, numbers, share, limit, read
+    tmp_path_factory, names, title, values, numbers, share, limit, read, gear
 ):
     first, second, port, signal = names
     mechanism = Mechanism(
@@ -83,6 +87,7 @@ def test_any_model_survives_the_file(
                 stiffness=values[2],
                 read=read,
                 error=(ErrorLine(second, *numbers[1:4]), ErrorLine(first, *numbers[2:])),
+                gear=gear,
             )
         ],
         [Input(signal, {first: share}, values[3])],

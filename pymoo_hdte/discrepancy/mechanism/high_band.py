@@ -1,0 +1,165 @@
+"""Forces beyond the band of the motion, whitened, over the position and the speed of a port.
+
+Beyond the cutoff a motion is too small to be measured, and so are its forces; but where a machine
+is, and how fast it moves, is known there as well. What varies with the position shows as a line of
+a frequency in proportion to the speed, up to half the sampling rate of the force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.mechanism import Mechanism, Port, Record
+from pymoo_hdte.mechanism.motion import margin_of, motion_of, smooth
+from pymoo_hdte.mechanism.port_motion import motion_at_port
+
+Values = NDArray[np.float64]
+Phasors = NDArray[np.complex128]
+
+_BEYOND = 1.25
+"""Lowest frequency over the cutoff: there the slow part, which is taken away, is below 3 %."""
+_SEGMENT, _SEGMENTS = 512, 8
+"""Most samples in a window, and fewest windows of a record: for its spectrum, and to tell what
+has one frequency from what follows the position."""
+
+
+@dataclass(frozen=True, eq=False)
+class HighBand:
+    """The force at a port in one record beyond the band of the motion.
+
+    Attributes
+    ----------
+    time, position, speed : ndarray, shape (n,)
+        s, and of the port, SI.
+    plain : ndarray, shape (n,)
+        Force of the inputs at the port, N or N.m.
+    force : ndarray, shape (n,)
+        The same, whitened: noise has the same power at each frequency.
+    lowest, highest : float
+        Hz, of what is looked at.
+    window : int
+        Samples.
+    """
+
+    time: Values
+    position: Values
+    speed: Values
+    plain: Values
+    force: Values
+    lowest: float
+    highest: float
+    window: int
+    _frequency: Values = field(repr=False)
+    _gain: Values = field(repr=False)
+
+    def inside(self, order: float) -> NDArray[np.bool_]:
+        """Return where the frequency of an order is between ``lowest`` and ``highest``, (n,)."""
+        frequency = order * np.abs(self.speed) / (2.0 * np.pi)
+        return np.asarray((frequency >= self.lowest) & (frequency <= self.highest))
+
+    def gain(self, order: float) -> Values:
+        """Return the factor of the whitening at the frequency of an order, 1/SI, shape (n,).
+
+        Zero where that is not between ``lowest`` and ``highest``.
+        """
+        frequency = order * np.abs(self.speed) / (2.0 * np.pi)
+        return np.interp(frequency, self._frequency, self._gain) * self.inside(order)
+
+    @property
+    def step(self) -> float:
+        """Time between samples, s."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+    def ways(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return where the port moves forward, and where backward, shape (n,) each."""
+        return self.speed > 0.0, self.speed < 0.0
+
+
+def high_bands(
+    mechanism: Mechanism,
+    port: Port,
+    records: Sequence[Record],
+    cutoff: float,
+    rules: Rules,
+) -> list[HighBand]:
+    """Return the forces of the inputs at a port beyond a cutoff, by record.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    port : Port
+    records : sequence of Record
+        As they were sampled.
+    cutoff : float
+        Hz, up to which the motion is known.
+    rules : Rules
+
+    Returns
+    -------
+    list of HighBand
+        Without records that have little beyond the cutoff, are short, or have no such force.
+    """
+    found = []
+    for record in records:
+        lowest, highest = _BEYOND * cutoff, rules.nyquist_share * 0.5 / record.step
+        margin = margin_of(cutoff, record.step)
+        inner = slice(margin, len(record.time) - margin)
+        count = len(record.time[inner])
+        window = min(_SEGMENT, count // _SEGMENTS)
+        if 2.0 * lowest > highest or window < _SEGMENTS:
+            continue
+        motions = {
+            name: motion_of(record.channel(name), record.step, cutoff)
+            for name in mechanism.coordinates
+        }
+        motion = motion_at_port(
+            port,
+            {name: one.position for name, one in motions.items()},
+            {name: one.speed for name, one in motions.items()},
+        )
+        force = np.zeros(len(record.time))
+        for one in mechanism.inputs:
+            share = sum(port.motion.get(name, 0.0) * acts for name, acts in one.acts.items())
+            force += share * one.gain.value * record.channel(one.name)
+        # Half, as smoothing passes all up to the frequency that it is given.
+        force = (force - smooth(force, record.step, 0.5 * cutoff))[inner]
+        if np.ptp(force) == 0.0:
+            continue
+        frequency, gain = _whitening(force, record.step, window, lowest)
+        found.append(
+            HighBand(
+                record.time[inner],
+                motion.position[inner],
+                motion.speed[inner],
+                force,
+                _filtered(force, record.step, frequency, gain),
+                lowest,
+                highest,
+                window,
+                frequency,
+                gain,
+            )
+        )
+    return found
+
+
+def _whitening(force: Values, step: float, window: int, lowest: float) -> tuple[Values, Values]:
+    """Return frequencies, Hz, and the factor at each with which a force becomes white."""
+    frequency, power = welch(force, 1.0 / step, nperseg=window, detrend="constant")
+    inside = frequency >= lowest
+    floor = max(1e-12 * float(power.max()), 1e-300)
+    power = np.where(inside, np.maximum(power, floor), np.inf)
+    return frequency, np.sqrt(2.0 * step / power)
+
+
+def _filtered(force: Values, step: float, frequency: Values, gain: Values) -> Values:
+    """Return a force with a factor at each frequency, without delay."""
+    spectrum = np.fft.rfft(force)
+    there = np.fft.rfftfreq(len(force), step)
+    return np.asarray(np.fft.irfft(spectrum * np.interp(there, frequency, gain), len(force)))

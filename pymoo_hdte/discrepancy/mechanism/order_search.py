@@ -1,0 +1,299 @@
+"""Orders at which a whitened force varies with the position, told from lines of one frequency.
+
+The power of an order is compared with that of its neighbours, so that no noise of whatever colour
+makes one; and an order has to explain more than any frequency does, in windows with a phase of
+their own: mains and the switching of a motor's power stage have one frequency at all speeds, and
+look like an order while the speed is constant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+from scipy.ndimage import median_filter
+from scipy.stats import gamma
+
+from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, Phasors, Values
+
+_MOST_TRIED = 20_000
+_BLOCK = 1.1
+"""Ratio of the last to the first order of a block, for all of which the same rows are taken."""
+NEIGHBOURS = np.concatenate([np.arange(-14.0, -3.5, 0.5), np.arange(4.0, 14.5, 0.5)])
+"""Distances, in resolutions, of the orders the power of which is the noise of one between them."""
+_SURROUNDINGS = 101
+"""Number of orders whose median power estimates the noise at the middle one."""
+FEWEST_ROWS = 30
+"""For sums of fewer the power of noise has no exponential distribution."""
+_BESIDE = 2.5
+"""Distance in resolutions within which an order is a side line of a stronger one."""
+_SEGMENTS = 12
+"""Windows of a record with phases of their own."""
+_PADDED = 4
+"""Length of a transform over that of its signal, so that powers between its lines are known."""
+_CHANGES = 3
+"""Powers of the position, 0 on, with which the amplitude of what is taken out may change."""
+_TRIES = 3
+"""Searches per order that may be kept: some find what has one frequency."""
+_LEAST_SHARE = 0.1
+"""Share of the moving rows within the band at the highest order that is tried."""
+
+
+@dataclass(frozen=True)
+class SeenOrder:
+    """An order that was seen.
+
+    Attributes
+    ----------
+    order : float
+        Cycles per turn of an angle in rad; of a length, radians per m.
+    resolution : float
+        Change of the order by which the longest travel gets one more cycle.
+    power : float
+        Over the least that is significant.
+    """
+
+    order: float
+    resolution: float
+    power: float
+
+
+def seen_orders(
+    bands: Sequence[HighBand],
+    expected: Sequence[float],
+    known: Sequence[float],
+    rules: Rules,
+) -> tuple[list[SeenOrder], list[float], list[float]]:
+    """Return orders, the strongest first, orders that may be frequencies, and frequencies in Hz.
+
+    Parameters
+    ----------
+    bands : sequence of HighBand
+        Of one port.
+    expected : sequence of float
+        Orders that a gear is known to have, which share a chance of a false alarm of their own.
+    known : sequence of float
+        Orders that are known already, and not looked for.
+    rules : Rules
+    """
+    for order in known:
+        bands = [_without_order(one, order) for one in bands]
+    orders, resolution = _tried(bands, rules)
+    kept: list[SeenOrder] = []
+    fixed: list[float] = []
+    undecided: list[float] = []
+    for _ in range(_TRIES * rules.most_position_orders):
+        if not orders.size or len(kept) == rules.most_position_orders:
+            break
+        power = _significance(bands, orders, expected, resolution, rules)
+        for taken in (*known, *undecided, *(one.order for one in kept)):
+            power[np.abs(orders - taken) <= _BESIDE * resolution] = 0.0
+        place = int(np.argmax(power))
+        if power[place] <= 1.0:
+            break
+        order = _refined(bands, float(orders[place]), 0.5 * resolution)
+        one = SeenOrder(order, resolution, float(power[place]))
+        alone, frequency = told_from_frequencies(bands, order, rules)
+        if alone and _at_two_speeds(bands, one, rules):
+            kept.append(one)
+            bands = [_without_order(one, order) for one in bands]
+        elif frequency is None:
+            undecided.append(order)
+        else:
+            fixed.append(frequency)
+            bands = [_without_frequency(one, frequency) for one in bands]
+    return kept, undecided, sorted(set(fixed))
+
+
+def _tried(bands: Sequence[HighBand], rules: Rules) -> tuple[Values, float]:
+    """Return the orders that are searched, and their resolution.
+
+    From those with enough periods in the travel to those beyond the force's band in most rows.
+    """
+    widest = max((float(np.ptp(one.position)) for one in bands), default=0.0)
+    if widest == 0.0:
+        return np.empty(0), 1.0
+    resolution = 2.0 * np.pi / widest
+    speed = np.concatenate([np.abs(one.speed) for one in bands])
+    # The slow tail of the rows would ask for orders that the others cannot show.
+    slow = np.quantile(speed[speed > 0.01 * speed.max()], _LEAST_SHARE)
+    highest = max(one.highest for one in bands) * 2.0 * np.pi / slow
+    lowest = max(
+        resolution * rules.fewest_periods,
+        min(one.lowest for one in bands) * 2.0 * np.pi / float(speed.max()),
+    )
+    step = 0.5 * resolution
+    if (highest - lowest) / step > _MOST_TRIED:
+        # As for a shaft with parts of which there are whole numbers.
+        step = 1.0
+        lowest = np.ceil(lowest)
+    return np.arange(lowest, min(highest, lowest + _MOST_TRIED * step), step), resolution
+
+
+def _significance(
+    bands: Sequence[HighBand],
+    orders: Values,
+    expected: Sequence[float],
+    resolution: float,
+    rules: Rules,
+) -> Values:
+    """Return the ratio of the power of each order to the least that is significant, (n_orders,)."""
+    total, counted = np.zeros((2, len(orders)))
+    for band in bands:
+        for way in band.ways():
+            power = _powers(band, way, orders)
+            seen = power > 0.0
+            if not seen.any():
+                continue
+            around = median_filter(power[seen], min(_SURROUNDINGS, int(seen.sum())), mode="reflect")
+            total[seen] += power[seen] / np.maximum(around, 1e-300) * np.log(2.0)
+            counted += seen
+    near = np.zeros(len(orders), dtype=bool)
+    for one in expected:
+        near |= np.abs(orders - one) <= resolution
+    chance = np.where(near, 1.0 / max(int(near.sum()), 1), 1.0 / max(int((~near).sum()), 1))
+    limit = gamma.isf(rules.position_order_chance * chance, np.maximum(counted, 1))
+    return np.asarray(total / limit)
+
+
+def _powers(band: HighBand, way: NDArray[np.bool_], orders: Values) -> Values:
+    """Return the power of each order per unit of its noise, (n_orders,); 0 where nothing shows."""
+    found = np.zeros(len(orders))
+    first = 0
+    while first < len(orders):
+        last = int(np.searchsorted(orders, max(_BLOCK * orders[first], orders[first] + 1e-9)))
+        last = max(last, first + 1)
+        gain = band.gain(float(orders[(first + last) // 2])) * way
+        rows = np.flatnonzero(gain)
+        if len(rows) >= FEWEST_ROWS:
+            g, position = gain[rows], band.position[rows]
+            sums = phasors(position, g * band.force[rows], orders[first:last])
+            found[first:last] = np.abs(sums) ** 2 / np.sum(g**2)
+        first = last
+    return found
+
+
+def phasors(position: Values, signal: Values, orders: Values) -> Phasors:
+    """Return the sum of a signal times exp(-i order position) at evenly spaced orders, (n_orders,).
+
+    Every order is one of a coarse grid and one of a fine grid within its steps, so that the
+    exponentials of about two square roots of n_orders are enough.
+    """
+    fine = int(np.ceil(np.sqrt(len(orders))))
+    coarse = np.exp(-1j * np.outer(orders[::fine], position)) * signal
+    within = np.exp(-1j * np.outer(orders[:fine] - orders[0], position))
+    return np.asarray((coarse @ within.T).ravel()[: len(orders)])
+
+
+def _refined(bands: Sequence[HighBand], order: float, step: float) -> float:
+    """Return the order of largest power near one of a grid with a step."""
+    near = order + step * np.linspace(-1.0, 1.0, 41)
+    power = np.zeros(len(near))
+    for band in bands:
+        gain = band.gain(order)
+        for way in band.ways():
+            rows = np.flatnonzero(gain * way)
+            if len(rows) >= FEWEST_ROWS:
+                sums = phasors(band.position[rows], (gain * band.force)[rows], near)
+                power += np.abs(sums) ** 2 / np.sum(gain[rows] ** 2)
+    return float(near[np.argmax(power)])
+
+
+def told_from_frequencies(
+    bands: Sequence[HighBand], order: float, rules: Rules
+) -> tuple[bool, float | None]:
+    """Return whether an order explains more than any frequency, and one in Hz that is significant.
+
+    Once over whole records, as mains are coherent for hours, and once with a phase of its own in
+    every window, as a switching frequency drifts. Where the speed changes, one of them explains
+    clearly more.
+    """
+    lowest, highest = min(one.lowest for one in bands), max(one.highest for one in bands)
+    for windows in (1, _SEGMENTS):
+        longest = max(len(one.time) // windows * one.step for one in bands)
+        frequencies = np.arange(lowest, highest, 0.25 / longest)
+        of_frequency, n_windows = np.zeros(len(frequencies)), 0
+        of_order, n_order = 0.0, 0
+        for band in bands:
+            turned = band.gain(order) * np.exp(-1j * order * band.position)
+            for rows in np.array_split(np.arange(len(band.time)), windows):
+                of_frequency += _line_power(band.force[rows], band.step, frequencies)
+                n_windows += 1
+                for way in band.ways():
+                    here = (turned * way)[rows]
+                    size = float(np.sum(np.abs(here) ** 2))
+                    if size > 0.0:
+                        of_order += abs(band.force[rows] @ here) ** 2 / size
+                        n_order += 1
+        noise = float(np.median(of_frequency)) / gamma.median(n_windows)
+        place = int(np.argmax(of_frequency))
+        gain_of_order = of_order / noise - n_order
+        gain_of_frequency = float(of_frequency[place]) / noise - n_windows
+        limit = gamma.isf(rules.position_order_chance / len(frequencies), n_windows) - n_windows
+        doubt = gamma.isf(rules.second_speed_chance, n_windows) - n_windows
+        significant = gain_of_frequency > limit
+        if gain_of_order <= gain_of_frequency + doubt and (windows == 1 or significant):
+            return False, float(frequencies[place]) if significant else None
+    return True, None
+
+
+def _at_two_speeds(bands: Sequence[HighBand], seen: SeenOrder, rules: Rules) -> bool:
+    """Tell whether an order is seen without the rows of its commonest speed, too.
+
+    What rings at a frequency after a start, and starts at the same places again and again, follows
+    the position as well as an order does, but at one speed only.
+    """
+    speed = np.sort(np.concatenate([np.abs(one.speed)[one.inside(seen.order)] for one in bands]))
+    width = rules.fixed_frequency_range * float(speed[-1])
+    commonest = int(np.argmax(np.searchsorted(speed, speed + width) - np.arange(len(speed))))
+    slowest = float(speed[commonest])
+    orders = seen.order + seen.resolution * np.concatenate([np.zeros(1), NEIGHBOURS])
+    total, counted = 0.0, 0
+    for band in bands:
+        size = np.abs(band.speed)
+        gain = band.gain(seen.order) * ((size < slowest) | (size > slowest + width))
+        for way in band.ways():
+            rows = np.flatnonzero(gain * way)
+            if len(rows) < FEWEST_ROWS:
+                continue
+            turned = np.exp(-1j * np.outer(orders, band.position[rows]))
+            power = np.abs(turned @ (gain * band.force)[rows]) ** 2
+            total += float(power[0] / np.median(power[1:])) * np.log(2.0)
+            counted += 1
+    return bool(counted) and total > gamma.isf(rules.second_speed_chance, counted)
+
+
+def _line_power(force: Values, step: float, frequencies: Values) -> Values:
+    """Return the power of a force at frequencies, Hz, per unit of its noise, (n_frequencies,)."""
+    size = next_fast_len(_PADDED * len(force), real=True)
+    power = np.abs(np.fft.rfft(force, size)) ** 2 / len(force)
+    return np.interp(frequencies, np.fft.rfftfreq(size, step), power)
+
+
+def _without_order(band: HighBand, order: float) -> HighBand:
+    """Return a band without an order, the amplitude of which may change slowly along the travel."""
+    gain, force = band.gain(order), band.force.copy()
+    middle, half = np.mean(band.position), max(0.5 * float(np.ptp(band.position)), 1e-300)
+    for way in band.ways():
+        rows = np.flatnonzero(gain * way)
+        if len(rows) < FEWEST_ROWS:
+            continue
+        place = ((band.position[rows] - middle) / half)[:, None] ** np.arange(_CHANGES)
+        angle = (order * band.position[rows])[:, None]
+        lines = gain[rows, None] * np.hstack([place * np.cos(angle), place * np.sin(angle)])
+        force[rows] -= lines @ np.linalg.lstsq(lines, force[rows], rcond=None)[0]
+    return replace(band, force=force)
+
+
+def _without_frequency(band: HighBand, frequency: float) -> HighBand:
+    """Return a band without a frequency in Hz, window by window."""
+    angle, force = 2.0 * np.pi * frequency * band.time, band.force.copy()
+    for start in range(0, len(band.time), band.window):
+        rows = slice(start, start + band.window)
+        lines = np.column_stack([np.cos(angle[rows]), np.sin(angle[rows])])
+        force[rows] -= lines @ np.linalg.lstsq(lines, force[rows], rcond=None)[0]
+    return replace(band, force=force)

@@ -1,0 +1,281 @@
+"""Ripple beyond the band of the motion: its orders, sizes, and how it changes with the speed.
+
+A verdict compares forces up to the frequency at which a motion can be measured. Beyond, forces that
+vary with the position are still seen, because positions are known, up to half the sampling rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
+from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, high_bands
+from pymoo_hdte.discrepancy.mechanism.order_search import SeenOrder, seen_orders
+from pymoo_hdte.discrepancy.mechanism.ripple_size import (
+    Part,
+    gap_of,
+    over_speed,
+    parts_of,
+    trend_of,
+)
+from pymoo_hdte.effects.effect import effect_named, place_of
+from pymoo_hdte.effects.sentence_blanks import listed, sentence_at
+from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.gear import Gear
+
+Values = NDArray[np.float64]
+Pair = tuple[float, float]
+
+_OTHER = {
+    "position_dependent_friction": "turns with the direction, as friction",
+    "torque_ripple": "is the same in both directions",
+}
+_CENTRAL = float(norm.ppf(0.975))
+
+
+@dataclass(frozen=True, eq=False)
+class Ripple:
+    """What varies with the position of a port beyond the band of the motion.
+
+    Attributes
+    ----------
+    port : str
+    order, resolution : float
+        Cycles per turn of an angle in rad; of a length, radians per m. The resolution is the change
+        of the order by which the longest travel has one cycle more.
+    meaning : str
+        What the gear says of the order; empty if nothing.
+    frequencies : (float, float)
+        Hz, between which it was seen.
+    parts : tuple of Part
+    speeds : ndarray, shape (n, 3)
+        Speed, amplitude, and its standard deviation, SI.
+    trend : str
+        How the amplitude changes with the speed, in words.
+    fitted : (float, float)
+        Root mean square beyond the band before and after the ripple is taken away, N or N.m, while
+        its frequency is between those.
+    held_out : (float, float) or None
+        The same in records that were not fitted.
+    """
+
+    port: str
+    order: float
+    resolution: float
+    meaning: str
+    frequencies: Pair
+    parts: tuple[Part, ...]
+    speeds: Values
+    trend: str
+    fitted: Pair
+    held_out: Pair | None
+
+    @property
+    def words(self) -> str:
+        """Its order, and what the gear says of it."""
+        return f"{self.order:.5g}{f' ({self.meaning})' if self.meaning else ''}"
+
+    @property
+    def sentence(self) -> str:
+        """What it is."""
+        names = [one.law.name for one in self.parts]
+        words = effect_named(names[0]).sentence
+        told = [sentence_at(words, self.port, f"{self.order:.5g}", "force")]
+        if len(names) > 1:
+            told.append(f"A part of it {_OTHER[names[1]]}.")
+        if self.meaning:
+            told.append(f"Within the resolution of the travel, {self.meaning}.")
+        low, high = self.frequencies
+        told.append(f"It was seen from {low:.3g} to {high:.3g} Hz. {self.trend}")
+        return " ".join(told)
+
+    def as_dicts(self) -> list[dict[str, Any]]:
+        """Return its effects as a verdict has them, with plain values."""
+        return [
+            {
+                "name": part.law.name,
+                "port": self.port,
+                "sentence": self.sentence,
+                "parameters": {
+                    "order": _value(self.order, 0.5 * self.resolution),
+                    **{
+                        name: _value(value, _CENTRAL * variance**0.5)
+                        for name, (value, variance) in part.values.items()
+                    },
+                },
+                "at_bound": [],
+                "beyond_band": {
+                    "frequencies_Hz": list(self.frequencies),
+                    "resolution": self.resolution,
+                    "amplitude_over_speed": self.speeds.tolist(),
+                    "fitted": list(self.fitted),
+                    "held_out": None if self.held_out is None else list(self.held_out),
+                },
+            }
+            for part in self.parts
+        ]
+
+
+@dataclass(frozen=True)
+class Ripples:
+    """What a search beyond the band found.
+
+    Attributes
+    ----------
+    found : tuple of Ripple
+        The strongest first, port by port.
+    limits : tuple of str
+        What was seen and is none, or cannot be told, in sentences.
+    """
+
+    found: tuple[Ripple, ...] = ()
+    limits: tuple[str, ...] = ()
+
+    @property
+    def laws(self) -> tuple[LawAt, ...]:
+        """All laws."""
+        return tuple(part.law for one in self.found for part in one.parts)
+
+    @property
+    def sentence(self) -> str:
+        """What was found, in words; empty for nothing."""
+        ports = dict.fromkeys(one.port for one in self.found)
+        orders = {p: [one.words for one in self.found if one.port == p] for p in ports}
+        return " ".join(
+            f"Beyond the band of the motion the force at the {port} varies with its position, "
+            f"order{'s'[: len(here) - 1]} {listed(here)}."
+            for port, here in orders.items()
+        )
+
+
+NO_RIPPLES = Ripples()
+
+
+def find_ripples(
+    mechanism: Mechanism,
+    records: Sequence[Record],
+    cutoff: float,
+    effects: Collection[LawAt] = (),
+    rules: Rules = RULES,
+) -> Ripples:
+    """Return what varies with the position of ports beyond the band of the motion.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    records : sequence of Record
+        As they were sampled; those held out judge what the others show.
+    cutoff : float
+        Hz, up to which the motion is known.
+    effects : collection of LawAt
+        That are known already; their orders are not looked for.
+    rules : Rules
+
+    Returns
+    -------
+    Ripples
+    """
+    found: list[Ripple] = []
+    limits: list[str] = []
+    of_role = {role: [one for one in records if one.role == role] for role in ("train", "held_out")}
+    for port in _ports(mechanism):
+        train, held_out = (
+            high_bands(mechanism, port, of_role[role], cutoff, rules) for role in of_role
+        )
+        known = [
+            order
+            for one in effects
+            if (order := place_of(one)[2])
+            and dict(mechanism.port(one.port).motion) == dict(port.motion)
+        ]
+        expected = port.gear.expected if port.gear else {}
+        seen, undecided, fixed = seen_orders(train, tuple(expected), known, rules)
+        lost = []
+        for one in seen:
+            ripple = _ripple(port, one, train, held_out, rules)
+            if _share(ripple.fitted) < rules.ripple_share:
+                continue
+            if ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share:
+                found.append(ripple)
+            else:
+                lost.append(f"{one.order:.5g}")
+        if lost:
+            limits.append(
+                f"Ripple at the {port.name}, order {', '.join(lost)}, is seen, but to take it "
+                "away makes the forces of the held-out records no smaller: it is not named."
+            )
+        if undecided:
+            limits.append(
+                f"Ripple at the {port.name}, order "
+                f"{', '.join(f'{one:.5g}' for one in undecided)}, is seen at one speed or "
+                "is weak, so that these records do not tell it from a frequency: it is not named."
+            )
+        if fixed:
+            limits.append(
+                f"The force at the {port.name} has lines at "
+                f"{', '.join(f'{one:.3g}' for one in fixed)} Hz, which these records show as "
+                "frequencies and not as orders of its position."
+            )
+    return Ripples(tuple(found), tuple(limits))
+
+
+def _ports(mechanism: Mechanism) -> list[Port]:
+    """Return one port for each motion at which forces of inputs act; one with a gear, if any."""
+    found: dict[frozenset[tuple[str, float]], Port] = {}
+    for port in mechanism.ports:
+        motion = frozenset((name, share) for name, share in port.motion.items() if share)
+        if not port.read and (motion not in found or (port.gear and not found[motion].gear)):
+            found[motion] = port
+    return list(found.values())
+
+
+def _ripple(
+    port: Port,
+    seen: SeenOrder,
+    train: Sequence[HighBand],
+    held_out: Sequence[HighBand],
+    rules: Rules,
+) -> Ripple:
+    parts = parts_of(port.name, seen, train, rules)
+    rows = [one.inside(seen.order) for one in train]
+    speed = np.concatenate([np.abs(one.speed)[here] for one, here in zip(train, rows, strict=True)])
+    per_speed = seen.order / (2.0 * np.pi)
+    speeds = over_speed(seen, train, speed)
+    laws = [one.law for one in parts]
+    return Ripple(
+        port.name,
+        seen.order,
+        seen.resolution,
+        _meaning(port.gear, seen),
+        (per_speed * float(speed.min()), per_speed * float(speed.max())),
+        parts,
+        speeds,
+        trend_of(speeds, rules),
+        gap_of(seen.order, laws, train) or (0.0, 0.0),
+        gap_of(seen.order, laws, held_out),
+    )
+
+
+def _share(gap: Pair) -> float:
+    """Return the share of the power that is taken away between two root mean squares."""
+    before, after = gap
+    return 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
+
+
+def _meaning(gear: Gear | None, seen: SeenOrder) -> str:
+    """Return what a gear says of an order, the nearest first; empty if nothing."""
+    expected = gear.expected if gear else {}
+    off = {order: abs(order - seen.order) for order in expected}
+    near = sorted((order for order in off if off[order] <= seen.resolution), key=off.__getitem__)
+    return "; ".join(f"{order:.5g} is {expected[order]}" for order in near)
+
+
+def _value(value: float, half: float) -> dict[str, Any]:
+    interval = [value - half, value + half]
+    return {"value": value, "unit": "SI", "interval95": interval, "at_bound": False}

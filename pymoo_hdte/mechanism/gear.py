@@ -1,0 +1,65 @@
+"""The gear of a joint: what its kind and ratio say about the orders of a ripple."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pymoo_hdte.checks import one_of, real_number, whole_number
+
+KINDS = ("harmonic drive", "other")
+_PER_TURN = (2, 4, 6)
+"""Cycles per turn of a wave generator, an ellipse with two ends, against either spline (Tuttle and
+Seering, IEEE Trans. Robotics and Automation 12, 1996)."""
+_PER_FIELD = (1, 2, 6)
+"""Cycles per turn of a motor's field: at six, the currents of three phases commutate."""
+
+
+@dataclass(frozen=True)
+class Gear:
+    """A gear in front of a port, whose motion is that of the gear's output.
+
+    Attributes
+    ----------
+    ratio : float
+        Turns of the input per turn of the output, dimensionless; at least 1.
+    kind : {"harmonic drive", "other"}
+    pole_pairs : int
+        Of the motor at the input; 0 if unknown.
+
+    Raises
+    ------
+    InvalidInput
+        For a ratio below 1, another kind, or a negative number of pole pairs.
+
+    Examples
+    --------
+    >>> Gear(101.0, "harmonic drive").expected[202.0]
+    '2 per input turn'
+    """
+
+    ratio: float
+    kind: str = "other"
+    pole_pairs: int = 0
+
+    def __post_init__(self) -> None:
+        real_number("gear.ratio", self.ratio, at_least=1.0)
+        one_of("gear.kind", self.kind, KINDS)
+        whole_number("gear.pole_pairs", self.pole_pairs, at_least=0)
+
+    @property
+    def expected(self) -> dict[float, str]:
+        """Orders at which a ripple is expected, cycles per turn of the output, each in words."""
+        found = {}
+        if self.kind == "harmonic drive":
+            for count in _PER_TURN:
+                found[count * self.ratio] = f"{count} per input turn"
+                # The output turns as well, the same way or, of a flexible spline, the other way.
+                for output in (-1.0, 1.0):
+                    order = count * (self.ratio + output)
+                    found[order] = f"{count} per input turn against the output"
+        for count in _PER_FIELD if self.pole_pairs else ():
+            words = f"{count * self.pole_pairs} per input turn, {count} per pole pair"
+            found.setdefault(count * self.pole_pairs * self.ratio, words)
+        found.setdefault(self.ratio, "1 per input turn")
+        found.setdefault(1.0, "1 per turn of the output")
+        return found

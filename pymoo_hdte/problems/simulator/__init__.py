@@ -1,0 +1,1 @@
+"""Robust design of any simulator, on a surrogate that finds its own order."""

@@ -1,0 +1,185 @@
+"""Robust design of anyone's simulator: from a function to a pymoo problem."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from pymoo_hdte.checks import InvalidInput, real_number, whole_number
+from pymoo_hdte.problems.simulator.inputs import Design, Inputs
+from pymoo_hdte.problems.simulator.problem import SimulatorProblem, place_of
+from pymoo_hdte.problems.simulator.runs import RunFile, Simulator
+from pymoo_hdte.problems.simulator.statistics import Mean, RobustConstraint, Statistic, Std
+from pymoo_hdte.problems.simulator.trust import (
+    failing,
+    inaccurate,
+    negative_somewhere,
+    positive_places,
+)
+from pymoo_hdte.surrogate.sparse.adaptive import HELD_OUT_DESIGNS, AdaptiveFit, fit_adaptively
+from pymoo_hdte.surrogate.trust import UntrustedSurrogate
+
+Array = NDArray[np.float64]
+
+_NUMBERS_PER_TERM = 4096 + 2048
+"""Values of a term at common samples, and in arrays for the designs of a block."""
+
+
+def robust_problem(
+    simulator: Callable[..., Any],
+    designs: Mapping[str, Design],
+    noise: Mapping[Any, Any] | None = None,
+    objectives: Sequence[Statistic] = (Mean(), Std()),
+    constraints: Sequence[RobustConstraint] = (),
+    accuracy: float = 0.01,
+    budget: int = 1000,
+    positive: Sequence[str] | bool = False,
+    vectorised: bool = False,
+    executor: Any = None,
+    at_once: int = 1,
+    tries: int = 2,
+    cache: str | os.PathLike[str] | None = None,
+    seed: int = 1,
+    progress: bool = True,
+) -> SimulatorProblem:
+    """Return the robust design problem of a simulator.
+
+    A sparse polynomial surrogate grows, run by run, until mean and standard deviation of every
+    response are as accurate as asked for at points that it does not use. Their values and gradients
+    then are exact for the surrogate, whatever the independent distributions.
+
+    Parameters
+    ----------
+    simulator : callable
+        Takes the inputs by name; returns a number, a mapping of names to numbers, or a sequence.
+    designs : mapping of str to Design
+        Design variables with their bounds and scatter.
+    noise : mapping, optional
+        From a name to its distribution (of `chaospy`, or a frozen one of `scipy.stats`), or from a
+        tuple of names to a joint one of `chaospy`. Together with the designs at most 20 inputs.
+    objectives : sequence of Statistic
+        To be minimised; ``-Mean()`` is maximised.
+    constraints : sequence of RobustConstraint
+        As ``Quantile(0.99, response="stress") <= 250e6``.
+    accuracy : float
+        Largest error of mean and standard deviation, as a share of the standard deviation, above 0.
+        Where that is below a tenth of its median over the designs, of this tenth.
+    budget : int
+        Most runs.
+    positive : sequence of str, or bool
+        Responses that cannot be negative; True for all. A surrogate that is so is refused.
+    vectorised : bool
+        Whether the simulator takes and returns arrays of shape (n,) in the place of numbers.
+    executor : object, optional
+        Of `concurrent.futures`, or a client of Dask, that makes the runs.
+    at_once : int
+        Least number of runs that are chosen together; the number of workers of the executor.
+    tries : int
+        How often a run is made that raises or gives NaN, before it is left out.
+    cache : path, optional
+        File of finished runs: with it, no run is made twice, though the process be killed.
+    seed : int
+        Of the points not used.
+    progress : bool
+        Whether to tell runs and memory on the error stream before the first run, and show a bar.
+
+    Returns
+    -------
+    SimulatorProblem
+        With ``accuracy`` and ``n_runs``.
+
+    Raises
+    ------
+    InvalidInput
+        For an argument that is not allowed.
+    UntrustedSurrogate
+        If the budget is spent and the error is still larger than asked for, a positive response
+        becomes negative, or more than a fifth of the runs fail; tells where.
+    SimulatorFailed
+        If all runs of a batch fail.
+
+    Warns
+    -----
+    RuntimeWarning
+        If runs failed; their inputs are in ``failed`` of the result.
+    """
+    inputs = Inputs(designs, {} if noise is None else noise)
+    accuracy = real_number("accuracy", accuracy, above=0.0)
+    least = least_runs(inputs)
+    budget = whole_number("budget", budget, least)
+    _check_statistics(objectives, constraints)
+    file = None if cache is None else RunFile(cache, inputs.names)
+    bar = _announce(inputs, least, budget) if progress else None
+    count = whole_number("tries", tries, 1)
+    simulate = Simulator(simulator, inputs.names, vectorised, executor, count, file, bar)
+
+    def function(cube: Array) -> Array:
+        return simulate(inputs.values(cube))
+
+    def trusted(fit: AdaptiveFit) -> bool:
+        return not negative_somewhere(inputs, fit, positive_places(positive, simulate.responses))
+
+    random_state = np.random.default_rng(whole_number("seed", seed, 0))
+    batch = whole_number("at_once", at_once, 1)
+    fit = fit_adaptively(inputs.axes, function, accuracy, budget, random_state, trusted, batch)
+    if bar is not None:
+        bar.close()
+    responses = simulate.responses
+    for one in [*objectives, *(limit.statistic for limit in constraints)]:
+        place_of(one, responses)
+    refusal = (
+        failing(inputs, fit)
+        or inaccurate(inputs, fit, accuracy, responses)
+        or negative_somewhere(inputs, fit, positive_places(positive, responses))
+    )
+    if refusal:
+        raise UntrustedSurrogate(*refusal)
+    problem = SimulatorProblem(inputs, fit, responses, objectives, constraints, fit.n_runs)
+    _tell_failures(problem)
+    return problem
+
+
+def least_runs(inputs: Inputs) -> int:
+    """Return the number of runs below which no surrogate is made."""
+    return 2 * HELD_OUT_DESIGNS + 1 + len(inputs.axes)
+
+
+def _announce(inputs: Inputs, least: int, budget: int) -> tqdm:
+    megabytes = max(1, round(8e-6 * budget * (_NUMBERS_PER_TERM + 20 * len(inputs.axes))))
+    tqdm.write(
+        f"robust_problem: {len(inputs.axes)} inputs, {least} to {budget} runs, at most"
+        f" {megabytes} MB; called where "
+        + ", ".join(f"{n} is {low:.4g} to {high:.4g}" for n, (low, high) in inputs.reach().items()),
+        file=sys.stderr,
+    )
+    return tqdm(total=budget, desc="runs", unit="run", mininterval=1.0)
+
+
+def _check_statistics(
+    objectives: Sequence[Statistic], constraints: Sequence[RobustConstraint]
+) -> None:
+    kinds = (("objectives", objectives, Statistic), ("constraints", constraints, RobustConstraint))
+    for field, given, kind in kinds:
+        if not isinstance(given, Sequence) or not all(isinstance(one, kind) for one in given):
+            raise InvalidInput(field, given, f"a sequence of {kind.__name__}s")
+    if not objectives:
+        raise InvalidInput("objectives", objectives, "one or more")
+
+
+def _tell_failures(problem: SimulatorProblem) -> None:
+    if not len(problem.failed):
+        return
+    rows = [
+        ", ".join(f"{n} = {v:.6g}" for n, v in zip(problem.input_names, row, strict=True))
+        for row in problem.failed[:5]
+    ]
+    more = "" if len(problem.failed) <= len(rows) else ", .."
+    message = f"{len(problem.failed)} runs failed and are left out: {'; '.join(rows)}{more}"
+    warnings.warn(message, RuntimeWarning, stacklevel=3)

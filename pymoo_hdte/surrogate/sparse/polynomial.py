@@ -1,0 +1,88 @@
+"""Polynomials in many variables whose Chebyshev coefficients live on a sparse set of degrees."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebder
+from numpy.typing import NDArray
+
+from pymoo_hdte.surrogate.sparse.index_set import AxisMap
+from pymoo_hdte.surrogate.sparse.leja import hierarchical_to_chebyshev
+from pymoo_hdte.surrogate.tensor import chebyshev_basis
+
+_AT_ONCE = 2**20
+"""Numbers in one array."""
+
+
+class SparsePolynomial:
+    """Several Chebyshev series on the cube [-1, 1]^d over one downward-closed set of degrees.
+
+    Parameters
+    ----------
+    indices : ndarray of int, shape (p, d)
+        Degrees of the terms.
+    coefficients : ndarray, shape (r, p)
+        Of r responses, in their units.
+    """
+
+    def __init__(self, indices: NDArray[np.int_], coefficients: NDArray[np.float64]) -> None:
+        self.indices = np.array(indices)
+        self.coefficients = np.array(coefficients, dtype=float)
+        for array in (self.indices, self.coefficients):
+            array.flags.writeable = False
+
+    @classmethod
+    def from_hierarchical(
+        cls,
+        indices: NDArray[np.int_],
+        surpluses: NDArray[np.float64],
+        points: list[NDArray[np.float64]],
+    ) -> SparsePolynomial:
+        """Return the polynomial with these coefficients in the hierarchical basis of the points.
+
+        Parameters
+        ----------
+        indices : ndarray of int, shape (p, d)
+            A downward-closed set.
+        surpluses : ndarray, shape (r, p)
+        points : list of ndarray
+            The nested points of each variable.
+        """
+        coefficients = surpluses[None]
+        for axis, nested in enumerate(points):
+            columns = int(indices[:, axis].max()) + 1
+            step = AxisMap(indices, axis, columns)
+            matrix = hierarchical_to_chebyshev(nested[:columns])
+            coefficients = step.forward(coefficients, matrix[None])
+        return cls(indices, coefficients[0])
+
+    @property
+    def degrees(self) -> tuple[int, ...]:
+        """Highest degree in each variable."""
+        return tuple(self.indices.max(axis=0).tolist())
+
+    def __call__(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values, shape (n, r), at points of shape (n, d) of the cube."""
+        values = np.empty((len(cube), len(self.coefficients)))
+        step = max(1, _AT_ONCE // len(self.indices))
+        for start in range(0, len(cube), step):
+            block = slice(start, start + step)
+            values[block] = self._products(cube[block].T) @ self.coefficients.T
+        return values
+
+    def _products(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        product = np.ones((x.shape[1], len(self.indices)))
+        for axis, degree in enumerate(self.degrees):
+            if degree:
+                product *= chebyshev_basis(x[axis], degree + 1).T[:, self.indices[:, axis]]
+        return product
+
+    def derivative(self, axis: int) -> SparsePolynomial:
+        """Return the derivative in one variable of the cube, on the same set."""
+        size = self.degrees[axis] + 1
+        matrix = np.zeros((size, size))
+        if size > 1:
+            matrix[:-1] = chebder(np.eye(size))
+        step = AxisMap(self.indices, axis, size)
+        coefficients = step.forward(self.coefficients[None], matrix[None])
+        return SparsePolynomial(self.indices, coefficients[0])

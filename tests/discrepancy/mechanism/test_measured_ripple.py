@@ -1,0 +1,272 @@
+"""Ripple beyond the band of the motion: found where it is, and nowhere in noise or mains."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.signal import lfilter
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
+from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.high_band import high_bands
+from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
+from pymoo_hdte.discrepancy.mechanism.order_search import (
+    SeenOrder,
+    _at_two_speeds,
+    _significance,
+    _tried,
+    told_from_frequencies,
+)
+from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
+from pymoo_hdte.discrepancy.mechanism.ripple import find_ripples
+from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
+from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
+from tests.helpers.places import SHARED
+
+STEP, CUTOFF = 5e-3, 4.0
+TIME = np.arange(0.0, 20.0, STEP)
+GEAR = Gear(101.0, "harmonic drive")
+
+
+def joint(gear=None):
+    return Mechanism(
+        {"q": BelievedValue(0.05, 0.5)},
+        [Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, 1.0), gear=gear)],
+        [Input("torque", {"q": 1.0})],
+    )
+
+
+JOINT = joint(GEAR)
+
+
+def swings(generator):
+    phases = generator.uniform(0.0, 6.0, 3)
+    parts = ((0.8, 0.11), (0.3, 0.31), (0.1, 0.77))
+    return sum(
+        size * np.sin(2.0 * np.pi * frequency * TIME + phase)
+        for (size, frequency), phase in zip(parts, phases, strict=True)
+    )
+
+
+def trapezoids(*speeds):
+    """There and back at constant speeds, in a period that holds whole cycles of 50 Hz."""
+    ramp, hold = np.linspace(0.0, 1.0, 60), np.ones(400)
+    up = np.concatenate([ramp, hold, ramp[::-1]])
+    cycle = np.concatenate([sign * speed * up for speed in speeds for sign in (1.0, -1.0)])
+    return STEP * np.cumsum(np.resize(cycle, len(TIME)))
+
+
+def record(q, torque, generator, role="train"):
+    q = q + 1e-6 * generator.standard_normal(len(q))
+    return Record(role, role, STEP * np.arange(len(q)), {"q": q, "torque": torque})
+
+
+def noises(generator):
+    white, hertz = generator.standard_normal(len(TIME)), 2.0 * np.pi * TIME
+    resonance = lfilter([0.1], [1.0, -1.97 * np.cos(0.3 * np.pi), 0.97], white)
+    return {
+        "white": white,
+        "coloured": lfilter([1.0], [1.0, -0.95], white),
+        "mains": white + 5.0 * (np.sin(50.0 * hertz) + np.sin(25.0 * hertz + 1.0)),
+        "harmonics": white + 5.0 * sum(np.sin(20.0 * n * hertz) for n in (1, 2, 3)),
+        "resonance": white + 3.0 * resonance,
+    }
+
+
+def bands_of(q, torque, generator):
+    return high_bands(JOINT, JOINT.ports[0], [record(q, torque, generator)], CUTOFF, RULES)
+
+
+@pytest.mark.parametrize("kind", ["white", "coloured", "mains", "harmonics", "resonance"])
+def test_no_noise_and_no_line_of_one_frequency_is_an_order(kind):
+    generator = np.random.default_rng([7, len(kind)])
+    motions = [swings(generator), trapezoids(0.8), trapezoids(0.4, 0.8), trapezoids(0.3, 0.6, 0.9)]
+    for q in motions:
+        dry = 0.3 * np.sign(np.gradient(q))
+        found = find_ripples(
+            JOINT, [record(q, dry + 0.1 * noises(generator)[kind], generator)], CUTOFF
+        )
+        assert found.found == ()
+
+
+@pytest.mark.parametrize("count", [15, pytest.param(600, marks=pytest.mark.nightly)])
+def test_noise_makes_an_order_significant_as_rarely_as_the_rule_says(count):
+    chance, generator = 0.05, np.random.default_rng(11)
+    rules, q = Rules(position_order_chance=chance), swings(generator)
+    alarms = 0
+    for _ in range(count):
+        torque = lfilter([1.0], [1.0, -0.6], generator.standard_normal(len(TIME)))
+        bands = bands_of(q, torque, generator)
+        orders, resolution = _tried(bands, rules)
+        alarms += bool(np.any(_significance(bands, orders, (), resolution, rules) > 1.0))
+    assert alarms <= count * chance + 3.0 * math.sqrt(count * chance)
+
+
+def test_the_orders_of_a_gear_are_seen_at_a_smaller_size():
+    generator = np.random.default_rng(13)
+    q = swings(generator)
+    bands = bands_of(q, 0.02 * np.cos(202.0 * q) + 0.1 * noises(generator)["white"], generator)
+    orders, resolution = _tried(bands, RULES)
+    there = int(np.argmin(np.abs(orders - 202.0)))
+    expected = tuple(GEAR.expected)
+    with_gear, without = (
+        _significance(bands, orders, known, resolution, RULES)[there] for known in (expected, ())
+    )
+    assert with_gear > 1.2 * without
+
+
+def hidden(kind, order, size, phase, q):
+    turns = np.sign(np.gradient(q)) if kind == "position_dependent_friction" else -1.0
+    return size * turns * np.cos(order * q + phase)
+
+
+@settings(max_examples=5, deadline=None, derandomize=True)
+@given(
+    kind=st.sampled_from(["torque_ripple", "position_dependent_friction"]),
+    order=st.floats(150.0, 420.0),
+    phase=st.floats(-3.0, 3.0),
+    seed=st.integers(0, 1000),
+)
+def test_a_ripple_beyond_the_band_is_found_with_its_kind_order_and_size(kind, order, phase, seed):
+    generator = np.random.default_rng(seed)
+    q = swings(generator)
+    torque = hidden(kind, order, 0.1, phase, q) + 0.1 * noises(generator)["mains"]
+    (one,) = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found
+    (part,) = one.parts
+    assert part.law.name == kind
+    assert one.order == pytest.approx(order, abs=0.25 * one.resolution)
+    (size, variance), *_ = part.values.values()
+    assert abs(size - 0.1) <= max(4.0 * variance**0.5, 0.01)
+
+
+def test_at_one_speed_an_order_and_a_frequency_look_alike_and_neither_is_an_order():
+    """Constant speed: order 202 has 50 Hz at every moment, and nothing tells them apart."""
+    generator = np.random.default_rng(3)
+    speed = 2.0 * np.pi * 50.0 / 202.0
+    q = speed * TIME + 0.002 * np.sin(2.0 * np.pi * 0.4 * TIME)
+    for line in (np.cos(202.0 * q), np.cos(2.0 * np.pi * 50.0 * TIME)):
+        torque = 0.02 * line + 0.1 * generator.standard_normal(len(TIME))
+        bands = bands_of(q, torque, generator)
+        assert not told_from_frequencies(bands, 202.0, RULES)[0]
+        assert find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found == ()
+
+
+def test_what_follows_the_position_at_one_speed_only_is_no_order():
+    generator = np.random.default_rng(4)
+    q = trapezoids(0.4, 0.8)
+    noise = 0.05 * generator.standard_normal(len(TIME))
+    fast = np.abs(np.gradient(q, STEP)) > 0.78
+    resolution = 2.0 * np.pi / float(np.ptp(q))
+    for rows, seen in ((fast, False), (np.ones_like(fast), True)):
+        bands = bands_of(q, 0.2 * rows * np.cos(202.0 * q) + noise, generator)
+        assert _at_two_speeds(bands, SeenOrder(202.0, resolution, 2.0), RULES) == seen
+
+
+def test_two_records_of_one_speed_each_tell_an_order_from_a_frequency():
+    generator = np.random.default_rng(5)
+    for line, orders in ((lambda q: 0.05 * np.cos(202.0 * q), [202.0]), (np.zeros_like, [])):
+        records = []
+        for name, speed in (("slow", 0.5), ("fast", 0.9)):
+            q = speed * TIME + 0.01 * np.sin(2.0 * np.pi * 0.4 * TIME)
+            mains = 0.1 * np.sin(2.0 * np.pi * 25.0 * TIME)
+            torque = line(q) + mains + 0.1 * generator.standard_normal(len(TIME))
+            one = record(q, torque, generator)
+            records.append(Record(name, "train", one.time, one.channels))
+        found = find_ripples(JOINT, records, CUTOFF).found
+        assert [one.order for one in found] == pytest.approx(orders, abs=0.3)
+
+
+@pytest.mark.parametrize(("power", "words"), [(2.0, "grows"), (0.0, "hardly"), (-1.0, "falls")])
+def test_how_the_amplitude_changes_with_the_speed_is_said(power, words):
+    generator = np.random.default_rng(8)
+    q = swings(generator)
+    speed = np.abs(np.gradient(q, STEP))
+    torque = np.maximum(speed, 0.1) ** power * np.cos(202.0 * q)
+    torque = torque + 0.02 * generator.standard_normal(len(TIME))
+    one = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found[0]
+    assert one.trend.startswith(f"It {words}")
+    assert "202 is 2 per input turn" in one.meaning
+
+
+def test_a_ripple_that_other_records_do_not_show_is_not_named():
+    generator = np.random.default_rng(9)
+    train, other = swings(generator), swings(generator)
+    noise = 0.1 * generator.standard_normal((3, len(TIME)))
+    first = record(train, 0.1 * np.cos(202.0 * train) + noise[0], generator)
+    shows = record(other, 0.1 * np.cos(202.0 * other) + noise[1], generator, "held_out")
+    not_there = record(other, noise[2], generator, "held_out")
+    (one,) = find_ripples(JOINT, [first, shows], CUTOFF).found
+    assert one.held_out[1] < one.held_out[0]
+    lost = find_ripples(JOINT, [first, not_there], CUTOFF)
+    assert not lost.found
+    assert "not named" in lost.limits[0]
+
+
+def test_what_is_known_already_is_not_found_again():
+    generator = np.random.default_rng(10)
+    q = swings(generator)
+    torque = hidden("torque_ripple", 202.0, 0.3, 1.0, q)
+    one = record(q, torque + 0.1 * generator.standard_normal(len(TIME)), generator)
+    (ripple,) = find_ripples(JOINT, [one], CUTOFF).found
+    assert not find_ripples(JOINT, [one], CUTOFF, [part.law for part in ripple.parts]).found
+
+
+def test_a_model_that_lacks_a_ripple_only_is_not_adequate_and_gets_it(tmp_path):
+    generator = np.random.default_rng(12)
+    q = swings(generator)
+    speed = np.gradient(q, STEP)
+    moved = 0.05 * np.gradient(speed, STEP) + 0.5 * speed
+    noise = 0.05 * generator.standard_normal(len(TIME))
+    plain = examine_mechanism(JOINT, [record(q, moved + noise, generator)], CUTOFF)
+    assert plain.verdict.status == "adequate"
+    rippled = moved + noise + hidden("torque_ripple", 202.0, 0.1, 1.0, q)
+    finding = examine_mechanism(JOINT, [record(q, rippled, generator)], CUTOFF)
+    assert finding.verdict.status == "named"
+    assert finding.accepted.values == pytest.approx(plain.accepted.values, rel=0.02)
+    document = write_mechanism_report("joint", finding, (), next_test(finding), tmp_path / "out")
+    (effect,) = document["effects"]
+    assert (effect["name"], effect["port"]) == ("torque_ripple", "bearing")
+    lower, upper = effect["parameters"]["amplitude"]["interval95"]
+    assert lower < 0.1 < upper
+    assert "2 per input turn" in document["sentence"]
+    (law,) = revised_mechanism("joint", finding).effects
+    assert isinstance(law, LawAt)
+    again = examine_mechanism(JOINT, [record(q, rippled, generator)], CUTOFF, [law])
+    assert again.verdict.status == "adequate"
+
+
+def test_orders_that_a_gear_has():
+    drive = Gear(100.0, "harmonic drive", pole_pairs=7).expected
+    # The wave generator has two ends, and turns 99 or 101 times against the output.
+    assert {198.0, 200.0, 202.0, 400.0, 700.0, 1400.0, 4200.0, 100.0, 1.0} <= set(drive)
+    assert drive[200.0] == "2 per input turn"
+    assert set(Gear(5.0).expected) == {5.0, 1.0}
+    for wrong in ({"ratio": 0.5}, {"ratio": 5.0, "kind": "belt"}, {"ratio": 5.0, "pole_pairs": -1}):
+        with pytest.raises(InvalidInput, match=r"gear\."):
+            Gear(**wrong)
+
+
+UR10E = SHARED / "measured" / "ur10e"
+MEASURED = {1: (10.0, 202.0), 4: (9.0, 200.0), 6: (10.12, 404.0)}
+"""Torque constant in N.m/A and an order of each joint, 2 or 4 per turn of the wave generator."""
+
+
+@pytest.mark.skipif(not UR10E.is_dir(), reason="measured data of others are not here")
+@pytest.mark.parametrize("number", MEASURED)
+def test_joints_of_a_robot_have_two_or_four_cycles_per_input_turn(number):
+    gain, order = MEASURED[number]
+    rows = np.loadtxt(UR10E / f"joint_{number}.csv", delimiter=",")
+    time, q, current = rows[:, 0], rows[:, number], rows[:, 12 + number]
+    even = np.linspace(time[0], time[-1], len(time))
+    channels = {"q": np.interp(even, time, q), "torque": gain * np.interp(even, time, current)}
+    first = int(0.6 * len(time))
+    records = [
+        Record(role, role, even[part], {name: one[part] for name, one in channels.items()})
+        for role, part in (("train", slice(first)), ("held_out", slice(first, None)))
+    ]
+    found = find_ripples(JOINT, records, 3.5).found
+    assert any(abs(one.order - order) <= one.resolution for one in found)
+    assert all("input turn" in one.meaning for one in found[:1])

@@ -1,0 +1,356 @@
+"""Anyone's simulator as a robust problem: accuracy, refusals, failures, resumed runs."""
+
+import concurrent.futures
+import copy
+import pickle
+
+import chaospy
+import numpy as np
+import pytest
+import scipy.stats
+from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.core.problem import Problem
+from pymoo.optimize import minimize
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems import (
+    Design,
+    Mean,
+    MeanPlusStd,
+    Robust,
+    SimulatorFailed,
+    Std,
+    UntrustedSurrogate,
+    robust_problem,
+)
+from pymoo_hdte.surrogate import ExtrapolationError
+
+FORCE, MODULUS = chaospy.Normal(500.0, 50.0), scipy.stats.norm(2.1e11, 1e10)
+SIZES = {
+    "b": Design(0.02, 0.05, tolerance=0.02, scale="log"),
+    "h": Design(0.02, 0.05, tolerance=0.02, scale="log"),
+}
+
+
+def cantilever(b, h, F, E):
+    """Return the deflection in m of a cantilever of 1 m."""
+    return 4.0 * F / (E * b * h**3)
+
+
+def quiet(simulator, designs=SIZES, noise=None, **options):
+    return robust_problem(simulator, designs, noise, progress=False, **options)
+
+
+@pytest.fixture(scope="module")
+def beam():
+    return quiet(cantilever, noise={"F": FORCE, "E": MODULUS}, positive=True)
+
+
+def powers(distribution, exponents):
+    """Return expectations of powers of a variable near 1 by a fine Gauss rule of chaospy."""
+    nodes, weights = chaospy.generate_quadrature(30, distribution, rule="gaussian")
+    return [weights @ nodes[0] ** exponent for exponent in exponents]
+
+
+def true_moments(X):
+    band = chaospy.Uniform(0.98, 1.02)
+    of_b, of_h = powers(band, (-1, -2)), powers(band, (-3, -6))
+    of_modulus = powers(chaospy.Normal(1.0, 1.0 / 21.0), (-1, -2))
+    b, h = X.T
+    mean = 4.0 * 500.0 / 2.1e11 * of_modulus[0] * of_b[0] / b * of_h[0] / h**3
+    square = (
+        16.0 * (500.0**2 + 50.0**2) / 2.1e11**2 * of_modulus[1] * of_b[1] / b**2 * of_h[1] / h**6
+    )
+    return np.column_stack([mean, np.sqrt(square - mean**2)])
+
+
+def designs_of(problem, n=200):
+    return np.random.default_rng(3).uniform(problem.xl, problem.xu, (n, problem.n_var))
+
+
+def test_the_cantilever_is_as_accurate_as_asked_for_and_the_band_covers_it(beam):
+    X = designs_of(beam)
+    truth = true_moments(X)
+    error = np.abs(beam.evaluate(X) - truth)
+    assert np.all(np.quantile(error / truth[:, 1:], 0.95, axis=0) <= 0.01)
+    assert np.all(np.mean(error <= beam.band(X), axis=0) >= 0.95)
+    assert np.all(beam.accuracy <= 0.01)
+    assert beam.n_runs < 200
+    assert beam.obj_names == ("mean", "std")
+
+
+def test_gradients_equal_differences(beam):
+    X = designs_of(beam, 5) * 0.9 + 0.1 * 0.035
+    F, dF, band = beam.evaluate(X, return_values_of=["F", "dF", "F_band"])
+    assert band == pytest.approx(beam.band(X))
+    for j in range(2):
+        step = 1e-7 * np.eye(2)[j]
+        difference = (beam.evaluate(X + step) - beam.evaluate(X - step)) / 2e-7
+        assert dF[:, :, j] == pytest.approx(difference, rel=1e-5)
+    assert F.shape == (5, 2)
+
+
+def test_it_is_an_ordinary_problem_of_pymoo(beam):
+    again = pickle.loads(pickle.dumps(copy.deepcopy(beam)))
+    assert np.array_equal(again.evaluate(designs_of(beam)), beam.evaluate(designs_of(beam)))
+    result = minimize(beam, NSGA2(pop_size=20), ("n_gen", 10), seed=1)
+    assert result.X[0] == pytest.approx([0.05, 0.05], rel=0.02)
+    with pytest.raises(ExtrapolationError, match="h is"):
+        beam.evaluate(np.array([[0.03, 0.06]]))
+
+
+def test_prediction_is_near_the_simulator(beam):
+    row = [[0.03, 0.04, 520.0, 2.0e11]]
+    assert beam.predict(row)[0, 0] == pytest.approx(cantilever(*row[0]), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"budget": 60, "accuracy": 1e-3}, "error of the .* after 60 runs is .* at most 0.001"),
+        ({"budget": 60, "positive": True, "accuracy": 99.0}, "positive response is -"),
+    ],
+)
+def test_what_cannot_be_trusted_is_refused_with_the_region(options, words):
+    sizes = {name: Design(0.008, 0.05, tolerance=0.02) for name in "bh"}
+    with pytest.raises(UntrustedSurrogate, match=words) as refusal:
+        quiet(cantilever, sizes, {"F": FORCE, "E": MODULUS}, **options)
+    assert set(refusal.value.region) & {"b", "h"}
+    assert "so where" in str(refusal.value)
+    assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"lower": -1.0, "upper": 1.0, "tolerance": 0.1}, "bounds of one sign"),
+        ({"lower": 0.0, "upper": 1.0, "tolerance": 0.1}, "bounds of one sign"),
+        ({"lower": 1.0, "upper": 1.0}, "upper"),
+        ({"lower": 0.0, "upper": np.inf}, "upper"),
+        ({"lower": 1.0, "upper": 2.0, "tolerance": 1.0}, "tolerance"),
+        ({"lower": 1.0, "upper": 2.0, "tolerance": 0.1, "deviation": 0.1}, "deviation"),
+        ({"lower": 1.0, "upper": 2.0, "deviation": 0.1, "scale": "log"}, "scale"),
+        ({"lower": -1.0, "upper": 2.0, "scale": "log"}, "scale"),
+        ({"lower": 1.0, "upper": 2.0, "tolerance": "wide"}, "tolerance"),
+    ],
+)
+def test_a_design_that_makes_no_sense_is_refused(arguments, words):
+    with pytest.raises(InvalidInput, match=words):
+        Design(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"accuracy": 0.0}, "accuracy"),
+        ({"budget": 5}, "budget"),
+        ({"objectives": []}, "objectives"),
+        ({"objectives": [Mean(response="stress")]}, "stress"),
+        ({"constraints": [Mean()]}, "constraints"),
+        ({"positive": ["stress"]}, "positive"),
+        ({"noise": {"b": FORCE}}, "names of the inputs"),
+        ({"noise": {("F", "E"): FORCE}}, "joint distribution"),
+        ({"designs": {}}, "designs"),
+        ({"designs": {"b": (1.0, 2.0)}}, "designs"),
+        ({"seed": -1}, "seed"),
+        ({"tries": 0}, "tries"),
+    ],
+)
+def test_bad_arguments_are_refused_by_name(options, words):
+    given = {"designs": SIZES, "noise": {}} | options
+    with pytest.raises(InvalidInput, match=words):
+        quiet(lambda b, h: b + h, **given)
+
+
+def test_a_heavy_tail_goes_through_its_normal_coordinate():
+    """A log-normal factor of deviation 1: its moments are closed form, its polynomials huge."""
+    noise = {"a": chaospy.LogNormal(0.0, 1.0)}
+    problem = quiet(lambda x, a: x * a, {"x": Design(1.0, 2.0)}, noise, accuracy=0.02)
+    mean = np.exp(0.5)
+    std = mean * np.sqrt(np.e - 1.0)
+    again = pickle.loads(pickle.dumps(problem))
+    assert again.evaluate(np.array([1.5])) == pytest.approx([1.5 * mean, 1.5 * std], rel=0.02)
+
+
+def two_responses(x, a):
+    return {"deflection": x + a, "stress": x**2 * a}
+
+
+def test_several_responses_scalar_or_vectorised_give_the_same():
+    sizes, noise = {"x": Design(1.0, 2.0, deviation=0.1)}, {"a": chaospy.Uniform(0.0, 1.0)}
+    asked = {
+        "objectives": [Mean(response="deflection"), -Std(response="stress")],
+        "constraints": [MeanPlusStd(2.0, response="stress") <= 3.0],
+    }
+    first, second = (
+        quiet(two_responses, sizes, noise, vectorised=one, **asked) for one in (False, True)
+    )
+    X = np.array([[1.2], [1.9]])
+    for key in ("F", "G", "dF", "dG"):
+        values = first.evaluate(X, return_values_of=[key])
+        assert values == pytest.approx(second.evaluate(X, return_values_of=[key]), rel=1e-12)
+    x2 = X**2 + 0.1**2 / 3.0
+    x4 = X**4 + 6.0 * X**2 * 0.01 / 3.0 + 1e-4 / 5.0
+    std = np.sqrt(x4 / 3.0 - (x2 / 2.0) ** 2)
+    assert first.evaluate(X, return_values_of=["F"]) == pytest.approx(np.hstack([X + 0.5, -std]))
+    G = first.evaluate(X, return_values_of=["G"])
+    assert pytest.approx(x2 / 2.0 + 2.0 * std - 3.0) == G
+
+
+class Flaky:
+    """A simulator that notes its calls and fails where it is told to."""
+
+    def __init__(self, fails=lambda call, x: False):
+        self.calls, self.fails = [], fails
+
+    def __call__(self, x, a):
+        self.calls.append((x, a))
+        if self.fails(len(self.calls), x):
+            raise RuntimeError("no convergence")
+        return np.exp(x * a)
+
+
+PLAIN = {"x": Design(0.5, 1.0, deviation=0.05)}, {"a": chaospy.Uniform(0.0, 1.0)}
+
+
+def test_a_run_that_fails_once_is_made_again():
+    calm, flaky = Flaky(), Flaky(lambda call, x: call % 7 == 3)
+    X = np.array([[0.7]])
+    steady = quiet(calm, *PLAIN)
+    assert np.array_equal(quiet(flaky, *PLAIN).evaluate(X), steady.evaluate(X))
+    assert len(flaky.calls) > len(calm.calls)
+
+
+def test_runs_that_always_fail_are_left_out_and_told():
+    with pytest.warns(RuntimeWarning, match=r"runs failed and are left out: x = 0\.4"):
+        problem = quiet(Flaky(lambda call, x: x < 0.5), *PLAIN, accuracy=0.05)
+    assert len(problem.failed) > 0
+    assert np.all(problem.failed[:, 0] < 0.5)
+    mean = problem.evaluate(np.array([[0.8]]))[0, 0]
+    x = np.linspace(0.75, 0.85, 2001)
+    assert mean == pytest.approx(np.mean((np.exp(x) - 1.0) / x), rel=0.02)
+
+
+def test_a_simulator_that_never_runs_says_why():
+    with pytest.raises(SimulatorFailed, match=r"failed in all .*no convergence") as failure:
+        quiet(Flaky(lambda call, x: True), *PLAIN)
+    assert "no convergence" in str(failure.value.__cause__)
+
+
+def test_a_simulator_that_fails_in_half_of_the_box_is_refused_with_its_region():
+    with pytest.raises(UntrustedSurrogate, match=r"runs that failed is .* so where x is 0\.[45]"):
+        quiet(Flaky(lambda call, x: x < 0.72), *PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("gives", "words"),
+    [
+        (lambda x: "a", "what the simulator returns is 'a'"),
+        (lambda x: 1j * x, "what the simulator returns"),
+        (lambda x: 1e200 * x, "choose another unit"),
+        (lambda x: {"y" if x < 0.7 else "z": x}, "names of the responses"),
+    ],
+)
+def test_what_is_no_response_is_refused(gives, words):
+    with pytest.raises(InvalidInput, match=words):
+        quiet(gives, PLAIN[0])
+
+
+def test_responses_without_scatter_are_no_trouble():
+    asked = {"objectives": [Mean(response="response_1"), Std(response="response_2")]}
+    problem = quiet(
+        lambda x, y: np.array([3.0, x * y]), {"x": Design(0, 1), "y": Design(1, 2)}, **asked
+    )
+    F, dF = problem.evaluate(np.array([[0.5, 1.5]]), return_values_of=["F", "dF"])
+    assert pytest.approx(np.array([[3.0, 0.0]]), abs=1e-12) == F
+    assert dF == pytest.approx(np.zeros((1, 2, 2)), abs=1e-9)
+
+
+def test_a_killed_study_goes_on_without_a_run_made_twice(tmp_path):
+    whole = Flaky()
+    expected = quiet(whole, *PLAIN).evaluate(np.array([[0.7]]))
+    file = tmp_path / "runs.jsonl"
+
+    def killed(call, x):
+        if call == 40:
+            raise KeyboardInterrupt
+        return False
+
+    first = Flaky(killed)
+    with pytest.raises(KeyboardInterrupt):
+        quiet(first, *PLAIN, cache=file)
+    # A line that was being written when the process died.
+    file.write_text(file.read_text() + '{"at": ["0x1.', encoding="utf-8")
+    second = Flaky()
+    found = quiet(second, *PLAIN, cache=file).evaluate(np.array([[0.7]]))
+    assert np.array_equal(found, expected)
+    assert not set(first.calls[:39]) & set(second.calls)
+    assert len(second.calls) == len(set(whole.calls)) - 39
+    third = Flaky()
+    quiet(third, *PLAIN, cache=file, objectives=[Mean(response="response")])
+    assert not third.calls
+    with pytest.raises(InvalidInput, match="cache"):
+        quiet(cantilever, noise={"F": FORCE, "E": MODULUS}, cache=file)
+
+
+@pytest.fixture(params=["threads", "dask"])
+def workers(request):
+    if request.param == "threads":
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            yield pool
+        return
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(processes=False, dashboard_address=None, n_workers=1) as client:
+        yield client
+
+
+FAILED_ONCE = set()
+
+
+def fails_once_everywhere(x, a):
+    """Fail at the first call at every seventh point; what Dask sends holds no state."""
+    if int(1e6 * x) % 7 == 3 and x not in FAILED_ONCE:
+        FAILED_ONCE.add(x)
+        raise RuntimeError("no licence")
+    return np.exp(x * a)
+
+
+def test_workers_give_the_same_and_make_failed_runs_again(workers):
+    FAILED_ONCE.clear()
+    problem = quiet(fails_once_everywhere, *PLAIN, executor=workers)
+    X = np.array([[0.7]])
+    assert np.array_equal(problem.evaluate(X), quiet(Flaky(), *PLAIN).evaluate(X))
+    assert FAILED_ONCE
+    assert not len(problem.failed)
+
+
+def test_runs_and_memory_are_told_before_the_first_run(capsys):
+    def told(x, a):
+        assert "2 inputs, 35 to 1000 runs, at most" in capsys.readouterr().err
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        robust_problem(told, *PLAIN)
+
+
+class Circle(Problem):
+    """Two objectives, one constraint, closed form."""
+
+    def __init__(self):
+        super().__init__(n_var=2, n_obj=2, n_ieq_constr=1, xl=0.0, xu=2.0)
+
+    def _evaluate(self, x, out, *args, **kwargs):
+        out["F"] = np.column_stack([x[:, 0] ** 2, x[:, 1]])
+        out["G"] = 1.0 - x.sum(axis=1)
+
+
+def test_a_problem_of_pymoo_gets_its_robust_counterpart():
+    problem = Robust(Circle(), scatter=0.1, progress=False)
+    X = np.array([[0.5, 1.5]])
+    F, G = problem.evaluate(X, return_values_of=["F", "G"])
+    assert pytest.approx(np.array([[0.25 + 0.01 / 3.0, 1.5]])) == F
+    assert G[0, 0] == pytest.approx(-1.0 + 3.0 * np.sqrt(0.02 / 3.0))
+    with pytest.raises(InvalidInput, match="scatter"):
+        Robust(Circle(), scatter={"y": 0.1})
+    with pytest.raises(InvalidInput, match="length of scatter"):
+        Robust(Circle(), scatter=[0.1])

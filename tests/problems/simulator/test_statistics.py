@@ -1,0 +1,110 @@
+"""Statistics of a response against closed forms, their gradients and their stated errors."""
+
+import chaospy
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems import (
+    CVaR,
+    Design,
+    FailureProbability,
+    Mean,
+    MeanPlusStd,
+    Quantile,
+    Std,
+    WorstCase,
+    robust_problem,
+)
+
+LIMIT = 3.5
+ASKED = (
+    *(Mean(), Std(), MeanPlusStd(2.0), Quantile(0.9), CVaR(0.9), WorstCase()),
+    *(WorstCase("smallest"), FailureProbability(above=LIMIT), FailureProbability(below=LIMIT)),
+)
+
+
+def response(x, a, b):
+    return x + x * a + 0.5 * b
+
+
+@pytest.fixture(scope="module")
+def problem():
+    """A response that is normal: mean x, variance 0.01 x^2 + 0.01."""
+    noise = {"a": chaospy.Normal(0.0, 0.1), "b": chaospy.Normal(0.0, 0.2)}
+    return robust_problem(
+        response, {"x": Design(2.0, 4.0)}, noise, objectives=ASKED, progress=False
+    )
+
+
+def test_statistics_of_a_normal_response_are_closed_forms(problem):
+    x = np.linspace(2.0, 4.0, 9)
+    F, band = problem.evaluate(x[:, None], return_values_of=["F", "F_band"])
+    std = 0.1 * np.hypot(x, 1.0)
+    z = norm.ppf(0.9)
+    reach = norm.ppf(1.0 - 1e-5)
+    worst = (0.1 * x + 0.1) * reach
+    failing = norm.sf((LIMIT - x) / std)
+    truth = np.column_stack(
+        [
+            *(x, std, x + 2.0 * std, x + z * std, x + norm.pdf(z) / 0.1 * std),
+            *(x + worst, x - worst, failing, 1.0 - failing),
+        ]
+    )
+    assert F[:, [0, 1, 2]] == pytest.approx(truth[:, [0, 1, 2]], rel=1e-9)
+    assert F[:, [5, 6]] == pytest.approx(truth[:, [5, 6]], rel=1e-6)
+    assert np.all(np.abs(F - truth)[:, 3:5] < 0.02 * std[:, None])
+    assert np.all(np.abs(F - truth)[:, 7:] < 0.01)
+    assert np.mean(np.abs(F - truth)[:, 3:] <= band[:, 3:] + 1e-9) > 0.9
+
+
+def test_gradients_of_statistics_equal_differences():
+    noise = {"a": chaospy.Normal(0.0, 0.1), "b": chaospy.Uniform(-0.2, 0.2)}
+    designs = {"x": Design(2.0, 4.0, tolerance=0.05), "y": Design(0.0, 1.0, deviation=0.1)}
+    problem = robust_problem(
+        lambda x, y, a, b: x**2 * (1.0 + a) + b * y + np.sin(y),
+        *(designs, noise, ASKED[:7]),
+        progress=False,
+    )
+    X = np.array([[2.5, 0.3], [3.3, 0.8]])
+    F, dF = problem.evaluate(X, return_values_of=["F", "dF"])
+    for j in range(2):
+        step = 1e-6 * np.eye(2)[j]
+        difference = (problem.evaluate(X + step) - problem.evaluate(X - step)) / 2e-6
+        assert dF[:, :, j] == pytest.approx(difference, rel=1e-3, abs=2e-3)
+    assert F.shape == (2, 7)
+
+
+def test_the_worst_case_lies_inside_the_box_where_the_response_turns():
+    problem = robust_problem(
+        lambda x, a: 1.0 - (a - 0.3 * x) ** 2,
+        {"x": Design(1.0, 2.0)},
+        {"a": chaospy.Uniform(0.0, 1.0)},
+        objectives=[WorstCase(), WorstCase("smallest")],
+        progress=False,
+    )
+    F = problem.evaluate(np.array([[1.0], [2.0]]))
+    assert pytest.approx(np.array([[1.0, 0.51], [1.0, 0.64]]), abs=1e-6) == F
+
+
+def test_a_probability_has_no_gradient(problem):
+    with pytest.raises(InvalidInput, match="gradient"):
+        problem.evaluate(np.array([[3.0]]), return_values_of=["dF"])
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda: Quantile(1.0),
+        lambda: CVaR(0.0),
+        lambda: WorstCase("best"),
+        lambda: FailureProbability(),
+        lambda: FailureProbability(above=1.0, below=0.0),
+        lambda: MeanPlusStd(np.nan),
+        lambda: Mean() <= None,
+    ],
+)
+def test_a_statistic_that_makes_no_sense_is_refused(wrong):
+    with pytest.raises(InvalidInput):
+        wrong()

@@ -1,0 +1,168 @@
+"""Moments of sparse polynomials over any scatter: closed forms, chaospy, polynomials are exact."""
+
+import chaospy
+import numpy as np
+import pytest
+import scipy.stats
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems import Design
+from pymoo_hdte.problems.simulator.inputs import Inputs
+from pymoo_hdte.surrogate.sparse.held_out import draw_designs
+from pymoo_hdte.surrogate.sparse.interpolation import GrowingInterpolation
+from pymoo_hdte.surrogate.sparse.measures import Distribution, Measure, OrthonormalPolynomials
+from pymoo_hdte.surrogate.sparse.moments import SparseMoments
+
+DISTRIBUTIONS = {
+    "normal": (chaospy.Normal(2.0, 0.3), 2.0, 0.3),
+    "uniform": (scipy.stats.uniform(-1.0, 2.0), 0.0, 1.0 / np.sqrt(3.0)),
+    "beta": (chaospy.Beta(2.0, 3.0), 0.4, 0.2),
+    "triangle": (chaospy.Triangle(0.0, 0.5, 2.0), 2.5 / 3.0, np.sqrt((4.0 + 0.25 - 1.0) / 18.0)),
+    "gamma": (scipy.stats.gamma(2.0), 2.0, np.sqrt(2.0)),
+    "arcsine": (scipy.stats.beta(0.5, 0.5), 0.5, np.sqrt(0.125)),
+}
+
+
+@pytest.mark.parametrize("name", DISTRIBUTIONS)
+def test_a_measure_has_the_moments_of_its_distribution(name):
+    given_, mean, std = DISTRIBUTIONS[name]
+    measure = Measure.of(name, Distribution(name, given_))
+    assert (measure.mean, measure.std) == pytest.approx((mean, std), rel=1e-8, abs=1e-10)
+    family = OrthonormalPolynomials(measure, 12)
+    products = family(measure.nodes) * measure.weights @ family(measure.nodes).T
+    assert products == pytest.approx(np.eye(13), abs=1e-10)
+    assert family.weights @ family.nodes**3 == pytest.approx(
+        measure.weights @ measure.nodes**3, rel=1e-9, abs=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [1.0, None, scipy.stats.poisson(3), chaospy.Binomial(5, 0.5), scipy.stats.norm(0, np.nan)],
+)
+def test_what_is_no_continuous_distribution_is_refused_by_name(wrong):
+    with pytest.raises(InvalidInput, match="noise of x"):
+        Distribution("noise of x", wrong)
+
+
+def inputs():
+    designs = {
+        "relative": Design(1.0, 2.0, tolerance=0.1),
+        "absolute": Design(-1.0, 1.0, deviation=chaospy.Normal(0.0, 0.2)),
+        "exact": Design(0.0, 3.0),
+    }
+    return Inputs(designs, {"noise": chaospy.Normal(1.0, 0.5), "other": scipy.stats.uniform(0, 1)})
+
+
+def interpolant(values_of, indices, given_):
+    """Return the moments of the interpolant of a function of the physical inputs."""
+    grown = GrowingInterpolation(given_.axes)
+    for index in indices:
+        point = given_.values(grown.point(index)[None])
+        grown.add(index, np.array([float(values_of(*point[0]))]))
+    return grown
+
+
+SET = [(a, b, c, d, e) for a in range(3) for b in range(3) for c in range(2) for d in range(3)
+       for e in range(2)]  # fmt: skip
+
+
+@settings(max_examples=15)
+@given(
+    st.lists(st.floats(-2.0, 2.0), min_size=4, max_size=4),
+    st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3),
+)
+def test_moments_of_polynomials_are_exact(weights, place):
+    a, b, c, d = weights
+
+    def function(r, s, t, n, o):
+        return a * r**2 + b * s * n + c * t * o + d * n**2
+
+    given_ = inputs()
+    moments = SparseMoments(interpolant(function, SET, given_).polynomial(), given_.axes)
+    u, v, w = np.array([1.0, -1.0, 0.0]) + np.array(place) * np.array([1.0, 2.0, 3.0])
+    mean, std = moments(np.array([[u, v, w]]))
+    third, fifth = 0.1**2 / 3.0, 0.1**4 / 5.0
+    # E r^2, Var r^2 of a uniform band; independent terms share only n.
+    true_mean = a * u**2 * (1.0 + third) + b * v + c * w * 0.5 + d * 1.25
+    of_square = u**4 * (1.0 + 6.0 * third + fifth) - (u**2 * (1.0 + third)) ** 2
+    of_product = (v**2 + 0.04) * 1.25 - v**2
+    of_normal = 4.0 * 0.25 + 2.0 * 0.25**2
+    shared = 2.0 * b * d * v * 2.0 * 0.25
+    variance = a**2 * of_square + b**2 * of_product + d**2 * of_normal + shared
+    variance += c**2 * w**2 / 12.0
+    assert mean[0, 0] == pytest.approx(true_mean, rel=1e-9, abs=1e-9)
+    assert std[0, 0] == pytest.approx(np.sqrt(max(variance, 0.0)), rel=1e-7, abs=1e-7)
+
+
+def smooth(r, s, t, n, o):
+    return np.exp(0.3 * r * n) + np.sin(s + t) * o
+
+
+def test_the_moments_agree_with_chaospy():
+    given_ = inputs()
+    grown = interpolant(smooth, SET, given_)
+    polynomial = grown.polynomial()
+    design = np.array([[1.4, 0.3, 2.0]])
+    mean, std = SparseMoments(polynomial, given_.axes)(design)
+    scatter = chaospy.J(
+        chaospy.Uniform(1.4 * 0.9, 1.4 * 1.1),
+        chaospy.Normal(0.3, 0.2),
+        chaospy.Normal(1.0, 0.5),
+        chaospy.Uniform(0.0, 1.0),
+    )
+    nodes, weights = chaospy.generate_quadrature(6, scatter, rule="gaussian")
+    r, s, n, o = nodes
+    physical = [r, s, np.full_like(r, 2.0), n, o]
+    cube = np.column_stack([axis.cube(v) for axis, v in zip(given_.axes, physical, strict=True)])
+    values = polynomial(cube)[:, 0]
+    assert mean[0, 0] == pytest.approx(weights @ values, rel=1e-10)
+    assert std[0, 0] ** 2 == pytest.approx(weights @ (values - mean[0, 0]) ** 2, rel=1e-9)
+
+
+def test_gradients_equal_differences():
+    given_ = inputs()
+    moments = SparseMoments(interpolant(smooth, SET, given_).polynomial(), given_.axes)
+    designs = 0.02 + 0.96 * draw_designs(given_.axes, 5, np.random.default_rng(2))
+    slopes = moments.gradient(designs)
+    for j in range(3):
+        step = 1e-5 * np.eye(3)[j]
+        for slope, up, down in zip(
+            slopes, moments(designs + step), moments(designs - step), strict=True
+        ):
+            assert slope[..., j] == pytest.approx((up - down) / 2e-5, rel=1e-5, abs=1e-8)
+
+
+def test_the_interpolant_meets_the_function_and_its_order_of_inputs_does_not_matter():
+    given_ = inputs()
+    grown = interpolant(smooth, SET, given_)
+    points = np.array([grown.point(index) for index in SET])
+    values = [smooth(*row) for row in given_.values(points)]
+    assert grown.polynomial()(points)[:, 0] == pytest.approx(values, rel=1e-12)
+    turned = Inputs(
+        {name: Design(1.0, 2.0, tolerance=0.1) for name in "ab"}, {"n": chaospy.Normal(1.0, 0.5)}
+    )
+    found = []
+    for order in ((0, 1), (1, 0)):
+        indices = [tuple(np.take(index, [*order, 2]).tolist()) for index in np.ndindex(3, 2, 2)]
+        indices.sort()
+
+        def function(a, b, n, order=order):
+            first, second = (a, b)[order[0]], (a, b)[order[1]]
+            return np.exp(0.2 * first) * second + n * second
+
+        moments = SparseMoments(interpolant(function, indices, turned).polynomial(), turned.axes)
+        found.append(moments(np.array([[1.2, 1.7], [1.9, 1.1]])[:, list(order)]))
+    assert np.array(found[0]) == pytest.approx(np.array(found[1]), rel=1e-12)
+
+
+def test_dependent_noise_is_exact_for_what_is_linear_in_it():
+    joint = chaospy.MvNormal([1.0, 2.0], [[0.04, 0.03], [0.03, 0.09]])
+    given_ = Inputs({"x": Design(1.0, 2.0)}, {("a", "b"): joint})
+    indices = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1)]
+    grown = interpolant(lambda x, a, b: x * a - b, indices, given_)
+    mean, std = SparseMoments(grown.polynomial(), given_.axes)(np.array([[1.5]]))
+    assert mean[0, 0] == pytest.approx(-0.5, abs=1e-9)
+    assert std[0, 0] ** 2 == pytest.approx(2.25 * 0.04 + 0.09 - 2 * 1.5 * 0.03, rel=1e-7)
