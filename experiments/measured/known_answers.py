@@ -58,9 +58,10 @@ class KnownRig:
     friction : Friction or None
         Known curve of the friction.
     order : float or None
-        Cycles of a ripple per turn of the joint, known within the resolution of the travel,
-    resolution : float
-        which is this.
+        Cycles of a ripple per turn of the joint, known within ``reach``: of the resolution of the
+        travel, and of whether the ripple turns with the housing or with the output, which is off by
+        the ripple's cycles per input turn.
+    reach : float
     """
 
     name: str
@@ -72,7 +73,7 @@ class KnownRig:
     values: tuple[tuple[str, float], ...] = ()
     friction: Friction | None = None
     order: float | None = None
-    resolution: float = 0.0
+    reach: float = 0.0
 
 
 def judged(rig: KnownRig, status: str, names: Collection[str]) -> str:
@@ -108,7 +109,7 @@ KNOWN_RIGS = (
         frozenset({"nonlinear_drag"}),
         friction=Friction(5.6, 11.8, 17.5),
         order=202.0,
-        resolution=2.1,
+        reach=2.0 + 2.0,
     ),
     KnownRig(
         "ur10e_joint_4",
@@ -118,7 +119,7 @@ KNOWN_RIGS = (
         (frozenset({"gravity"}), _DRY, _RIPPLE),
         values=(("gravity: torque", 3.0), ("coulomb_friction: level", 2.3)),
         order=202.0,
-        resolution=2.1,
+        reach=2.0 + 2.0,
     ),
     KnownRig(
         "ur10e_joint_6",
@@ -128,7 +129,7 @@ KNOWN_RIGS = (
         (_DRY, _RIPPLE),
         values=(("coulomb_friction: level", 2.30),),
         order=404.0,
-        resolution=3.7,
+        reach=3.7 + 4.0,
     ),
     KnownRig(
         "tx40_joint_4",
@@ -176,7 +177,7 @@ KNOWN_RIGS = (
         "means and lines of the ten runs; HBRS-SDP/joint-friction-model",
         (_DRY, _RIPPLE),
         order=200.0,
-        resolution=1.0,
+        reach=1.0,
     ),
     KnownRig(
         "lara8_joint_3",

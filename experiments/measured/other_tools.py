@@ -14,20 +14,56 @@ from importlib.util import find_spec
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import dct
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.motion import margin_of, motion_of, smooth
 
 Values = NDArray[np.float64]
+Part = tuple[float, float]
+"""First and last share of a record."""
 
 _MOST_ROWS = 4000
-"""Of a record: what is sampled more finely is thinned."""
+"""Of a NARMAX model."""
 _VALIDATED = 0.3
-"""Last share of the training rows, by which a threshold is chosen."""
+"""Last share of the training records, by which a threshold is chosen."""
+_AS_GOOD = 1.1
+"""Ratio of mean squares up to which the model with fewer terms is taken."""
 _THRESHOLDS = np.geomspace(1e-3, 0.3, 12)
 _LAGS, _DEGREE, _TERMS = 2, 3, 12
 """Of NARMAX models: past samples, powers, and most terms."""
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    """Terms and force of records as coefficients of a cosine transform up to the cutoff.
+
+    Beyond it the motion is not known.
+
+    Attributes
+    ----------
+    columns : ndarray, shape (n, k)
+    force, one : ndarray, shape (n,)
+        Of the inputs, and of a constant.
+    """
+
+    columns: Values
+    force: Values
+    one: Values
+
+    @property
+    def power(self) -> float:
+        """Variance of the force about its mean over all records."""
+        samples = self.one @ self.one
+        about = self.force - self.one * (self.one @ self.force) / samples
+        return float(about @ about / samples)
+
+    def explained(self, values: Values) -> float:
+        """Return R2 of the force for values (k,) of the terms."""
+        left = self.force - self.columns @ values
+        return float(1.0 - left @ left / (self.one @ self.one) / self.power)
+
 
 TERMS: dict[str, Callable[[Values, Values, Values], Values]] = {
     "a": lambda q, v, a: a,
@@ -96,9 +132,9 @@ Said = tuple[str, str, frozenset[str] | None, float | None, float | None]
 def least_squares(finding: MechanismFinding) -> Said:
     """Fit inertia, viscous and Coulomb friction, an offset, and the spring that is believed."""
     names = ["a", "v", "sign v", "1", *(["q"] if _sprung(finding) else [])]
-    train, test = _regression(finding, "train", names), _regression(finding, "held_out", names)
-    values: Values = np.linalg.lstsq(*train, rcond=None)[0].astype(float)
-    of_force = _determination(test[1], test[0] @ values)
+    train, test = terms_of(finding, "train", names), terms_of(finding, "held_out", names)
+    values: Values = np.linalg.lstsq(train.columns, train.force, rcond=None)[0].astype(float)
+    of_force = test.explained(values)
     named = frozenset({"coulomb_friction"})
     return "least squares", _in_words(names, values), named, of_force, None
 
@@ -107,7 +143,7 @@ def sparse_regression(finding: MechanismFinding) -> Said:
     """Name terms by sequentially thresholded least squares of the force (pysindy).
 
     Brunton, Proctor, Kutz, PNAS 113, 2016. The threshold is the largest that predicts the last part
-    of the training rows within a tenth of the best one.
+    of the training records within a tenth of the best one.
     """
     if find_spec("pysindy") is None:
         return "pysindy", "not installed", None, None, None
@@ -115,29 +151,26 @@ def sparse_regression(finding: MechanismFinding) -> Said:
 
     turning = any(finding.mechanism.turns(port) for port in finding.mechanism.ports)
     names = [one for one in TERMS if turning or one not in ("sin q", "cos q")]
-    (columns, force), test = (_regression(finding, role, names) for role in ("train", "held_out"))
-    scale = columns.std(axis=0) + np.abs(columns.mean(axis=0))
-    size, first = force.std(), int((1.0 - _VALIDATED) * len(force))
+    parts = (0.0, 1.0 - _VALIDATED), (1.0 - _VALIDATED, 1.0), (0.0, 1.0)
+    first, last, whole = (terms_of(finding, "train", names, part) for part in parts)
 
-    def fitted(threshold: float, rows: slice) -> Values:
+    def fitted(threshold: float, given: Terms) -> Values:
+        scale = np.sqrt(np.mean(given.columns**2, axis=0))
+        size = np.sqrt(np.mean(given.force**2))
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore")
             model = STLSQ(threshold=threshold, alpha=1e-9)
-            model.fit(columns[rows] / scale, force[rows, None] / size)
+            model.fit(given.columns / scale, given.force[:, None] / size)
         return np.asarray(model.coef_[0] * size / scale)
 
-    missed = [
-        float(np.mean((force[first:] - columns[first:] @ fitted(one, slice(first))) ** 2))
-        for one in _THRESHOLDS
-    ]
-    chosen = max(
-        one for one, size_ in zip(_THRESHOLDS, missed, strict=True) if size_ <= 1.1 * min(missed)
-    )
-    values = fitted(float(chosen), slice(None))
+    explained = [last.explained(fitted(one, first)) for one in _THRESHOLDS]
+    least = 1.0 - _AS_GOOD * (1.0 - max(explained))
+    near = zip(_THRESHOLDS.tolist(), explained, strict=True)
+    values = fitted(max(one for one, share in near if share >= least), whole)
     kept = [name for name, value in zip(names, values, strict=True) if value != 0.0]
     believed = {"linear_stiffness"} if _sprung(finding) else set()
     named = frozenset(MEANS[one] for one in kept if one in MEANS) - believed
-    of_force = _determination(test[1], test[0] @ values)
+    of_force = terms_of(finding, "held_out", names).explained(values)
     return "pysindy", _in_words(names, values), named, of_force, None
 
 
@@ -208,23 +241,35 @@ def _signals(finding: MechanismFinding, record: Record) -> tuple[Values, Values]
     return smooth(force, record.step, finding.cutoff), record.channels[coordinate]
 
 
-def _regression(
-    finding: MechanismFinding, role: str, names: Sequence[str]
-) -> tuple[Values, Values]:
-    """Return terms (n, k) and force (n,) of all records of a role."""
-    columns, forces = [], []
+def terms_of(
+    finding: MechanismFinding, role: str, names: Sequence[str], part: Part = (0.0, 1.0)
+) -> Terms:
+    """Return terms and force of a part of the records of a role.
+
+    Parameters
+    ----------
+    finding : MechanismFinding
+    role : {"train", "held_out"}
+    names : sequence of str
+        Of `TERMS`.
+    part : (float, float)
+        First and last share of each record.
+    """
+    found = []
     for record in finding.records:
         if record.role != role:
             continue
         force, angle = _signals(finding, record)
-        margin = margin_of(finding.cutoff, record.step)
-        stride = max(1, (len(force) - 2 * margin) // _MOST_ROWS)
-        rows = slice(margin, len(force) - margin, stride)
-        motion = motion_of(angle, record.step, finding.cutoff)
+        margin, n = margin_of(finding.cutoff, record.step), len(force)
+        first, last = (margin + int(share * (n - 2 * margin)) for share in part)
+        motion, rows = motion_of(angle, record.step, finding.cutoff), slice(first, last)
         state = motion.position[rows], motion.speed[rows], motion.acceleration[rows]
-        columns.append(np.column_stack([TERMS[name](*state) for name in names]))
-        forces.append(force[rows])
-    return np.concatenate(columns), np.concatenate(forces)
+        columns = [TERMS[name](*state) for name in names]
+        signals = np.column_stack([*columns, force[rows], np.ones(last - first)])
+        bins = int(2.0 * (last - first) * record.step * finding.cutoff) + 1
+        found.append(dct(signals, type=2, norm="ortho", axis=0)[:bins])
+    together = np.concatenate(found)
+    return Terms(together[:, :-2], together[:, -2], together[:, -1])
 
 
 def _determination(measured: Values, predicted: Values) -> float:

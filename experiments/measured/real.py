@@ -25,6 +25,7 @@ from experiments.measured.real_numbers import (
     determinations,
     explained,
     farthest,
+    named,
     nearest_order,
     pooled,
 )
@@ -39,7 +40,6 @@ from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
-from pymoo_hdte.discrepancy.report.mechanism_document import effects
 from pymoo_hdte.io.text_table import csv_text
 
 NAME = "real"
@@ -191,7 +191,7 @@ def _said(rig: KnownRig, one: Study) -> tuple[str, str]:
 
 
 def _names(one: Study) -> list[str]:
-    return list(dict.fromkeys(effect["name"] for effect in effects(one.finding)))
+    return list(dict.fromkeys(effect["name"] for effect in named(one)))
 
 
 def _tool_row(rig: KnownRig, answer: Answer) -> list[str]:
@@ -219,7 +219,7 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
         for one in KNOWN_RIGS
         for row in rows
         if row[0] == one.name and one.order is not None
-        if not row[6] or abs(float(row[6]) - one.order) > one.resolution
+        if not row[6] or abs(float(row[6]) - one.order) > one.reach
     ]
     return (
         Finding(not confident, f"Confidently wrong: {_listed(confident)}.", check=True),
@@ -230,7 +230,7 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
         ),
         Finding(
             not missed,
-            f"Ripple not found within the resolution of the travel: {_listed(missed)}.",
+            f"Ripple not found at the known order, within the resolution of the travel: {_listed(missed)}.",
             check=True,
         ),
     )

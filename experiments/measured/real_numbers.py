@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.measured.known_answers import KnownRig
+from experiments.measured.other_tools import terms_of
 from experiments.measured.rigs import Study, fitted_values
 from pymoo_hdte.discrepancy.report.mechanism_document import effects
 from pymoo_hdte.effects.effect import place_of
@@ -15,6 +18,12 @@ from pymoo_hdte.mechanism.port_motion import law_force
 Values = NDArray[np.float64]
 
 
+def named(one: Study) -> list[dict[str, Any]]:
+    """Return what a verdict names with its values, ripple beyond the band included."""
+    beyond = (effect for ripple in one.finding.ripples.found for effect in ripple.as_dicts())
+    return [*effects(one.finding), *beyond]
+
+
 def determinations(one: Study) -> list[str]:
     """Return R2 of force and simulated position by the accepted model, held out."""
     finding, gaps = one.finding, [gap for gap in one.gaps if gap.kind == "balance"]
@@ -22,21 +31,9 @@ def determinations(one: Study) -> list[str]:
     gaps = [gap for gap in gaps if gap.quantity == name]
     if not gaps:
         return ["", ""]
-    power = _held_out_force(one)
+    power = terms_of(finding, "held_out", ()).power
     left = float(np.mean([gap.after**2 for gap in gaps]))
     return [f"{1.0 - left / power:.5f}", f"{explained(one)[1]:.5f}"]
-
-
-def _held_out_force(one: Study) -> float:
-    """Return the variance of the force of the inputs in the held-out records."""
-    mechanism = one.finding.mechanism
-    (name,) = mechanism.coordinates
-    force = [
-        np.sum([i.acts[name] * i.gain.value * r.channels[i.name] for i in mechanism.inputs], axis=0)
-        for r in one.finding.records
-        if r.role == "held_out"
-    ]
-    return float(np.var(np.concatenate(force)))
 
 
 def explained(one: Study) -> tuple[float, float]:
@@ -115,7 +112,7 @@ def nearest_order(rig: KnownRig, one: Study) -> float | None:
         return None
     orders = [
         effect["parameters"]["order"]["value"]
-        for effect in effects(one.finding)
+        for effect in named(one)
         if "order" in effect["parameters"]
     ]
     orders += [order for each in one.finding.accepted.effects if (order := place_of(each)[2])]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, root_mean_square
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.held_out import (
@@ -21,6 +22,7 @@ from pymoo_hdte.discrepancy.mechanism.held_out import (
     laws_of,
     simulate_held_out,
 )
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import Record
 
 Values = NDArray[np.float64]
@@ -184,6 +186,21 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
             finding.data.rules.least_gap_share,
         )
         for place, name in enumerate(data.names)
+    ]
+
+
+def not_proven(finding: MechanismFinding) -> list[str]:
+    """Return a sentence on what the held-out records forbid to name, if they do."""
+    chosen = finding.verdict.chosen
+    if chosen is None or NOT_PROVEN not in finding.verdict.doubts:
+        return []
+    sizes = []
+    for name in finding.mechanism.coordinates:
+        before, after, _ = np.mean([one.powers(name) for one in finding.simulated], axis=0) ** 0.5
+        sizes.append(f"{name} by simulation {before:.3g} without it, {after:.3g} with it")
+    return [
+        f"{in_words(chosen.label)} would explain the records that were fitted, but "
+        f"{NOT_PROVEN}: {', '.join(sizes)} (root mean square, SI)."
     ]
 
 

@@ -12,13 +12,12 @@ import numpy as np
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, label_of
-from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
-from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
+from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, not_proven
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import in_words
@@ -218,21 +217,6 @@ def limits(finding: MechanismFinding) -> list[str]:
         if names:
             found.append(f"At the bound of its tolerance: {', '.join(names)}.")
     return [*found, *finding.ripples.limits]
-
-
-def not_proven(finding: MechanismFinding) -> list[str]:
-    """Return a sentence on what the held-out records forbid to name, if they do."""
-    chosen = finding.verdict.chosen
-    if chosen is None or NOT_PROVEN not in finding.verdict.doubts:
-        return []
-    sizes = []
-    for name in finding.mechanism.coordinates:
-        before, after, _ = np.mean([one.powers(name) for one in finding.simulated], axis=0) ** 0.5
-        sizes.append(f"{name} by simulation {before:.3g} without it, {after:.3g} with it")
-    return [
-        f"{in_words(chosen.label)} would explain the records that were fitted, but "
-        f"{NOT_PROVEN}: {', '.join(sizes)} (root mean square, SI)."
-    ]
 
 
 def _by_bic(one: Hypothesis) -> float:
