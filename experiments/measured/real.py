@@ -230,7 +230,8 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
         ),
         Finding(
             not missed,
-            f"Ripple not found at the known order, within the resolution of the travel: {_listed(missed)}.",
+            "Ripple not found at the known order, within the resolution of the travel: "
+            f"{_listed(missed)}.",
             check=True,
         ),
     )

@@ -23,6 +23,7 @@ LOWEST_FIRST = (
         "discrepancy.drive",
         "discrepancy.drive.misfit",
         "discrepancy.drive.plan",
+        "discrepancy.mechanism.beyond_band",
         "discrepancy.mechanism",
     ),
     *("discrepancy.report", "virtual"),

@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple import NO_RIPPLES, Ripples, find_ripples
 from pymoo_hdte.discrepancy.mechanism.candidates import mechanism_candidates
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.held_out import (
@@ -37,7 +38,6 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     usual_cutoff,
 )
 from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square, share_removed, with_rest
-from pymoo_hdte.discrepancy.mechanism.ripple import NO_RIPPLES, Ripples, find_ripples
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 

@@ -11,8 +11,8 @@ from scipy.stats import gamma
 
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import phasors
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
-from pymoo_hdte.discrepancy.mechanism.order_search import phasors
 
 Values = NDArray[np.float64]
 

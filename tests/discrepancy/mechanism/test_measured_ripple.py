@@ -11,17 +11,17 @@ from scipy.signal import lfilter
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.discrepancy.mechanism.high_band import high_bands
-from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
-from pymoo_hdte.discrepancy.mechanism.order_search import (
+from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import high_bands
+from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import (
     SeenOrder,
     _at_two_speeds,
     _significance,
     _tried,
     told_from_frequencies,
 )
+from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple import find_ripples
+from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
-from pymoo_hdte.discrepancy.mechanism.ripple import find_ripples
 from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
 from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
 from tests.helpers.places import SHARED

@@ -18,7 +18,7 @@ from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, Phasors, Values
+from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import HighBand, Phasors, Values
 
 _MOST_TRIED = 20_000
 _BLOCK = 1.1

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, high_bands
-from pymoo_hdte.discrepancy.mechanism.order_search import SeenOrder, seen_orders
-from pymoo_hdte.discrepancy.mechanism.ripple_size import (
+from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import HighBand, high_bands
+from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import SeenOrder, seen_orders
+from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple_size import (
     Part,
     gap_of,
     over_speed,
