@@ -138,8 +138,7 @@ KNOWN_RIGS = (
         "thanhndv212/figaroh-examples",
         (_DRY,),
         _RIPPLE | {"force_offset"},
-        (("coulomb_friction: level", 2.48), ("damping of bearing", 1.11)),
-        Friction(2.48, 1.11),
+        friction=Friction(2.48, 1.11),
     ),
     KnownRig(
         "silverbox",

@@ -128,7 +128,8 @@ def simulate_held_out(
         _Model(fitted_mechanism(mechanism, one), (*known, *laws_of(one.effects))) for one in fits
     ]
     last, cutoff = models[1], data.spectra[0].cutoff
-    reach = reach_of(last.mechanism, data, fits[1].residuals, last.effects)
+    duration = max(float(record.time[-1] - record.time[0]) for record in records)
+    reach = reach_of(last.mechanism, data, fits[1].residuals, last.effects, duration)
     rules = replace(data.rules, proof_samples=max(1, data.rules.proof_samples // len(records)))
     windows = [windows_of(record, cutoff, None if whole else reach, rules) for record in records]
     total, done = sum(len(one.rows) for one in windows), 0

@@ -97,7 +97,11 @@ class Windows:
 
 
 def reach_of(
-    mechanism: Mechanism, data: MeasuredData, residuals: Values, effects: Sequence[LawAt]
+    mechanism: Mechanism,
+    data: MeasuredData,
+    residuals: Values,
+    effects: Sequence[LawAt],
+    duration: float,
 ) -> Reach:
     """Return how far a fitted mechanism can be simulated: the least of the training records.
 
@@ -111,6 +115,8 @@ def reach_of(
         Whitened, what the model leaves of them.
     effects : sequence of LawAt
         Of the model: their forces count by the straight lines that fit them best.
+    duration : float
+        Of the longest record that is to be simulated, s.
     """
     found = []
     for balance, left in zip(data.spectra, data.coefficients(residuals), strict=True):
@@ -118,7 +124,8 @@ def reach_of(
         memory = _memory(_linearised(mechanism, balance, ()))
         matrix = _linearised(mechanism, balance, effects)
         step = float(balance.time[1] - balance.time[0])
-        errors = _errors(_inertias(mechanism), matrix, forces, step)
+        longest = Reach(np.inf, memory, step, np.ones((1, 1))).length(duration, data.rules)
+        errors = _errors(_inertias(mechanism), matrix, forces, step, int(longest / step))
         allowed = [balance.motions[name].position.std() for name in mechanism.coordinates]
         beyond = np.any(errors > (data.rules.window_drift * np.array(allowed)) ** 2, axis=1)
         drift = step * float(np.argmax(beyond)) if beyond.any() else np.inf
@@ -205,10 +212,10 @@ def _memory(matrix: Values) -> float:
     return float(-1.0 / slowest) if slowest < -1e-9 * abs(fastest) else np.inf
 
 
-def _errors(inertias: Values, matrix: Values, forces: Values, step: float) -> Values:
+def _errors(inertias: Values, matrix: Values, forces: Values, step: float, longest: int) -> Values:
     """Return mean squares of the positions to which forces (n, samples) move a mechanism at rest.
 
-    Shape (k, n), after one, two ... steps from moments all over the record.
+    Shape (k, n), after one, two ... ``longest`` steps from moments all over the record.
     """
     n, samples = forces.shape
     block = np.zeros((3 * n, 3 * n))
@@ -218,7 +225,7 @@ def _errors(inertias: Values, matrix: Values, forces: Values, step: float) -> Va
     by_state, by_force = both[:, : 2 * n], both[:, 2 * n :]
     starts = np.unique(np.linspace(0, max(samples - 2, 0), _STARTS).astype(int))
     state, found = np.zeros((2 * n, len(starts))), list[Values]()
-    for passed in range(samples - 1):
+    for passed in range(min(max(longest, 1), samples - 1)):
         inside = starts + passed < samples
         if found and np.count_nonzero(inside) < _FEWEST_STARTS:
             break
