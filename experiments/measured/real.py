@@ -71,6 +71,8 @@ TOOLS = (
 SECONDS = (Column("rig"), Column("tool"), Column("CPU time", "s", 3))
 ARROW = "silverbox"
 """Rig whose held-out record is simulated without a break as well, which takes a minute."""
+LONGEST = 20.0
+"""s of CPU that reading, verdict and proof of a rig may take."""
 LOST = -10.0
 """R2 below which a prediction is lost."""
 SETTING = (
@@ -125,7 +127,14 @@ def run(context: Context) -> Result:
                 findings=_findings(first),
             ),
             Table("tools", "Beside other tools", TOOLS, _cells(found[1]), note=TOOLS_NOTE),
-            Table("seconds", "CPU time", SECONDS, _cells(found[2]), wall_times=True),
+            Table(
+                "seconds",
+                "CPU time",
+                SECONDS,
+                _cells(found[2]),
+                findings=(_in_time(found[2]),),
+                wall_times=True,
+            ),
         ),
         headline="verdicts",
     )
@@ -235,6 +244,13 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
             check=True,
         ),
     )
+
+
+def _in_time(rows: Rows) -> Finding:
+    """Return whether the workflow is fast enough on every rig."""
+    seconds, rig = max((float(row[2]), row[0]) for row in rows if row[1] == "workflow")
+    words = f"The workflow takes at most {seconds:.3g} s of CPU ({rig}); {LONGEST:g} are allowed."
+    return Finding(seconds <= LONGEST, words, check=True)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ from contextlib import closing
 
 import pytest
 
-from pymoo_hdte.cli.reading_bar import MANY_BYTES, ReadingBar
+from pymoo_hdte.cli.reading_bar import MANY_BYTES, ReadingBar, SimulationBar
 
 
 class Screen(io.StringIO):
@@ -38,3 +38,14 @@ def test_a_bar_is_shown_where_somebody_waits(terminal, quiet, total, shown, monk
         bar(total // 4, total)
     assert bool(screen.getvalue()) == shown
     assert ("25%" in screen.getvalue()) == shown
+
+
+def test_a_bar_is_shown_while_held_out_records_are_simulated(monkeypatch):
+    screen = Screen(True)
+    monkeypatch.setattr(sys, "stderr", screen)
+    with closing(SimulationBar(False)) as bar:
+        bar(1, 4)
+        time.sleep(0.15)
+        bar(3, 4)
+    assert "simulating" in screen.getvalue()
+    assert "75%" in screen.getvalue()

@@ -53,7 +53,14 @@ def of_joint(role, seed, effects=(DRY,), wander=0.05, duration=20.0):
 def test_a_name_that_the_held_out_record_contradicts_is_not_given():
     # The friction of the fitted record is gone from the other one.
     held_out = rig.record_of(nothing, "held_out", seed=3, duration=rig.HELD_OUT)
-    finding = examine_mechanism(OSCILLATOR, [rig.record_of(dry, seed=4), held_out])
+    told = []
+    finding = examine_mechanism(
+        OSCILLATOR,
+        [rig.record_of(dry, seed=4), held_out],
+        progress=lambda done, total: told.append((done, total)),
+    )
+    assert told == [(one, len(told)) for one in range(1, len(told) + 1)]
+    assert len(told) == finding.simulated[0].extent.windows
     assert finding.verdict.status == "unlisted"
     assert NOT_PROVEN in finding.verdict.doubts
     assert finding.accepted is finding.verdict.base

@@ -70,6 +70,9 @@ def test_every_rig_is_shown_what_falls_short_first(tmp_path):
     ranks = [FALLS_SHORT.index(row[1]) for row in verdicts.rows]
     assert len(ranks) == len(names)
     assert ranks == sorted(ranks)
+    findings = [one for table in result.tables for one in table.findings]
+    assert len(findings) == 4
+    assert [one.sentence for one in findings if not one.agrees] == []
     for table, least in ((tools, 4), (seconds, 1)):
         assert {row[0] for row in table.rows} == set(names)
         assert all(sum(row[0] == name for row in table.rows) >= least for name in names)
