@@ -1,5 +1,7 @@
 """Raw logs of a robot joint, as they come, with a rig.toml of a few lines and no script."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -137,6 +139,33 @@ def test_without_a_gain_the_ratios_are_determined_and_that_is_said(folder):
     assert any("told in units of current" in one for one in limits(finding))
     with pytest.raises(InvalidInput, match=r"line 7: inputs\.current\.gain is None.*inertia of"):
         rig(folder, ("gain = { value = -7.6 }\n", ""), ("1.0, factor = 3.0 }\n[p", "1.0 }\n[p"))
+
+
+def test_a_gain_is_needed_where_something_else_has_a_scale_of_its_own(folder):
+    no_gain = "gain = { value = -7.6 }\n", ""
+    second = "[inputs.load]\nacts = { joint = 1.0 }\ngain = { value = 1.0, factor = 3.0 }\n[table]"
+    sensor = "[ports.sensor]\nmotion = { joint = 1.0 }\nread = true\n[inputs"
+    law = '[[effects]]\nname = "coulomb_friction"\nport = "bearing"\nlevel = 1.0\n[table]'
+    for change in (("[table]", second), ("[inputs", sensor), ("[table]", law)):
+        with pytest.raises(InvalidInput, match=r"inputs\.current\.gain is None, .*of its own"):
+            rig(folder, no_gain, change)
+    # Two inputs without a gain are not in one unit either.
+    with pytest.raises(InvalidInput, match=r"gain of current is None"):
+        Mechanism(
+            {"joint": BelievedValue(1.0, factor=3.0)},
+            inputs=[Input(name, {"joint": 1.0}, scaled=False) for name in ("current", "load")],
+        )
+
+
+def test_effects_of_a_revised_model_without_a_gain_are_in_units_of_the_signal(folder):
+    law = '[[effects]]\nname = "coulomb_friction"\nport = "bearing"\nlevel = 1.0\n[table]'
+    given = rig(folder, ("[table]", law)).model
+    inputs = [replace(one, scaled=False) for one in given.mechanism.inputs]
+    revised = replace(given, mechanism=replace(given.mechanism, inputs=inputs))
+    (folder / "revised.toml").write_text(model_text(revised))
+    records = RIG[RIG.index("[table]") :]
+    (folder / "rig.toml").write_text(f'title = "again"\nmodel = "revised.toml"\n{records}')
+    assert read_rig(folder).effects == given.effects
 
 
 @pytest.mark.parametrize(
