@@ -100,13 +100,15 @@ class Table:
 
     Time is as measured, or row / sample rate counted from the first row of the file. ``dropped``
     counts rows with mapped values that were not finite: left out at the ends, interpolated inside.
-    ``remark`` says what else was done to the rows, empty if they are as they were measured.
+    ``remark`` says what else was done to the rows, empty if they are as they were measured, and
+    ``interpolated`` whether they stand where none was measured, as in `EvenRows`.
     """
 
     time: NDArray[np.float64]
     channels: dict[str, NDArray[np.float64]]
     dropped: int
     remark: str = ""
+    interpolated: bool = False
 
 
 def read_table(
@@ -164,16 +166,17 @@ def read_table(
         raise refuse(start + int(row) + 1, column, allowed)
     # Turns of an angle that wraps, and rates, count from the first row of the file.
     signals = {name: read.si(channel)[kept] for name, channel in layout.channels.items()}
-    remark = ""
+    remark, interpolated = "", False
     if layout.time is not None and not is_even(time):
         even = even_steps(time, signals)
-        time, signals, remark = even.time, even.signals, even.remark
+        time, signals = even.time, even.signals
+        remark, interpolated = even.remark, even.interpolated
     for name, channel in layout.channels.items():
         # Only now: the integral over stamps that are wrong is smooth over them, and hides it.
         if channel.integrated:
             sums = make_interp_spline(time, signals[name], 3).antiderivative()(time)
             signals[name] = sums - sums[0] + read.sum_before(channel, kept.start)
-    return Table(time, signals, dropped, remark)
+    return Table(time, signals, dropped, remark, interpolated)
 
 
 def _part_of(read: Columns, part: Part | None) -> slice:

@@ -43,7 +43,8 @@ def test_rows_that_were_taken_unevenly_keep_their_motion(seed, spread, start):
     assert time[0] <= even.time[0] < even.time[-1] <= time[-1] + 1e-9
     inside = slice(5, -5)
     error = even.signals["q"] - motion(even.time, 0.01)
-    assert np.sqrt(np.mean(error[inside] ** 2)) < 0.02
+    assert np.sqrt(np.mean(error[inside] ** 2)) < 2e-3
+    assert even.interpolated
     np.testing.assert_allclose(even.signals["held"], 1.0, atol=1e-9)
 
 
@@ -56,6 +57,7 @@ def test_stamps_that_are_late_do_not_move_the_rows_of_an_even_clock(seed, tick, 
     signal = motion(clock, tick) + 1e-4 * chance.standard_normal(len(clock))
     even = even_steps(late_stamps(chance, clock), {"q": signal})
     assert f"lost and are interpolated: {lost}." in even.remark
+    assert even.interpolated == (lost > 0)
     assert len(even.time) == 600
     assert np.mean(np.diff(even.time)) == pytest.approx(tick, rel=1e-3)
     # Rows that were measured stay as they are, but where a late stamp hides which row was lost.
