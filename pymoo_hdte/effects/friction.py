@@ -12,7 +12,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
-from pymoo_hdte.effects.unknowns import Family, unknown, wave_starts
+from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 
 FRICTION_PORTS = ("input", "output")
 
@@ -238,7 +238,7 @@ def _varying(sizes: Sizes) -> list[Guess]:
             varying = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
             return (*varying, CoulombFriction(values[-1]))
 
-        found.append(Guess(unknowns, wave_starts(unknowns), build, family, family.form))
+        found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
     return found
 
 
@@ -287,7 +287,7 @@ def _ripple(sizes: Sizes) -> list[Guess]:
                 PeriodicTorque(order, phase, amplitude) for order, amplitude, phase in lines
             )
 
-        found.append(Guess(unknowns, wave_starts(unknowns), build, family, family.form))
+        found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
     return found
 
 
