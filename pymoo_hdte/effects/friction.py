@@ -181,16 +181,11 @@ def _drag(sizes: Sizes) -> list[Guess]:
 
     level = unknown("level", 0.0, sizes.largest, sizes.force)
     faster, slower = unknown("exponent", 1.2, 4.0, 2.0), unknown("exponent", 0.25, 0.85, 0.6)
+    starts = [(level.start, power) for power in (0.6, 0.35)]
     sentence = "A friction at the {port} that grows, but slower than the speed."
     return [
         Guess((level, faster), [(level.start, power) for power in (2.0, 3.0, 1.5)], build),
-        Guess(
-            (level, slower),
-            [(level.start, power) for power in (0.6, 0.35)],
-            build,
-            form="sublinear",
-            sentence=sentence,
-        ),
+        Guess((level, slower), starts, build, form="sublinear", sentence=sentence),
     ]
 
 
@@ -283,9 +278,7 @@ def _ripple(sizes: Sizes) -> list[Guess]:
 
         def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
             lines = family.lines(values)
-            return tuple(
-                PeriodicTorque(order, phase, amplitude) for order, amplitude, phase in lines
-            )
+            return tuple(PeriodicTorque(order, phase, size) for order, size, phase in lines)
 
         found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
     return found
