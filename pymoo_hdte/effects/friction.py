@@ -12,7 +12,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
-from pymoo_hdte.effects.unknowns import Family, unknown, wave_starts
+from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 
 FRICTION_PORTS = ("input", "output")
 
@@ -181,16 +181,11 @@ def _drag(sizes: Sizes) -> list[Guess]:
 
     level = unknown("level", 0.0, sizes.largest, sizes.force)
     faster, slower = unknown("exponent", 1.2, 4.0, 2.0), unknown("exponent", 0.25, 0.85, 0.6)
+    starts = [(level.start, power) for power in (0.6, 0.35)]
     sentence = "A friction at the {port} that grows, but slower than the speed."
     return [
         Guess((level, faster), [(level.start, power) for power in (2.0, 3.0, 1.5)], build),
-        Guess(
-            (level, slower),
-            [(level.start, power) for power in (0.6, 0.35)],
-            build,
-            form="sublinear",
-            sentence=sentence,
-        ),
+        Guess((level, slower), starts, build, form="sublinear", sentence=sentence),
     ]
 
 
@@ -238,7 +233,7 @@ def _varying(sizes: Sizes) -> list[Guess]:
             varying = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
             return (*varying, CoulombFriction(values[-1]))
 
-        found.append(Guess(unknowns, wave_starts(unknowns), build, family, family.form))
+        found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
     return found
 
 
@@ -283,11 +278,9 @@ def _ripple(sizes: Sizes) -> list[Guess]:
 
         def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
             lines = family.lines(values)
-            return tuple(
-                PeriodicTorque(order, phase, amplitude) for order, amplitude, phase in lines
-            )
+            return tuple(PeriodicTorque(order, phase, size) for order, size, phase in lines)
 
-        found.append(Guess(unknowns, wave_starts(unknowns), build, family, family.form))
+        found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
     return found
 
 

@@ -11,7 +11,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
-from pymoo_hdte.effects.unknowns import polar, wave, wave_starts
+from pymoo_hdte.effects.unknowns import polar, starts_along_each, wave
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def _weight(sizes: Sizes) -> list[Guess]:
         return (Gravity(*polar(*values)),)
 
     unknowns = wave("torque", sizes.largest, sizes.force)
-    return [Guess(unknowns, wave_starts(unknowns), build)]
+    return [Guess(unknowns, starts_along_each(unknowns), build)]
 
 
 register(

@@ -12,7 +12,7 @@ from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.friction import SMOOTHING_SPEED
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
-from pymoo_hdte.effects.unknowns import unknown, wave_starts
+from pymoo_hdte.effects.unknowns import starts_along_each, unknown
 
 FURTHEST = 20.0
 """Largest force of a spring at position zero, in units of the largest one on its travel."""
@@ -132,7 +132,7 @@ def _spring(sizes: Sizes) -> list[Guess]:
         found.append(
             Guess(
                 unknowns,
-                wave_starts(unknowns),
+                starts_along_each(unknowns),
                 _preloaded,
                 form="preloaded",
                 sentence="There is a spring at the {port}, its rest not at zero.",

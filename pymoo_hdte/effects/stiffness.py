@@ -177,13 +177,10 @@ def _dead_zone(state: PortState, half_width: Values | float) -> Response:
     """Return the reduction of K d by a clearance: everything within, a constant beyond."""
     rounding = ROUNDING * np.maximum(half_width, 1e-12)
     left, right = state.position + half_width, state.position - half_width
-    lost = rounding * (_soft_plus(left / rounding) - _soft_plus(right / rounding)) - half_width
+    met = np.logaddexp(0.0, left / rounding) - np.logaddexp(0.0, right / rounding)
+    lost = rounding * met - half_width
     slope = expit(left / rounding) - expit(right / rounding)
     return Response(-state.stiffness * lost, -state.stiffness * slope)
-
-
-def _soft_plus(x: Values) -> Values:
-    return np.logaddexp(0.0, x)
 
 
 @dataclass(frozen=True)
@@ -276,8 +273,7 @@ def _uneven(sizes: Sizes) -> list[Guess]:
 
         def build(values: Sequence[float], order: float = order) -> tuple[Law, ...]:
             variation, phase = polar(values[0], values[1])
-            half_width = values[2] + variation
-            return (PeriodicClearance(order, phase, half_width, variation, values[3]),)
+            return (PeriodicClearance(order, phase, values[2] + variation, variation, values[3]),)
 
         unknowns = (
             *wave("variation", widest / 2.0, size),

@@ -82,8 +82,8 @@ def _parts(name: str, start: float, largest: float, size: float) -> list[Paramet
     ]
 
 
-def wave_starts(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:
-    """Return one start along each part of a `wave`, and along its mean."""
+def starts_along_each(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...], ...]:
+    """Return one start along each unknown, which are those of a `wave` or others that add up."""
     sizes = np.diag([parameter.scale for parameter in parameters])
     return tuple(tuple(row) for row in sizes.tolist())
 

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.io.even_steps import STEP_SPREAD
 from pymoo_hdte.io.layout import TableLayout
 from pymoo_hdte.io.parts import Part
 from pymoo_hdte.io.tables import FEWEST_ROWS, Table, read_table
@@ -17,6 +18,8 @@ from pymoo_hdte.io.text_lines import Seen
 
 _SAME = 1e-3
 """In steps, up to which moments are the same."""
+_RATES = STEP_SPREAD / 2.0
+"""By which rates may differ and count as equal, relative: a step may deviate by twice as much."""
 _LENGTHS = 0.01
 """By which the lengths of files without a column of time may differ, relative."""
 
@@ -34,8 +37,9 @@ def read_joined(
     files : mapping of str to Path
         The file of each channel of the layout.
     layout : TableLayout
-        Its column of time is in each of the files. With a sampling rate instead, equal rows of the
-        files belong together.
+        Its column of time is in each of the files, which have one rate: between the rows of a
+        coarser one nothing was measured. With a sampling rate instead, equal rows of the files
+        belong together.
     seen : callable, optional
         Is told how many further bytes have been read.
     part : Part, optional
@@ -78,6 +82,14 @@ def read_joined(
 
 def _at_the_finest(paths: Sequence[Path], tables: Sequence[Table]) -> Table:
     finest = min(tables, key=_step)
+    if _step(max(tables, key=_step)) > (1.0 + _RATES) * _step(finest):
+        rates = {path.name: 1.0 / _step(one) for path, one in zip(paths, tables, strict=True)}
+        raise InvalidInput(
+            "rates of the files, Hz",
+            {name: float(f"{rate:.6g}") for name, rate in rates.items()},
+            f"the same within {_RATES:.1%}: take every row of the finer ones that "
+            "belongs to one of the coarsest",
+        )
     step = _step(finest)
     first = max(one.time[0] for one in tables) - _SAME * step
     last = min(one.time[-1] for one in tables) + _SAME * step
@@ -99,7 +111,11 @@ def _at_the_finest(paths: Sequence[Path], tables: Sequence[Table]) -> Table:
     if moved:
         remarks.append(f"The signals of {names} are taken at the steps of the finest file.")
     return Table(
-        time, channels, sum(one.dropped for one in tables), " ".join(filter(None, remarks))
+        time,
+        channels,
+        sum(one.dropped for one in tables),
+        " ".join(filter(None, remarks)),
+        moved or any(one.interpolated for one in tables),
     )
 
 

@@ -65,18 +65,10 @@ class Columns:
         values = (np.unwrap(values) if channel.unwrap else values) * channel.scale + channel.origin
         return values if at.size == raw.size else np.interp(np.arange(raw.size), at, values)
 
-    def signal(self, channel: Channel, rows: slice) -> NDArray[np.float64]:
-        """Return some rows of a channel as they are used, shape (n,); their times rise.
-
-        Turns of an angle that wraps, and rates, count from the first row of the file.
-        """
-        values = self.si(channel)
-        if not channel.integrated:
-            return values[rows]
-        time = self.time
-        before = float(np.trapezoid(values[: rows.start + 1], time[: rows.start + 1]))
-        within = make_interp_spline(time[rows], values[rows], 3).antiderivative()(time[rows])
-        return within - within[0] + before
+    def sum_before(self, channel: Channel, row: int) -> float:
+        """Return what a rate adds up to from the first row of the file to this one, SI."""
+        rows = slice(row + 1)
+        return float(np.trapezoid(self.si(channel)[rows], self.time[rows]))
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -108,13 +100,15 @@ class Table:
 
     Time is as measured, or row / sample rate counted from the first row of the file. ``dropped``
     counts rows with mapped values that were not finite: left out at the ends, interpolated inside.
-    ``remark`` says what else was done to the rows, empty if they are as they were measured.
+    ``remark`` says what else was done to the rows, empty if they are as they were measured, and
+    ``interpolated`` whether they stand where none was measured, as in `EvenRows`.
     """
 
     time: NDArray[np.float64]
     channels: dict[str, NDArray[np.float64]]
     dropped: int
     remark: str = ""
+    interpolated: bool = False
 
 
 def read_table(
@@ -170,11 +164,19 @@ def read_table(
         )
         column = layout.time.column if layout.time else next(iter(columns))
         raise refuse(start + int(row) + 1, column, allowed)
-    channels = {name: read.signal(channel, kept) for name, channel in layout.channels.items()}
-    if layout.time is None or is_even(time):
-        return Table(time, channels, dropped)
-    even = even_steps(time, channels)
-    return Table(even.time, even.signals, dropped, even.remark)
+    # Turns of an angle that wraps, and rates, count from the first row of the file.
+    signals = {name: read.si(channel)[kept] for name, channel in layout.channels.items()}
+    remark, interpolated = "", False
+    if layout.time is not None and not is_even(time):
+        even = even_steps(time, signals)
+        time, signals = even.time, even.signals
+        remark, interpolated = even.remark, even.interpolated
+    for name, channel in layout.channels.items():
+        # Only now: the integral over stamps that are wrong is smooth over them, and hides it.
+        if channel.integrated:
+            sums = make_interp_spline(time, signals[name], 3).antiderivative()(time)
+            signals[name] = sums - sums[0] + read.sum_before(channel, kept.start)
+    return Table(time, signals, dropped, remark, interpolated)
 
 
 def _part_of(read: Columns, part: Part | None) -> slice:

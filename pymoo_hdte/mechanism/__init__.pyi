@@ -1,7 +1,7 @@
 from pymoo_hdte.mechanism.believed import BelievedValue
+from pymoo_hdte.mechanism.error_line import ErrorLine
 from pymoo_hdte.mechanism.gear import Gear
 from pymoo_hdte.mechanism.mechanism import (
-    ErrorLine,
     Input,
     LawAt,
     Loop,

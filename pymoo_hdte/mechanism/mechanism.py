@@ -14,38 +14,8 @@ from types import MappingProxyType
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.effects.law import Law
 from pymoo_hdte.mechanism.believed import NOTHING, BelievedValue
+from pymoo_hdte.mechanism.error_line import ErrorLine
 from pymoo_hdte.mechanism.gear import Gear
-
-
-@dataclass(frozen=True)
-class ErrorLine:
-    """Kinematic error of a port: amplitude sin(order q + phase) of a coordinate q, as Eq. (1).
-
-    Attributes
-    ----------
-    coordinate : str
-        Name of q.
-    order : float
-        Cycles per turn of an angle in rad; of a length, radians per m.
-    amplitude : float
-        In the unit of the port's motion, m or rad.
-    phase : float
-        rad.
-
-    Raises
-    ------
-    InvalidInput
-        For a number that is not finite.
-    """
-
-    coordinate: str
-    order: float
-    amplitude: float
-    phase: float
-
-    def __post_init__(self) -> None:
-        for name in ("order", "amplitude", "phase"):
-            real_number(f"error.{name}", getattr(self, name))
 
 
 @dataclass(frozen=True)
@@ -95,8 +65,9 @@ class Input:
     gain : BelievedValue
         Force, N, or torque, N.m, per unit of the signal.
     scaled : bool
-        False where the gain is not known at all. It is then 1, and inertias, stiffnesses, dampings
-        and forces are told in units of the signal: their ratios are determined, their sizes not.
+        False where the gain of the only input is not known at all. It is then 1, and inertias,
+        stiffnesses, dampings and forces, those of known effects as well, are in units of the
+        signal: their ratios are determined, their sizes not.
     """
 
     name: str
@@ -157,7 +128,7 @@ class Mechanism:
     InvalidInput
         For a name that is used twice or refers to nothing, an inertia that is not positive, a
         stiffness or damping that is negative, a port or input that touches no coordinate, or a gain
-        that is not stated where another quantity is known exactly.
+        that is not stated beside a quantity that is known exactly, a force sensor or another input.
     """
 
     inertias: Mapping[str, BelievedValue]
@@ -198,13 +169,7 @@ class Mechanism:
             self._check_shares(f"acts of {one.name}", one.acts)
         for name in self.angles or ():
             one_of("mechanism.angles", name, self.coordinates)
-        known = [name for name, one in self.quantities.items() if one.known]
-        for driving in self.inputs:
-            own = f"gain of {driving.name}"
-            for other in known if not driving.scaled else ():
-                if other != own:
-                    allowed = f"a number, with a tolerance or factor: {other} is known exactly"
-                    raise InvalidInput(own, None, allowed)
+        self._check_scales()
         for loop in self.loops:
             one_of("loop.input", loop.input, [one.name for one in self.inputs])
             one_of("loop.coordinate", loop.coordinate, self.coordinates)
@@ -280,6 +245,18 @@ class Mechanism:
         ]
         inputs = [replace(one, gain=known(f"gain of {one.name}", one.gain)) for one in self.inputs]
         return Mechanism(inertias, ports, inputs, self.loops, self.angles)
+
+    def _check_scales(self) -> None:
+        """Refuse an input without a gain beside anything that is not in units of its signal."""
+        known = [name for name, one in self.quantities.items() if one.known]
+        sensors = [f"force sensor {port.name}" for port in self.ports if port.read]
+        for driving in self.inputs:
+            own, allowed = f"gain of {driving.name}", "a number, with a tolerance or factor: "
+            exact = [f"{name} is known exactly" for name in known if name != own]
+            further = [f"input {one.name}" for one in self.inputs if one is not driving]
+            scales = [f"{name} has a scale of its own" for name in (*further, *sensors)]
+            for other in (*exact, *scales) if not driving.scaled else ():
+                raise InvalidInput(own, None, allowed + other)
 
     def _check_shares(self, name: str, shares: Mapping[str, float]) -> None:
         for coordinate, share in shares.items():

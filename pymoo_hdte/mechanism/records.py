@@ -42,6 +42,8 @@ class Record:
         inside. A report states their number.
     remarks : tuple of str
         What else was done to the signals, in sentences, which a report repeats.
+    interpolated : bool
+        Whether rows stand where none was measured, on a cubic spline, which takes ten in a period.
 
     Raises
     ------
@@ -58,6 +60,7 @@ class Record:
     noise: Mapping[str, float]
     dropped: int
     remarks: tuple[str, ...]
+    interpolated: bool
 
     def __init__(
         self,
@@ -68,6 +71,7 @@ class Record:
         noise: Mapping[str, float] | None = None,
         dropped: int = 0,
         remarks: Sequence[str] = (),
+        interpolated: bool = False,
     ) -> None:
         if not isinstance(name, str):
             raise InvalidInput("name of a record", name, "a text")
@@ -103,6 +107,7 @@ class Record:
             ("noise", known),
             ("dropped", whole_number(f"dropped of record {name}", dropped, at_least=0)),
             ("remarks", tuple(remarks)),
+            ("interpolated", interpolated),
             ("name", name),
             ("role", role),
             ("time", moments),

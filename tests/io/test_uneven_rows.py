@@ -1,5 +1,7 @@
 """Rows at uneven times: brought to even steps so that the motion stays what it was, and said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -41,7 +43,8 @@ def test_rows_that_were_taken_unevenly_keep_their_motion(seed, spread, start):
     assert time[0] <= even.time[0] < even.time[-1] <= time[-1] + 1e-9
     inside = slice(5, -5)
     error = even.signals["q"] - motion(even.time, 0.01)
-    assert np.sqrt(np.mean(error[inside] ** 2)) < 0.02
+    assert np.sqrt(np.mean(error[inside] ** 2)) < 2e-3
+    assert even.interpolated
     np.testing.assert_allclose(even.signals["held"], 1.0, atol=1e-9)
 
 
@@ -54,11 +57,33 @@ def test_stamps_that_are_late_do_not_move_the_rows_of_an_even_clock(seed, tick, 
     signal = motion(clock, tick) + 1e-4 * chance.standard_normal(len(clock))
     even = even_steps(late_stamps(chance, clock), {"q": signal})
     assert f"lost and are interpolated: {lost}." in even.remark
+    assert even.interpolated == (lost > 0)
     assert len(even.time) == 600
     assert np.mean(np.diff(even.time)) == pytest.approx(tick, rel=1e-3)
     # Rows that were measured stay as they are, but where a late stamp hides which row was lost.
     exact = np.isclose(even.signals["q"][np.delete(np.arange(600), places)], signal, atol=1e-6)
     assert np.count_nonzero(~exact) <= lost
+
+
+@pytest.mark.parametrize("least", [0.1, 2e-2, 2e-3, 1e-4])
+def test_a_speed_is_integrated_over_the_steps_that_are_believed(tmp_path, least):
+    chance, tick = np.random.default_rng(6), 0.01
+    clock = tick * np.arange(3000.0)
+    late = np.where(chance.random(3000) < 0.3, chance.exponential(0.3 * tick, 3000), 0.0)
+    # A stamp that is late lets the next one follow after as little as ``least``, in steps.
+    stamps = np.maximum.accumulate(clock + late - least * tick * np.arange(3000))
+    stamps += least * tick * np.arange(3000)
+    omega = 2.0 * np.pi * 0.7
+    rate = omega * np.cos(omega * clock) + 1e-4 * chance.standard_normal(3000)
+    path = tmp_path / "log.txt"
+    np.savetxt(path, np.c_[stamps, rate], fmt="%.9f")
+    channels = {"q": Channel(1, "rad/s", integrated=True)}
+    table = read_table(path, replace(LAYOUT, channels=channels))
+    assert "and the stamps as late" in table.remark
+    np.testing.assert_allclose(table.channels["q"], np.sin(omega * clock), atol=1e-4)
+    # A later part counts from the first row of the file: over stamps, of which each is late.
+    part = read_table(path, replace(LAYOUT, channels=channels), part=Part("share", 0.5, 1.0))
+    np.testing.assert_allclose(part.channels["q"], np.sin(omega * clock[1500:]), atol=0.03)
 
 
 def test_the_noise_of_a_sensor_is_still_known_after_the_rows_are_evened():

@@ -23,7 +23,7 @@ the records have units of their own::
     phase = 0.0
     [inputs.vir]
     acts = { q = 1.0 }
-    gain = { value = 35.15 }                       # absent: forces are in units of the signal
+    gain = { value = 35.15 }                       # absent, of the only input: forces in its unit
     [[loops]]                                      # optional, as `Loop`
     input = "vir"
     reference = "qg"
@@ -194,7 +194,15 @@ def read_rig(
 def _model(top: Fields, path: Path) -> MechanismModel:
     """Take the believed model out of a rig's file, or out of the file that it names."""
     if not top.has("model"):
-        return model_from_fields(top, path.name)
+        model = model_from_fields(top, path.name)
+        for one in model.mechanism.inputs if model.effects else ():
+            if not one.scaled:
+                allowed = (
+                    "a number, with a tolerance or factor: a known effect has a scale of its own; "
+                    "one in units of the signal belongs into a model file, model = ..."
+                )
+                raise InvalidInput(f"{path.name}.inputs.{one.name}.gain", None, allowed)
+        return model
     model = read_mechanism_model(path.parent / top.text("model"))
     cutoff = top.number("cutoff", above=0.0) if top.has("cutoff") else model.cutoff
     return replace(model, title=top.text("title"), cutoff=cutoff)

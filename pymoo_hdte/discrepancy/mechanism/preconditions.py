@@ -47,7 +47,7 @@ def usual_cutoff(mechanism: Mechanism, records: Sequence[Record], rules: Rules =
     """Return the frequency, Hz, up to which every coordinate exceeds its noise.
 
     At most a tenth of the sampling rate; a third where that would leave out more than
-    `Rules.band_share` of the power of some coordinate.
+    `Rules.band_share` of the power of some coordinate, and no record is interpolated.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def usual_cutoff(mechanism: Mechanism, records: Sequence[Record], rules: Rules =
     for record in records:
         for name in mechanism.coordinates:
             noise = noise_between(record, name) if coarse else record.noise_of(name)
-            share = COARSEST_SHARE if coarse else highest_share(1.0)
+            share = COARSEST_SHARE if coarse and not record.interpolated else highest_share(1.0)
             try:
                 found.append(highest_frequency(record.channels[name], record.step, noise, share))
             except InvalidInput as error:
@@ -79,7 +79,7 @@ def fine_enough(records: Sequence[Record], cutoff: float) -> tuple[Record, ...]:
     Raises
     ------
     InvalidInput
-        If a record has less than three.
+        If a record has less than three, or less than ten and is interpolated already.
     """
     real_number("cutoff", cutoff, above=0.0)
     found = []
@@ -91,6 +91,14 @@ def fine_enough(records: Sequence[Record], cutoff: float) -> tuple[Record, ...]:
                 round(1.0 / record.step, 6),
                 f"at least {cutoff / COARSEST_SHARE:.4g} Hz, three samples in a period of the "
                 f"cutoff of {cutoff:.4g} Hz; or a cutoff of at most {most:.4g} Hz",
+            )
+        if record.interpolated and cutoff > RATE_SLACK * fine:
+            raise InvalidInput(
+                f"sampling rate of record {record.name}",
+                round(1.0 / record.step, 6),
+                f"at least {cutoff / highest_share(1.0):.4g} Hz, ten rows in a period of the "
+                f"cutoff of {cutoff:.4g} Hz, because its rows were not measured at even steps; or "
+                f"a cutoff of at most {fine:.4g} Hz",
             )
         # Finer than the ratio asks for, so that rounding refuses no record afterwards.
         coarse = cutoff > RATE_SLACK * fine

@@ -123,7 +123,14 @@ def read_records(
         remarks = [*([table.remark] if table.remark else []), *told]
         try:
             record = Record(
-                name, role, table.time, table.channels, of_channels, table.dropped, remarks
+                name,
+                role,
+                table.time,
+                table.channels,
+                of_channels,
+                table.dropped,
+                remarks,
+                table.interpolated,
             )
         except InvalidInput as error:
             place = f"{listed.paths[0].name}: {error.field}"

@@ -13,7 +13,7 @@ from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes, Lines, Sessio
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess
 from pymoo_hdte.effects.law import Values
-from pymoo_hdte.effects.unknowns import wave_starts
+from pymoo_hdte.effects.unknowns import starts_along_each
 
 ENCODER_LINE = "encoder_line"
 """Name of an error of the encoder's scale, which no verdict names: see `Guess.name`."""
@@ -106,7 +106,7 @@ def _turning(sizes: DriveSizes, turns: float) -> Guess:
         lines = family.lines(values)
         return tuple(Eccentricity(amplitude, phase, order) for order, amplitude, phase in lines)
 
-    starts = wave_starts(unknowns)
+    starts = starts_along_each(unknowns)
     if turns == 1.0:
         return Guess(unknowns, starts, build, family)
     sentence = "The output encoder errs {order} times in its turn."

@@ -12,7 +12,7 @@ from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess
 from pymoo_hdte.effects.stiffness import PeriodicStiffness
-from pymoo_hdte.effects.unknowns import wave_starts
+from pymoo_hdte.effects.unknowns import starts_along_each
 
 WAVE_GENERATOR_ORDER = 2.0
 """Order of the effects of the wave generator's two lobes, in cycles per input turn."""
@@ -69,7 +69,7 @@ def _varying(sizes: DriveSizes) -> list[Guess]:
         lines = family.lines(values)
         return tuple(MeshStiffnessVariation(depth, phase, order) for order, depth, phase in lines)
 
-    return [Guess(unknowns, wave_starts(unknowns), build, family)]
+    return [Guess(unknowns, starts_along_each(unknowns), build, family)]
 
 
 register(

@@ -15,7 +15,7 @@ from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.friction import PeriodicTorque
 from pymoo_hdte.effects.guess import Guess, Sizes
-from pymoo_hdte.effects.unknowns import Family, unknown, wave_starts
+from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def _of_drive(sizes: DriveSizes) -> list[Guess]:
                 for order, amplitude, phase in family.lines(values)
             )
 
-        found.append(Guess(unknowns, wave_starts(unknowns), build, family))
+        found.append(Guess(unknowns, starts_along_each(unknowns), build, family))
     return found
 
 
@@ -94,7 +94,7 @@ def _of_reading(sizes: Sizes) -> list[Guess]:
             "The reading of {port} varies with the position, orders {order}, and has one amplitude "
             "at all speeds run: it is kinematic, and no {force} that moves inertias."
         )
-        starts = wave_starts(unknowns)
+        starts = starts_along_each(unknowns)
         found.append(Guess(unknowns, starts, build, family, family.form, sentence))
     return found
 

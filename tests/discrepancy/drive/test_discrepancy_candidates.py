@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.drive import preset
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.drive.toml_text import model_toml
-from pymoo_hdte.effects.unknowns import line_with_variance, lines_of, polar, wave, wave_starts
+from pymoo_hdte.effects.unknowns import line_with_variance, lines_of, polar, starts_along_each, wave
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.units import ARCSEC
 
@@ -134,7 +134,7 @@ def test_lines_of_a_wave_come_back(pairs):
 @given(st.floats(1e-6, 1e3), st.integers(1, 3))
 def test_starts_of_a_wave_span_its_parts(typical, harmonics):
     unknowns = wave("amplitude", 2.0 * typical, typical, harmonics)
-    starts = np.array(wave_starts(unknowns))
+    starts = np.array(starts_along_each(unknowns))
     assert len(unknowns) == 2 * harmonics
     assert np.linalg.matrix_rank(starts / typical) == 2 * harmonics
     assert np.count_nonzero(starts) == 2 * harmonics

@@ -1,5 +1,7 @@
 """Raw logs of a robot joint, as they come, with a rig.toml of a few lines and no script."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,11 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
 from pymoo_hdte.discrepancy.mechanism.models import model_text, read_mechanism_model
-from pymoo_hdte.discrepancy.mechanism.preconditions import check_sampling, fine_enough
+from pymoo_hdte.discrepancy.mechanism.preconditions import (
+    check_sampling,
+    fine_enough,
+    usual_cutoff,
+)
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.discrepancy.report.mechanism_document import effects, limits, quantities
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
@@ -139,6 +145,33 @@ def test_without_a_gain_the_ratios_are_determined_and_that_is_said(folder):
         rig(folder, ("gain = { value = -7.6 }\n", ""), ("1.0, factor = 3.0 }\n[p", "1.0 }\n[p"))
 
 
+def test_a_gain_is_needed_where_something_else_has_a_scale_of_its_own(folder):
+    no_gain = "gain = { value = -7.6 }\n", ""
+    second = "[inputs.load]\nacts = { joint = 1.0 }\ngain = { value = 1.0, factor = 3.0 }\n[table]"
+    sensor = "[ports.sensor]\nmotion = { joint = 1.0 }\nread = true\n[inputs"
+    law = '[[effects]]\nname = "coulomb_friction"\nport = "bearing"\nlevel = 1.0\n[table]'
+    for change in (("[table]", second), ("[inputs", sensor), ("[table]", law)):
+        with pytest.raises(InvalidInput, match=r"inputs\.current\.gain is None, .*of its own"):
+            rig(folder, no_gain, change)
+    # Two inputs without a gain are not in one unit either.
+    with pytest.raises(InvalidInput, match=r"gain of current is None"):
+        Mechanism(
+            {"joint": BelievedValue(1.0, factor=3.0)},
+            inputs=[Input(name, {"joint": 1.0}, scaled=False) for name in ("current", "load")],
+        )
+
+
+def test_effects_of_a_revised_model_without_a_gain_are_in_units_of_the_signal(folder):
+    law = '[[effects]]\nname = "coulomb_friction"\nport = "bearing"\nlevel = 1.0\n[table]'
+    given = rig(folder, ("[table]", law)).model
+    inputs = [replace(one, scaled=False) for one in given.mechanism.inputs]
+    revised = replace(given, mechanism=replace(given.mechanism, inputs=inputs))
+    (folder / "revised.toml").write_text(model_text(revised))
+    records = RIG[RIG.index("[table]") :]
+    (folder / "rig.toml").write_text(f'title = "again"\nmodel = "revised.toml"\n{records}')
+    assert read_rig(folder).effects == given.effects
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -208,13 +241,31 @@ def test_a_record_of_several_files_has_all_their_channels(tmp_path):
         several(tmp_path, rows=(2400, 1000))
 
 
-def test_files_of_one_clock_and_other_rates_come_to_the_finest(tmp_path):
-    first, second = several(tmp_path, (200.0, 500.0), (2400, 6500), timed=True).records
-    for one in (first, second):
-        assert one.step == pytest.approx(1.0 / 500.0)
+def test_files_of_one_clock_need_one_rate_and_are_known_to_a_tenth_of_it(tmp_path):
+    with pytest.raises(InvalidInput, match=r"rates of the files, Hz .* 200\.0, 'b\.csv': 500\.0"):
+        several(tmp_path, (200.0, 500.0), (2400, 6000), timed=True)
+    measured = several(tmp_path, (200.0, 200.5), timed=True)
+    for one in measured.records:
         np.testing.assert_allclose(one.channels["joint"], moved(one.time)[0], atol=1e-5)
         assert "a.csv, b.csv are taken at the steps of the finest file" in one.remarks[0]
-    assert second.time[-1] < 12.0
+        with pytest.raises(InvalidInput, match=r"ten rows in a period"):
+            fine_enough([one], 0.3 / one.step)
+    assert not several(tmp_path, timed=True).records[0].remarks
+
+
+def test_rows_that_were_brought_to_even_steps_are_used_with_ten_in_a_period(folder):
+    measured = rig(folder)
+    (record, _) = measured.records
+    tenth = 0.1 / record.step
+    assert f"Motion is known up to {tenth:.4g} Hz" in record.remarks[0]
+    with pytest.raises(InvalidInput, match=r"sampling rate of record log_train .*ten rows in a p"):
+        found(replace(measured, cutoff=1.2 * tenth))
+    # A motion with five rows in a period: between them it is not known.
+    time = 0.01 * np.arange(3000.0)
+    signals = {"joint": np.sin(40.0 * np.pi * time), "current": np.cos(time)}
+    for interpolated in (False, True):
+        one = Record("one", "train", time, signals, interpolated=interpolated)
+        assert (usual_cutoff(measured.mechanism, [one]) > 10.1) != interpolated
 
 
 def test_rates_that_differ_by_rounding_only_are_no_reason_to_refuse():
