@@ -14,7 +14,7 @@ from experiments.measured.rigs import (
     study,
     verdict_paragraphs,
 )
-from experiments.measured.twins import Twin, find_twins, twins_table
+from experiments.measured.twins import Twin, drag_at, find_twins, twins_table
 from experiments.runner.result import Result, Table
 
 Judge = Callable[[Study, tuple[Twin, ...]], Table]
@@ -57,7 +57,7 @@ def measured_result(rig: MeasuredRig, judge: Judge) -> Result:
     one = study(rig.name, rig.folder)
     if one is None:
         return absent(rig.title, rig.folder, command, rig.origin)
-    found = find_twins(one, rig.port, rig.drag)
+    found = find_twins(one, drag_at(one, rig.port, rig.drag))
     return Result(
         title=rig.title,
         command=command,

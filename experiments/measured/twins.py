@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy.mechanism.held_out import fitted_mechanism
 from pymoo_hdte.effects.friction import NonlinearDrag
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import ForceBalance
-from pymoo_hdte.mechanism.motion import noise_of
+from pymoo_hdte.mechanism.motion import motion_of
 from pymoo_hdte.mechanism.port_motion import law_force
 
 SEED = 5
@@ -40,23 +40,44 @@ class Twin:
         return tuple(candidate.name for candidate in self.finding.accepted.candidates)
 
 
-def find_twins(one: Study, port: str, force: float) -> tuple[Twin, ...]:
-    """Return a twin without a missing effect, and two in which a drag is hidden.
+def drag_at(one: Study, port: str, force: float) -> LawAt:
+    """Return a drag at a port that grows with the square of the speed.
+
+    Parameters
+    ----------
+    one : Study
+    port : str
+    force : float
+        At the largest speed of the port in the real records, N or N.m.
+    """
+    speed = max(float(np.abs(each.ports[port].speed).max()) for each in one.finding.data.spectra)
+    return LawAt("nonlinear_drag", port, NonlinearDrag(force / speed**2))
+
+
+def find_twins(
+    one: Study, hidden: LawAt, known: Sequence[LawAt] = (), disturbed: bool = True
+) -> tuple[Twin, ...]:
+    """Return a twin without a missing effect, and one or two in which an effect is hidden.
 
     Parameters
     ----------
     one : Study
         Of the real rig, whose fitted values the twins have.
-    port : str
-        Where the drag acts.
-    force : float
-        Its force at the largest speed, N or N.m.
+    hidden : LawAt
+    known : sequence of LawAt
+        Effects that all twins have and their model is known to have.
+    disturbed : bool
+        Whether to hide the effect in a twin with the disturbance of the real rig as well.
     """
-    speed = max(float(np.abs(each.ports[port].speed).max()) for each in one.finding.data.spectra)
-    drag = LawAt("nonlinear_drag", port, NonlinearDrag(force / speed**2))
+    kinds: tuple[tuple[str, Sequence[LawAt], bool], ...] = (
+        ("nothing", (), False),
+        (hidden.name, (hidden,), False),
+        (hidden.name, (hidden,), True),
+    )
     return tuple(
-        Twin("nonlinear_drag" if effects else "nothing", rest, _found(one, effects, rest))
-        for effects, rest in (((), False), ((drag,), False), ((drag,), True))
+        Twin(name, rest, _found(one, known, effects, rest))
+        for name, effects, rest in kinds
+        if disturbed or not rest
     )
 
 
@@ -94,19 +115,28 @@ def twins_table(found: Sequence[Twin]) -> Table:
     )
 
 
-def _found(one: Study, effects: Sequence[LawAt], rest: bool) -> MechanismFinding:
+def _found(
+    one: Study, known: Sequence[LawAt], hidden: Sequence[LawAt], rest: bool
+) -> MechanismFinding:
     generator = np.random.default_rng(SEED)
-    mechanism = fitted_mechanism(one.rig.mechanism, one.finding.accepted)
+    mechanism = one.rig.mechanism
+    # A model that does not fit is no machine: its values lie at the bounds of what is believed.
+    if one.finding.verdict.status != "unlisted":
+        mechanism = fitted_mechanism(mechanism, one.finding.accepted)
     disturbances = coloured_rest(one, generator)
+    measured = [record for record in one.rig.records if record.role == "train"]
     records = [
-        _twin(mechanism, balance, effects, disturbance if rest else 0.0 * disturbance, generator)
-        for balance, disturbance in zip(one.finding.data.spectra, disturbances, strict=True)
+        _twin(mechanism, record, balance, (*known, *hidden), rest * disturbance, generator)
+        for record, balance, disturbance in zip(
+            measured, one.finding.data.spectra, disturbances, strict=True
+        )
     ]
-    return examine_mechanism(one.rig.mechanism, records, one.finding.cutoff)
+    return examine_mechanism(one.rig.mechanism, records, one.finding.cutoff, known)
 
 
 def _twin(
     mechanism: Mechanism,
+    measured: Record,
     balance: ForceBalance,
     effects: Sequence[LawAt],
     disturbance: NDArray[np.float64],
@@ -115,12 +145,14 @@ def _twin(
     """Return a record of the measured motion with the input that it takes, and noise.
 
     The measured motion, smoothed, is the truth, so that the excitation is that of the real rig; the
-    one input is what the twin's force balance asks for.
+    one input is what the twin's force balance asks for. Where the balance needed a finer record
+    than the measured one, the samples between those of the latter are left out again, so that the
+    twin is as coarse.
     """
     record = balance.record
     (coordinate,), (drive,) = mechanism.coordinates, mechanism.inputs
-    exact = ForceBalance(mechanism, record, balance.cutoff)
-    motion = exact.motions[coordinate]
+    # The smoothing passes up to twice its frequency, and beyond the cutoff the motion is noise.
+    motion = motion_of(record.channel(coordinate), record.step, balance.cutoff / 2.0)
     force = mechanism.inertias[coordinate].value * motion.acceleration - disturbance[0]
     for port in mechanism.ports:
         if not port.read:
@@ -136,12 +168,14 @@ def _twin(
     }
     for row, port in enumerate(port for port in mechanism.ports if port.read):
         channels[port.name] = np.array(disturbance[1 + row])
+    every = round(measured.step / record.step)
     return Record(
         f"twin of {record.name}",
         "train",
-        record.time,
+        record.time[::every],
         {
-            name: signal + noise_of(record.channels[name]) * generator.standard_normal(len(signal))
+            name: signal[::every]
+            + record.noise_of(name) / every**0.5 * generator.standard_normal(len(signal[::every]))
             for name, signal in channels.items()
         },
     )

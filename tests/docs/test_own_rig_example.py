@@ -1,4 +1,4 @@
-"""The example of a rig of one's own finds what it hides, and its page shows that output."""
+"""The examples of rigs of one's own find what they hide, and their page shows that output."""
 
 import contextlib
 import io
@@ -15,97 +15,80 @@ import numpy as np
 import pytest
 from kept_results import kept, put_files
 from places import DOCS
-from scipy.integrate import solve_ivp
 
 from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
 from pymoo_hdte.mechanism.effects import law_effects
 
-EXAMPLE = DOCS / "examples" / "own_rig.py"
+TABLE, JOINT = "own_rig", "own_joint"
+FOLDERS = {TABLE: "my_rig", JOINT: "my_joint"}
 PAGE = (DOCS / "bring_your_own_rig.md").read_text(encoding="utf-8")
 HIDDEN = "hardening_stiffness: coefficient"
 CUT = "..."
 """End of a line of the page that leaves out the rest of what is printed."""
-JOINT = {"inertia": 0.4, "damping": 2.0, "friction": 1.5, "gain": 7.6}
 
 
 def blocks(language):
     return re.findall(rf"^```{language}\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
 
 
-def run_example(folder):
-    """Return what the example prints, and the names it defines."""
+def run_example(name, folder):
+    """Return what an example prints, and the names it defines."""
+    script = str(DOCS / "examples" / f"{name}.py")
     text = io.StringIO()
     with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(text):
-        patch.setattr(sys, "argv", [str(EXAMPLE), str(folder)])
-        names = runpy.run_path(str(EXAMPLE), run_name="__main__")
+        patch.setattr(sys, "argv", [script, str(folder)])
+        names = runpy.run_path(script, run_name="__main__")
     return text.getvalue(), names
 
 
 @kept
-def example():
-    """Return what the example prints, two of the names it defines and its files, by their path."""
+def example(name):
+    """Return what an example prints, what it hides or believes and its files, by their path."""
     with TemporaryDirectory() as top:
-        folder = Path(top) / "my_rig"
-        printed, names = run_example(folder)
+        folder = Path(top) / FOLDERS[name]
+        printed, names = run_example(name, folder)
         files = {
             path.relative_to(folder): path.read_bytes()
             for path in folder.rglob("*")
             if path.is_file()
         }
     names = {name: names[name] for name in ("TRUTH", "RIG")}
-    return printed.replace(str(folder), "my_rig"), names, files
+    return printed.replace(str(folder), folder.name), names, files
 
 
-@pytest.fixture(scope="module")
-def rig(tmp_path_factory):
-    """The folder of the example, what it printed, its names and its verdict."""
-    folder = tmp_path_factory.mktemp("example") / "my_rig"
-    printed, names, files = example()
+def put_example(name, top):
+    """Return the folder of an example, what it printed, its names and its verdict."""
+    folder = top / FOLDERS[name]
+    printed, names, files = example(name)
     put_files(files, folder)
     verdict = json.loads((folder / "report" / "verdict.json").read_text(encoding="utf-8"))
     return folder, printed, names, verdict
 
 
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """The example with a table on a leaf spring."""
+    return put_example(TABLE, tmp_path_factory.mktemp("example"))
+
+
+@pytest.fixture(scope="module")
+def joint(tmp_path_factory):
+    """The example with a joint of a robot."""
+    return put_example(JOINT, tmp_path_factory.mktemp("example"))
+
+
 @pytest.fixture
 def at_the_rig(rig, monkeypatch):
-    """The folder of the example as the working directory, with the record of a joint."""
+    """The folder of the example as the working directory."""
     monkeypatch.chdir(rig[0])
-    if not Path("joint.csv").exists():
-        np.savetxt(
-            "joint.csv", joint_record(), "%.5f", ",", header="time_s,current_A,angle_deg",
-            comments="",
-        )  # fmt: skip
     return rig[0]
 
 
-def read_block(folder, block):
-    """Return the rig of a block of the page, with the records of a folder."""
-    path = folder / "block.toml"
-    path.write_text(block, encoding="utf-8")
-    try:
-        return read_rig(path)
-    finally:
-        path.unlink()
-
-
-def joint_record():
-    """Return s, A and degrees, (n, 3), of a joint with dry friction that moves both ways."""
-    generator = np.random.default_rng(2)
-    time, orders = np.arange(6000) / 500.0, np.arange(1, 31)
-    phases = generator.uniform(0.0, 2.0 * np.pi, orders.size)
-
-    def current(t):
-        return 0.35 * np.cos(2.0 * np.pi * 0.1 * orders * t + phases).sum()
-
-    def motion(t, state):
-        friction = JOINT["friction"] * np.tanh(state[1] / 1e-3)
-        torque = JOINT["gain"] * current(t) - JOINT["damping"] * state[1] - friction
-        return state[1], torque / JOINT["inertia"]
-
-    angle = solve_ivp(motion, time[[0, -1]], (0, 0), "LSODA", time, rtol=1e-8, atol=1e-10).y[0]
-    rows = np.column_stack([time, [current(t) for t in time], np.rad2deg(angle)])
-    return rows + [0.0, 0.01, 0.001] * generator.standard_normal(rows.shape)
+def size_of(effect):
+    """Return the torque of an effect with its interval."""
+    (size,) = {"torque", "level", "amplitude"} & set(effect["parameters"])
+    return effect["parameters"][size]
 
 
 def numbers_and_words(line):
@@ -145,13 +128,14 @@ def test_gap_of_the_held_out_record_is_gone(rig):
 def test_a_folder_with_files_is_left_alone(rig):
     before = {path: path.stat().st_mtime_ns for path in rig[0].rglob("*")}
     with pytest.raises(SystemExit, match="is not empty"):
-        run_example(rig[0])
+        run_example(TABLE, rig[0])
     assert before == {path: path.stat().st_mtime_ns for path in rig[0].rglob("*")}
 
 
-def test_page_shows_what_the_example_prints(rig):
-    (shown,) = blocks("text")
-    shown, printed = (text.strip().split("\n") for text in (shown, rig[1]))
+@pytest.mark.parametrize("place", [0, 1], ids=[TABLE, JOINT])
+def test_page_shows_what_the_example_prints(place, rig, joint):
+    texts = blocks("text")[place], (rig, joint)[place][1]
+    shown, printed = (text.strip().split("\n") for text in texts)
     assert len(shown) == len(printed)
     for here, there in zip(shown, printed, strict=True):
         if here.endswith(CUT):
@@ -171,36 +155,49 @@ def test_lines_are_compared_by_their_numbers():
     assert [last_digit(one) for one in values] == pytest.approx([1.0, 1e-7, 0.1, 1.0])
 
 
-def test_page_prints_the_rig_of_the_example(rig):
-    assert blocks("toml")[0] == rig[2]["RIG"] == (rig[0] / "rig.toml").read_text(encoding="utf-8")
+def test_page_prints_the_rigs_of_the_examples(rig, joint):
+    assert len(joint[2]["RIG"].splitlines()) <= 25
+    for block, (folder, _, names, _) in zip(blocks("toml"), (rig, joint), strict=True):
+        assert block == names["RIG"] == (folder / "rig.toml").read_text(encoding="utf-8")
 
 
-def test_every_toml_block_is_read(at_the_rig):
-    table, joint = (read_block(at_the_rig, block) for block in blocks("toml"))
+def test_rig_of_the_page_is_read(at_the_rig):
+    table = read_rig(at_the_rig / "rig.toml")
     found = {record.name: record.role for record in table.records}
     assert found == {"multisine": "train", "sweep": "held_out"}
-    # Millimetres have become metres, degrees radians.
+    # Millimetres have become metres.
     assert 0.01 < np.abs(table.records[0].channels["position"]).max() < 0.1
-    (record,) = joint.records
-    degrees = np.loadtxt("joint.csv", delimiter=",", skiprows=1)[:, 2]
-    np.testing.assert_allclose(record.channels["angle"], np.deg2rad(degrees))
+
+
+def test_raw_log_of_a_joint_shows_gravity_friction_and_ripple(joint):
+    folder, _, names, verdict = joint
+    stamps = np.loadtxt(folder / "log.csv", delimiter=",")[:, 0]
+    assert np.ptp(np.diff(stamps)) > 1e-3
+    assert verdict["status"] == "named"
+    found = {effect["name"]: size_of(effect) for effect in verdict["effects"]}
+    assert list(found) == list(names["TRUTH"])
+    for effect, truth in names["TRUTH"].items():
+        lower, upper = found[effect]["interval95"]
+        assert lower <= truth <= upper, effect
+    (sentence,) = re.findall(r"gravity is (\S+), dry friction (\S+) and the ripple (\S+) N.m", PAGE)
+    for shown, size in zip(sentence, found.values(), strict=True):
+        assert float(shown) == pytest.approx(size["value"], abs=1.01 * last_digit(shown))
+
+
+def test_corrected_joint_predicts_what_was_held_out(joint):
+    (balance,) = (gap for gap in joint[3]["held_out"] if gap["kind"] == "balance")
+    assert balance["before"] > 10.0 * balance["noise_floor"]
+    assert balance["after"] < 0.05 * balance["before"]
 
 
 @pytest.mark.nightly
-def test_every_python_block_runs_and_prints_what_the_page_says(at_the_rig):
-    names, printed = {}, []
-    for block in blocks("python"):
-        text = io.StringIO()
-        with contextlib.redirect_stdout(text):
-            exec(compile(block, "bring_your_own_rig.md", "exec"), names)
-        printed.append(text.getvalue().strip())
-    assert printed == re.findall(r"prints\s`(.*?)`", PAGE)
-    for name, block in zip(("table", "joint"), blocks("toml"), strict=True):
-        assert read_block(at_the_rig, block).mechanism == names[name], name
-    # The second block is left with the joint.
-    (friction,) = names["analysis"].verdict.accepted.effects
-    assert friction.name == "coulomb_friction"
-    assert friction.law.level == pytest.approx(JOINT["friction"], rel=0.03)
+def test_python_block_runs_and_prints_what_the_page_says(at_the_rig):
+    names, text = {}, io.StringIO()
+    (block,) = blocks("python")
+    with contextlib.redirect_stdout(text):
+        exec(compile(block, "bring_your_own_rig.md", "exec"), names)
+    assert [text.getvalue().strip()] == re.findall(r"prints\s`(.*?)`", PAGE)
+    assert read_rig(at_the_rig / "rig.toml").mechanism == names["table"]
 
 
 def test_page_lists_the_library():
@@ -212,9 +209,10 @@ def test_page_lists_the_library():
 
 def test_every_block_is_checked_here():
     languages = re.findall(r"^```(\w+)\n", PAGE, flags=re.MULTILINE)
-    assert sorted(languages) == [*["python"] * 2, *["sh"] * 2, "text", *["toml"] * 2]
-    example, command = (shlex.split(block) for block in blocks("sh"))
-    assert example == ["python", "docs/examples/own_rig.py", "my_rig"]
+    assert sorted(languages) == ["python", *["sh"] * 3, *["text"] * 2, *["toml"] * 2]
+    table, command, joint = (shlex.split(block) for block in blocks("sh"))
+    assert table == ["python", "docs/examples/own_rig.py", "my_rig"]
+    assert joint == ["python", "docs/examples/own_joint.py", "my_joint"]
     options = cli._parser().parse_args(command[1:])
     assert (command[0], options.campaign, options.out) == (
         "pymoo-hdte", Path("my_rig"), Path("my_rig/report"),
