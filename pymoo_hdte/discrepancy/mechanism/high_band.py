@@ -123,10 +123,7 @@ def high_bands(
             {name: one.position for name, one in motions.items()},
             {name: one.speed for name, one in motions.items()},
         )
-        force = np.zeros(len(record.time))
-        for one in mechanism.inputs:
-            share = sum(port.motion.get(name, 0.0) * acts for name, acts in one.acts.items())
-            force += share * one.gain.value * record.channel(one.name)
+        force = _force_at(mechanism, port, record)
         # Half, as smoothing passes all up to the frequency that it is given.
         force = (force - smooth(force, record.step, 0.5 * cutoff))[inner]
         if np.ptp(force) == 0.0:
@@ -147,6 +144,23 @@ def high_bands(
             )
         )
     return found
+
+
+def _force_at(mechanism: Mechanism, port: Port, record: Record) -> Values:
+    """Return the force at a port that the inputs balance, (n,); zero where they drive none of it.
+
+    A force F at a port enters the balance of a coordinate as its share times F: F is the solution
+    by least squares of the balances of those coordinates that an input drives.
+    """
+    driven = {name for one in mechanism.inputs for name, acts in one.acts.items() if acts}
+    shares = {name: share for name, share in port.motion.items() if share and name in driven}
+    size = sum(share**2 for share in shares.values())
+    force = np.zeros(len(record.time))
+    for one in mechanism.inputs:
+        acts = sum(share * one.acts.get(name, 0.0) for name, share in shares.items())
+        if acts:
+            force += acts / size * one.gain.value * record.channel(one.name)
+    return force
 
 
 def _whitening(force: Values, step: float, window: int, lowest: float) -> tuple[Values, Values]:

@@ -188,12 +188,7 @@ def find_ripples(
         train, held_out = (
             high_bands(mechanism, port, of_role[role], cutoff, rules) for role in of_role
         )
-        known = [
-            order
-            for one in effects
-            if (order := place_of(one)[2])
-            and dict(mechanism.port(one.port).motion) == dict(port.motion)
-        ]
+        known = _known_orders(mechanism, port, effects)
         expected = port.gear.expected if port.gear else {}
         seen, undecided, fixed = seen_orders(train, tuple(expected), known, rules)
         lost = []
@@ -226,13 +221,38 @@ def find_ripples(
 
 
 def _ports(mechanism: Mechanism) -> list[Port]:
-    """Return one port for each motion at which forces of inputs act; one with a gear, if any."""
+    """Return one port for each motion at which forces of inputs act; one with a gear, if any.
+
+    Motions in proportion are one: a force at one of these ports is a force at each.
+    """
     found: dict[frozenset[tuple[str, float]], Port] = {}
     for port in mechanism.ports:
-        motion = frozenset((name, share) for name, share in port.motion.items() if share)
+        motion = _direction(port)
         if not port.read and (motion not in found or (port.gear and not found[motion].gear)):
             found[motion] = port
     return list(found.values())
+
+
+def _shares(port: Port) -> dict[str, float]:
+    return {name: port.motion[name] for name in sorted(port.motion) if port.motion[name]}
+
+
+def _direction(port: Port) -> frozenset[tuple[str, float]]:
+    """Return the shares of a port's motion over the first of them, but for rounding."""
+    shares = _shares(port)
+    first = next(iter(shares.values()))
+    return frozenset((name, float(f"{share / first:.9g}")) for name, share in shares.items())
+
+
+def _known_orders(mechanism: Mechanism, port: Port, effects: Collection[LawAt]) -> list[float]:
+    """Return the orders of effects at ports of the same motion, per turn of this port."""
+    found = []
+    for one in effects:
+        there, order = mechanism.port(one.port), place_of(one)[2]
+        if order and _direction(there) == _direction(port):
+            theirs, ours = (next(iter(_shares(each).values())) for each in (there, port))
+            found.append(abs(order * theirs / ours))
+    return found
 
 
 def _ripple(

@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.mechanism.order_search import (
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.discrepancy.mechanism.ripple import find_ripples
 from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
 from tests.helpers.places import SHARED
 
@@ -133,13 +134,16 @@ def hidden(kind, order, size, phase, q):
 def test_a_ripple_beyond_the_band_is_found_with_its_kind_order_and_size(kind, order, phase, seed):
     generator = np.random.default_rng(seed)
     q = swings(generator)
-    torque = hidden(kind, order, 0.1, phase, q) + 0.1 * noises(generator)["mains"]
+    noise = 0.1 * noises(generator)["mains"]
+    torque = hidden(kind, order, 0.1, phase, q) + noise
     (one,) = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found
     (part,) = one.parts
     assert part.law.name == kind
     assert one.order == pytest.approx(order, abs=0.25 * one.resolution)
     (size, variance), *_ = part.values.values()
-    assert abs(size - 0.1) <= max(4.0 * variance**0.5, 0.01)
+    # That of a line beside noise of this power, for all rows.
+    assert 0.5 < variance**0.5 / (2.0 * np.mean(noise**2) / len(TIME)) ** 0.5 < 2.0
+    assert abs(size - 0.1) <= 4.0 * variance**0.5
 
 
 def test_at_one_speed_an_order_and_a_frequency_look_alike_and_neither_is_an_order():
@@ -212,6 +216,40 @@ def test_what_is_known_already_is_not_found_again():
     one = record(q, torque + 0.1 * generator.standard_normal(len(TIME)), generator)
     (ripple,) = find_ripples(JOINT, [one], CUTOFF).found
     assert not find_ripples(JOINT, [one], CUTOFF, [part.law for part in ripple.parts]).found
+
+
+def geared(*shares):
+    """A joint whose coordinate is the angle of its motor, with a port for each share of it."""
+    return Mechanism(
+        {"m": BelievedValue(1e-5, 0.5)},
+        [Port(f"port {n}", {"m": share}) for n, share in enumerate(shares)],
+        [Input("torque", {"m": 1.0})],
+    )
+
+
+def test_a_ripple_has_one_size_by_the_angle_of_the_motor_and_by_that_of_the_output():
+    generator = np.random.default_rng(15)
+    q = swings(generator)
+    torque = hidden("torque_ripple", 202.0, 0.1, 1.0, q)
+    torque = torque + 0.05 * generator.standard_normal(len(TIME))
+    output = record(q, torque, generator)
+    channels = {"m": 101.0 * output.channels["q"], "torque": torque / 101.0}
+    motor = Record("motor", "train", output.time, channels)
+    (expected,) = find_ripples(JOINT, [output], CUTOFF).found
+    (one,) = find_ripples(geared(1.0 / 101.0), [motor], CUTOFF).found
+    assert one.order == pytest.approx(expected.order, rel=1e-6)
+    ((name, (size, variance)), *_), same = one.parts[0].values.items(), expected.parts[0].values
+    assert size == pytest.approx(0.1, abs=0.005)
+    assert (size, variance) == pytest.approx(same[name], rel=1e-4)
+    # Ports of the same motion have the same forces: one of them is named, and known at each.
+    both = geared(1.0, 1.0 / 101.0)
+    (one,) = find_ripples(both, [motor], CUTOFF).found
+    assert one.order == pytest.approx(2.0, rel=1e-3)
+    for there in (both.ports[0], both.ports[1]):
+        order = one.order / there.motion["m"]
+        law = effect_named("torque_ripple").law_of({"order": order, "amplitude": 1.0, "phase": 0.0})
+        known = [LawAt("torque_ripple", there.name, law)]
+        assert not find_ripples(both, [motor], CUTOFF, known).found
 
 
 def test_a_model_that_lacks_a_ripple_only_is_not_adequate_and_gets_it(tmp_path):
