@@ -62,13 +62,38 @@ class SeenOrder:
     power: float
 
 
+@dataclass(frozen=True)
+class SeenOrders:
+    """What a search found.
+
+    Attributes
+    ----------
+    kept : tuple of SeenOrder
+        The strongest first.
+    undecided : tuple of float
+        Orders that may be frequencies.
+    fixed : tuple of float
+        Frequencies that are no orders, Hz.
+    highest : float
+        Order up to which all were tried.
+    cut : bool
+        Whether the records could show higher ones.
+    """
+
+    kept: tuple[SeenOrder, ...]
+    undecided: tuple[float, ...]
+    fixed: tuple[float, ...]
+    highest: float
+    cut: bool
+
+
 def seen_orders(
     bands: Sequence[HighBand],
     expected: Sequence[float],
     known: Sequence[float],
     rules: Rules,
-) -> tuple[list[SeenOrder], list[float], list[float]]:
-    """Return orders, the strongest first, orders that may be frequencies, and frequencies in Hz.
+) -> SeenOrders:
+    """Return the orders at which the force of bands varies, told from frequencies.
 
     Parameters
     ----------
@@ -82,14 +107,15 @@ def seen_orders(
     """
     for order in known:
         bands = [_without_order(one, order) for one in bands]
-    orders, resolution = _tried(bands, rules)
+    grids, resolution, cut = _tried(bands, expected, rules)
+    orders = np.concatenate(grids)
     kept: list[SeenOrder] = []
     fixed: list[float] = []
     undecided: list[float] = []
     for _ in range(_TRIES * rules.most_position_orders):
         if not orders.size or len(kept) == rules.most_position_orders:
             break
-        power = _significance(bands, orders, expected, resolution, rules)
+        power = _significance(bands, grids, expected, resolution, rules)
         for taken in (*known, *undecided, *(one.order for one in kept)):
             power[np.abs(orders - taken) <= _BESIDE * resolution] = 0.0
         place = int(np.argmax(power))
@@ -106,17 +132,21 @@ def seen_orders(
         else:
             fixed.append(frequency)
             bands = [_without_frequency(one, frequency) for one in bands]
-    return kept, undecided, sorted(set(fixed))
+    highest = float(grids[0][-1]) if grids[0].size else 0.0
+    return SeenOrders(tuple(kept), tuple(undecided), tuple(sorted(set(fixed))), highest, cut)
 
 
-def _tried(bands: Sequence[HighBand], rules: Rules) -> tuple[Values, float]:
-    """Return the orders that are searched, and their resolution.
+def _tried(
+    bands: Sequence[HighBand], expected: Sequence[float], rules: Rules
+) -> tuple[list[Values], float, bool]:
+    """Return grids of orders that are searched, their resolution, and whether the range was cut.
 
-    From those with enough periods in the travel to those beyond the force's band in most rows.
+    The first is from orders with enough periods in the travel to those beyond the force's band in
+    most rows. Expected orders that it steps over, or ends below, have grids of their own.
     """
     widest = max((float(np.ptp(one.position)) for one in bands), default=0.0)
     if widest == 0.0:
-        return np.empty(0), 1.0
+        return [np.empty(0)], 1.0, False
     resolution = 2.0 * np.pi / widest
     speed = np.concatenate([np.abs(one.speed) for one in bands])
     # The slow tail of the rows would ask for orders that the others cannot show.
@@ -129,19 +159,43 @@ def _tried(bands: Sequence[HighBand], rules: Rules) -> tuple[Values, float]:
     step = 0.5 * resolution
     if (highest - lowest) / step > _MOST_TRIED:
         # As for a shaft with parts of which there are whole numbers.
-        step = 1.0
-        lowest = np.ceil(lowest)
-    return np.arange(lowest, min(highest, lowest + _MOST_TRIED * step), step), resolution
+        step = max(step, 1.0)
+        lowest = step * np.ceil(lowest / step)
+    last = min(highest, lowest + _MOST_TRIED * step)
+    grids = [np.arange(lowest, last, step)]
+    around = 0.5 * resolution * np.arange(-(_SURROUNDINGS // 2), _SURROUNDINGS // 2 + 1)
+    for order in expected:
+        missed = order >= last or step > 0.5 * resolution
+        if missed and lowest <= order <= highest:
+            near = order + around
+            grids.append(near[near >= resolution * rules.fewest_periods])
+    return grids, resolution, bool(last < highest)
 
 
 def _significance(
     bands: Sequence[HighBand],
-    orders: Values,
+    grids: Sequence[Values],
     expected: Sequence[float],
     resolution: float,
     rules: Rules,
 ) -> Values:
-    """Return the ratio of the power of each order to the least that is significant, (n_orders,)."""
+    """Return the ratio of the power of each order to the least that is significant, (n_orders,).
+
+    ``grids`` have evenly spaced orders each; n_orders is that of all.
+    """
+    found = [_over_noise(bands, orders) for orders in grids]
+    total, counted = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    orders = np.concatenate(grids)
+    near = np.zeros(len(orders), dtype=bool)
+    for one in expected:
+        near |= np.abs(orders - one) <= resolution
+    chance = np.where(near, 1.0 / max(int(near.sum()), 1), 1.0 / max(int((~near).sum()), 1))
+    limit = gamma.isf(rules.position_order_chance * chance, np.maximum(counted, 1))
+    return np.asarray(total / limit)
+
+
+def _over_noise(bands: Sequence[HighBand], orders: Values) -> tuple[Values, Values]:
+    """Return the power of orders over that of their surroundings, and in how many sums it is."""
     total, counted = np.zeros((2, len(orders)))
     for band in bands:
         for way in band.ways():
@@ -152,12 +206,7 @@ def _significance(
             around = median_filter(power[seen], min(_SURROUNDINGS, int(seen.sum())), mode="reflect")
             total[seen] += power[seen] / np.maximum(around, 1e-300) * np.log(2.0)
             counted += seen
-    near = np.zeros(len(orders), dtype=bool)
-    for one in expected:
-        near |= np.abs(orders - one) <= resolution
-    chance = np.where(near, 1.0 / max(int(near.sum()), 1), 1.0 / max(int((~near).sum()), 1))
-    limit = gamma.isf(rules.position_order_chance * chance, np.maximum(counted, 1))
-    return np.asarray(total / limit)
+    return total, counted
 
 
 def _powers(band: HighBand, way: NDArray[np.bool_], orders: Values) -> Values:
@@ -200,7 +249,13 @@ def _refined(bands: Sequence[HighBand], order: float, step: float) -> float:
             if len(rows) >= FEWEST_ROWS:
                 sums = phasors(band.position[rows], (gain * band.force)[rows], near)
                 power += np.abs(sums) ** 2 / np.sum(gain[rows] ** 2)
-    return float(near[np.argmax(power)])
+    top = int(np.argmax(power))
+    if not 0 < top < len(near) - 1:
+        return float(near[top])
+    # Powers are a parabola at their top: the steps are no limit of an order.
+    before, middle, after = power[top - 1 : top + 2]
+    bend = max(2.0 * middle - before - after, 1e-300)
+    return float(near[top] + 0.5 * (near[1] - near[0]) * (after - before) / bend)
 
 
 def told_from_frequencies(

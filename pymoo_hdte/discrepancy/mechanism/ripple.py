@@ -16,12 +16,12 @@ from scipy.stats import norm
 
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, high_bands
-from pymoo_hdte.discrepancy.mechanism.order_search import SeenOrder, seen_orders
+from pymoo_hdte.discrepancy.mechanism.order_search import SeenOrder, SeenOrders, seen_orders
 from pymoo_hdte.discrepancy.mechanism.ripple_size import (
     Part,
     gap_of,
     over_speed,
-    parts_of,
+    size_of,
     trend_of,
 )
 from pymoo_hdte.effects.effect import effect_named, place_of
@@ -49,11 +49,15 @@ class Ripple:
     order, resolution : float
         Cycles per turn of an angle in rad; of a length, radians per m. The resolution is the change
         of the order by which the longest travel has one cycle more.
+    variance : float
+        Of the order.
     meaning : str
         What the gear says of the order; empty if nothing.
     frequencies : (float, float)
         Hz, between which it was seen.
     parts : tuple of Part
+    ways : int
+        Directions, 1 or 2, in which it was seen.
     speeds : ndarray, shape (n, 3)
         Speed, amplitude, and its standard deviation, SI.
     trend : str
@@ -68,9 +72,11 @@ class Ripple:
     port: str
     order: float
     resolution: float
+    variance: float
     meaning: str
     frequencies: Pair
     parts: tuple[Part, ...]
+    ways: int
     speeds: Values
     trend: str
     fitted: Pair
@@ -89,6 +95,8 @@ class Ripple:
         told = [sentence_at(words, self.port, f"{self.order:.5g}", "force")]
         if len(names) > 1:
             told.append(f"A part of it {_OTHER[names[1]]}.")
+        if self.ways == 1:
+            told.append(_one_way(self.port))
         if self.meaning:
             told.append(f"Within the resolution of the travel, {self.meaning}.")
         low, high = self.frequencies
@@ -103,7 +111,7 @@ class Ripple:
                 "port": self.port,
                 "sentence": self.sentence,
                 "parameters": {
-                    "order": _value(self.order, 0.5 * self.resolution),
+                    "order": _value(self.order, _CENTRAL * self.variance**0.5),
                     **{
                         name: _value(value, _CENTRAL * variance**0.5)
                         for name, (value, variance) in part.values.items()
@@ -190,34 +198,54 @@ def find_ripples(
         )
         known = _known_orders(mechanism, port, effects)
         expected = port.gear.expected if port.gear else {}
-        seen, undecided, fixed = seen_orders(train, tuple(expected), known, rules)
-        lost = []
-        for one in seen:
+        search = seen_orders(train, tuple(expected), known, rules)
+        here, lost = [], []
+        for one in search.kept:
             ripple = _ripple(port, one, train, held_out, rules)
             if _share(ripple.fitted) < rules.ripple_share:
                 continue
-            if ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share:
-                found.append(ripple)
-            else:
-                lost.append(f"{one.order:.5g}")
-        if lost:
-            limits.append(
-                f"Ripple at the {port.name}, order {', '.join(lost)}, is seen, but to take it "
-                "away makes the forces of the held-out records no smaller: it is not named."
-            )
-        if undecided:
-            limits.append(
-                f"Ripple at the {port.name}, order "
-                f"{', '.join(f'{one:.5g}' for one in undecided)}, is seen at one speed or "
-                "is weak, so that these records do not tell it from a frequency: it is not named."
-            )
-        if fixed:
-            limits.append(
-                f"The force at the {port.name} has lines at "
-                f"{', '.join(f'{one:.3g}' for one in fixed)} Hz, which these records show as "
-                "frequencies and not as orders of its position."
-            )
+            shown = ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share
+            (here if shown else lost).append(ripple)
+        found += here
+        limits += _limits(port.name, search, here, lost)
     return Ripples(tuple(found), tuple(limits))
+
+
+def _limits(
+    port: str, search: SeenOrders, found: Sequence[Ripple], lost: Sequence[Ripple]
+) -> list[str]:
+    """Return what was seen at a port and is not named, or cannot be told, in sentences."""
+    limits = []
+    if search.cut:
+        limits.append(f"Orders at the {port} were searched up to {search.highest:.4g} only.")
+    if any(one.ways == 1 for one in found):
+        limits.append(_one_way(port))
+    if lost:
+        orders = ", ".join(f"{one.order:.5g}" for one in lost)
+        limits.append(
+            f"Ripple at the {port}, order {orders}, is seen, but to take it away makes the forces "
+            "of the held-out records no smaller: it is not named."
+        )
+    if search.undecided:
+        orders = ", ".join(f"{one:.5g}" for one in search.undecided)
+        limits.append(
+            f"Ripple at the {port}, order {orders}, is seen at one speed or is weak, so that "
+            "these records do not tell it from a frequency: it is not named."
+        )
+    if search.fixed:
+        lines = ", ".join(f"{one:.3g}" for one in search.fixed)
+        limits.append(
+            f"The force at the {port} has lines at {lines} Hz, which these records show as "
+            "frequencies and not as orders of its position."
+        )
+    return limits
+
+
+def _one_way(port: str) -> str:
+    return (
+        f"The {port} shows its ripple in one direction only: a torque cannot be told from friction "
+        "that varies with the position."
+    )
 
 
 def _ports(mechanism: Mechanism) -> list[Port]:
@@ -262,19 +290,21 @@ def _ripple(
     held_out: Sequence[HighBand],
     rules: Rules,
 ) -> Ripple:
-    parts = parts_of(port.name, seen, train, rules)
+    size = size_of(port.name, seen, train, rules)
     rows = [one.inside(seen.order) for one in train]
     speed = np.concatenate([np.abs(one.speed)[here] for one, here in zip(train, rows, strict=True)])
     per_speed = seen.order / (2.0 * np.pi)
     speeds = over_speed(seen, train, speed)
-    laws = [one.law for one in parts]
+    laws = [one.law for one in size.parts]
     return Ripple(
         port.name,
         seen.order,
         seen.resolution,
+        size.variance,
         _meaning(port.gear, seen),
         (per_speed * float(speed.min()), per_speed * float(speed.max())),
-        parts,
+        size.parts,
+        size.ways,
         speeds,
         trend_of(speeds, rules),
         gap_of(seen.order, laws, train) or (0.0, 0.0),

@@ -101,8 +101,8 @@ def test_noise_makes_an_order_significant_as_rarely_as_the_rule_says(count):
     for _ in range(count):
         torque = lfilter([1.0], [1.0, -0.6], generator.standard_normal(len(TIME)))
         bands = bands_of(q, torque, generator)
-        orders, resolution = _tried(bands, rules)
-        alarms += bool(np.any(_significance(bands, orders, (), resolution, rules) > 1.0))
+        grids, resolution, _ = _tried(bands, (), rules)
+        alarms += bool(np.any(_significance(bands, grids, (), resolution, rules) > 1.0))
     assert alarms <= count * chance + 3.0 * math.sqrt(count * chance)
 
 
@@ -110,11 +110,11 @@ def test_the_orders_of_a_gear_are_seen_at_a_smaller_size():
     generator = np.random.default_rng(13)
     q = swings(generator)
     bands = bands_of(q, 0.02 * np.cos(202.0 * q) + 0.1 * noises(generator)["white"], generator)
-    orders, resolution = _tried(bands, RULES)
-    there = int(np.argmin(np.abs(orders - 202.0)))
     expected = tuple(GEAR.expected)
+    grids, resolution, _ = _tried(bands, expected, RULES)
+    there = int(np.argmin(np.abs(np.concatenate(grids) - 202.0)))
     with_gear, without = (
-        _significance(bands, orders, known, resolution, RULES)[there] for known in (expected, ())
+        _significance(bands, grids, known, resolution, RULES)[there] for known in (expected, ())
     )
     assert with_gear > 1.2 * without
 
