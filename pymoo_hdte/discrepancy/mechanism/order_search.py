@@ -9,38 +9,24 @@ look like an order while the speed is constant.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
-from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, Phasors, Values
+from pymoo_hdte.discrepancy.mechanism.high_band import FEWEST_ROWS, HighBand, Values
+from pymoo_hdte.discrepancy.mechanism.orders import SURROUNDINGS, over_noise, phasors
 
-_MOST_TRIED = 20_000
 _BLOCK = 1.1
 """Ratio of the last to the first order of a block, for all of which the same rows are taken."""
 NEIGHBOURS = np.concatenate([np.arange(-14.0, -3.5, 0.5), np.arange(4.0, 14.5, 0.5)])
 """Distances, in resolutions, of the orders the power of which is the noise of one between them."""
-_SURROUNDINGS = 101
-"""Number of orders whose median power estimates the noise at the middle one."""
-FEWEST_ROWS = 30
-"""For sums of fewer the power of noise has no exponential distribution."""
-_BESIDE = 2.5
-"""Distance in resolutions within which an order is a side line of a stronger one."""
 _SEGMENTS = 12
 """Windows of a record with phases of their own."""
-_PADDED = 4
-"""Length of a transform over that of its signal, so that powers between its lines are known."""
-_CHANGES = 3
-"""Powers of the position, 0 on, with which the amplitude of what is taken out may change."""
 _TRIES = 3
 """Searches per order that may be kept: some find what has one frequency."""
-_LEAST_SHARE = 0.1
-"""Share of the moving rows within the band at the highest order that is tried."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +92,7 @@ def seen_orders(
     rules : Rules
     """
     for order in known:
-        bands = [_without_order(one, order) for one in bands]
+        bands = [one.without_order(order) for one in bands]
     grids, resolution, cut = _tried(bands, expected, rules)
     orders = np.concatenate(grids)
     kept: list[SeenOrder] = []
@@ -117,7 +103,7 @@ def seen_orders(
             break
         power = _significance(bands, grids, expected, resolution, rules)
         for taken in (*known, *undecided, *(one.order for one in kept)):
-            power[np.abs(orders - taken) <= _BESIDE * resolution] = 0.0
+            power[np.abs(orders - taken) <= rules.side_lines * resolution] = 0.0
         place = int(np.argmax(power))
         if power[place] <= 1.0:
             break
@@ -126,12 +112,12 @@ def seen_orders(
         alone, frequency = told_from_frequencies(bands, order, rules)
         if alone and _at_two_speeds(bands, one, rules):
             kept.append(one)
-            bands = [_without_order(one, order) for one in bands]
+            bands = [one.without_order(order) for one in bands]
         elif frequency is None:
             undecided.append(order)
         else:
             fixed.append(frequency)
-            bands = [_without_frequency(one, frequency) for one in bands]
+            bands = [one.without_frequency(frequency) for one in bands]
     highest = float(grids[0][-1]) if grids[0].size else 0.0
     return SeenOrders(tuple(kept), tuple(undecided), tuple(sorted(set(fixed))), highest, cut)
 
@@ -150,20 +136,20 @@ def _tried(
     resolution = 2.0 * np.pi / widest
     speed = np.concatenate([np.abs(one.speed) for one in bands])
     # The slow tail of the rows would ask for orders that the others cannot show.
-    slow = np.quantile(speed[speed > 0.01 * speed.max()], _LEAST_SHARE)
+    slow = np.quantile(speed[speed > 0.01 * speed.max()], rules.slow_share)
     highest = max(one.highest for one in bands) * 2.0 * np.pi / slow
     lowest = max(
         resolution * rules.fewest_periods,
         min(one.lowest for one in bands) * 2.0 * np.pi / float(speed.max()),
     )
     step = 0.5 * resolution
-    if (highest - lowest) / step > _MOST_TRIED:
+    if (highest - lowest) / step > rules.most_tried_orders:
         # As for a shaft with parts of which there are whole numbers.
         step = max(step, 1.0)
         lowest = step * np.ceil(lowest / step)
-    last = min(highest, lowest + _MOST_TRIED * step)
+    last = min(highest, lowest + rules.most_tried_orders * step)
     grids = [np.arange(lowest, last, step)]
-    around = 0.5 * resolution * np.arange(-(_SURROUNDINGS // 2), _SURROUNDINGS // 2 + 1)
+    around = 0.5 * resolution * np.arange(-(SURROUNDINGS // 2), SURROUNDINGS // 2 + 1)
     for order in expected:
         missed = order >= last or step > 0.5 * resolution
         if missed and lowest <= order <= highest:
@@ -203,8 +189,7 @@ def _over_noise(bands: Sequence[HighBand], orders: Values) -> tuple[Values, Valu
             seen = power > 0.0
             if not seen.any():
                 continue
-            around = median_filter(power[seen], min(_SURROUNDINGS, int(seen.sum())), mode="reflect")
-            total[seen] += power[seen] / np.maximum(around, 1e-300) * np.log(2.0)
+            total[seen] += over_noise(power[seen])
             counted += seen
     return total, counted
 
@@ -217,25 +202,18 @@ def _powers(band: HighBand, way: NDArray[np.bool_], orders: Values) -> Values:
         last = int(np.searchsorted(orders, max(_BLOCK * orders[first], orders[first] + 1e-9)))
         last = max(last, first + 1)
         gain = band.gain(float(orders[(first + last) // 2])) * way
-        rows = np.flatnonzero(gain)
-        if len(rows) >= FEWEST_ROWS:
-            g, position = gain[rows], band.position[rows]
-            sums = phasors(position, g * band.force[rows], orders[first:last])
-            found[first:last] = np.abs(sums) ** 2 / np.sum(g**2)
+        found[first:last] = _power(band, gain, orders[first:last])
         first = last
     return found
 
 
-def phasors(position: Values, signal: Values, orders: Values) -> Phasors:
-    """Return the sum of a signal times exp(-i order position) at evenly spaced orders, (n_orders,).
-
-    Every order is one of a coarse grid and one of a fine grid within its steps, so that the
-    exponentials of about two square roots of n_orders are enough.
-    """
-    fine = int(np.ceil(np.sqrt(len(orders))))
-    coarse = np.exp(-1j * np.outer(orders[::fine], position)) * signal
-    within = np.exp(-1j * np.outer(orders[:fine] - orders[0], position))
-    return np.asarray((coarse @ within.T).ravel()[: len(orders)])
+def _power(band: HighBand, gain: Values, orders: Values) -> Values:
+    """Return the power of orders with one gain, (n,), per unit of noise; 0 with too few rows."""
+    rows = np.flatnonzero(gain)
+    if len(rows) < FEWEST_ROWS:
+        return np.zeros(len(orders))
+    sums = phasors(band.position[rows], (gain * band.force)[rows], orders)
+    return np.asarray(np.abs(sums) ** 2 / np.sum(gain[rows] ** 2))
 
 
 def _refined(bands: Sequence[HighBand], order: float, step: float) -> float:
@@ -243,12 +221,8 @@ def _refined(bands: Sequence[HighBand], order: float, step: float) -> float:
     near = order + step * np.linspace(-1.0, 1.0, 41)
     power = np.zeros(len(near))
     for band in bands:
-        gain = band.gain(order)
         for way in band.ways():
-            rows = np.flatnonzero(gain * way)
-            if len(rows) >= FEWEST_ROWS:
-                sums = phasors(band.position[rows], (gain * band.force)[rows], near)
-                power += np.abs(sums) ** 2 / np.sum(gain[rows] ** 2)
+            power += _power(band, band.gain(order) * way, near)
     top = int(np.argmax(power))
     if not 0 < top < len(near) - 1:
         return float(near[top])
@@ -276,7 +250,7 @@ def told_from_frequencies(
         for band in bands:
             turned = band.gain(order) * np.exp(-1j * order * band.position)
             for rows in np.array_split(np.arange(len(band.time)), windows):
-                of_frequency += _line_power(band.force[rows], band.step, frequencies)
+                of_frequency += band.line_power(rows, frequencies)
                 n_windows += 1
                 for way in band.ways():
                     here = (turned * way)[rows]
@@ -320,35 +294,3 @@ def _at_two_speeds(bands: Sequence[HighBand], seen: SeenOrder, rules: Rules) -> 
             total += float(power[0] / np.median(power[1:])) * np.log(2.0)
             counted += 1
     return bool(counted) and total > gamma.isf(rules.second_speed_chance, counted)
-
-
-def _line_power(force: Values, step: float, frequencies: Values) -> Values:
-    """Return the power of a force at frequencies, Hz, per unit of its noise, (n_frequencies,)."""
-    size = next_fast_len(_PADDED * len(force), real=True)
-    power = np.abs(np.fft.rfft(force, size)) ** 2 / len(force)
-    return np.interp(frequencies, np.fft.rfftfreq(size, step), power)
-
-
-def _without_order(band: HighBand, order: float) -> HighBand:
-    """Return a band without an order, the amplitude of which may change slowly along the travel."""
-    gain, force = band.gain(order), band.force.copy()
-    middle, half = np.mean(band.position), max(0.5 * float(np.ptp(band.position)), 1e-300)
-    for way in band.ways():
-        rows = np.flatnonzero(gain * way)
-        if len(rows) < FEWEST_ROWS:
-            continue
-        place = ((band.position[rows] - middle) / half)[:, None] ** np.arange(_CHANGES)
-        angle = (order * band.position[rows])[:, None]
-        lines = gain[rows, None] * np.hstack([place * np.cos(angle), place * np.sin(angle)])
-        force[rows] -= lines @ np.linalg.lstsq(lines, force[rows], rcond=None)[0]
-    return replace(band, force=force)
-
-
-def _without_frequency(band: HighBand, frequency: float) -> HighBand:
-    """Return a band without a frequency in Hz, window by window."""
-    angle, force = 2.0 * np.pi * frequency * band.time, band.force.copy()
-    for start in range(0, len(band.time), band.window):
-        rows = slice(start, start + band.window)
-        lines = np.column_stack([np.cos(angle[rows]), np.sin(angle[rows])])
-        force[rows] -= lines @ np.linalg.lstsq(lines, force[rows], rcond=None)[0]
-    return replace(band, force=force)

@@ -12,15 +12,15 @@ from scipy.stats import gamma
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
-from pymoo_hdte.discrepancy.mechanism.order_search import phasors
 
 Values = NDArray[np.float64]
+Phasors = NDArray[np.complex128]
 
 # Grid and smoothing of the search. When an order counts as seen is in `Rules`.
 _MOST_TRIED = 2000
 _WHOLE = 2.0
 """Resolution up to which orders are taken as whole numbers."""
-_SURROUNDINGS = 101
+SURROUNDINGS = 101
 """Number of orders whose median power estimates the noise at the middle one."""
 _BESIDE = 5.0
 """Distance in steps within which an order is a side line of another one with changing amplitude."""
@@ -118,11 +118,29 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rule
         if not seen.any():
             continue
         power = np.abs(phasors(position, signal, orders[seen])) ** 2
-        around = median_filter(power, min(_SURROUNDINGS, len(power)), mode="reflect")
-        total[seen] += power / np.maximum(around, 1e-300) * np.log(2.0)
+        total[seen] += over_noise(power)
         counted += seen
     limit = gamma.isf(rules.position_order_chance / max(len(orders), 1), np.maximum(counted, 1))
     return np.asarray(total / limit)
+
+
+def over_noise(power: Values) -> Values:
+    """Return the power of orders, (n,), over that of noise: the median of those around each."""
+    around = median_filter(power, min(SURROUNDINGS, len(power)), mode="reflect")
+    # Powers of noise are exponential, with a median of log 2.
+    return np.asarray(power / np.maximum(around, 1e-300) * np.log(2.0))
+
+
+def phasors(position: Values, signal: Values, orders: Values) -> Phasors:
+    """Return the sum of a signal times exp(-i order position) at evenly spaced orders, (n_orders,).
+
+    Every order is one of a coarse grid and one of a fine grid within its steps, so that the
+    exponentials of about two square roots of n_orders are enough.
+    """
+    fine = int(np.ceil(np.sqrt(len(orders))))
+    coarse = np.exp(-1j * np.outer(orders[::fine], position)) * signal
+    within = np.exp(-1j * np.outer(orders[:fine] - orders[0], position))
+    return np.asarray((coarse @ within.T).ravel()[: len(orders)])
 
 
 def _without(signal: Values, angle: Values) -> Values:

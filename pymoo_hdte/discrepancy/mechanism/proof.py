@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, root_mean_square
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
+from pymoo_hdte.discrepancy.mechanism.rest import fitted_values
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.records import FINER
 from pymoo_hdte.mechanism.simulation import simulate_mechanism
@@ -103,15 +104,6 @@ def prove_measured(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
 def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:
     """Return a mechanism with the values of a fit, as known ones."""
     return mechanism.with_values(fitted_values(mechanism, fitted))
-
-
-def fitted_values(mechanism: Mechanism, fitted: Fit) -> dict[str, float]:
-    """Return the fitted quantities of the mechanism, SI, by name."""
-    return {
-        parameter.name: float(value)
-        for parameter, value in zip(fitted.parameters, fitted.values, strict=True)
-        if parameter.name in mechanism.quantities
-    }
 
 
 def _simulated(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
-from pymoo_hdte.discrepancy.mechanism.proof import fitted_values, laws_of
+from pymoo_hdte.discrepancy.mechanism.proof import laws_of
+from pymoo_hdte.discrepancy.mechanism.rest import fitted_values
 
 MODEL_FILE = "revised_model.toml"
 

@@ -15,7 +15,12 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.mechanism.high_band import HighBand, high_bands
+from pymoo_hdte.discrepancy.mechanism.high_band import (
+    HighBand,
+    high_bands,
+    known_orders,
+    ports_apart,
+)
 from pymoo_hdte.discrepancy.mechanism.order_search import SeenOrder, SeenOrders, seen_orders
 from pymoo_hdte.discrepancy.mechanism.ripple_size import (
     Part,
@@ -24,10 +29,9 @@ from pymoo_hdte.discrepancy.mechanism.ripple_size import (
     size_of,
     trend_of,
 )
-from pymoo_hdte.effects.effect import effect_named, place_of
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import listed, sentence_at
 from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.gear import Gear
 
 Values = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -192,14 +196,15 @@ def find_ripples(
     found: list[Ripple] = []
     limits: list[str] = []
     of_role = {role: [one for one in records if one.role == role] for role in ("train", "held_out")}
-    for port in _ports(mechanism):
+    for port in ports_apart(mechanism):
         train, held_out = (
             high_bands(mechanism, port, of_role[role], cutoff, rules) for role in of_role
         )
-        known = _known_orders(mechanism, port, effects)
-        expected = port.gear.expected if port.gear else {}
+        known = known_orders(mechanism, port, effects)
+        expected = port.gear.expected if port.gear else ()
         search = seen_orders(train, tuple(expected), known, rules)
-        here, lost = [], []
+        here: list[Ripple] = []
+        lost: list[Ripple] = []
         for one in search.kept:
             ripple = _ripple(port, one, train, held_out, rules)
             if _share(ripple.fitted) < rules.ripple_share:
@@ -248,41 +253,6 @@ def _one_way(port: str) -> str:
     )
 
 
-def _ports(mechanism: Mechanism) -> list[Port]:
-    """Return one port for each motion at which forces of inputs act; one with a gear, if any.
-
-    Motions in proportion are one: a force at one of these ports is a force at each.
-    """
-    found: dict[frozenset[tuple[str, float]], Port] = {}
-    for port in mechanism.ports:
-        motion = _direction(port)
-        if not port.read and (motion not in found or (port.gear and not found[motion].gear)):
-            found[motion] = port
-    return list(found.values())
-
-
-def _shares(port: Port) -> dict[str, float]:
-    return {name: port.motion[name] for name in sorted(port.motion) if port.motion[name]}
-
-
-def _direction(port: Port) -> frozenset[tuple[str, float]]:
-    """Return the shares of a port's motion over the first of them, but for rounding."""
-    shares = _shares(port)
-    first = next(iter(shares.values()))
-    return frozenset((name, float(f"{share / first:.9g}")) for name, share in shares.items())
-
-
-def _known_orders(mechanism: Mechanism, port: Port, effects: Collection[LawAt]) -> list[float]:
-    """Return the orders of effects at ports of the same motion, per turn of this port."""
-    found = []
-    for one in effects:
-        there, order = mechanism.port(one.port), place_of(one)[2]
-        if order and _direction(there) == _direction(port):
-            theirs, ours = (next(iter(_shares(each).values())) for each in (there, port))
-            found.append(abs(order * theirs / ours))
-    return found
-
-
 def _ripple(
     port: Port,
     seen: SeenOrder,
@@ -301,7 +271,7 @@ def _ripple(
         seen.order,
         seen.resolution,
         size.variance,
-        _meaning(port.gear, seen),
+        port.gear.meaning(seen.order, seen.resolution) if port.gear else "",
         (per_speed * float(speed.min()), per_speed * float(speed.max())),
         size.parts,
         size.ways,
@@ -316,14 +286,6 @@ def _share(gap: Pair) -> float:
     """Return the share of the power that is taken away between two root mean squares."""
     before, after = gap
     return 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
-
-
-def _meaning(gear: Gear | None, seen: SeenOrder) -> str:
-    """Return what a gear says of an order, the nearest first; empty if nothing."""
-    expected = gear.expected if gear else {}
-    off = {order: abs(order - seen.order) for order in expected}
-    near = sorted((order for order in off if off[order] <= seen.resolution), key=off.__getitem__)
-    return "; ".join(f"{order:.5g} is {expected[order]}" for order in near)
 
 
 def _value(value: float, half: float) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.mechanism.high_band import HighBand
-from pymoo_hdte.discrepancy.mechanism.order_search import FEWEST_ROWS, NEIGHBOURS, SeenOrder
+from pymoo_hdte.discrepancy.mechanism.high_band import FEWEST_ROWS, HighBand
+from pymoo_hdte.discrepancy.mechanism.order_search import NEIGHBOURS, SeenOrder
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.unknowns import line_with_variance
 from pymoo_hdte.mechanism import LawAt
