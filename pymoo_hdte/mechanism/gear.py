@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from pymoo_hdte.checks import one_of, real_number, whole_number
+from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
 
 KINDS = ("harmonic drive", "other")
 _PER_TURN = (2, 4, 6)
@@ -63,3 +64,19 @@ class Gear:
         found.setdefault(self.ratio, "1 per input turn")
         found.setdefault(1.0, "1 per turn of the output")
         return found
+
+    def check_at(self, port: str, motion: Mapping[str, float], angles: Collection[str]) -> None:
+        """Raise `InvalidInput` for a port whose motion is not one of the coordinates ``angles``."""
+        moved = [name for name, share in motion.items() if share]
+        if len(moved) != 1 or moved[0] not in angles:
+            allowed = "a port whose motion is the angle of the gear's output"
+            raise InvalidInput(f"gear of {port}", dict(motion), allowed)
+
+    def meaning(self, order: float, within: float) -> str:
+        """Return in words what an order may be, the nearest first; empty if nothing is near.
+
+        ``order`` and the distance ``within`` which it may be are cycles per turn of the output.
+        """
+        off = {one: abs(one - order) for one in self.expected}
+        near = sorted((one for one in off if off[one] <= within), key=off.__getitem__)
+        return "; ".join(f"{one:.5g} is {self.expected[one]}" for one in near)

@@ -127,8 +127,9 @@ class Mechanism:
     ------
     InvalidInput
         For a name that is used twice or refers to nothing, an inertia that is not positive, a
-        stiffness or damping that is negative, a port or input that touches no coordinate, or a gain
-        that is not stated beside a quantity that is known exactly, a force sensor or another input.
+        stiffness or damping that is negative, a port or input that touches no coordinate, a gear
+        at a port whose motion is not the angle of a shaft, or a gain that is not stated beside a
+        quantity that is known exactly, a force sensor or another input.
     """
 
     inertias: Mapping[str, BelievedValue]
@@ -162,6 +163,10 @@ class Mechanism:
             self._check_shares(f"motion of {port.name}", port.motion)
             for line in port.error:
                 one_of(f"error of {port.name}", line.coordinate, self.coordinates)
+            if port.gear:
+                # Where the mechanism does not tell its angles, the gear is believed.
+                turning = self.coordinates if self.angles is None else self.angles
+                port.gear.check_at(port.name, port.motion, turning)
             for name, share in port.load.items():
                 one_of(f"load of {port.name}", name, [one.name for one in self.inputs])
                 real_number(f"load of {port.name}.{name}", share)

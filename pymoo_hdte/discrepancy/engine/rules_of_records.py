@@ -216,6 +216,28 @@ class RecordRules(RuleSet):
         "Most orders of one port.",
         f"{BY_HAND} as a budget of time.",
     )
+    most_tried_orders: int = rule(
+        20_000,
+        "1",
+        "Most orders of one port that are tried beyond the band; where there were more, whole "
+        "numbers are, up to an order that is said.",
+        f"{BY_HAND} as a budget of time: a few seconds for a record of some ten thousand rows.",
+    )
+    slow_share: float = rule(
+        0.1,
+        "share of the moving rows",
+        "The highest order that is tried beyond the band is within it in this share of the rows.",
+        f"{BY_HAND}: fewer rows show an order only if it is three times as large as it has to be "
+        "in all of them, and orders that are hardly seen raise the limit of the others.",
+        at_most=1.0,
+    )
+    side_lines: float = rule(
+        2.5,
+        "resolutions of an order",
+        "So near to a stronger order none is looked for.",
+        f"{BY_HAND}: the second side line of a travel that is passed evenly is at 2.5, with 2 % of "
+        "the power.",
+    )
     ripple_share: float = rule(
         1e-3,
         "share of the power beyond the band",

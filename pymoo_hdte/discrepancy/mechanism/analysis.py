@@ -37,7 +37,12 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     fine_enough,
     usual_cutoff,
 )
-from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square, share_removed, with_rest
+from pymoo_hdte.discrepancy.mechanism.rest import (
+    fitted_values,
+    root_mean_square,
+    share_removed,
+    with_rest,
+)
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 
 
@@ -171,7 +176,12 @@ def examine_mechanism(
     sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
     data, verdict = _examined(sensors)
-    ripples = find_ripples(mechanism, sampled, cutoff, (*known, *verdict.accepted.effects), rules)
+    # With the gains that are fitted, as all forces of the verdict are.
+    gains = [f"gain of {one.name}" for one in mechanism.inputs]
+    fitted = fitted_values(mechanism, verdict.accepted)
+    scaled = {name: fitted[name] for name in gains if name in fitted}
+    as_fitted = mechanism.with_values(scaled, exactly=False)
+    ripples = find_ripples(as_fitted, sampled, cutoff, (*known, *verdict.accepted.effects), rules)
     if ripples.found and verdict.status == "unlisted":
         # While the port moves slowly, a ripple is within the band as well.
         again = _examined(replace(sensors, known=(*known, *ripples.laws)))

@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN, Verdict
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
+from pymoo_hdte.discrepancy.mechanism.rest import fitted_values
 from pymoo_hdte.discrepancy.mechanism.windows import Reach, Windows, reach_of, windows_of
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.motion import SmoothedMotion, motion_of, smooth
@@ -249,15 +250,6 @@ def _vote(simulated: Sequence[SimulatedRecord]) -> Vote:
 def fitted_mechanism(mechanism: Mechanism, fitted: Fit) -> Mechanism:
     """Return a mechanism with the values of a fit."""
     return mechanism.with_values(fitted_values(mechanism, fitted), exactly=False)
-
-
-def fitted_values(mechanism: Mechanism, fitted: Fit) -> dict[str, float]:
-    """Return the fitted quantities of the mechanism, SI, by name."""
-    return {
-        parameter.name: float(value)
-        for parameter, value in zip(fitted.parameters, fitted.values, strict=True)
-        if parameter.name in mechanism.quantities
-    }
 
 
 def laws_of(effects: Sequence[Any]) -> tuple[LawAt, ...]:

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import phasors
+from pymoo_hdte.discrepancy.mechanism.beyond_band.order_lines import over_noise, phasors
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 
 Values = NDArray[np.float64]
@@ -20,8 +19,6 @@ Values = NDArray[np.float64]
 _MOST_TRIED = 2000
 _WHOLE = 2.0
 """Resolution up to which orders are taken as whole numbers."""
-_SURROUNDINGS = 101
-"""Number of orders whose median power estimates the noise at the middle one."""
 _BESIDE = 5.0
 """Distance in steps within which an order is a side line of another one with changing amplitude."""
 
@@ -118,8 +115,7 @@ def _significance(signals: Sequence[tuple[Values, Values]], orders: Values, rule
         if not seen.any():
             continue
         power = np.abs(phasors(position, signal, orders[seen])) ** 2
-        around = median_filter(power, min(_SURROUNDINGS, len(power)), mode="reflect")
-        total[seen] += power / np.maximum(around, 1e-300) * np.log(2.0)
+        total[seen] += over_noise(power)
         counted += seen
     limit = gamma.isf(rules.position_order_chance / max(len(orders), 1), np.maximum(counted, 1))
     return np.asarray(total / limit)

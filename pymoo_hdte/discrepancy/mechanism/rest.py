@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 )
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
+from pymoo_hdte.mechanism import Mechanism
 
 
 def with_rest(
@@ -109,3 +110,12 @@ def root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDAr
     """Return the root mean square of each balance, N or N.m, for whitened residuals (n,)."""
     samples = sum(len(balance.time) for balance in data.spectra)
     return np.sqrt(data.power(residuals) / samples)
+
+
+def fitted_values(mechanism: Mechanism, fitted: Fit) -> dict[str, float]:
+    """Return the fitted quantities of the mechanism, SI, by name."""
+    return {
+        parameter.name: float(value)
+        for parameter, value in zip(fitted.parameters, fitted.values, strict=True)
+        if parameter.name in mechanism.quantities
+    }

@@ -183,7 +183,7 @@ def band(finding: MechanismFinding) -> dict[str, Any]:
         "share_of_force_beyond": force,
         "sentence": f"Model and records are compared up to {cutoff:.3g} Hz; beyond lie "
         f"{100.0 * motion:.2g} % of the motion's power and {100.0 * force:.2g} % of the forces'"
-        f"{', about which nothing is known' if much else ''}.",
+        f"{', in which only ripple is looked for' if much else ''}.",
     }
 
 

@@ -15,14 +15,17 @@ from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import high_bands
 from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import (
     SeenOrder,
     _at_two_speeds,
+    _refined,
     _significance,
     _tried,
     told_from_frequencies,
 )
 from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple import find_ripples
+from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple_size import size_of
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
 from tests.helpers.places import SHARED
 
@@ -100,8 +103,8 @@ def test_noise_makes_an_order_significant_as_rarely_as_the_rule_says(count):
     for _ in range(count):
         torque = lfilter([1.0], [1.0, -0.6], generator.standard_normal(len(TIME)))
         bands = bands_of(q, torque, generator)
-        orders, resolution = _tried(bands, rules)
-        alarms += bool(np.any(_significance(bands, orders, (), resolution, rules) > 1.0))
+        grids, resolution, _ = _tried(bands, (), rules)
+        alarms += bool(np.any(_significance(bands, grids, (), resolution, rules) > 1.0))
     assert alarms <= count * chance + 3.0 * math.sqrt(count * chance)
 
 
@@ -109,11 +112,11 @@ def test_the_orders_of_a_gear_are_seen_at_a_smaller_size():
     generator = np.random.default_rng(13)
     q = swings(generator)
     bands = bands_of(q, 0.02 * np.cos(202.0 * q) + 0.1 * noises(generator)["white"], generator)
-    orders, resolution = _tried(bands, RULES)
-    there = int(np.argmin(np.abs(orders - 202.0)))
     expected = tuple(GEAR.expected)
+    grids, resolution, _ = _tried(bands, expected, RULES)
+    there = int(np.argmin(np.abs(np.concatenate(grids) - 202.0)))
     with_gear, without = (
-        _significance(bands, orders, known, resolution, RULES)[there] for known in (expected, ())
+        _significance(bands, grids, known, resolution, RULES)[there] for known in (expected, ())
     )
     assert with_gear > 1.2 * without
 
@@ -133,13 +136,16 @@ def hidden(kind, order, size, phase, q):
 def test_a_ripple_beyond_the_band_is_found_with_its_kind_order_and_size(kind, order, phase, seed):
     generator = np.random.default_rng(seed)
     q = swings(generator)
-    torque = hidden(kind, order, 0.1, phase, q) + 0.1 * noises(generator)["mains"]
+    noise = 0.1 * noises(generator)["mains"]
+    torque = hidden(kind, order, 0.1, phase, q) + noise
     (one,) = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found
     (part,) = one.parts
     assert part.law.name == kind
     assert one.order == pytest.approx(order, abs=0.25 * one.resolution)
     (size, variance), *_ = part.values.values()
-    assert abs(size - 0.1) <= max(4.0 * variance**0.5, 0.01)
+    # That of a line beside noise of this power, for all rows.
+    assert 0.5 < variance**0.5 / (2.0 * np.mean(noise**2) / len(TIME)) ** 0.5 < 2.0
+    assert abs(size - 0.1) <= 4.0 * variance**0.5
 
 
 def test_at_one_speed_an_order_and_a_frequency_look_alike_and_neither_is_an_order():
@@ -212,6 +218,147 @@ def test_what_is_known_already_is_not_found_again():
     one = record(q, torque + 0.1 * generator.standard_normal(len(TIME)), generator)
     (ripple,) = find_ripples(JOINT, [one], CUTOFF).found
     assert not find_ripples(JOINT, [one], CUTOFF, [part.law for part in ripple.parts]).found
+
+
+def geared(*shares):
+    """A joint whose coordinate is the angle of its motor, with a port for each share of it."""
+    return Mechanism(
+        {"m": BelievedValue(1e-5, 0.5)},
+        [Port(f"port {n}", {"m": share}) for n, share in enumerate(shares)],
+        [Input("torque", {"m": 1.0})],
+    )
+
+
+def test_a_ripple_has_one_size_by_the_angle_of_the_motor_and_by_that_of_the_output():
+    generator = np.random.default_rng(15)
+    q = swings(generator)
+    torque = hidden("torque_ripple", 202.0, 0.1, 1.0, q)
+    torque = torque + 0.05 * generator.standard_normal(len(TIME))
+    output = record(q, torque, generator)
+    channels = {"m": 101.0 * output.channels["q"], "torque": torque / 101.0}
+    motor = Record("motor", "train", output.time, channels)
+    (expected,) = find_ripples(JOINT, [output], CUTOFF).found
+    (one,) = find_ripples(geared(1.0 / 101.0), [motor], CUTOFF).found
+    assert one.order == pytest.approx(expected.order, rel=1e-6)
+    ((name, (size, variance)), *_), same = one.parts[0].values.items(), expected.parts[0].values
+    assert size == pytest.approx(0.1, abs=0.005)
+    assert (size, variance) == pytest.approx(same[name], rel=1e-4)
+    # Ports of the same motion have the same forces: one of them is named, and known at each.
+    both = geared(1.0, 1.0 / 101.0)
+    (one,) = find_ripples(both, [motor], CUTOFF).found
+    assert one.order == pytest.approx(2.0, rel=1e-3)
+    for there in (both.ports[0], both.ports[1]):
+        order = one.order / there.motion["m"]
+        law = effect_named("torque_ripple").law_of({"order": order, "amplitude": 1.0, "phase": 0.0})
+        known = [LawAt("torque_ripple", there.name, law)]
+        assert not find_ripples(both, [motor], CUTOFF, known).found
+
+
+@pytest.mark.parametrize("count", [40, pytest.param(400, marks=pytest.mark.nightly)])
+def test_intervals_of_a_size_and_of_an_order_hold_as_often_as_they_say(count):
+    generator = np.random.default_rng(16)
+    inside = np.zeros(2)
+    for _ in range(count):
+        q = swings(generator)
+        torque = hidden("torque_ripple", 202.0, 0.05, 1.0, q)
+        bands = bands_of(q, torque + 0.1 * generator.standard_normal(len(TIME)), generator)
+        resolution = 2.0 * np.pi / float(np.ptp(q))
+        order = _refined(bands, 202.0 + resolution * generator.uniform(-0.2, 0.2), 0.5 * resolution)
+        size = size_of("bearing", SeenOrder(order, resolution, 2.0), bands, RULES)
+        amplitude, variance = size.parts[0].values["amplitude"]
+        inside += (
+            abs(amplitude - 0.05) <= 1.96 * variance**0.5,
+            (abs(order - 202.0) <= 1.96 * size.variance**0.5),
+        )
+    least = 0.95 * count - 3.0 * math.sqrt(0.95 * 0.05 * count)
+    assert np.all(inside >= least)
+    # An interval that always holds is too wide.
+    assert count < 100 or np.all(inside < 0.985 * count)
+
+
+def test_in_one_direction_a_torque_is_not_told_from_friction():
+    generator = np.random.default_rng(17)
+    there_and_back = swings(generator)
+    forward = np.cumsum(np.abs(np.gradient(there_and_back)))
+    for q, ways in ((forward, 1), (there_and_back, 2)):
+        torque = hidden("position_dependent_friction", 202.0, 0.1, 1.0, q)
+        torque = torque + 0.05 * generator.standard_normal(len(TIME))
+        found = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF)
+        (one,) = found.found
+        assert one.ways == ways
+        doubted = [words for words in found.limits if "one direction only" in words]
+        assert len(doubted) == (ways == 1)
+        assert ("one direction only" in one.sentence) == (ways == 1)
+
+
+def test_a_ripple_has_the_size_of_the_fitted_gain():
+    """The inertia is known, the gain of the input is believed to be 30 % too small."""
+    generator = np.random.default_rng(18)
+    mechanism = Mechanism(
+        {"q": BelievedValue(0.5)},
+        [Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, 1.0))],
+        [Input("torque", {"q": 1.0}, BelievedValue(0.7, 0.5))],
+    )
+    q = swings(generator)
+    speed = np.gradient(q, STEP)
+    torque = 0.5 * np.gradient(speed, STEP) + 0.5 * speed
+    torque = torque + hidden("torque_ripple", 402.0, 0.1, 1.0, q)
+    torque = torque + 0.05 * generator.standard_normal(len(TIME))
+    finding = examine_mechanism(mechanism, [record(q, torque, generator)], CUTOFF)
+    accepted = finding.accepted
+    names = [parameter.name for parameter in accepted.parameters]
+    assert accepted.values[names.index("gain of torque")] == pytest.approx(1.0, rel=0.03)
+    (one,) = finding.ripples.found
+    assert one.parts[0].values["amplitude"][0] == pytest.approx(0.1, rel=0.04)
+
+
+def test_a_range_of_orders_that_is_too_long_is_cut_at_its_end_and_that_is_said():
+    generator = np.random.default_rng(19)
+    rules = Rules(most_tried_orders=100)
+    # A linear axis of some cm: orders, in rad per m, are far apart.
+    q = 0.01 * swings(generator)
+    force = 0.2 * generator.standard_normal(len(TIME))
+    bands = bands_of(q, force, generator)
+    (whole,), resolution, cut = _tried(bands, (), RULES)
+    assert not cut
+    (short,), _, cut = _tried(bands, (), rules)
+    assert cut
+    assert len(short) <= 101
+    # No finer, and from as low on, than without a cut.
+    assert short[1] - short[0] == pytest.approx(whole[1] - whole[0])
+    assert short[0] < whole[0] + resolution
+    found = find_ripples(JOINT, [record(q, force, generator)], CUTOFF, rules=rules)
+    assert any("were searched up to" in words for words in found.limits)
+    found = find_ripples(JOINT, [record(q, force, generator)], CUTOFF)
+    assert not any("were searched up to" in words for words in found.limits)
+
+
+def test_an_order_of_a_gear_is_seen_between_whole_numbers_and_beyond_a_cut():
+    """After many turns only whole numbers are tried, up to a limit."""
+    generator = np.random.default_rng(20)
+    gear, rules = Gear(20.3, "harmonic drive"), Rules(most_tried_orders=40)
+    q = STEP * np.cumsum(3.0 + 1.5 * np.sin(0.6 * TIME))
+    for order in (40.6, 81.2):
+        force = 0.03 * np.cos(order * q) + 0.1 * generator.standard_normal(len(TIME))
+        one = [record(q, force, generator)]
+        found = find_ripples(joint(gear), one, CUTOFF, rules=rules).found
+        assert [each.order for each in found] == pytest.approx([order], abs=0.02)
+        assert not find_ripples(joint(), one, CUTOFF, rules=rules).found
+
+
+def test_a_gear_is_at_a_port_that_is_an_angle_only():
+    def with_gear(motion, angles):
+        Mechanism(
+            {"a": BelievedValue(1.0), "b": BelievedValue(1.0)},
+            [Port("joint", motion, gear=GEAR)],
+            angles=angles,
+        )
+
+    with_gear({"a": 0.01, "b": 0.0}, ["a"])
+    with_gear({"a": 0.01}, None)
+    for motion, angles in (({"a": 1.0, "b": -1.0}, None), ({"a": 1.0}, ["b"])):
+        with pytest.raises(InvalidInput, match="gear of joint"):
+            with_gear(motion, angles)
 
 
 def test_a_model_that_lacks_a_ripple_only_is_not_adequate_and_gets_it(tmp_path):

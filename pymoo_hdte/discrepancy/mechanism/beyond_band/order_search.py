@@ -9,38 +9,28 @@ look like an order while the speed is constant.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
-from scipy.ndimage import median_filter
 from scipy.stats import gamma
 
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import HighBand, Phasors, Values
+from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import FEWEST_ROWS, HighBand, Values
+from pymoo_hdte.discrepancy.mechanism.beyond_band.order_lines import (
+    SURROUNDINGS,
+    over_noise,
+    phasors,
+)
 
-_MOST_TRIED = 20_000
 _BLOCK = 1.1
 """Ratio of the last to the first order of a block, for all of which the same rows are taken."""
 NEIGHBOURS = np.concatenate([np.arange(-14.0, -3.5, 0.5), np.arange(4.0, 14.5, 0.5)])
 """Distances, in resolutions, of the orders the power of which is the noise of one between them."""
-_SURROUNDINGS = 101
-"""Number of orders whose median power estimates the noise at the middle one."""
-FEWEST_ROWS = 30
-"""For sums of fewer the power of noise has no exponential distribution."""
-_BESIDE = 2.5
-"""Distance in resolutions within which an order is a side line of a stronger one."""
 _SEGMENTS = 12
 """Windows of a record with phases of their own."""
-_PADDED = 4
-"""Length of a transform over that of its signal, so that powers between its lines are known."""
-_CHANGES = 3
-"""Powers of the position, 0 on, with which the amplitude of what is taken out may change."""
 _TRIES = 3
 """Searches per order that may be kept: some find what has one frequency."""
-_LEAST_SHARE = 0.1
-"""Share of the moving rows within the band at the highest order that is tried."""
 
 
 @dataclass(frozen=True)
@@ -62,13 +52,38 @@ class SeenOrder:
     power: float
 
 
+@dataclass(frozen=True)
+class SeenOrders:
+    """What a search found.
+
+    Attributes
+    ----------
+    kept : tuple of SeenOrder
+        The strongest first.
+    undecided : tuple of float
+        Orders that may be frequencies.
+    fixed : tuple of float
+        Frequencies that are no orders, Hz.
+    highest : float
+        Order up to which all were tried.
+    cut : bool
+        Whether the records could show higher ones.
+    """
+
+    kept: tuple[SeenOrder, ...]
+    undecided: tuple[float, ...]
+    fixed: tuple[float, ...]
+    highest: float
+    cut: bool
+
+
 def seen_orders(
     bands: Sequence[HighBand],
     expected: Sequence[float],
     known: Sequence[float],
     rules: Rules,
-) -> tuple[list[SeenOrder], list[float], list[float]]:
-    """Return orders, the strongest first, orders that may be frequencies, and frequencies in Hz.
+) -> SeenOrders:
+    """Return the orders at which the force of bands varies, told from frequencies.
 
     Parameters
     ----------
@@ -81,17 +96,18 @@ def seen_orders(
     rules : Rules
     """
     for order in known:
-        bands = [_without_order(one, order) for one in bands]
-    orders, resolution = _tried(bands, rules)
+        bands = [one.without_order(order) for one in bands]
+    grids, resolution, cut = _tried(bands, expected, rules)
+    orders = np.concatenate(grids)
     kept: list[SeenOrder] = []
     fixed: list[float] = []
     undecided: list[float] = []
     for _ in range(_TRIES * rules.most_position_orders):
         if not orders.size or len(kept) == rules.most_position_orders:
             break
-        power = _significance(bands, orders, expected, resolution, rules)
+        power = _significance(bands, grids, expected, resolution, rules)
         for taken in (*known, *undecided, *(one.order for one in kept)):
-            power[np.abs(orders - taken) <= _BESIDE * resolution] = 0.0
+            power[np.abs(orders - taken) <= rules.side_lines * resolution] = 0.0
         place = int(np.argmax(power))
         if power[place] <= 1.0:
             break
@@ -100,48 +116,76 @@ def seen_orders(
         alone, frequency = told_from_frequencies(bands, order, rules)
         if alone and _at_two_speeds(bands, one, rules):
             kept.append(one)
-            bands = [_without_order(one, order) for one in bands]
+            bands = [one.without_order(order) for one in bands]
         elif frequency is None:
             undecided.append(order)
         else:
             fixed.append(frequency)
-            bands = [_without_frequency(one, frequency) for one in bands]
-    return kept, undecided, sorted(set(fixed))
+            bands = [one.without_frequency(frequency) for one in bands]
+    highest = float(grids[0][-1]) if grids[0].size else 0.0
+    return SeenOrders(tuple(kept), tuple(undecided), tuple(sorted(set(fixed))), highest, cut)
 
 
-def _tried(bands: Sequence[HighBand], rules: Rules) -> tuple[Values, float]:
-    """Return the orders that are searched, and their resolution.
+def _tried(
+    bands: Sequence[HighBand], expected: Sequence[float], rules: Rules
+) -> tuple[list[Values], float, bool]:
+    """Return grids of orders that are searched, their resolution, and whether the range was cut.
 
-    From those with enough periods in the travel to those beyond the force's band in most rows.
+    The first is from orders with enough periods in the travel to those beyond the force's band in
+    most rows. Expected orders that it steps over, or ends below, have grids of their own.
     """
     widest = max((float(np.ptp(one.position)) for one in bands), default=0.0)
     if widest == 0.0:
-        return np.empty(0), 1.0
+        return [np.empty(0)], 1.0, False
     resolution = 2.0 * np.pi / widest
     speed = np.concatenate([np.abs(one.speed) for one in bands])
     # The slow tail of the rows would ask for orders that the others cannot show.
-    slow = np.quantile(speed[speed > 0.01 * speed.max()], _LEAST_SHARE)
+    slow = np.quantile(speed[speed > 0.01 * speed.max()], rules.slow_share)
     highest = max(one.highest for one in bands) * 2.0 * np.pi / slow
     lowest = max(
         resolution * rules.fewest_periods,
         min(one.lowest for one in bands) * 2.0 * np.pi / float(speed.max()),
     )
     step = 0.5 * resolution
-    if (highest - lowest) / step > _MOST_TRIED:
+    if (highest - lowest) / step > rules.most_tried_orders:
         # As for a shaft with parts of which there are whole numbers.
-        step = 1.0
-        lowest = np.ceil(lowest)
-    return np.arange(lowest, min(highest, lowest + _MOST_TRIED * step), step), resolution
+        step = max(step, 1.0)
+        lowest = step * np.ceil(lowest / step)
+    last = min(highest, lowest + rules.most_tried_orders * step)
+    grids = [np.arange(lowest, last, step)]
+    around = 0.5 * resolution * np.arange(-(SURROUNDINGS // 2), SURROUNDINGS // 2 + 1)
+    for order in expected:
+        missed = order >= last or step > 0.5 * resolution
+        if missed and lowest <= order <= highest:
+            near = order + around
+            grids.append(near[near >= resolution * rules.fewest_periods])
+    return grids, resolution, bool(last < highest)
 
 
 def _significance(
     bands: Sequence[HighBand],
-    orders: Values,
+    grids: Sequence[Values],
     expected: Sequence[float],
     resolution: float,
     rules: Rules,
 ) -> Values:
-    """Return the ratio of the power of each order to the least that is significant, (n_orders,)."""
+    """Return the ratio of the power of each order to the least that is significant, (n_orders,).
+
+    ``grids`` have evenly spaced orders each; n_orders is that of all.
+    """
+    found = [_over_noise(bands, orders) for orders in grids]
+    total, counted = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    orders = np.concatenate(grids)
+    near = np.zeros(len(orders), dtype=bool)
+    for one in expected:
+        near |= np.abs(orders - one) <= resolution
+    chance = np.where(near, 1.0 / max(int(near.sum()), 1), 1.0 / max(int((~near).sum()), 1))
+    limit = gamma.isf(rules.position_order_chance * chance, np.maximum(counted, 1))
+    return np.asarray(total / limit)
+
+
+def _over_noise(bands: Sequence[HighBand], orders: Values) -> tuple[Values, Values]:
+    """Return the power of orders over that of their surroundings, and in how many sums it is."""
     total, counted = np.zeros((2, len(orders)))
     for band in bands:
         for way in band.ways():
@@ -149,15 +193,9 @@ def _significance(
             seen = power > 0.0
             if not seen.any():
                 continue
-            around = median_filter(power[seen], min(_SURROUNDINGS, int(seen.sum())), mode="reflect")
-            total[seen] += power[seen] / np.maximum(around, 1e-300) * np.log(2.0)
+            total[seen] += over_noise(power[seen])
             counted += seen
-    near = np.zeros(len(orders), dtype=bool)
-    for one in expected:
-        near |= np.abs(orders - one) <= resolution
-    chance = np.where(near, 1.0 / max(int(near.sum()), 1), 1.0 / max(int((~near).sum()), 1))
-    limit = gamma.isf(rules.position_order_chance * chance, np.maximum(counted, 1))
-    return np.asarray(total / limit)
+    return total, counted
 
 
 def _powers(band: HighBand, way: NDArray[np.bool_], orders: Values) -> Values:
@@ -168,25 +206,18 @@ def _powers(band: HighBand, way: NDArray[np.bool_], orders: Values) -> Values:
         last = int(np.searchsorted(orders, max(_BLOCK * orders[first], orders[first] + 1e-9)))
         last = max(last, first + 1)
         gain = band.gain(float(orders[(first + last) // 2])) * way
-        rows = np.flatnonzero(gain)
-        if len(rows) >= FEWEST_ROWS:
-            g, position = gain[rows], band.position[rows]
-            sums = phasors(position, g * band.force[rows], orders[first:last])
-            found[first:last] = np.abs(sums) ** 2 / np.sum(g**2)
+        found[first:last] = _power(band, gain, orders[first:last])
         first = last
     return found
 
 
-def phasors(position: Values, signal: Values, orders: Values) -> Phasors:
-    """Return the sum of a signal times exp(-i order position) at evenly spaced orders, (n_orders,).
-
-    Every order is one of a coarse grid and one of a fine grid within its steps, so that the
-    exponentials of about two square roots of n_orders are enough.
-    """
-    fine = int(np.ceil(np.sqrt(len(orders))))
-    coarse = np.exp(-1j * np.outer(orders[::fine], position)) * signal
-    within = np.exp(-1j * np.outer(orders[:fine] - orders[0], position))
-    return np.asarray((coarse @ within.T).ravel()[: len(orders)])
+def _power(band: HighBand, gain: Values, orders: Values) -> Values:
+    """Return the power of orders with one gain, (n,), per unit of noise; 0 with too few rows."""
+    rows = np.flatnonzero(gain)
+    if len(rows) < FEWEST_ROWS:
+        return np.zeros(len(orders))
+    sums = phasors(band.position[rows], (gain * band.force)[rows], orders)
+    return np.asarray(np.abs(sums) ** 2 / np.sum(gain[rows] ** 2))
 
 
 def _refined(bands: Sequence[HighBand], order: float, step: float) -> float:
@@ -194,13 +225,15 @@ def _refined(bands: Sequence[HighBand], order: float, step: float) -> float:
     near = order + step * np.linspace(-1.0, 1.0, 41)
     power = np.zeros(len(near))
     for band in bands:
-        gain = band.gain(order)
         for way in band.ways():
-            rows = np.flatnonzero(gain * way)
-            if len(rows) >= FEWEST_ROWS:
-                sums = phasors(band.position[rows], (gain * band.force)[rows], near)
-                power += np.abs(sums) ** 2 / np.sum(gain[rows] ** 2)
-    return float(near[np.argmax(power)])
+            power += _power(band, band.gain(order) * way, near)
+    top = int(np.argmax(power))
+    if not 0 < top < len(near) - 1:
+        return float(near[top])
+    # Powers are a parabola at their top: the steps are no limit of an order.
+    before, middle, after = power[top - 1 : top + 2]
+    bend = max(2.0 * middle - before - after, 1e-300)
+    return float(near[top] + 0.5 * (near[1] - near[0]) * (after - before) / bend)
 
 
 def told_from_frequencies(
@@ -221,7 +254,7 @@ def told_from_frequencies(
         for band in bands:
             turned = band.gain(order) * np.exp(-1j * order * band.position)
             for rows in np.array_split(np.arange(len(band.time)), windows):
-                of_frequency += _line_power(band.force[rows], band.step, frequencies)
+                of_frequency += band.line_power(rows, frequencies)
                 n_windows += 1
                 for way in band.ways():
                     here = (turned * way)[rows]
@@ -265,35 +298,3 @@ def _at_two_speeds(bands: Sequence[HighBand], seen: SeenOrder, rules: Rules) -> 
             total += float(power[0] / np.median(power[1:])) * np.log(2.0)
             counted += 1
     return bool(counted) and total > gamma.isf(rules.second_speed_chance, counted)
-
-
-def _line_power(force: Values, step: float, frequencies: Values) -> Values:
-    """Return the power of a force at frequencies, Hz, per unit of its noise, (n_frequencies,)."""
-    size = next_fast_len(_PADDED * len(force), real=True)
-    power = np.abs(np.fft.rfft(force, size)) ** 2 / len(force)
-    return np.interp(frequencies, np.fft.rfftfreq(size, step), power)
-
-
-def _without_order(band: HighBand, order: float) -> HighBand:
-    """Return a band without an order, the amplitude of which may change slowly along the travel."""
-    gain, force = band.gain(order), band.force.copy()
-    middle, half = np.mean(band.position), max(0.5 * float(np.ptp(band.position)), 1e-300)
-    for way in band.ways():
-        rows = np.flatnonzero(gain * way)
-        if len(rows) < FEWEST_ROWS:
-            continue
-        place = ((band.position[rows] - middle) / half)[:, None] ** np.arange(_CHANGES)
-        angle = (order * band.position[rows])[:, None]
-        lines = gain[rows, None] * np.hstack([place * np.cos(angle), place * np.sin(angle)])
-        force[rows] -= lines @ np.linalg.lstsq(lines, force[rows], rcond=None)[0]
-    return replace(band, force=force)
-
-
-def _without_frequency(band: HighBand, frequency: float) -> HighBand:
-    """Return a band without a frequency in Hz, window by window."""
-    angle, force = 2.0 * np.pi * frequency * band.time, band.force.copy()
-    for start in range(0, len(band.time), band.window):
-        rows = slice(start, start + band.window)
-        lines = np.column_stack([np.cos(angle[rows]), np.sin(angle[rows])])
-        force[rows] -= lines @ np.linalg.lstsq(lines, force[rows], rcond=None)[0]
-    return replace(band, force=force)

@@ -15,19 +15,27 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import HighBand, high_bands
-from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import SeenOrder, seen_orders
+from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import (
+    HighBand,
+    high_bands,
+    known_orders,
+    ports_apart,
+)
+from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import (
+    SeenOrder,
+    SeenOrders,
+    seen_orders,
+)
 from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple_size import (
     Part,
     gap_of,
     over_speed,
-    parts_of,
+    size_of,
     trend_of,
 )
-from pymoo_hdte.effects.effect import effect_named, place_of
+from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import listed, sentence_at
 from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
-from pymoo_hdte.mechanism.gear import Gear
 
 Values = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -49,11 +57,15 @@ class Ripple:
     order, resolution : float
         Cycles per turn of an angle in rad; of a length, radians per m. The resolution is the change
         of the order by which the longest travel has one cycle more.
+    variance : float
+        Of the order.
     meaning : str
         What the gear says of the order; empty if nothing.
     frequencies : (float, float)
         Hz, between which it was seen.
     parts : tuple of Part
+    ways : int
+        Directions, 1 or 2, in which it was seen.
     speeds : ndarray, shape (n, 3)
         Speed, amplitude, and its standard deviation, SI.
     trend : str
@@ -68,9 +80,11 @@ class Ripple:
     port: str
     order: float
     resolution: float
+    variance: float
     meaning: str
     frequencies: Pair
     parts: tuple[Part, ...]
+    ways: int
     speeds: Values
     trend: str
     fitted: Pair
@@ -89,6 +103,8 @@ class Ripple:
         told = [sentence_at(words, self.port, f"{self.order:.5g}", "force")]
         if len(names) > 1:
             told.append(f"A part of it {_OTHER[names[1]]}.")
+        if self.ways == 1:
+            told.append(_one_way(self.port))
         if self.meaning:
             told.append(f"Within the resolution of the travel, {self.meaning}.")
         low, high = self.frequencies
@@ -103,7 +119,7 @@ class Ripple:
                 "port": self.port,
                 "sentence": self.sentence,
                 "parameters": {
-                    "order": _value(self.order, 0.5 * self.resolution),
+                    "order": _value(self.order, _CENTRAL * self.variance**0.5),
                     **{
                         name: _value(value, _CENTRAL * variance**0.5)
                         for name, (value, variance) in part.values.items()
@@ -184,55 +200,61 @@ def find_ripples(
     found: list[Ripple] = []
     limits: list[str] = []
     of_role = {role: [one for one in records if one.role == role] for role in ("train", "held_out")}
-    for port in _ports(mechanism):
+    for port in ports_apart(mechanism):
         train, held_out = (
             high_bands(mechanism, port, of_role[role], cutoff, rules) for role in of_role
         )
-        known = [
-            order
-            for one in effects
-            if (order := place_of(one)[2])
-            and dict(mechanism.port(one.port).motion) == dict(port.motion)
-        ]
-        expected = port.gear.expected if port.gear else {}
-        seen, undecided, fixed = seen_orders(train, tuple(expected), known, rules)
-        lost = []
-        for one in seen:
+        known = known_orders(mechanism, port, effects)
+        expected = port.gear.expected if port.gear else ()
+        search = seen_orders(train, tuple(expected), known, rules)
+        here: list[Ripple] = []
+        lost: list[Ripple] = []
+        for one in search.kept:
             ripple = _ripple(port, one, train, held_out, rules)
             if _share(ripple.fitted) < rules.ripple_share:
                 continue
-            if ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share:
-                found.append(ripple)
-            else:
-                lost.append(f"{one.order:.5g}")
-        if lost:
-            limits.append(
-                f"Ripple at the {port.name}, order {', '.join(lost)}, is seen, but to take it "
-                "away makes the forces of the held-out records no smaller: it is not named."
-            )
-        if undecided:
-            limits.append(
-                f"Ripple at the {port.name}, order "
-                f"{', '.join(f'{one:.5g}' for one in undecided)}, is seen at one speed or "
-                "is weak, so that these records do not tell it from a frequency: it is not named."
-            )
-        if fixed:
-            limits.append(
-                f"The force at the {port.name} has lines at "
-                f"{', '.join(f'{one:.3g}' for one in fixed)} Hz, which these records show as "
-                "frequencies and not as orders of its position."
-            )
+            shown = ripple.held_out is None or _share(ripple.held_out) >= rules.ripple_share
+            (here if shown else lost).append(ripple)
+        found += here
+        limits += _limits(port.name, search, here, lost)
     return Ripples(tuple(found), tuple(limits))
 
 
-def _ports(mechanism: Mechanism) -> list[Port]:
-    """Return one port for each motion at which forces of inputs act; one with a gear, if any."""
-    found: dict[frozenset[tuple[str, float]], Port] = {}
-    for port in mechanism.ports:
-        motion = frozenset((name, share) for name, share in port.motion.items() if share)
-        if not port.read and (motion not in found or (port.gear and not found[motion].gear)):
-            found[motion] = port
-    return list(found.values())
+def _limits(
+    port: str, search: SeenOrders, found: Sequence[Ripple], lost: Sequence[Ripple]
+) -> list[str]:
+    """Return what was seen at a port and is not named, or cannot be told, in sentences."""
+    limits = []
+    if search.cut:
+        limits.append(f"Orders at the {port} were searched up to {search.highest:.4g} only.")
+    if any(one.ways == 1 for one in found):
+        limits.append(_one_way(port))
+    if lost:
+        orders = ", ".join(f"{one.order:.5g}" for one in lost)
+        limits.append(
+            f"Ripple at the {port}, order {orders}, is seen, but to take it away makes the forces "
+            "of the held-out records no smaller: it is not named."
+        )
+    if search.undecided:
+        orders = ", ".join(f"{one:.5g}" for one in search.undecided)
+        limits.append(
+            f"Ripple at the {port}, order {orders}, is seen at one speed or is weak, so that "
+            "these records do not tell it from a frequency: it is not named."
+        )
+    if search.fixed:
+        lines = ", ".join(f"{one:.3g}" for one in search.fixed)
+        limits.append(
+            f"The force at the {port} has lines at {lines} Hz, which these records show as "
+            "frequencies and not as orders of its position."
+        )
+    return limits
+
+
+def _one_way(port: str) -> str:
+    return (
+        f"The {port} shows its ripple in one direction only: a torque cannot be told from friction "
+        "that varies with the position."
+    )
 
 
 def _ripple(
@@ -242,19 +264,21 @@ def _ripple(
     held_out: Sequence[HighBand],
     rules: Rules,
 ) -> Ripple:
-    parts = parts_of(port.name, seen, train, rules)
+    size = size_of(port.name, seen, train, rules)
     rows = [one.inside(seen.order) for one in train]
     speed = np.concatenate([np.abs(one.speed)[here] for one, here in zip(train, rows, strict=True)])
     per_speed = seen.order / (2.0 * np.pi)
     speeds = over_speed(seen, train, speed)
-    laws = [one.law for one in parts]
+    laws = [one.law for one in size.parts]
     return Ripple(
         port.name,
         seen.order,
         seen.resolution,
-        _meaning(port.gear, seen),
+        size.variance,
+        port.gear.meaning(seen.order, seen.resolution) if port.gear else "",
         (per_speed * float(speed.min()), per_speed * float(speed.max())),
-        parts,
+        size.parts,
+        size.ways,
         speeds,
         trend_of(speeds, rules),
         gap_of(seen.order, laws, train) or (0.0, 0.0),
@@ -266,14 +290,6 @@ def _share(gap: Pair) -> float:
     """Return the share of the power that is taken away between two root mean squares."""
     before, after = gap
     return 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
-
-
-def _meaning(gear: Gear | None, seen: SeenOrder) -> str:
-    """Return what a gear says of an order, the nearest first; empty if nothing."""
-    expected = gear.expected if gear else {}
-    off = {order: abs(order - seen.order) for order in expected}
-    near = sorted((order for order in off if off[order] <= seen.resolution), key=off.__getitem__)
-    return "; ".join(f"{order:.5g} is {expected[order]}" for order in near)
 
 
 def _value(value: float, half: float) -> dict[str, Any]:

@@ -11,12 +11,8 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import HighBand
-from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import (
-    FEWEST_ROWS,
-    NEIGHBOURS,
-    SeenOrder,
-)
+from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import FEWEST_ROWS, HighBand
+from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import NEIGHBOURS, SeenOrder
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.unknowns import line_with_variance
 from pymoo_hdte.mechanism import LawAt
@@ -46,18 +42,60 @@ class Part:
     values: dict[str, Pair]
 
 
-def parts_of(
-    port: str, seen: SeenOrder, bands: Sequence[HighBand], rules: Rules
-) -> tuple[Part, ...]:
-    """Return the part of a line that is the same both ways, the one that turns, or both."""
-    ways = [_amplitude(seen, bands, way) for way in (1.0, -1.0)]
-    both = [one for one in ways if one is not None]
-    mean = sum(value for value, _ in both) / len(both)
-    variance = sum(spread for _, spread in both) / len(both) ** 2
+@dataclass(frozen=True)
+class _Line:
+    """The force while a port moves one way: the real part of amplitude times exp(i order position).
+
+    Attributes
+    ----------
+    amplitude : complex
+        N or N.m.
+    variance : float
+        Of it, real and imaginary part together, by the powers of the neighbouring orders.
+    spread : float
+        Variance of the positions.
+    """
+
+    amplitude: complex
+    variance: float
+    spread: float
+
+
+@dataclass(frozen=True, eq=False)
+class Size:
+    """What a line of an order is.
+
+    Attributes
+    ----------
+    parts : tuple of Part
+        The part that is the same both ways, the one that turns, or both; the larger first.
+    ways : int
+        Directions, 1 or 2, in which it was seen.
+    variance : float
+        Of the order, its unit squared.
+    """
+
+    parts: tuple[Part, ...]
+    ways: int
+    variance: float
+
+
+def size_of(port: str, seen: SeenOrder, bands: Sequence[HighBand], rules: Rules) -> Size:
+    """Return the parts of a line; while a port moves one way, all of it counts as a torque."""
+    lines = [_line(seen, bands, way) for way in (1.0, -1.0)]
+    both = [one for one in lines if one is not None]
+    # An order is the slope of a phase over the position, as in a regression.
+    known = sum(2.0 * abs(one.amplitude) ** 2 * one.spread / one.variance for one in both)
+    return Size(_parts(port, seen, both, rules), len(both), 1.0 / known)
+
+
+def _parts(port: str, seen: SeenOrder, both: Sequence[_Line], rules: Rules) -> tuple[Part, ...]:
+    mean = sum(one.amplitude for one in both) / len(both)
+    variance = sum(one.variance for one in both) / len(both) ** 2
     # A driving torque acts with the motion, a force of friction against it.
     lines = [("torque_ripple", "amplitude", -mean)]
     if len(both) == 2:
-        turning = 0.5 * (both[0][0] - both[1][0])
+        turning = 0.5 * (both[0].amplitude - both[1].amplitude)
         lines.append(("position_dependent_friction", "level", turning))
     strongest = max(abs(line) for _, _, line in lines)
     least = min(strongest, (-np.log(rules.position_order_chance) * variance) ** 0.5)
@@ -71,17 +109,14 @@ def parts_of(
     return tuple(part for _, part in sorted(found, key=lambda one: -one[0]))
 
 
-def _amplitude(
+def _line(
     seen: SeenOrder,
     bands: Sequence[HighBand],
     way: float,
     slowest: float = 0.0,
     fastest: float = np.inf,
-) -> tuple[complex, float] | None:
-    """Return the complex amplitude of the force while the port moves one way, and its variance.
-
-    The force is the real part of it times exp(i order position). The variance is that of the
-    neighbouring orders, real and imaginary part together.
+) -> _Line | None:
+    """Return the line of an order while the port moves one way, None with too few rows.
 
     Parameters
     ----------
@@ -90,11 +125,6 @@ def _amplitude(
     way : {1.0, -1.0}
     slowest, fastest : float
         Speeds between which rows are taken.
-
-    Returns
-    -------
-    (complex, float) or None
-        None with too few rows.
     """
     turned, force = [], []
     for band in bands:
@@ -112,7 +142,8 @@ def _amplitude(
     orders = seen.order + seen.resolution * NEIGHBOURS
     around = np.abs(np.exp(-1j * np.outer(orders, position)) @ left) ** 2
     # Powers of noise are exponential, with a median of log 2.
-    return amplitude, 4.0 * float(np.median(around)) / np.log(2.0) / len(signal) ** 2
+    variance = 4.0 * float(np.median(around)) / np.log(2.0) / len(signal) ** 2
+    return _Line(amplitude, max(variance, 1e-300), float(np.var(position)))
 
 
 def over_speed(seen: SeenOrder, bands: Sequence[HighBand], speed: Values) -> Values:
@@ -121,11 +152,11 @@ def over_speed(seen: SeenOrder, bands: Sequence[HighBand], speed: Values) -> Val
     edges = np.quantile(speed, np.linspace(0.0, 1.0, _SPEEDS + 1))
     edges[0] = 0.0
     for slowest, fastest in pairwise(edges):
-        here = [_amplitude(seen, bands, way, slowest, fastest) for way in (1.0, -1.0)]
+        here = [_line(seen, bands, way, slowest, fastest) for way in (1.0, -1.0)]
         lines = [one for one in here if one is not None]
         if lines:
-            power = np.mean([abs(line) ** 2 for line, _ in lines])
-            variance = np.mean([spread for _, spread in lines]) / (2.0 * len(lines))
+            power = np.mean([abs(line.amplitude) ** 2 for line in lines])
+            variance = np.mean([line.variance for line in lines]) / (2.0 * len(lines))
             middle = np.mean(speed[(speed > slowest) & (speed <= fastest)])
             found.append((middle, power**0.5, variance**0.5))
     return np.array(found).reshape(len(found), 3)
