@@ -66,16 +66,41 @@ class Gear:
         return found
 
     def check_at(self, port: str, motion: Mapping[str, float], angles: Collection[str]) -> None:
-        """Raise `InvalidInput` for a port whose motion is not one of the coordinates ``angles``."""
+        """Refuse a port that cannot be the output of a gear.
+
+        Parameters
+        ----------
+        port : str
+            Its name.
+        motion : mapping of str to float
+            Share of each coordinate in its motion, by name.
+        angles : collection of str
+            Coordinates that are, or may be, angles of a shaft.
+
+        Raises
+        ------
+        InvalidInput
+            If the motion is not that of one coordinate, or this is no angle.
+        """
         moved = [name for name, share in motion.items() if share]
         if len(moved) != 1 or moved[0] not in angles:
             allowed = "a port whose motion is the angle of the gear's output"
             raise InvalidInput(f"gear of {port}", dict(motion), allowed)
 
     def meaning(self, order: float, within: float) -> str:
-        """Return in words what an order may be, the nearest first; empty if nothing is near.
+        """Return in words what an order of a ripple may be.
 
-        ``order`` and the distance ``within`` which it may be are cycles per turn of the output.
+        Parameters
+        ----------
+        order : float
+            Cycles per turn of the output.
+        within : float
+            Distance from an expected order, cycles per turn, up to which it may be that one.
+
+        Returns
+        -------
+        str
+            The nearest first; empty if none is near.
         """
         off = {one: abs(one - order) for one in self.expected}
         near = sorted((one for one in off if off[one] <= within), key=off.__getitem__)

@@ -83,7 +83,8 @@ def test_any_model_survives_the_file(
         [
             Port(
                 port,
-                {second: share, first: numbers[0]},
+                # A gear is at a port of one shaft.
+                {second: share, first: 0.0 if gear else numbers[0]},
                 stiffness=values[2],
                 read=read,
                 error=(ErrorLine(second, *numbers[1:4]), ErrorLine(first, *numbers[2:])),
