@@ -1,6 +1,7 @@
 """Order of the guides, from use to mathematics; a guide that is not listed is an error."""
 
 ORDER = (
+    "robust_simulator.py",
     "robust_study.py",
     "drive_data_sheet.py",
     "own_problem.py",
