@@ -55,6 +55,11 @@ def robust_problem(
     response are as accurate as asked for at points that it does not use. Their values and gradients
     then are exact for the surrogate, whatever the independent distributions.
 
+    The simulator is called within the support of a scatter, or between its quantiles of 1e-5 where
+    that is unbounded. What lies beyond counts as the surrogate goes on there, if that changes mean
+    and deviation by no more than ``accuracy``, or than four times what the values at these ends
+    would. Otherwise it is left out, and four times that is added to the error.
+
     Parameters
     ----------
     simulator : callable

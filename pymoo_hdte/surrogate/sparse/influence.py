@@ -35,7 +35,7 @@ class Influence:
         for axis in axes:
             own = designs[:, column] if axis.designed else None
             column += axis.designed
-            rule = OrthonormalPolynomials(axis.measure, HIGHEST_DEGREE)
+            rule = OrthonormalPolynomials(axis.cut, HIGHEST_DEGREE)
             offset, factor, _, _ = axis.around(own)
             z = offset[:, None] + factor[:, None] * rule.nodes
             self._squares.append(hierarchical_basis(axis.points, z) ** 2 @ rule.weights)

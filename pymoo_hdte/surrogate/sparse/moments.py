@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
-from pymoo_hdte.surrogate.sparse.measures import OrthonormalPolynomials
+from pymoo_hdte.surrogate.sparse.measures import Measure, OrthonormalPolynomials
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
 
@@ -36,6 +36,8 @@ class SparseMoments:
         Of d variables.
     axes : sequence of Axis, length d
         Their coordinates and scatter; m of them have designs.
+    measures : list of Measure, length d, optional
+        Of the scatter, in the place of the whole of each axis.
 
     Attributes
     ----------
@@ -45,12 +47,18 @@ class SparseMoments:
         Of the scatter of each variable.
     """
 
-    def __init__(self, polynomial: SparsePolynomial, axes: list[Axis]) -> None:
+    def __init__(
+        self,
+        polynomial: SparsePolynomial,
+        axes: list[Axis],
+        measures: list[Measure] | None = None,
+    ) -> None:
         self.axes = axes
+        measures = [axis.measure for axis in axes] if measures is None else measures
         self.designed = [j for j, axis in enumerate(axes) if axis.designed]
         self.orthonormal = [
-            OrthonormalPolynomials(axis.measure, degree)
-            for axis, degree in zip(axes, polynomial.degrees, strict=True)
+            OrthonormalPolynomials(measure, degree)
+            for measure, degree in zip(measures, polynomial.degrees, strict=True)
         ]
         indices, coefficients = polynomial.indices, polynomial.coefficients[None]
         for j in (j for j, axis in enumerate(axes) if not axis.designed):
