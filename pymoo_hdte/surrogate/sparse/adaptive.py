@@ -20,11 +20,11 @@ Array = NDArray[np.float64]
 HELD_OUT_DESIGNS = 16
 """Designs with two points each at which the error is measured."""
 HELD_OUT_SHARE = 0.2
-"""Share of the runs at which that number is doubled."""
+"""Share of the runs at which that number is doubled; set by hand."""
 JUDGED_DESIGNS = 32
 """Designs at which the size of a surplus is judged."""
 SMALLEST_SCATTER = 0.1
-"""Scatter below this share of its median over the designs is judged as if it were that."""
+"""Scatter below this share of its median over the designs is judged as if it were that; by hand."""
 SCATTER_OF_RANGE = 1e-4
 """The same, as a share of the response's deviation over all points."""
 TAIL_GROWTH = 4.0
@@ -35,7 +35,7 @@ as much to mean and deviation as it does for a linear response, and a third of i
 a standard normal a. A polynomial of degree 18 adds some thousand times as much: it runs away there.
 """
 BATCH = 0.04
-"""Share of the set that is added at once, before all sizes are judged anew."""
+"""Share of the set that is added at once, before all sizes are judged anew; set by hand."""
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,9 @@ TAIL = 1e-5
 LONGEST_TAIL = 4.0
 """Distance from the median to the 1 - 1e-9 quantile over that to the 1 - 1e-3 quantile.
 
-1.9 for a normal, 3.2 for an exponential distribution. Where it is larger (log-normal with a large
-deviation, Student's t), polynomials of the variable itself have huge moments; its coordinate then
-is the standard normal variable of the same probability.
+1.9 for a normal, 3.2 for an exponential distribution; set by hand. Where it is larger (log-normal
+with a large deviation, Student's t), polynomials of the variable itself have huge moments; its
+coordinate then is the standard normal variable of the same probability.
 """
 START = 0.15
 """First point as a share of the interval, off its centre: many functions are even or odd there."""

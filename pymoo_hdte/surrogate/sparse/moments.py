@@ -14,7 +14,6 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder
 from numpy.typing import NDArray
 
-from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
 from pymoo_hdte.surrogate.sparse.measures import Measure, OrthonormalPolynomials
@@ -86,17 +85,6 @@ class SparseMoments:
         """Return mean and standard deviation, shape (n, r) each, in the responses' units."""
         expansion = self.expansion(designs)
         return expansion[..., 0], deviation(expansion)
-
-    def gradient(self, designs: Array) -> tuple[Array, Array]:
-        """Return the gradients of mean and deviation, shape (n, r, m) each.
-
-        That of a deviation of zero is given as zero.
-        """
-        expansion = self.expansion(designs)
-        first, others = np.zeros_like(expansion), expansion.copy()
-        first[..., 0], others[..., 0] = 1.0, 0.0
-        others = divide_or_zero(others, deviation(expansion)[..., None])
-        return self.pulled_back(designs, first), self.pulled_back(designs, others)
 
     def pulled_back(self, designs: Array, weights: Array) -> Array:
         """Return the gradient in the design of sums over the expansion, shape (n, r, m).
