@@ -34,7 +34,7 @@ class SparseMoments:
     polynomial : SparsePolynomial
         Of d variables.
     axes : sequence of Axis, length d
-        Their coordinates and scatter; m of them have designs.
+        Their coordinates and scatter; m of them, one or more, have designs.
     measures : list of Measure, length d, optional
         Of the scatter, in the place of the whole of each axis.
 
@@ -71,13 +71,11 @@ class SparseMoments:
             indices = step.result
         first = np.lexsort(indices.T[::-1])
         self._order, self.indices = first, indices[first]
-        largest = max([step.size for step in self._steps], default=1)
+        largest = max(step.size for step in self._steps)
         self._at_once = max(1, _AT_ONCE // (largest * coefficients.shape[1]))
 
     def expansion(self, designs: Array) -> Array:
         """Return the coefficients around designs of shape (n, m), shape (n, r, q)."""
-        if not self.designed:
-            return np.repeat(self._coefficients[..., self._order], len(designs), axis=0)
         parts = [self._stages(designs[block])[-1] for block in self._blocks(len(designs))]
         return np.concatenate(parts)[..., self._order]
 
