@@ -67,8 +67,9 @@ def robust_problem(
     designs : mapping of str to Design
         Design variables with their bounds and scatter.
     noise : mapping, optional
-        From a name to its distribution (of `chaospy`, or a frozen one of `scipy.stats`), or from a
-        tuple of names to a joint one of `chaospy`. Together with the designs at most 20 inputs.
+        From a name to its distribution (of `chaospy`, or a frozen one of `scipy.stats`, with a
+        variance), or from a tuple of names to a joint one of `chaospy`. Together with the designs
+        at most 20 inputs.
     objectives : sequence of Statistic
         To be minimised; ``-Mean()`` is maximised.
     constraints : sequence of RobustConstraint
