@@ -57,8 +57,9 @@ def robust_problem(
 
     The simulator is called within the support of a scatter, or between its quantiles of 1e-5 where
     that is unbounded. What lies beyond counts as the surrogate goes on there, if that changes mean
-    and deviation by no more than ``accuracy``, or than four times what the values at these ends
-    would. Otherwise it is left out, and four times that is added to the error.
+    and deviation by no more than ``accuracy``. If by more, then what the values at these ends would
+    change is added to the error; and if by more than four times that, the surrogate runs away: what
+    lies beyond is left out, and four times that is added.
 
     Parameters
     ----------

@@ -34,6 +34,11 @@ An unbounded scatter has no runs beyond its quantiles of 1e-5. Moved to these, t
 as much to mean and deviation as it does for a linear response, and a third of it for exp(1.5 a) of
 a standard normal a. A polynomial of degree 18 adds some thousand times as much: it runs away there.
 """
+FAR_ERROR = 1e6
+"""How many times its error inside a polynomial may be off beyond all runs; by hand.
+
+An exact one, with an error of rounding, is exact there as well.
+"""
 BATCH = 0.04
 """Share of the set that is added at once, before all sizes are judged anew; set by hand."""
 
@@ -150,11 +155,18 @@ class _Growth:
         without, added, at_ends = (
             np.array(one(self.influence.designs)) for one in (fit.moments, whole, ended)
         )
-        allowed = TAIL_GROWTH * np.abs(at_ends - without) / self.scale
-        if np.all(np.abs(added - without) / self.scale <= np.maximum(allowed, accuracy)):
+        beyond, at_ends = (
+            np.abs(added - without) / self.scale,
+            np.abs(at_ends - without) / self.scale,
+        )
+        if np.all(beyond <= accuracy):
             return replace(fit, moments=whole)
-        of_mean, of_std = allowed.max(axis=1)
-        return replace(fit, mean_error=fit.mean_error + of_mean, std_error=fit.std_error + of_std)
+        moments, doubt = fit.moments, TAIL_GROWTH * at_ends.max(axis=1)
+        if np.all(beyond <= np.maximum(accuracy, TAIL_GROWTH * at_ends)):
+            inside = np.array([fit.mean_error, fit.std_error])
+            moments, doubt = whole, np.minimum(at_ends.max(axis=1), FAR_ERROR * inside)
+        of_mean, of_std = fit.mean_error + doubt[0], fit.std_error + doubt[1]
+        return replace(fit, moments=moments, mean_error=of_mean, std_error=of_std)
 
     def hold_out_more(self, budget: int) -> None:
         """Keep the points not used in step with the set: more of them tell errors better."""

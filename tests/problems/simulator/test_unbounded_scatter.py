@@ -77,10 +77,26 @@ def test_a_polynomial_keeps_the_moments_of_the_whole_scatter():
 
 def test_rare_values_that_carry_the_scatter_are_in_it_or_refused():
     """The factor exp(1.5 a): 6 % of its deviation lie beyond the quantiles of 1e-5."""
-    problem = made(lambda x, a: x * np.exp(1.5 * a), Design(1.0, 2.0), "a", NORMAL)
+    made_with = lambda x, a: x * np.exp(1.5 * a), Design(1.0, 2.0), "a", NORMAL
+    with pytest.raises(UntrustedSurrogate, match="standard deviation"):
+        made(*made_with, budget=60)
+    problem = made(*made_with, accuracy=0.05)
     mean = np.exp(1.125)
     std = mean * np.sqrt(np.exp(2.25) - 1.0)
     assert problem.evaluate(np.array([1.0])) == pytest.approx([mean, std], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("function", "scatter"),
+    [
+        (lambda x, a: x + np.exp(a) * np.cos(3.0 * a), scipy.stats.gumbel_r()),
+        (lambda x, a: x * np.exp(0.4 * a), scipy.stats.expon()),
+    ],
+)
+def test_a_response_that_lives_beyond_all_runs_is_refused(function, scatter):
+    """The first has no variance, of the second 22 % lie beyond the quantile of 1 - 1e-5."""
+    with pytest.raises(UntrustedSurrogate, match="standard deviation"):
+        made(function, Design(1.0, 2.0), "a", scatter, budget=100)
 
 
 @pytest.mark.parametrize("wrong", [scipy.stats.t(1), scipy.stats.t(2), chaospy.StudentT(2)])
