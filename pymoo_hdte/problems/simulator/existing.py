@@ -62,7 +62,8 @@ def Robust(
     k : float
         Standard deviations by which constraints have to hold, dimensionless.
     options : dict
-        Other arguments of `robust_problem`: accuracy, budget, noise, seed and the others.
+        Other arguments of `robust_problem`: accuracy, budget, noise, seed and the others, all but
+        ``vectorised``: problems of pymoo are.
 
     Returns
     -------
@@ -77,6 +78,10 @@ def Robust(
     """
     if not isinstance(problem, Problem):
         raise InvalidInput("problem", problem, "a Problem of pymoo")
+    if problem.vtype not in (None, float):
+        raise InvalidInput("variables of the problem", problem.vtype, "real ones")
+    if not options.pop("vectorised", True):
+        raise InvalidInput("vectorised", False, "True: problems of pymoo are")
     if problem.n_eq_constr:
         raise InvalidInput("equality constraints", problem.n_eq_constr, "0: scatter breaks them")
     names = tuple(f"x{j + 1}" for j in range(problem.n_var))

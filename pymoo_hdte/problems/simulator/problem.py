@@ -32,7 +32,7 @@ class SimulatorProblem(Problem):
 
     An ordinary vectorised `Problem` of pymoo. Ask for ``dF`` and ``dG`` in ``return_values_of`` to
     get gradients, shape (n, n_obj, n_var), exact for the surrogate, and for ``F_band`` to get the
-    estimated half-width of the error of F.
+    estimated half-width of the error of F, NaN for a `WorstCase`.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class SimulatorProblem(Problem):
         Runs of the simulator behind the surrogate, those at points it does not use among them.
     accuracy : ndarray, shape (n_obj,)
         Estimated error of each objective as a share of the scatter of its response: the median over
-        the design box. Of a `FailureProbability` it is the error itself.
+        the design box. Of a `FailureProbability` it is the error itself, of a `WorstCase` NaN.
     failed : ndarray, shape (k, d)
         Inputs in their units at which the simulator failed; the fit goes on without them.
     var_names, obj_names : tuple of str

@@ -55,6 +55,12 @@ def robust_problem(
     response are as accurate as asked for at points that it does not use. Their values and gradients
     then are exact for the surrogate, whatever the independent distributions.
 
+    The simulator is called within the support of a scatter, or between its quantiles of 1e-5 where
+    that is unbounded. What lies beyond counts as the surrogate goes on there, if that changes mean
+    and deviation by no more than ``accuracy``. If by more, then what the values at these ends would
+    change is added to the error; and if by more than four times that, the surrogate runs away: what
+    lies beyond is left out, and four times that is added.
+
     Parameters
     ----------
     simulator : callable
@@ -62,8 +68,9 @@ def robust_problem(
     designs : mapping of str to Design
         Design variables with their bounds and scatter.
     noise : mapping, optional
-        From a name to its distribution (of `chaospy`, or a frozen one of `scipy.stats`), or from a
-        tuple of names to a joint one of `chaospy`. Together with the designs at most 20 inputs.
+        From a name to its distribution (of `chaospy`, or a frozen one of `scipy.stats`, with a
+        variance), or from a tuple of names to a joint one of `chaospy`. Together with the designs
+        at most 20 inputs.
     objectives : sequence of Statistic
         To be minimised; ``-Mean()`` is maximised.
     constraints : sequence of RobustConstraint
@@ -72,7 +79,7 @@ def robust_problem(
         Largest error of mean and standard deviation, as a share of the standard deviation, above 0.
         Where that is below a tenth of its median over the designs, of this tenth.
     budget : int
-        Most runs.
+        Most points; a failing one is run up to ``tries`` times.
     positive : sequence of str, or bool
         Responses that cannot be negative; True for all. A surrogate that is so is refused.
     vectorised : bool
@@ -82,9 +89,11 @@ def robust_problem(
     at_once : int
         Least number of runs that are chosen together; the number of workers of the executor.
     tries : int
-        How often a run is made that raises or gives NaN, before it is left out.
+        How often a run is made that raises or gives NaN, before it is left out. What a vectorised
+        simulator raises is passed on.
     cache : path, optional
-        File of finished runs: with it, no run is made twice, though the process be killed.
+        File of finished runs: with it, no run is made twice, though the process be killed, but the
+        first, which tells whether the file is this simulator's.
     seed : int
         Of the points not used.
     progress : bool
@@ -103,7 +112,7 @@ def robust_problem(
         If the budget is spent and the error is still larger than asked for, a positive response
         becomes negative, or more than a fifth of the runs fail; tells where.
     SimulatorFailed
-        If all runs of a batch fail.
+        If every run so far failed.
 
     Warns
     -----
@@ -116,31 +125,26 @@ def robust_problem(
     budget = whole_number("budget", budget, least)
     _check_statistics(objectives, constraints)
     file = None if cache is None else RunFile(cache, inputs.names)
-    bar = _announce(inputs, least, budget) if progress else None
-    count = whole_number("tries", tries, 1)
-    simulate = Simulator(simulator, inputs.names, vectorised, executor, count, file, bar)
-
-    def function(cube: Array) -> Array:
-        return simulate(inputs.values(cube))
-
-    def trusted(fit: AdaptiveFit) -> bool:
-        return not negative_somewhere(inputs, fit, positive_places(positive, simulate.responses))
-
+    count, batch = whole_number("tries", tries, 1), whole_number("at_once", at_once, 1)
     random_state = np.random.default_rng(whole_number("seed", seed, 0))
-    batch = whole_number("at_once", at_once, 1)
-    fit = fit_adaptively(inputs.axes, function, accuracy, budget, random_state, trusted, batch)
-    if bar is not None:
-        bar.close()
+    bar = _announce(inputs, least, budget) if progress else tqdm(disable=True)
+    with bar:
+        simulate = Simulator(simulator, inputs.names, vectorised, executor, count, file, bar)
+        fit = fit_adaptively(
+            inputs.axes,
+            lambda cube: simulate(inputs.values(cube)),
+            accuracy,
+            budget,
+            random_state,
+            lambda fit: (
+                not negative_somewhere(inputs, fit, positive_places(positive, simulate.responses))
+            ),
+            batch,
+        )
     responses = simulate.responses
     for one in [*objectives, *(limit.statistic for limit in constraints)]:
         place_of(one, responses)
-    refusal = (
-        failing(inputs, fit)
-        or inaccurate(inputs, fit, accuracy, responses)
-        or negative_somewhere(inputs, fit, positive_places(positive, responses))
-    )
-    if refusal:
-        raise UntrustedSurrogate(*refusal)
+    _refuse_untrusted(inputs, fit, accuracy, responses, positive)
     problem = SimulatorProblem(inputs, fit, responses, objectives, constraints, fit.n_runs)
     _tell_failures(problem)
     return problem
@@ -149,6 +153,22 @@ def robust_problem(
 def least_runs(inputs: Inputs) -> int:
     """Return the number of runs below which no surrogate is made."""
     return 2 * HELD_OUT_DESIGNS + 1 + len(inputs.axes)
+
+
+def _refuse_untrusted(
+    inputs: Inputs,
+    fit: AdaptiveFit,
+    accuracy: float,
+    responses: tuple[str, ...],
+    positive: Sequence[str] | bool,
+) -> None:
+    refusal = (
+        failing(inputs, fit)
+        or inaccurate(inputs, fit, accuracy, responses)
+        or negative_somewhere(inputs, fit, positive_places(positive, responses))
+    )
+    if refusal:
+        raise UntrustedSurrogate(*refusal)
 
 
 def _announce(inputs: Inputs, least: int, budget: int) -> tqdm:

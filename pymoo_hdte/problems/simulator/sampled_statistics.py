@@ -8,10 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput, real_number
-from pymoo_hdte.problems.simulator.around import Around
+from pymoo_hdte.problems.simulator.around import PARTS, SAMPLES, Around
 from pymoo_hdte.problems.simulator.statistics import Statistic, reach_of
 
 Array = NDArray[np.float64]
+
+FEWEST = 10
+"""Samples that have to lie beyond a quantile or a limit: ten have an error of a third."""
+RESOLVED = FEWEST / SAMPLES
+"""Smallest probability that the samples tell."""
+STUDENT = 3.182
+"""Standard errors of a mean of four parts within which it lies with 95 %: Student's t(3).
+
+The size of the standard error itself is taken from these four; 2 would cover some 86 %.
+"""
+NONE_OF = 3.0
+"""Events of a probability p are none in n draws with 5 % where n p = -ln 0.05 = 3.0."""
+
+
+def _resolved(field: str, given: float, lowest: float, highest: float) -> float:
+    share = real_number(field, given)
+    if not lowest <= share <= highest:
+        allowed = f"{lowest:.4g} to {highest:.4g}: {SAMPLES} samples tell nothing beyond"
+        raise InvalidInput(field, share, allowed)
+    return share
 
 
 @dataclass(frozen=True)
@@ -21,7 +41,7 @@ class Quantile(Statistic):
     Parameters
     ----------
     p : float
-        Probability, above 0 and below 1.
+        Probability, at least 10/4096 from 0 and from 1: there are 4096 samples.
     response : str or None
         Name of the response; None for the only one.
     sign : float
@@ -36,7 +56,7 @@ class Quantile(Statistic):
     p: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "p", real_number("p", self.p, above=0.0, below=1.0))
+        object.__setattr__(self, "p", _resolved("p", self.p, RESOLVED, 1.0 - RESOLVED))
 
     def _of(self, around: Around) -> tuple[Array, Array]:
         values, basis = around.samples
@@ -61,7 +81,8 @@ class CVaR(Statistic):
     Parameters
     ----------
     p : float
-        Probability of the values that are left out, above 0 and below 1.
+        Probability of the values that are left out, above 0 and at most 1 - 10/4096: there are
+        4096 samples.
     response : str or None
         Name of the response; None for the only one.
     sign : float
@@ -76,7 +97,8 @@ class CVaR(Statistic):
     p: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "p", real_number("p", self.p, above=0.0, below=1.0))
+        real_number("p", self.p, above=0.0)
+        object.__setattr__(self, "p", _resolved("p", self.p, 0.0, 1.0 - RESOLVED))
 
     def _of(self, around: Around) -> tuple[Array, Array]:
         values, basis = around.samples
@@ -87,7 +109,9 @@ class CVaR(Statistic):
         weights[-1] = count - whole
         weights /= count
         largest = np.take_along_axis(values, order, axis=1)
-        return largest @ weights, np.einsum("nkq,k->nq", basis[order], weights)
+        share = np.zeros_like(values)
+        np.put_along_axis(share, order, np.broadcast_to(weights, order.shape), axis=1)
+        return largest @ weights, share @ basis
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
         return _sampled_error(self, mean_error, std_error, around)
@@ -96,6 +120,8 @@ class CVaR(Statistic):
 @dataclass(frozen=True)
 class FailureProbability(Statistic):
     """The probability that a response is above, or below, a limit; sampled, without a gradient.
+
+    From 4096 samples: as a constraint its bound is at least 10/4096 from 0 and from 1.
 
     Parameters
     ----------
@@ -125,6 +151,9 @@ class FailureProbability(Statistic):
     def _of(self, around: Around) -> tuple[Array, Array]:
         return self._share(around, np.zeros(len(around.mean))), np.zeros((0, 0))
 
+    def _bound(self, bound: float) -> float:
+        return _resolved("bound of a probability", bound, RESOLVED, 1.0 - RESOLVED)
+
     @property
     def has_gradient(self) -> bool:
         """False: the share of a sample jumps."""
@@ -147,7 +176,7 @@ class FailureProbability(Statistic):
         ends = [self._share(around, side * shift) for side in (-1.0, 1.0)]
         found = self._share(around, 0.0 * shift)
         count = len(around.samples[1])
-        sampling = 2.0 * np.sqrt(np.maximum(found * (1.0 - found), 1.0 / count) / count)
+        sampling = np.maximum(2.0 * np.sqrt(found * (1.0 - found) / count), NONE_OF / count)
         return np.max(np.abs(np.array(ends) - found), axis=0) + sampling
 
 
@@ -157,5 +186,5 @@ def _sampled_error(
     """Return the error by that of the surrogate and by the spread of four parts of the sample."""
     value = statistic.value(around)[0]
     parts = np.array([statistic.value(part)[0] for part in around.quarters()])
-    sampling = 2.0 * parts.std(axis=0, ddof=1) / np.sqrt(len(parts))
+    sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
     return mean_error + reach_of(value, around) * std_error + sampling

@@ -38,10 +38,13 @@ class Statistic:
         return replace(self, sign=-self.sign)
 
     def __le__(self, bound: float) -> RobustConstraint:
-        return RobustConstraint(self, real_number("bound", bound), 1.0)
+        return RobustConstraint(self, self._bound(bound), 1.0)
 
     def __ge__(self, bound: float) -> RobustConstraint:
-        return RobustConstraint(self, real_number("bound", bound), -1.0)
+        return RobustConstraint(self, self._bound(bound), -1.0)
+
+    def _bound(self, bound: float) -> float:
+        return real_number("bound", bound)
 
     @property
     def name(self) -> str:
@@ -77,7 +80,7 @@ class Statistic:
         return self._of(around)
 
     def half_width(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        """Return the half-width of its error band, shape (n,), in its unit.
+        """Return the half-width of its error band, shape (n,), in its unit; NaN if it has none.
 
         Parameters
         ----------
@@ -188,7 +191,9 @@ class MeanPlusStd(Statistic):
 class WorstCase(Statistic):
     """The largest value of a response in the box of the scatter around the design.
 
-    That box is the support of the scatter, or its quantiles of 1e-5 where that is unbounded.
+    That box is the support of the scatter, or its quantiles of 1e-5 where that is unbounded. The
+    value is found by a search along one input after the other, so it is a lower estimate. It has no
+    error band (NaN): errors are measured at draws of the scatter, hardly one of them in a corner.
 
     Parameters
     ----------
@@ -214,7 +219,7 @@ class WorstCase(Statistic):
         return around.extreme(1.0 if self.side == "largest" else -1.0)
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return mean_error + reach_of(self._of(around)[0], around) * std_error
+        return np.full_like(mean_error, np.nan)
 
 
 def reach_of(values: Array, around: Around) -> Array:

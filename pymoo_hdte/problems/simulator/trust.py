@@ -27,12 +27,11 @@ Refusal = tuple[str, float, str, dict[str, tuple[float, float]]]
 
 def failing(inputs: Inputs, fit: AdaptiveFit) -> Refusal | None:
     """Return where the simulator fails, if it does so too often to leave the runs out, or None."""
-    bad = np.isnan(fit.held_out_error).any(axis=1)
-    if bad.mean() <= MOST_FAILED:
+    share = len(fit.failed) / fit.n_runs
+    if share <= MOST_FAILED:
         return None
-    points = inputs.values(fit.held_out_points[bad])
-    region = region_of(inputs.names, points, reach(inputs))
-    return "share of runs that failed", float(bad.mean()), f"at most {MOST_FAILED:g}", region
+    region = region_of(inputs.names, inputs.values(fit.failed), reach(inputs))
+    return "share of runs that failed", share, f"at most {MOST_FAILED:g}", region
 
 
 def inaccurate(

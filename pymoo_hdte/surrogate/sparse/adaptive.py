@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,15 +20,27 @@ Array = NDArray[np.float64]
 HELD_OUT_DESIGNS = 16
 """Designs with two points each at which the error is measured."""
 HELD_OUT_SHARE = 0.2
-"""Share of the runs at which that number is doubled."""
+"""Share of the runs at which that number is doubled; set by hand."""
 JUDGED_DESIGNS = 32
 """Designs at which the size of a surplus is judged."""
 SMALLEST_SCATTER = 0.1
-"""Scatter below this share of its median over the designs is judged as if it were that."""
+"""Scatter below this share of its median over the designs is judged as if it were that; by hand."""
 SCATTER_OF_RANGE = 1e-4
 """The same, as a share of the response's deviation over all points."""
+TAIL_GROWTH = 4.0
+"""How many times what it adds at its end values the scatter beyond all runs may add; by hand.
+
+An unbounded scatter has no runs beyond its quantiles of 1e-5. Moved to these, that part adds about
+as much to mean and deviation as it does for a linear response, and a third of it for exp(1.5 a) of
+a standard normal a. A polynomial of degree 18 adds some thousand times as much: it runs away there.
+"""
+FAR_ERROR = 1e6
+"""How many times its error inside a polynomial may be off beyond all runs; by hand.
+
+An exact one, with an error of rounding, is exact there as well.
+"""
 BATCH = 0.04
-"""Share of the set that is added at once, before all sizes are judged anew."""
+"""Share of the set that is added at once, before all sizes are judged anew; set by hand."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +76,11 @@ class AdaptiveFit:
     failed: Array
     held_out_points: Array
     held_out_error: Array
+
+    @property
+    def largest_error(self) -> float:
+        """Of mean and standard deviation of all responses, as a share of the scatter."""
+        return float(max(self.mean_error.max(), self.std_error.max()))
 
 
 class _Growth:
@@ -102,7 +119,9 @@ class _Growth:
         """Measure the surrogate as it stands."""
         self.grown.complete()
         polynomial = self.grown.polynomial()
-        moments = SparseMoments(polynomial, self.axes)
+        # Where there are no runs the polynomial runs away: its error would hide behind a scatter
+        # that is not there.
+        moments = SparseMoments(polynomial, self.axes, [axis.cut for axis in self.axes])
         _, judged = moments(self.influence.designs)
         spread = np.nanstd(self.truth, axis=0)
         least = np.maximum(SMALLEST_SCATTER * np.median(judged, axis=0), SCATTER_OF_RANGE * spread)
@@ -126,6 +145,28 @@ class _Growth:
             self.held_out.points,
             left / np.tile(scale, (2, 1)),
         )
+
+    def with_tails(self, fit: AdaptiveFit, accuracy: float) -> AdaptiveFit:
+        """Return the fit with the scatter beyond all runs, or with the error of leaving it out."""
+        if all(len(axis.cut.nodes) == len(axis.measure.nodes) for axis in self.axes):
+            return fit
+        whole = SparseMoments(fit.polynomial, self.axes)
+        ended = SparseMoments(fit.polynomial, self.axes, [axis.ended for axis in self.axes])
+        without, added, at_ends = (
+            np.array(one(self.influence.designs)) for one in (fit.moments, whole, ended)
+        )
+        beyond, at_ends = (
+            np.abs(added - without) / self.scale,
+            np.abs(at_ends - without) / self.scale,
+        )
+        if np.all(beyond <= accuracy):
+            return replace(fit, moments=whole)
+        moments, doubt = fit.moments, TAIL_GROWTH * at_ends.max(axis=1)
+        if np.all(beyond <= np.maximum(accuracy, TAIL_GROWTH * at_ends)):
+            inside = np.array([fit.mean_error, fit.std_error])
+            moments, doubt = whole, np.minimum(at_ends.max(axis=1), FAR_ERROR * inside)
+        of_mean, of_std = fit.mean_error + doubt[0], fit.std_error + doubt[1]
+        return replace(fit, moments=moments, mean_error=of_mean, std_error=of_std)
 
     def hold_out_more(self, budget: int) -> None:
         """Keep the points not used in step with the set: more of them tell errors better."""
@@ -186,9 +227,10 @@ def fit_adaptively(
     growth.grow(growth.grown.candidates())
     while True:
         fit = growth.judge()
-        accurate = max(fit.mean_error.max(), fit.std_error.max()) <= accuracy
-        if accurate and acceptable(fit):
-            return fit
+        if fit.largest_error <= accuracy:
+            fit = growth.with_tails(fit, accuracy)
+            if fit.largest_error <= accuracy and acceptable(fit):
+                return fit
         growth.hold_out_more(budget)
         batch = max(at_once, int(BATCH * len(growth.grown.members)))
         wanted = growth.next_indices(min(batch, budget - growth.n_runs))

@@ -24,9 +24,9 @@ TAIL = 1e-5
 LONGEST_TAIL = 4.0
 """Distance from the median to the 1 - 1e-9 quantile over that to the 1 - 1e-3 quantile.
 
-1.9 for a normal, 3.2 for an exponential distribution. Where it is larger (log-normal with a large
-deviation, Student's t), polynomials of the variable itself have huge moments; its coordinate then
-is the standard normal variable of the same probability.
+1.9 for a normal, 3.2 for an exponential distribution; set by hand. Where it is larger (log-normal
+with a large deviation, Student's t), polynomials of the variable itself have huge moments; its
+coordinate then is the standard normal variable of the same probability.
 """
 START = 0.15
 """First point as a share of the interval, off its centre: many functions are even or odd there."""
@@ -55,6 +55,10 @@ class Scatter:
     ----------
     lower, upper : float
         Interval: the support, or the quantiles of `TAIL` where that goes on for long.
+    cut : Measure
+        The measure inside that interval, where there are runs.
+    ended : Measure
+        The measure with all that lies beyond the interval moved to its ends.
     """
 
     def __init__(self, distribution: Distribution, measure: Measure) -> None:
@@ -67,6 +71,7 @@ class Scatter:
             self.lower = tail_low
         if self.upper - middle > 2.0 * (high - middle):
             self.upper = tail_high
+        self.cut, self.ended = measure.inside(self.lower, self.upper)
 
     @property
     def is_heavy(self) -> bool:
@@ -107,8 +112,8 @@ class Axis:
     ----------
     points : ndarray, shape (61,)
         Nested points in -1..1.
-    measure : Measure
-        Of s, a single node where nothing scatters.
+    measure, cut, ended : Measure
+        Of s, a single node where nothing scatters: the whole, and those of `Scatter`.
     """
 
     def __init__(
@@ -124,9 +129,11 @@ class Axis:
         self.scatter, self.design = scatter, design
         self.relative, self.logarithmic = relative, logarithmic
         self._from_normal = from_normal
-        self.measure = scatter.measure if scatter else Measure(np.zeros(1), np.ones(1))
+        fixed = Measure(np.zeros(1), np.ones(1))
+        measures = [scatter.measure, scatter.cut, scatter.ended] if scatter else [fixed] * 3
         if logarithmic:
-            self.measure = Measure(np.log1p(self.measure.nodes), self.measure.weights)
+            measures = [Measure(np.log1p(one.nodes), one.weights) for one in measures]
+        self.measure, self.cut, self.ended = measures
         low, high = self._ends()
         self.centre, self.half_width = 0.5 * (low + high), 0.5 * (high - low)
         self.points = self._nested_points()
@@ -135,12 +142,6 @@ class Axis:
     def designed(self) -> bool:
         """Whether the variable has a design."""
         return self.design is not None
-
-    @property
-    def reach(self) -> tuple[float, float]:
-        """Smallest and largest value at which the function will be called, in its unit."""
-        low, high = self.physical(np.array([-1.0, 1.0])).tolist()
-        return low, high
 
     def _ends(self) -> tuple[float, float]:
         """Return the ends of the coordinate before it is brought to -1..1."""
@@ -190,10 +191,14 @@ class Axis:
         return offset, slope, slope, zero
 
     def sample(self, p: Array) -> Array:
-        """Return values of s below which these shares of its probability lie, same shape."""
+        """Return values of s below which these shares of its probability lie, same shape.
+
+        Those beyond the interval for nodes are moved to its ends.
+        """
         if self.scatter is None:
             return np.zeros_like(p)
         values = self.scatter.distribution.quantile(p)
+        values = np.clip(values, self.scatter.lower, self.scatter.upper)
         return np.log1p(values) if self.logarithmic else values
 
     @property

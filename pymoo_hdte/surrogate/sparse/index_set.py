@@ -49,11 +49,6 @@ class AxisMap:
         return self._source.shape[1]
 
     @property
-    def rows(self) -> int:
-        """Number of rows of the matrix."""
-        return self._target.shape[1]
-
-    @property
     def size(self) -> int:
         """Numbers in the largest array for one matrix and one set of coefficients."""
         return self._source.size

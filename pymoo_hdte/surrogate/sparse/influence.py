@@ -14,9 +14,9 @@ from pymoo_hdte.surrogate.sparse.measures import OrthonormalPolynomials
 Array = NDArray[np.float64]
 
 FIRST_DECAY = 0.5
-"""Guess of the ratio of an axis's second surplus to its first, before both are known."""
+"""Guess of the ratio of an axis's second surplus to its first, before both are known; by hand."""
 BLIND_DECAY = 0.3
-"""Factor for each degree of an index by which unexplained errors are ascribed to candidates."""
+"""Factor for each degree of an index by which unexplained errors go to candidates; set by hand."""
 
 
 class Influence:
@@ -35,7 +35,7 @@ class Influence:
         for axis in axes:
             own = designs[:, column] if axis.designed else None
             column += axis.designed
-            rule = OrthonormalPolynomials(axis.measure, HIGHEST_DEGREE)
+            rule = OrthonormalPolynomials(axis.cut, HIGHEST_DEGREE)
             offset, factor, _, _ = axis.around(own)
             z = offset[:, None] + factor[:, None] * rule.nodes
             self._squares.append(hierarchical_basis(axis.points, z) ** 2 @ rule.weights)

@@ -29,13 +29,13 @@ def leja_points(
     size : int
         Number of points.
     """
-    grid = np.linspace(-1.0, 1.0, _GRID)
+    places = grid()
     with np.errstate(divide="ignore"):
         merit = np.log(weight)
         points = [start]
         for _ in range(size - 1):
-            merit = merit + np.log(np.abs(grid - points[-1]))
-            points.append(float(grid[np.argmax(merit)]))
+            merit = merit + np.log(np.abs(places - points[-1]))
+            points.append(float(places[np.argmax(merit)]))
     return np.array(points)
 
 

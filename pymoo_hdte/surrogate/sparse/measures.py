@@ -28,7 +28,11 @@ _CONTRADICTION = 1e-4
 """Largest difference from 1 of what the density integrates to; Trunc of chaospy has 2e-6."""
 _SHORTEST_PANEL = 1e-11
 """As a share of the support; nearer to an end of it nodes would be rounded onto the end."""
-_FIRST_QUANTILES = (1e-12, 1e-6, 1e-3, 0.1, 0.5, 0.9, 1.0 - 1e-3, 1.0 - 1e-6, 1.0 - 1e-12)
+_NO_VARIANCE = 0.499
+"""Exponent of the quantiles of a tail above which it has no variance: 1/2, less rounding."""
+_SHORTENS = 0.95
+"""Ratio of two such exponents, three decades apart, below which a tail shortens; set by hand."""
+_FIRST_QUANTILES = (1e-12, 1e-6, 1e-5, 1e-3, 0.1)
 
 
 class Distribution:
@@ -49,7 +53,7 @@ class Distribution:
     Raises
     ------
     InvalidInput
-        If it is none of these, discrete, of several variables or not finite.
+        If it is none of these, discrete, of several variables, not finite or without a variance.
     """
 
     def __init__(self, field: str, given: Any) -> None:
@@ -71,6 +75,22 @@ class Distribution:
         )
         if not (np.isfinite([self.lower, self.upper]).all() and self.lower < self.upper):
             raise InvalidInput(field, given, allowed + " with a finite, positive scatter")
+        if self._has_no_variance():
+            raise InvalidInput(field, given, allowed + " with a finite variance")
+
+    def _has_no_variance(self) -> bool:
+        """Whether a tail falls so slowly that squares have no mean, as Student's t(2).
+
+        A tail of the power -k has quantiles in proportion to p^(-1/k); k has to be above 2. That of
+        a log-normal becomes ever shorter. The libraries' own variances are wrong for some.
+        """
+        p = np.array([1e-6, 1e-9, 1e-12])
+        middle = self.quantile(0.5)
+        for far in (middle - self.quantile(p), self.quantile(1.0 - p) - middle):
+            early, late = np.diff(np.log(np.maximum(far, 1e-300))) / np.log(1e3)
+            if late > _NO_VARIANCE and late > _SHORTENS * early:
+                return True
+        return False
 
     def quantile(self, p: ArrayLike) -> NDArray[np.float64]:
         """Return the values below which these shares of the probability lie, same shape."""
@@ -113,7 +133,8 @@ class Measure:
         InvalidInput
             If the density does not integrate to 1.
         """
-        inner = distribution.quantile(_FIRST_QUANTILES)
+        below = np.array(_FIRST_QUANTILES)
+        inner = distribution.quantile([*below, 0.5, *(1.0 - below)])
         edges = np.unique([distribution.lower, *inner, distribution.upper])
         panels = list(pairwise(edges.tolist()))
         shortest = _SHORTEST_PANEL * (distribution.upper - distribution.lower)
@@ -143,6 +164,16 @@ class Measure:
     def std(self) -> float:
         """The standard deviation, in the variable's unit."""
         return float(np.sqrt(self.weights @ (self.nodes - self.mean) ** 2))
+
+    def inside(self, lower: float, upper: float) -> tuple[Measure, Measure]:
+        """Return what lies in an interval, and the whole with all beyond moved to the ends."""
+        below, above = self.nodes < lower, self.nodes > upper
+        kept = ~(below | above)
+        nodes, weights = self.nodes[kept], self.weights[kept]
+        beyond = [self.weights[below].sum()], [self.weights[above].sum()]
+        ended = np.concatenate([[lower], nodes, [upper]])
+        cut = Measure(nodes, weights / weights.sum())
+        return cut, Measure(ended, np.concatenate([beyond[0], weights, beyond[1]]))
 
 
 class OrthonormalPolynomials:

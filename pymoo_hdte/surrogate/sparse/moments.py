@@ -14,10 +14,9 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder
 from numpy.typing import NDArray
 
-from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
-from pymoo_hdte.surrogate.sparse.measures import OrthonormalPolynomials
+from pymoo_hdte.surrogate.sparse.measures import Measure, OrthonormalPolynomials
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
 
@@ -35,7 +34,9 @@ class SparseMoments:
     polynomial : SparsePolynomial
         Of d variables.
     axes : sequence of Axis, length d
-        Their coordinates and scatter; m of them have designs.
+        Their coordinates and scatter; m of them, one or more, have designs.
+    measures : list of Measure, length d, optional
+        Of the scatter, in the place of the whole of each axis.
 
     Attributes
     ----------
@@ -45,12 +46,18 @@ class SparseMoments:
         Of the scatter of each variable.
     """
 
-    def __init__(self, polynomial: SparsePolynomial, axes: list[Axis]) -> None:
+    def __init__(
+        self,
+        polynomial: SparsePolynomial,
+        axes: list[Axis],
+        measures: list[Measure] | None = None,
+    ) -> None:
         self.axes = axes
+        measures = [axis.measure for axis in axes] if measures is None else measures
         self.designed = [j for j, axis in enumerate(axes) if axis.designed]
         self.orthonormal = [
-            OrthonormalPolynomials(axis.measure, degree)
-            for axis, degree in zip(axes, polynomial.degrees, strict=True)
+            OrthonormalPolynomials(measure, degree)
+            for measure, degree in zip(measures, polynomial.degrees, strict=True)
         ]
         indices, coefficients = polynomial.indices, polynomial.coefficients[None]
         for j in (j for j, axis in enumerate(axes) if not axis.designed):
@@ -64,13 +71,11 @@ class SparseMoments:
             indices = step.result
         first = np.lexsort(indices.T[::-1])
         self._order, self.indices = first, indices[first]
-        largest = max([step.size for step in self._steps], default=1)
+        largest = max(step.size for step in self._steps)
         self._at_once = max(1, _AT_ONCE // (largest * coefficients.shape[1]))
 
     def expansion(self, designs: Array) -> Array:
         """Return the coefficients around designs of shape (n, m), shape (n, r, q)."""
-        if not self.designed:
-            return np.repeat(self._coefficients[..., self._order], len(designs), axis=0)
         parts = [self._stages(designs[block])[-1] for block in self._blocks(len(designs))]
         return np.concatenate(parts)[..., self._order]
 
@@ -78,17 +83,6 @@ class SparseMoments:
         """Return mean and standard deviation, shape (n, r) each, in the responses' units."""
         expansion = self.expansion(designs)
         return expansion[..., 0], deviation(expansion)
-
-    def gradient(self, designs: Array) -> tuple[Array, Array]:
-        """Return the gradients of mean and deviation, shape (n, r, m) each.
-
-        That of a deviation of zero is given as zero.
-        """
-        expansion = self.expansion(designs)
-        first, others = np.zeros_like(expansion), expansion.copy()
-        first[..., 0], others[..., 0] = 1.0, 0.0
-        others = divide_or_zero(others, deviation(expansion)[..., None])
-        return self.pulled_back(designs, first), self.pulled_back(designs, others)
 
     def pulled_back(self, designs: Array, weights: Array) -> Array:
         """Return the gradient in the design of sums over the expansion, shape (n, r, m).

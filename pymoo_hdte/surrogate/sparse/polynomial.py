@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebder
 from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
@@ -76,13 +75,3 @@ class SparsePolynomial:
             if degree:
                 product *= chebyshev_basis(x[axis], degree + 1).T[:, self.indices[:, axis]]
         return product
-
-    def derivative(self, axis: int) -> SparsePolynomial:
-        """Return the derivative in one variable of the cube, on the same set."""
-        size = self.degrees[axis] + 1
-        matrix = np.zeros((size, size))
-        if size > 1:
-            matrix[:-1] = chebder(np.eye(size))
-        step = AxisMap(self.indices, axis, size)
-        coefficients = step.forward(self.coefficients[None], matrix[None])
-        return SparsePolynomial(self.indices, coefficients[0])

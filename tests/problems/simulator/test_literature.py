@@ -1,4 +1,8 @@
-"""Functions of the literature of uncertainty: moments against closed forms and large samples."""
+"""Functions of the literature of uncertainty: moments against closed forms and large samples.
+
+`COVERAGE` and `INWARD`, two constants of the growth, were chosen on cantilever, OTL circuit,
+borehole, wing weight, Ishigami's function and piston; the spill was not among them.
+"""
 
 import chaospy
 import numpy as np
@@ -90,3 +94,43 @@ def test_borehole_in_eight_inputs_at_random_designs():
     assert np.mean(error <= problem.band(X) + 1e-3 * truth[:, 1:]) >= 0.95
     assert np.all(error < 0.015 * truth[:, 1:])
     assert problem.n_runs < 150
+
+
+SPILL = {
+    "M": chaospy.Uniform(7.0, 13.0),
+    "D": chaospy.Uniform(0.02, 0.12),
+    "L": chaospy.Uniform(0.01, 3.0),
+    "tau": chaospy.Uniform(30.01, 30.295),
+}
+
+
+def spill(s, t, M, D, L, tau):
+    """Return sqrt(4 pi) times the concentration of two spills in a channel at s and t.
+
+    Bliznyuk et al., Journal of Computational and Graphical Statistics 17, 2008: of mass M each, the
+    second one at L and tau; D is the rate of diffusion. In no stated units.
+    """
+    later = t - tau
+    first = M / np.sqrt(D * t) * np.exp(-(s**2) / (4.0 * D * t))
+    return first + M / np.sqrt(D * later) * np.exp(-((s - L) ** 2) / (4.0 * D * later))
+
+
+def test_a_spill_on_which_nothing_was_chosen():
+    """It shows an estimate that is too large: 10 % after 1108 runs, where the true error is 0.4 %.
+
+    With an accuracy of 1 % it is refused after 1000 runs.
+    """
+    designs = {"s": Design(1.0, 2.0, deviation=0.05), "t": Design(45.0, 60.0, deviation=0.5)}
+    settings = {"accuracy": 0.1, "budget": 1500, "vectorised": True, "progress": False}
+    problem = robust_problem(spill, designs, SPILL, **settings)
+    shares = qmc.Sobol(6, rng=1).random(2**14).T
+    noise = {
+        name: one.inv(share) for (name, one), share in zip(SPILL.items(), shares, strict=False)
+    }
+    X = np.random.default_rng(2).uniform(problem.xl, problem.xu, (40, 2))
+    place, time = 0.05 * (2.0 * shares[4] - 1.0), 0.5 * (2.0 * shares[5] - 1.0)
+    left = np.array([spill(s + place, t + time, **noise) for s, t in X])
+    truth = np.column_stack([left.mean(axis=1), left.std(axis=1)])
+    error = np.abs(problem.evaluate(X) - truth)
+    assert np.all(np.mean(error <= problem.band(X) + 1e-3 * truth[:, 1:], axis=0) >= 0.95)
+    assert np.all(error < 0.01 * truth[:, 1:])

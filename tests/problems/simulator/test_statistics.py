@@ -17,6 +17,7 @@ from pymoo_hdte.problems import (
     WorstCase,
     robust_problem,
 )
+from pymoo_hdte.problems.simulator.around import SAMPLES, Around, CommonSamples
 
 LIMIT = 3.5
 ASKED = (
@@ -56,7 +57,38 @@ def test_statistics_of_a_normal_response_are_closed_forms(problem):
     assert F[:, [5, 6]] == pytest.approx(truth[:, [5, 6]], rel=1e-6)
     assert np.all(np.abs(F - truth)[:, 3:5] < 0.02 * std[:, None])
     assert np.all(np.abs(F - truth)[:, 7:] < 0.01)
-    assert np.mean(np.abs(F - truth)[:, 3:] <= band[:, 3:] + 1e-9) > 0.9
+    assert np.all(np.abs(F - truth)[:, :3] <= band[:, :3] + 1e-9)
+    assert np.isnan(band[:, 5:7]).all()
+
+
+@pytest.mark.parametrize(
+    ("statistic", "reach"),
+    [
+        (Quantile(0.9), norm.ppf(0.9)),
+        (Quantile(0.05), norm.ppf(0.05)),
+        (CVaR(0.9), norm.pdf(norm.ppf(0.9)) / 0.1),
+        (FailureProbability(above=LIMIT), None),
+    ],
+)
+def test_the_band_of_a_sampled_statistic_covers_it_for_most_seeds(problem, statistic, reach):
+    x = np.array([2.5, 3.2])
+    std = 0.1 * np.hypot(x, 1.0)
+    truth = norm.sf((LIMIT - x) / std) if reach is None else x + reach * std
+    moments = problem._fit.moments
+    covered = []
+    for seed in range(120):
+        around = Around(CommonSamples(moments, seed), moments.expansion(x[:, None])[:, 0])
+        band = statistic.half_width(np.zeros(2), np.zeros(2), around)
+        covered.append(np.abs(statistic.value(around)[0] - truth) <= band)
+    assert np.all(np.mean(covered, axis=0) >= 0.9)
+
+
+def test_no_failure_in_all_samples_is_stated_as_three_in_their_number(problem):
+    moments = problem._fit.moments
+    around = Around(CommonSamples(moments, 1), moments.expansion(np.array([[2.0]]))[:, 0])
+    one = FailureProbability(above=1e3)
+    assert one.value(around)[0] == 0.0
+    assert one.half_width(np.zeros(1), np.zeros(1), around) == pytest.approx(3.0 / SAMPLES)
 
 
 def test_gradients_of_statistics_equal_differences():
@@ -103,6 +135,11 @@ def test_a_probability_has_no_gradient(problem):
         lambda: FailureProbability(above=1.0, below=0.0),
         lambda: MeanPlusStd(np.nan),
         lambda: Mean() <= None,
+        lambda: Quantile(0.999),
+        lambda: Quantile(0.001),
+        lambda: CVaR(0.999),
+        lambda: FailureProbability(above=1.0) <= 1e-3,
+        lambda: FailureProbability(above=1.0) >= 0.999,
     ],
 )
 def test_a_statistic_that_makes_no_sense_is_refused(wrong):

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import Design
 from pymoo_hdte.problems.simulator.inputs import Inputs
-from pymoo_hdte.surrogate.sparse.held_out import draw_designs
 from pymoo_hdte.surrogate.sparse.interpolation import GrowingInterpolation
 from pymoo_hdte.surrogate.sparse.measures import Distribution, Measure, OrthonormalPolynomials
 from pymoo_hdte.surrogate.sparse.moments import SparseMoments
@@ -120,19 +119,6 @@ def test_the_moments_agree_with_chaospy():
     values = polynomial(cube)[:, 0]
     assert mean[0, 0] == pytest.approx(weights @ values, rel=1e-10)
     assert std[0, 0] ** 2 == pytest.approx(weights @ (values - mean[0, 0]) ** 2, rel=1e-9)
-
-
-def test_gradients_equal_differences():
-    given_ = inputs()
-    moments = SparseMoments(interpolant(smooth, SET, given_).polynomial(), given_.axes)
-    designs = 0.02 + 0.96 * draw_designs(given_.axes, 5, np.random.default_rng(2))
-    slopes = moments.gradient(designs)
-    for j in range(3):
-        step = 1e-5 * np.eye(3)[j]
-        for slope, up, down in zip(
-            slopes, moments(designs + step), moments(designs - step), strict=True
-        ):
-            assert slope[..., j] == pytest.approx((up - down) / 2e-5, rel=1e-5, abs=1e-8)
 
 
 def test_the_interpolant_meets_the_function_and_its_order_of_inputs_does_not_matter():

@@ -1,0 +1,149 @@
+"""Runs of a simulator: failures, resumed studies, workers, and what it may return."""
+
+import concurrent.futures
+
+import chaospy
+import numpy as np
+import pytest
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems import (
+    Design,
+    Mean,
+    SimulatorFailed,
+    UntrustedSurrogate,
+    robust_problem,
+)
+
+
+def quiet(simulator, designs, noise=None, **options):
+    return robust_problem(simulator, designs, noise, progress=False, **options)
+
+
+class Flaky:
+    """A simulator that notes its calls and fails where it is told to."""
+
+    def __init__(self, fails=lambda call, x: False):
+        self.calls, self.fails = [], fails
+
+    def __call__(self, x, a):
+        self.calls.append((x, a))
+        if self.fails(len(self.calls), x):
+            raise RuntimeError("no convergence")
+        return np.exp(x * a)
+
+
+PLAIN = {"x": Design(0.5, 1.0, deviation=0.05)}, {"a": chaospy.Uniform(0.0, 1.0)}
+
+
+def test_a_run_that_fails_once_is_made_again():
+    calm, flaky = Flaky(), Flaky(lambda call, x: call % 7 == 3)
+    X = np.array([[0.7]])
+    steady = quiet(calm, *PLAIN)
+    assert np.array_equal(quiet(flaky, *PLAIN).evaluate(X), steady.evaluate(X))
+    assert len(flaky.calls) > len(calm.calls)
+
+
+def test_runs_that_always_fail_are_left_out_and_told():
+    with pytest.warns(RuntimeWarning, match=r"runs failed and are left out: x = 0\.4"):
+        problem = quiet(Flaky(lambda call, x: x < 0.5), *PLAIN, accuracy=0.05)
+    assert len(problem.failed) > 0
+    assert np.all(problem.failed[:, 0] < 0.5)
+    mean = problem.evaluate(np.array([[0.8]]))[0, 0]
+    x = np.linspace(0.75, 0.85, 2001)
+    assert mean == pytest.approx(np.mean((np.exp(x) - 1.0) / x), rel=0.02)
+
+
+def test_a_simulator_that_never_runs_says_why():
+    with pytest.raises(SimulatorFailed, match=r"failed in all .*no convergence") as failure:
+        quiet(Flaky(lambda call, x: True), *PLAIN)
+    assert "no convergence" in str(failure.value.__cause__)
+
+
+def test_a_simulator_that_fails_in_half_of_the_box_is_refused_with_its_region():
+    with pytest.raises(UntrustedSurrogate, match=r"runs that failed is .* so where x is 0\.[45]"):
+        quiet(Flaky(lambda call, x: x < 0.72), *PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("gives", "words"),
+    [
+        (lambda x: "a", "what the simulator returns is 'a'"),
+        (lambda x: 1j * x, "what the simulator returns"),
+        (lambda x: 1e200 * x, "choose another unit"),
+        (lambda x: {"y" if x < 0.7 else "z": x}, "names of the responses"),
+    ],
+)
+def test_what_is_no_response_is_refused(gives, words):
+    with pytest.raises(InvalidInput, match=words):
+        quiet(gives, PLAIN[0])
+
+
+def test_a_killed_study_goes_on_without_a_run_made_twice(tmp_path):
+    whole = Flaky()
+    expected = quiet(whole, *PLAIN).evaluate(np.array([[0.7]]))
+    file = tmp_path / "runs.jsonl"
+
+    def killed(call, x):
+        if call == 40:
+            raise KeyboardInterrupt
+        return False
+
+    first = Flaky(killed)
+    with pytest.raises(KeyboardInterrupt):
+        quiet(first, *PLAIN, cache=file)
+    # A line that was being written when the process died.
+    file.write_text(file.read_text() + '{"at": ["0x1.', encoding="utf-8")
+    second = Flaky()
+    found = quiet(second, *PLAIN, cache=file).evaluate(np.array([[0.7]]))
+    assert np.array_equal(found, expected)
+    # The first run is made again, to see whether the file is this simulator's.
+    assert set(first.calls[:39]) & set(second.calls) == {first.calls[0]}
+    assert len(second.calls) == len(set(whole.calls)) - 38
+    third = Flaky()
+    quiet(third, *PLAIN, cache=file, objectives=[Mean(response="response")])
+    assert third.calls == first.calls[:1]
+    with pytest.raises(InvalidInput, match="runs of this simulator"):
+        quiet(lambda x, a: 1.1 * np.exp(x * a), *PLAIN, cache=file)
+    with pytest.raises(InvalidInput, match="cache"):
+        quiet(lambda x, b: x * b, PLAIN[0], {"b": chaospy.Uniform(0.0, 1.0)}, cache=file)
+
+
+@pytest.fixture(params=["threads", "dask"])
+def workers(request):
+    if request.param == "threads":
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            yield pool
+        return
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(processes=False, dashboard_address=None, n_workers=1) as client:
+        yield client
+
+
+FAILED_ONCE = set()
+
+
+def fails_once_everywhere(x, a):
+    """Fail at the first call at every seventh point; what Dask sends holds no state."""
+    if int(1e6 * x) % 7 == 3 and x not in FAILED_ONCE:
+        FAILED_ONCE.add(x)
+        raise RuntimeError("no licence")
+    return np.exp(x * a)
+
+
+def test_workers_give_the_same_and_make_failed_runs_again(workers):
+    FAILED_ONCE.clear()
+    problem = quiet(fails_once_everywhere, *PLAIN, executor=workers)
+    X = np.array([[0.7]])
+    assert np.array_equal(problem.evaluate(X), quiet(Flaky(), *PLAIN).evaluate(X))
+    assert FAILED_ONCE
+    assert not len(problem.failed)
+
+
+def test_runs_and_memory_are_told_before_the_first_run(capsys):
+    def told(x, a):
+        assert "2 inputs, 35 to 1000 runs, at most" in capsys.readouterr().err
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        robust_problem(told, *PLAIN)

@@ -1,0 +1,105 @@
+"""Scatter without bounds: moments against quadrature where polynomials run away beyond all runs."""
+
+import chaospy
+import numpy as np
+import pytest
+import scipy.stats
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems import Design, UntrustedSurrogate, robust_problem
+
+
+def amplitude(x, speed):
+    """Return that of a mount of 20 kg in um per N at a speed in rad/s; its stiffness in kN/m."""
+    return 1e6 / np.hypot(1e3 * x - 20.0 * speed**2, 300.0 * speed)
+
+
+def bell(x, a):
+    return 1.0 / (1.0 + (a - x) ** 2)
+
+
+def step(x, a):
+    return np.tanh(3.0 * (a - x))
+
+
+def made(function, design, name, scatter, **options):
+    noise = {name: scatter}
+    settings = {"vectorised": True, "progress": False} | options
+    return robust_problem(function, {"x": design}, noise, **settings)
+
+
+def true_moments(function, designs, scatter):
+    """Return mean and std by the trapezoidal rule between the quantiles of 1e-13."""
+    s = np.linspace(*scatter.ppf([1e-13, 1.0 - 1e-13]), 20_001)
+    weights = scatter.pdf(s)
+    weights /= weights.sum()
+    values = np.array([function(x, s) for x in designs])
+    mean = values @ weights
+    return np.column_stack([mean, np.sqrt((values - mean[:, None]) ** 2 @ weights)])
+
+
+NORMAL = scipy.stats.norm()
+
+
+@pytest.mark.parametrize(
+    ("function", "design", "name", "scatter", "options"),
+    [
+        (amplitude, Design(100.0, 200.0), "speed", scipy.stats.norm(80.0, 4.0), {}),
+        (bell, Design(-1.0, 1.0), "a", NORMAL, {}),
+        (step, Design(-1.0, 1.0), "a", NORMAL, {"budget": 150}),
+        (bell, Design(0.0, 1.0), "a", scipy.stats.gumbel_r(), {"budget": 150}),
+    ],
+    ids=["mount", "bell", "step", "gumbel"],
+)
+def test_what_polynomials_do_beyond_all_runs_does_not_enter_the_moments(
+    function, design, name, scatter, options
+):
+    try:
+        problem = made(function, design, name, scatter, **options)
+    except UntrustedSurrogate:
+        assert "budget" in options
+        return
+    X = np.linspace(problem.xl, problem.xu, 21)
+    truth = true_moments(function, X[:, 0], scatter)
+    assert np.all(np.abs(problem.evaluate(X) - truth) < 0.015 * truth[:, 1:])
+
+
+def test_a_design_of_unbounded_deviation_is_right_or_refused():
+    design = Design(-1.0, 1.0, deviation=NORMAL)
+    with pytest.raises(UntrustedSurrogate, match="error of the standard deviation"):
+        robust_problem(lambda x: np.tanh(3.0 * x), {"x": design}, budget=150, progress=False)
+
+
+def test_a_polynomial_keeps_the_moments_of_the_whole_scatter():
+    problem = made(lambda x, a: x * a + 0.0 * x, Design(1.0, 2.0), "a", NORMAL, accuracy=1e-6)
+    assert problem.evaluate(np.array([1.5])) == pytest.approx([0.0, 1.5], rel=1e-9, abs=1e-9)
+
+
+def test_rare_values_that_carry_the_scatter_are_in_it_or_refused():
+    """The factor exp(1.5 a): 6 % of its deviation lie beyond the quantiles of 1e-5."""
+    made_with = lambda x, a: x * np.exp(1.5 * a), Design(1.0, 2.0), "a", NORMAL
+    with pytest.raises(UntrustedSurrogate, match="standard deviation"):
+        made(*made_with, budget=60)
+    problem = made(*made_with, accuracy=0.05)
+    mean = np.exp(1.125)
+    std = mean * np.sqrt(np.exp(2.25) - 1.0)
+    assert problem.evaluate(np.array([1.0])) == pytest.approx([mean, std], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("function", "scatter"),
+    [
+        (lambda x, a: x + np.exp(a) * np.cos(3.0 * a), scipy.stats.gumbel_r()),
+        (lambda x, a: x * np.exp(0.4 * a), scipy.stats.expon()),
+    ],
+)
+def test_a_response_that_lives_beyond_all_runs_is_refused(function, scatter):
+    """The first has no variance, of the second 22 % lie beyond the quantile of 1 - 1e-5."""
+    with pytest.raises(UntrustedSurrogate, match="standard deviation"):
+        made(function, Design(1.0, 2.0), "a", scatter, budget=100)
+
+
+@pytest.mark.parametrize("wrong", [scipy.stats.t(1), scipy.stats.t(2), chaospy.StudentT(2)])
+def test_scatter_without_a_variance_is_refused_by_name(wrong):
+    with pytest.raises(InvalidInput, match=r"noise\['a'\].*finite variance"):
+        made(bell, Design(0.0, 1.0), "a", wrong, budget=60)
