@@ -6,6 +6,7 @@ An effect that explains only one part of the data must not count as the cause of
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -164,15 +165,27 @@ def contains(one: Hypothesis, other: Hypothesis) -> bool:
     """
     if len(one.candidates) != len(other.candidates):
         return False
-    same = one.names & other.names
+    shared = Counter(_places(one)) & Counter(_places(other))
     pairs = zip(
-        *(
-            sorted((c for c in each.candidates if (c.name, c.port) not in same), key=_port)
-            for each in (one, other)
-        ),
+        *(sorted(_beyond(each, shared), key=_port) for each in (one, other)),
         strict=True,
     )
     return all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
+
+
+def _places(one: Hypothesis) -> list[tuple[str, str]]:
+    return [(each.name, each.port) for each in one.candidates]
+
+
+def _beyond(one: Hypothesis, shared: Counter[tuple[str, str]]) -> list[Candidate]:
+    """Return the effects of a set beyond those that are shared; a set may have one name twice."""
+    left, rest = Counter(shared), []
+    for place, each in zip(_places(one), one.candidates, strict=True):
+        if left[place]:
+            left[place] -= 1
+        else:
+            rest.append(each)
+    return rest
 
 
 def _port(candidate: Candidate) -> str:

@@ -7,6 +7,7 @@ import pytest
 
 from pymoo_hdte.discrepancy.engine import verdict
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.hypothesis import contains
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.verdict import doubts_of
 
@@ -94,3 +95,18 @@ def test_the_special_case_that_does_as_well_stands_for_a_law_at_its_bound(
     )
     ((chosen, _),) = verdict._special_case(search, best).names
     assert chosen == name
+
+
+def test_two_lines_of_one_name_are_no_special_case_of_one_of_them_and_another():
+    """An eccentricity with its harmonic beside one with another line ended in an error."""
+
+    def lines(*names):
+        members = tuple(
+            SimpleNamespace(name=name, port="sensor", holds=lambda other: False) for name in names
+        )
+        return SimpleNamespace(candidates=members, names=frozenset((n, "sensor") for n in names))
+
+    twice, mixed = lines("eccentricity", "eccentricity"), lines("eccentricity", "encoder_line")
+    assert not contains(twice, mixed)
+    assert not contains(mixed, twice)
+    assert contains(twice, lines("eccentricity", "eccentricity"))
