@@ -370,14 +370,15 @@ def test_blind_scores_are_those_of_the_committed_cases():
         [one for one in outcomes if one.case.kind == kind] for kind in ("single", "pair", "none")
     )
     stated = re.search(
-        r"Of the (\d+) blind campaigns .* the first (\d+) have been run.* (\d+) of (\d+) single "
+        r"Of the (\d+) blind campaigns .* cases (\d+) to (\d+) have .* (\d+) of (\d+) plain "
         r"answers were wrong, (\d+) of (\d+) single effects .* both effects of (\d+) of (\d+) pairs"
         r".* (\d+) of (\d+) campaigns that hide nothing",
         WORDS,
     )
     assert stated is not None
+    first = all_cases().index(outcomes[0].case) + 1
     assert [int(one) for one in stated.groups()] == [
-        *(len(all_cases()), len(outcomes)),
+        *(len(all_cases()), first, first + len(outcomes) - 1),
         *(sum(one.wrong_confident for one in outcomes), sum(one.confident for one in outcomes)),
         *(sum(one.right for one in singles), len(singles)),
         *(sum(one.all_named for one in pairs), len(pairs)),
