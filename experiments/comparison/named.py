@@ -137,7 +137,11 @@ def _directions(n_obj: int, population: int) -> Any:
 def _pymoo_algorithm(name: str) -> Any:
     """Return a class of `pymoo.algorithms.moo` by its name."""
     for module in pkgutil.iter_modules(pymoo.algorithms.moo.__path__):
-        found = getattr(import_module(f"pymoo.algorithms.moo.{module.name}"), name, None)
+        try:
+            found = getattr(import_module(f"pymoo.algorithms.moo.{module.name}"), name, None)
+        except ModuleNotFoundError:
+            # One module of pymoo (kgb) needs scikit-learn, which pymoo does not ask for.
+            continue
         if inspect.isclass(found) and issubclass(found, Algorithm):
             return found
     raise InvalidInput(OF_ALGORITHMS, name, f"{', '.join(ALGORITHMS)}, ElitistSwarm, {_OF_PYMOO}")

@@ -288,7 +288,7 @@ def test_the_command_questions_a_model_of_a_drive(believing, tmp_path, monkeypat
     """What the campaign believes gives way to the model that is asked about."""
     asked = []
 
-    def stop(measured, effects=()):
+    def stop(measured, **_):
         asked.append(measured.believed)
         raise InvalidInput("stopped", None, "nothing")
 

@@ -214,6 +214,7 @@ class TestStoredOutcome:
     def test_the_section_on_table_7_begins_with_its_picture(self):
         assert table_7_picture().leading
 
+    @pytest.mark.nightly
     def test_the_page_opens_with_it(self, tmp_path):
         result = run(Context(20, tmp_path, Campaign(tmp_path)))
         assert result.opening

@@ -205,7 +205,11 @@ def test_the_command_of_a_page_gives_the_same_setting_again(monkeypatch, tmp_pat
 
 @pytest.mark.parametrize(
     ("name", "kind", "size"),
-    [("NSGA3", NSGA3, 20), ("ElitistSwarm", ElitistSwarm, 20), ("NSGA-II", NSGA2, 20)],
+    [
+        pytest.param("NSGA3", NSGA3, 20, marks=pytest.mark.nightly),
+        ("ElitistSwarm", ElitistSwarm, 20),
+        ("NSGA-II", NSGA2, 20),
+    ],
 )
 def test_algorithms_get_the_population_that_was_asked_for(name, kind, size):
     algorithm = algorithm_named(name, size, "dtlz2")
@@ -247,3 +251,11 @@ def test_a_stranger_s_algorithm_reaches_other_processes(tmp_path):
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert len(rows_of(tmp_path / "results" / "table7" / "runs.csv")) == 2
+
+
+def test_a_module_of_pymoo_that_lacks_a_library_hides_no_other(monkeypatch):
+    """Without scikit-learn one module cannot be imported, which comes before that of NSGA-III."""
+    monkeypatch.setitem(sys.modules, "sklearn", None)
+    monkeypatch.setitem(sys.modules, "sklearn.naive_bayes", None)
+    monkeypatch.delitem(sys.modules, "pymoo.algorithms.moo.kgb", raising=False)
+    assert isinstance(algorithm_named("NSGA3", 20, "zdt1"), NSGA3)

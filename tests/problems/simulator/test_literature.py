@@ -115,6 +115,7 @@ def spill(s, t, M, D, L, tau):
     return first + M / np.sqrt(D * later) * np.exp(-((s - L) ** 2) / (4.0 * D * later))
 
 
+@pytest.mark.nightly
 def test_a_spill_on_which_nothing_was_chosen():
     """It shows an estimate that is too large: 10 % after 1108 runs, where the true error is 0.4 %.
 
