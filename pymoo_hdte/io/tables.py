@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,7 @@ class Columns:
         rows = slice(row + 1)
         return float(np.trapezoid(self.si(channel)[rows], self.time[rows]))
 
-    @property
+    @cached_property
     def time(self) -> NDArray[np.float64]:
         """Of each row, s, shape (n,): as measured, or row of the file / sample rate."""
         if self.layout.time:

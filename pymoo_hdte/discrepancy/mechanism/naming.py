@@ -66,13 +66,12 @@ def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdic
     removed = share_removed(sensors, data, verdict.base, chosen.fit)
     if removed < rules.partial_share or unexplained(data, verdict.base, chosen.fit).any():
         return verdict
-    most = rules.parsimony_ratio * data.power(chosen.fit.residuals)
     rivals = [
         one
         for one in verdict.alternatives
         if len(one.candidates) == len(chosen.candidates)
         and one.names != chosen.names
-        and np.all(data.power(one.fit.residuals) <= most)
+        and _does_as_well(data, one.fit, chosen.fit)
     ]
     doubt = f"it explains {100.0 * removed:.0f} % of the misfit, less than a name takes"
     doubts = (*_doubts(data, verdict.base, chosen), doubt)
@@ -88,13 +87,12 @@ def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
     chosen = verdict.chosen
     if chosen is None or verdict.status not in _NAMING:
         return verdict
-    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
     near = [
         one
         for one in verdict.alternatives
         if all(candidate.frees is None for candidate in one.candidates)
         and _unknowns(one) < _unknowns(chosen)
-        and np.all(data.power(one.fit.residuals) <= most)
+        and _does_as_well(data, one.fit, chosen.fit)
     ]
     if not near:
         return _choosing(data, verdict, chosen)
@@ -159,11 +157,10 @@ def _with_true_rivals(data: MeasuredData, verdict: Verdict) -> Verdict:
     chosen = verdict.chosen
     if chosen is None or verdict.status != "class":
         return verdict
-    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
     equivalent = (
         one
         for one in verdict.equivalent
-        if np.all(data.power(one.fit.residuals) <= most) and not contains(one, chosen)
+        if _does_as_well(data, one.fit, chosen.fit) and not contains(one, chosen)
     )
     return _with_rivals(verdict, equivalent)
 
@@ -175,7 +172,6 @@ def _with_substitutes(
     chosen = verdict.chosen
     if chosen is None or verdict.status not in _NAMING:
         return verdict
-    most = data.rules.parsimony_ratio * data.power(chosen.fit.residuals)
     rivals = list(verdict.equivalent)
     for member in chosen.candidates:
         kept = tuple(one for one in chosen.candidates if one is not member)
@@ -183,7 +179,7 @@ def _with_substitutes(
             if (other.instead_of, other.port) == (member.name, member.port):
                 start = np.append(chosen.values_of(kept), other.starts[0])
                 fitted = fit(data, (*kept, other), start)
-                if np.all(data.power(fitted.residuals) <= most):
+                if _does_as_well(data, fitted, chosen.fit):
                     excess = verdict.base.chi_square - verdict.degrees_of_freedom
                     rivals.append(hypothesis_of(fitted, excess))
     return _with_rivals(verdict, rivals) if len(rivals) > len(verdict.equivalent) else verdict
@@ -212,6 +208,12 @@ def _doubts(data: MeasuredData, base: Fit, chosen: Hypothesis) -> list[str]:
     ]
     found = doubts_of(Search(data, base, ()), chosen, None)
     return found + [f"{name} ended at the bound of its tolerance" for name in stuck]
+
+
+def _does_as_well(data: MeasuredData, one: Fit, chosen: Fit) -> bool:
+    """Tell whether a fit leaves about as little as the chosen one, in every balance."""
+    most = data.rules.parsimony_ratio * data.power(chosen.residuals)
+    return bool(np.all(data.power(one.residuals) <= most))
 
 
 def _bounded(fitted: Fit) -> list[str]:

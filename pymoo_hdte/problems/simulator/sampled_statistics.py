@@ -35,7 +35,20 @@ def _resolved(field: str, given: float, lowest: float, highest: float) -> float:
 
 
 @dataclass(frozen=True)
-class Quantile(Statistic):
+class _TailStatistic(Statistic):
+    """A statistic beyond a probability, whose band has the spread of four parts of the sample."""
+
+    p: float
+
+    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
+        value = self.value(around)[0]
+        parts = np.array([self.value(part)[0] for part in around.quarters()])
+        sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
+        return mean_error + reach_of(value, around) * std_error + sampling
+
+
+@dataclass(frozen=True)
+class Quantile(_TailStatistic):
     """The value below which a response stays with a given probability, sampled on the surrogate.
 
     Parameters
@@ -53,8 +66,6 @@ class Quantile(Statistic):
         If an argument is not in its range.
     """
 
-    p: float
-
     def __post_init__(self) -> None:
         object.__setattr__(self, "p", _resolved("p", self.p, RESOLVED, 1.0 - RESOLVED))
 
@@ -68,12 +79,9 @@ class Quantile(Statistic):
         slope = (1.0 - share) * basis[order[:, 0]] + share * basis[order[:, 1]]
         return chosen @ np.array([1.0 - share, share]), slope
 
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return _sampled_error(self, mean_error, std_error, around)
-
 
 @dataclass(frozen=True)
-class CVaR(Statistic):
+class CVaR(_TailStatistic):
     """The mean of the largest values of a response, beyond its p-quantile, sampled.
 
     The conditional value at risk of Rockafellar and Uryasev, Journal of Risk 2, 2000.
@@ -94,8 +102,6 @@ class CVaR(Statistic):
         If an argument is not in its range.
     """
 
-    p: float
-
     def __post_init__(self) -> None:
         real_number("p", self.p, above=0.0)
         object.__setattr__(self, "p", _resolved("p", self.p, 0.0, 1.0 - RESOLVED))
@@ -112,9 +118,6 @@ class CVaR(Statistic):
         share = np.zeros_like(values)
         np.put_along_axis(share, order, np.broadcast_to(weights, order.shape), axis=1)
         return largest @ weights, share @ basis
-
-    def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
-        return _sampled_error(self, mean_error, std_error, around)
 
 
 @dataclass(frozen=True)
@@ -178,13 +181,3 @@ class FailureProbability(Statistic):
         count = len(around.samples[1])
         sampling = np.maximum(2.0 * np.sqrt(found * (1.0 - found) / count), NONE_OF / count)
         return np.max(np.abs(np.array(ends) - found), axis=0) + sampling
-
-
-def _sampled_error(
-    statistic: Statistic, mean_error: Array, std_error: Array, around: Around
-) -> Array:
-    """Return the error by that of the surrogate and by the spread of four parts of the sample."""
-    value = statistic.value(around)[0]
-    parts = np.array([statistic.value(part)[0] for part in around.quarters()])
-    sampling = STUDENT * parts.std(axis=0, ddof=1) / np.sqrt(PARTS)
-    return mean_error + reach_of(value, around) * std_error + sampling
