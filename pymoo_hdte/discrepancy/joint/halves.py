@@ -7,6 +7,7 @@ follows the measured angle of the output. All angles and torques are those of th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
@@ -187,6 +188,9 @@ def _sum(one: BelievedValue, other: BelievedValue) -> BelievedValue:
         return other if one.value == NOTHING.value else one
     value = one.value + other.value
     lower, upper = (one.limits[end] + other.limits[end] for end in (0, 1))
-    if lower > 0.0:
-        return BelievedValue(value, factor=max(value / lower, upper / value, 1.0))
-    return BelievedValue(value, tolerance=min(max(1.0 - lower / value, upper / value - 1.0), 1.0))
+    share = max(1.0 - lower / value, upper / value - 1.0)
+    factor = max(value / lower, upper / value) if lower > 0.0 else math.inf
+    # The narrower of the two ways to say it.
+    if 2.0 * share <= factor - 1.0 / factor:
+        return BelievedValue(value, tolerance=min(share, 1.0))
+    return BelievedValue(value, factor=factor)

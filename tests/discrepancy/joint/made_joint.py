@@ -47,20 +47,23 @@ class Hidden:
         Friction of the motor, ahead of the gear, N.m at the output.
     order, amplitude : float
         Of the kinematic error, per turn of the output and rad.
+    late : float
+        By which the load's encoder is read after the motor's, s.
     """
 
     of_torsion: object = None
     dry: float = 0.0
     order: float = 0.0
     amplitude: float = 0.0
+    late: float = 0.0
 
 
-def motion(seconds, seed, way=1.0):
+def motion(seconds, seed):
     """Return time, position, speed and acceleration of a load that swings slowly to and fro."""
     time = np.arange(0.0, seconds, STEP)
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 4)
     rates = 2.0 * np.pi * np.array([0.07, 0.13, 0.31, 0.53])
-    sizes = way * np.array([1.8, 0.9, 0.25, 0.1])
+    sizes = np.array([1.8, 0.9, 0.25, 0.1])
     angles = np.outer(time, rates) + phases
     return (
         time,
@@ -70,7 +73,7 @@ def motion(seconds, seed, way=1.0):
     )
 
 
-def record(hidden, role, seconds=24.0, seed=1, noise=(0.3 * ARCSECOND, 0.05)):
+def record(hidden, role, seconds=20.0, seed=1, noise=(0.3 * ARCSECOND, 0.05)):
     """Return a record of the joint; ``noise`` of the encoders, rad, and of the torque, N.m."""
     time, q, v, a = motion(seconds, seed)
     wanted = LOAD * a + DAMPING * v + DELIVERED * np.cos(q + 0.4)
@@ -89,14 +92,16 @@ def record(hidden, role, seconds=24.0, seed=1, noise=(0.3 * ARCSECOND, 0.05)):
             torque = torque + hidden.of_torsion.respond(state).torque
         torsion = torsion + 0.5 * (wanted - torque) / STIFFNESS
     # The error is added to the torsion that the encoders show to get the one that winds the spring.
-    motor = q + torsion - hidden.amplitude * np.cos(hidden.order * q + 0.7)
+    motor = q + torsion
+    for _ in range(20):
+        motor = q + torsion - hidden.amplitude * np.cos(hidden.order * motor + 0.7)
     speed, acceleration = np.gradient(motor, STEP), np.gradient(np.gradient(motor, STEP), STEP)
     torque = wanted + MOTOR * acceleration + hidden.dry * np.tanh(speed / 1e-4)
     draw = np.random.default_rng(seed + 100).standard_normal((3, len(time)))
     inner = slice(5, -5)
     channels = {
         "motor": motor + noise[0] * draw[0] + 7.0,
-        "load": q + noise[0] * draw[1],
+        "load": np.interp(time + hidden.late, time, q) + noise[0] * draw[1],
         "torque": torque + noise[1] * draw[2],
     }
     return Record(role, role, time[inner], {name: one[inner] for name, one in channels.items()})
@@ -104,4 +109,4 @@ def record(hidden, role, seconds=24.0, seed=1, noise=(0.3 * ARCSECOND, 0.05)):
 
 def records(hidden):
     """Return a record to be fitted and one held out."""
-    return [record(hidden, "train"), record(hidden, "held_out", 16.0, 2)]
+    return [record(hidden, "train"), record(hidden, "held_out", 10.0, 2)]
