@@ -286,6 +286,8 @@ class JointAnalysis(MechanismAnalysis):
 
     Attributes
     ----------
+    measured : MeasuredMechanism
+        The joint as it is believed, and its records.
     joint : JointFinding
         With the verdict on the torsion beside that on the torques, and the ``status`` of both.
     """
@@ -305,7 +307,25 @@ class JointAnalysis(MechanismAnalysis):
 
     @ONE_THREAD
     def report(self, out: str | Path) -> dict[str, Any]:
-        """Write the report as `MechanismAnalysis.report`, with the torsion; return the verdict."""
+        """Write the report as `MechanismAnalysis.report`, with the torsion; return the verdict.
+
+        Parameters
+        ----------
+        out : str or Path
+            A folder that is new, empty, or an earlier report, which is replaced.
+
+        Returns
+        -------
+        dict
+            What ``verdict.json`` holds.
+
+        Raises
+        ------
+        InvalidInput
+            If the folder holds anything else.
+        OSError
+            If it cannot be written.
+        """
         from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
 
         check_report_folder(out)

@@ -1,15 +1,17 @@
 """Joints with encoders on both sides of their gear: what their torques and their torsion lack."""
 
 import json
+import re
 from dataclasses import replace
-from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
-from made_joint import ARCSECOND, DAMPING, STIFFNESS, Hidden, believed, records
+from made_joint import ARCSECOND, DAMPING, STIFFNESS, Hidden, believed, record, records
 
+import pymoo_hdte
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy import JointAnalysis, MeasuredMechanism, analyse
+from pymoo_hdte.discrepancy import JointAnalysis, analyse, read_rig
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.joint.analysis import JointFinding, examine_joint
 from pymoo_hdte.discrepancy.joint.halves import joint_of, rigid_half, torsion_half
@@ -120,15 +122,26 @@ def test_an_error_beyond_the_band_is_found_in_the_torsion_with_its_order():
     assert line.parts[0].values["amplitude"][0] == pytest.approx(5.0 * ARCSECOND, rel=0.05)
 
 
-@cache
-def joint_analysis():
-    """Return the analysis of a joint of which the wind-up and the motor's friction are hidden."""
-    hidden = Hidden(WINDUP, dry=4.0)
-    return analyse(MeasuredMechanism(believed(), records(hidden), CUTOFF, title="A made joint"))
+@pytest.fixture(scope="module")
+def joint_analysis(tmp_path_factory):
+    """Return the analysis of a log of counts by the rig's file of the page in the documentation.
+
+    The wind-up of the gear and the motor's friction are hidden in it.
+    """
+    folder = tmp_path_factory.mktemp("joint")
+    page = (Path(pymoo_hdte.__file__).parents[1] / "docs" / "two_encoders.md").read_text()
+    (folder / "rig.toml").write_text(re.search(r"```toml\n(.*?)```", page, re.S)[1])
+    log = record(Hidden(WINDUP, dry=4.0), "train", 36.0)
+    counts = {"motor": 2**20 * 101, "load": 2**24}
+    columns = [np.round(log.channels[one] * n / (2.0 * np.pi)) for one, n in counts.items()]
+    table = np.column_stack([log.time, *columns, log.channels["torque"]])
+    titles = "time_s,motor,load,torque"
+    np.savetxt(folder / "log.csv", table, "%.12g", ",", header=titles, comments="")
+    return analyse(read_rig(folder))
 
 
-def test_one_document_tells_what_torques_and_torsion_lack(tmp_path):
-    analysis = joint_analysis()
+def test_one_document_tells_what_torques_and_torsion_lack(joint_analysis, tmp_path):
+    analysis = joint_analysis
     assert isinstance(analysis, JointAnalysis)
     document = analysis.report(tmp_path / "report")
     stored = json.loads((tmp_path / "report" / "verdict.json").read_text())
@@ -151,8 +164,8 @@ def test_one_document_tells_what_torques_and_torsion_lack(tmp_path):
     assert "Torsion between the encoders" in (tmp_path / "report" / "report.html").read_text()
 
 
-def test_the_revised_joint_explains_the_records(tmp_path):
-    model = joint_analysis().revised_model()
+def test_the_revised_joint_explains_the_records(joint_analysis, tmp_path):
+    model = joint_analysis.revised_model()
     (tmp_path / "model.toml").write_text(model_text(model))
     again = read_mechanism_model(tmp_path / "model.toml")
     assert {(one.name, one.port) for one in again.effects} == {
@@ -161,8 +174,9 @@ def test_the_revised_joint_explains_the_records(tmp_path):
         ("soft_windup", "gear"),
     }
     joint = joint_of(again.mechanism)
-    half = torsion_half(joint, joint_analysis().measured.records, again.effects)
-    assert examine_torsion(half, joint, CUTOFF).verdict.status == "adequate"
+    half = torsion_half(joint, joint_analysis.measured.records, again.effects)
+    cutoff = joint_analysis.finding.cutoff
+    assert examine_torsion(half, joint, cutoff).verdict.status == "adequate"
 
 
 def test_the_delay_of_an_encoder_is_not_told_from_friction():
@@ -222,14 +236,14 @@ def test_the_halves_of_a_joint_have_its_values():
     )
     joint, time = joint_of(mechanism), np.arange(0.0, 4.0, 0.01)
     angle = np.sin(time)
-    record = Record(
+    one = Record(
         "one",
         "train",
         time,
         {"motor": angle + 3.0, "load": angle, "torque": 0 * time, "push": angle},
     )
     known = [LawAt("gravity", "arm", Gravity(1.0, 0.0)), LawAt("soft_windup", "gear", WINDUP)]
-    rigid, torsion = (half(joint, [record], known) for half in (rigid_half, torsion_half))
+    rigid, torsion = (half(joint, [one], known) for half in (rigid_half, torsion_half))
     (inertia,), (port,) = rigid.mechanism.inertias.values(), rigid.mechanism.ports
     assert inertia.value == 3.0
     assert inertia.limits[0] <= 1.5 < 5.5 <= inertia.limits[1] + 1e-12
