@@ -136,6 +136,8 @@ def revised_joint(title: str, finding: JointFinding) -> MechanismModel:
     believed = list(dict.fromkeys(effects))
     for one in (*theirs, *ours, *believed):
         ports.setdefault(one.port, motor if one.port == motor.name else load)
+    if any(one.law.loaded for one in ours):
+        ports[motor.name] = replace(ports[motor.name], load=torsion.mechanism.ports[0].load)
     mechanism = _with_ports(joint.mechanism, list(ports.values()))
     values = _values(finding, whole, ahead)
     revised = mechanism.with_values(values, exactly=False)

@@ -123,6 +123,7 @@ def rigid_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]) 
         motion={name: 1.0},
         stiffness=_sum(load.stiffness, motor.stiffness),
         damping=_sum(load.damping, motor.damping),
+        load={**motor.load, **load.load},
         gear=joint.kind,
     )
     inputs = [replace(one, acts={name: sum(one.acts.values())}) for one in mechanism.inputs]
@@ -160,7 +161,10 @@ def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]
     if not inputs:
         raise InvalidInput("inputs", (), f"one that acts on {motor}: the torque of the motor")
     inertia = {motor: joint.mechanism.inertias[motor]}
-    half = Mechanism(inertia, [joint.side(motor), gear], inputs, (), [motor])
+    # What the motor delivers passes the shaft: a friction of tenths of it changes it by so much.
+    shaft = joint.side(motor)
+    shaft = replace(shaft, load=shaft.load or {one.name: one.acts[motor] for one in inputs})
+    half = Mechanism(inertia, [shaft, gear], inputs, (), [motor])
     kept = {motor, load, *(one.name for one in inputs)}
     first = records[0]
     middle = float(np.mean(first.channel(motor) - first.channel(load)))
