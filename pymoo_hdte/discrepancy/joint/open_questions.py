@@ -13,7 +13,10 @@ from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.units import ARCSEC
 
 _LAGS = {"hysteresis", "coulomb_friction", "stribeck_friction"}
-_OF_LOAD = {"soft_windup", "hardening_stiffness", "backlash", "kinematic_error"}
+_OF_LOAD = {
+    *("soft_windup", "hardening_stiffness", "backlash", "kinematic_error"),
+    "load_dependent_friction",
+}
 _MOST_TOLD = 4
 
 
@@ -59,7 +62,23 @@ def torsion_limits(finding: JointFinding) -> list[str]:
         if NOT_PROVEN in torsion.verdict.doubts:
             told += f"; but {NOT_PROVEN} with the best of them"
         found.append(f"{told}: none is named.")
-    return [*found, *_delay(finding), *_in_both(finding), *torsion.ripples.limits]
+    return [*found, *_delay(finding), *_in_both(finding), *_beyond_band(finding)]
+
+
+def _beyond_band(finding: JointFinding) -> list[str]:
+    """Return the limits of the search beyond the band, which speaks of forces and ripple."""
+    gear = finding.joint.gear.name
+    words = {
+        f"The force at the {gear}": f"The torsion of the {gear}",
+        f"Ripple at the {gear}": f"An error of the {gear}",
+        "makes the forces of the held-out records": "makes the torsion of the held-out records",
+        "its ripple": "its error",
+        "a torque cannot": "an error cannot",
+    }
+    found = list(finding.torsion.ripples.limits)
+    for theirs, ours in words.items():
+        found = [one.replace(theirs, ours) for one in found]
+    return found
 
 
 def _in_both(finding: JointFinding) -> list[str]:
@@ -141,7 +160,7 @@ def torsion_test(finding: JointFinding) -> str:
     if names & _OF_LOAD:
         found.append(
             "Repeat the sweep with another load: an error of the gear stays over the angle, "
-            "compliance and wind-up follow the torque."
+            "compliance, wind-up and friction that grows with the load follow the torque."
         )
     if names & set(SLOWING):
         found.append(

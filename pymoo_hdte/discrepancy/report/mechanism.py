@@ -76,6 +76,7 @@ def write_mechanism_report(
         torsion = torsion_document(joint)
         words = f"Torques: {document['sentence']} Torsion: {torsion['sentence']}"
         document |= {"status": joint.status, "sentence": words, "torsion": torsion}
+        document["location"]["sentence"] += f" {torsion['location']}"
     page_text = _page(finding, document, gaps, joint)
     FOLDER.write(Path(out), page_text, document, {MODEL_FILE: model_text(revised)})
     return document

@@ -36,6 +36,7 @@ def torsion_document(finding: JointFinding) -> dict[str, Any]:
         "status": torsion.verdict.status,
         "sentence": torsion_sentence(finding),
         "effects": _effects(finding),
+        "location": _location(finding),
         "offered": offered(torsion),
         "alternatives": [evidence(torsion, one) for one in alternatives],
         "not_ruled_out": [in_words(one.label) for one in near_by(finding)],
@@ -75,6 +76,17 @@ def torsion_sentence(finding: JointFinding) -> str:
         words = f"{' '.join(one.sentence for one in verdict.accepted.candidates)} Or, which these "
         words += "data cannot tell from it: the readings of the two encoders are apart in time."
     return f"{words} {lines}".strip()
+
+
+def _location(finding: JointFinding) -> str:
+    torsion, gear = finding.torsion, finding.joint.gear.name
+    if torsion.verdict.status == "adequate":
+        return f"Not in the torsion of the {gear}."
+    off, noise = (
+        float(one[0]) / finding.stiffness / ARCSEC
+        for one in (torsion.base_misfit, torsion.sensor_noise)
+    )
+    return f"In the torsion of the {gear} (off by {off:.3g} arcseconds, sensors {noise:.2g})."
 
 
 def _effects(finding: JointFinding) -> list[dict[str, Any]]:
