@@ -7,6 +7,7 @@ import numpy as np
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN
 from pymoo_hdte.discrepancy.joint.analysis import SLOWING, JointFinding
+from pymoo_hdte.discrepancy.joint.torsion import errors_of
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.discrepancy.mechanism.rest import fitted_values, share_removed
 from pymoo_hdte.effects.sentence_blanks import in_words
@@ -85,7 +86,7 @@ def _in_both(finding: JointFinding) -> list[str]:
     """Return which orders beyond the band vary both the torque and the torsion."""
     both = [
         one.order
-        for one in finding.torsion.ripples.found
+        for one, _ in errors_of(finding.torsion.ripples)
         if any(abs(one.order - r.order) <= r.resolution for r in finding.torque.ripples.found)
     ]
     if not both:

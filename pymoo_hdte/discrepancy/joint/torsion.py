@@ -18,7 +18,8 @@ from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.joint.halves import Half, Joint
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
-from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple import Ripples, find_ripples
+from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple import Ripple, Ripples, find_ripples
+from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple_size import Part
 from pymoo_hdte.discrepancy.mechanism.candidates import port_sizes
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.naming import judged
@@ -88,15 +89,25 @@ def _examined(sensors: MeasuredData) -> tuple[MeasuredData, Verdict]:
     return data, judged(sensors, data, every)
 
 
-def lines_of(ripples: Ripples) -> tuple[LawAt, ...]:
-    """Return the kinematic errors that lines beyond the band are.
+def errors_of(ripples: Ripples) -> list[tuple[Ripple, Part]]:
+    """Return the lines beyond the band that are kinematic errors, with their size in rad.
 
     Their part that turns with the direction is friction, or the error of a fit.
     """
+    return [
+        (one, part)
+        for one in ripples.found
+        for part in one.parts
+        if isinstance(part.law.law, PeriodicTorque)
+    ]
+
+
+def lines_of(ripples: Ripples) -> tuple[LawAt, ...]:
+    """Return the kinematic errors beyond the band as laws of the torsion."""
     return tuple(
         LawAt(KINEMATIC, one.port, KinematicTorsion(law.order, law.phase, law.amplitude))
-        for one in ripples.laws
-        if type(law := one.law) is PeriodicTorque
+        for one, part in errors_of(ripples)
+        if isinstance(law := part.law.law, PeriodicTorque)
     )
 
 

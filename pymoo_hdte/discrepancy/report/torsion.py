@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.stats import norm
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.joint.analysis import JointFinding
 from pymoo_hdte.discrepancy.joint.open_questions import near_by, torsion_limits, torsion_test
-from pymoo_hdte.discrepancy.joint.torsion import KINEMATIC
+from pymoo_hdte.discrepancy.joint.torsion import KINEMATIC, errors_of
 from pymoo_hdte.discrepancy.report.document import sentence
 from pymoo_hdte.discrepancy.report.mechanism_document import (
     effects,
@@ -20,6 +21,8 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.units import ARCSEC
+
+_CENTRAL = float(norm.ppf(0.975))
 
 
 def torsion_document(finding: JointFinding) -> dict[str, Any]:
@@ -65,7 +68,8 @@ def torsion_sentence(finding: JointFinding) -> str:
     torsion, gear = finding.torsion, finding.joint.gear.name
     verdict = torsion.verdict
     lines = " ".join(
-        f"The {gear} errs with its angle, order {one.words}." for one in torsion.ripples.found
+        f"The {gear} errs with its angle, order {one.words}."
+        for one, _ in errors_of(torsion.ripples)
     )
     if verdict.status == "adequate":
         return f"Beside the spring of the {gear} nothing is missing."
@@ -105,11 +109,9 @@ def _effects(finding: JointFinding) -> list[dict[str, Any]]:
             for name, value in entry["parameters"].items()
         }
         found.append(entry | {"parameters": parameters, **_size(finding, laws)})
-    for one in torsion.ripples.found:
-        (values, *_) = (part.values for part in one.parts)
-        half = 1.96 * np.sqrt(values["amplitude"][1]) if "amplitude" in values else 0.0
-        amplitude = values.get("amplitude", (0.0, 0.0))[0]
-        line = {"value": amplitude, "interval95": [amplitude - half, amplitude + half]}
+    for one, part in errors_of(torsion.ripples):
+        amplitude, variance = part.values["amplitude"]
+        line = {"value": amplitude, "interval95": _about(amplitude, variance)}
         found.append(
             {
                 "name": KINEMATIC,
@@ -118,7 +120,7 @@ def _effects(finding: JointFinding) -> list[dict[str, Any]]:
                 "parameters": {
                     "order": {"value": one.order, "interval95": _about(one.order, one.variance)}
                     | {"unit": "1", "at_bound": False},
-                    "amplitude": _shown({**line, "at_bound": False}, "rad"),
+                    "amplitude": _shown({**line, "at_bound": False}, "arcsec"),
                 },
                 "at_bound": [],
                 "rms_arcsec": amplitude / 2.0**0.5 / ARCSEC,
@@ -129,25 +131,27 @@ def _effects(finding: JointFinding) -> list[dict[str, Any]]:
 
 
 def _about(value: float, variance: float) -> list[float]:
-    half = 1.96 * variance**0.5
+    half = _CENTRAL * variance**0.5
     return [value - half, value + half]
 
 
 def _unit(candidate: Candidate, name: str) -> str:
-    """Return the unit of a parameter of a candidate; that of its last word for a line's."""
+    """Return the unit of a parameter of a candidate; that of its last word for a line's.
+
+    An angle of the gear is in arcseconds, a phase is not.
+    """
     if candidate.unit is None:
         return "SI"
     unit = candidate.unit(name)
-    return candidate.unit(name.rpartition("_")[2]) if unit == "1" else unit
+    unit = candidate.unit(name.rpartition("_")[2]) if unit == "1" else unit
+    return "arcsec" if unit == "rad" and not name.endswith("phase") else unit
 
 
 def _shown(parameter: dict[str, Any], unit: str) -> dict[str, Any]:
-    """Return a parameter in its unit; in arcseconds if that is rad, but for a phase."""
-    factor, word = 1.0, unit
-    if unit == "rad":
-        factor, word = 1.0 / ARCSEC, "arcsec"
+    """Return a parameter, which is in SI, in its unit."""
+    factor = 1.0 / ARCSEC if unit == "arcsec" else 1.0
     ends = [factor * one for one in parameter["interval95"]]
-    return parameter | {"value": factor * parameter["value"], "interval95": ends, "unit": word}
+    return parameter | {"value": factor * parameter["value"], "interval95": ends, "unit": unit}
 
 
 def _size(finding: JointFinding, laws: tuple[LawAt, ...]) -> dict[str, float]:

@@ -20,6 +20,7 @@ from pymoo_hdte.discrepancy.joint.open_questions import torsion_limits, torsion_
 from pymoo_hdte.discrepancy.joint.torsion import examine_torsion
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.models import model_text, read_mechanism_model
+from pymoo_hdte.discrepancy.report.torsion import torsion_document
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import HardeningStiffness, SoftWindup
@@ -119,7 +120,12 @@ def test_an_error_beyond_the_band_is_found_in_the_torsion_with_its_order():
     (line,) = finding.ripples.found
     assert line.order == pytest.approx(202.0, abs=line.resolution)
     assert "2 per input turn" in line.meaning
-    assert line.parts[0].values["amplitude"][0] == pytest.approx(5.0 * ARCSECOND, rel=0.05)
+    both = JointFinding(joint_of(believed()), finding, finding, ())
+    (effect,) = torsion_document(both)["effects"]
+    amplitude = effect["parameters"]["amplitude"]
+    assert amplitude["unit"] == "arcsec"
+    assert amplitude["value"] == pytest.approx(5.0, rel=0.05)
+    assert effect["rms_Nm"] == pytest.approx(5.0 * ARCSECOND * STIFFNESS / 2.0**0.5, rel=0.05)
 
 
 @pytest.fixture(scope="module")

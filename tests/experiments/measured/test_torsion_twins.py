@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 from experiments.measured.rigs import MEASURED, RIGS
+from pymoo_hdte.discrepancy.joint.analysis import JointFinding
 from pymoo_hdte.discrepancy.joint.halves import joint_of, torsion_half
 from pymoo_hdte.discrepancy.joint.held_out import torsion_gaps, voted
 from pymoo_hdte.discrepancy.joint.torsion import examine_torsion
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
+from pymoo_hdte.discrepancy.report.torsion import torsion_document
 from pymoo_hdte.drive.effects.static_error import KinematicTorsion
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import HardeningStiffness
 from pymoo_hdte.mechanism import Record
 from pymoo_hdte.mechanism.motion import motion_of, smooth
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
+from pymoo_hdte.units import ARCSEC
 
 STIFFNESS, INERTIA, ZERO = 3e4, 1.0, 1.0
 NOISE = {"motor": 2e-6, "load": 2e-6, "torque": 0.2}
@@ -87,6 +90,13 @@ def test_a_twin_with_nothing_missing_is_adequate():
     ids=("kinematic", "cubic", "hysteresis"),
 )
 def test_what_a_twin_hides_is_named(law, name, statuses):
-    _, verdict = examined(law)
+    finding, verdict = examined(law)
     assert verdict.status in statuses
     assert [one.name for one in verdict.accepted.candidates] == [name]
+    if isinstance(law, KinematicTorsion):
+        both = JointFinding(measured()[0], finding, finding, ())
+        (effect,) = torsion_document(both)["effects"]
+        size, phase = (effect["parameters"][one] for one in ("amplitude", "amplitude_phase"))
+        assert (size["unit"], phase["unit"]) == ("arcsec", "rad")
+        assert size["value"] == pytest.approx(law.amplitude / ARCSEC, rel=0.05)
+        assert np.cos(phase["value"] - law.phase) == pytest.approx(1.0, abs=0.01)
