@@ -234,6 +234,8 @@ class BalanceObjective(Unknowns):
     def __init__(self, data: MeasuredData, candidates: Sequence[Candidate]) -> None:
         super().__init__(data.base, candidates)
         self.data = data
+        self._of_laws = {f"stiffness of {port.name}" for port in data.mechanism.ports}
+        self._of_laws |= {f"zero of {port.name}" for port in data.mechanism.ports if port.followed}
 
     def residuals(self, values: Vector) -> Vector:
         """Return residuals at values (n_parameters,)."""
@@ -248,7 +250,7 @@ class BalanceObjective(Unknowns):
         stands = self._forces(values)
         for place, parameter in enumerate(self.parameters):
             # A law may depend on stiffness and zero of its port, but not on masses and dampers.
-            if place >= n_base or parameter.name.startswith(_OF_LAWS):
+            if place >= n_base or parameter.name in self._of_laws:
                 moved = values.copy()
                 moved[place] += steps[place] * self.scale[place]
                 found[:, place] -= (self._forces(moved) - stands) / steps[place]
