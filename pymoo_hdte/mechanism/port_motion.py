@@ -17,11 +17,20 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class PortMotion:
-    """Position and speed at a port, and the load it passes on where known, shape (n,); SI."""
+    """Position and speed at a port, and the load it passes on where known, shape (n,); SI.
+
+    ``angle`` is that on which periodic laws depend, where it is not the position.
+    """
 
     position: Values
     speed: Values
     load: Values | None = None
+    angle: Values | None = None
+
+    @property
+    def shaft(self) -> Values:
+        """The angle on which periodic laws depend."""
+        return self.position if self.angle is None else self.angle
 
 
 def motion_at_port(
@@ -31,13 +40,15 @@ def motion_at_port(
     load: Values | None = None,
 ) -> PortMotion:
     """Return the motion at a port, with its kinematic error, for coordinates of shape (n,)."""
-    here = np.sum([share * position[name] for name, share in port.motion.items()], axis=0)
-    rate = np.sum([share * speed[name] for name, share in port.motion.items()], axis=0)
+    shares = {**port.motion, **port.followed}
+    here = np.sum([share * position[name] for name, share in shares.items()], axis=0)
+    rate = np.sum([share * speed[name] for name, share in shares.items()], axis=0)
     for line in port.error:
         angle = line.order * position[line.coordinate] + line.phase
         here = here + line.amplitude * np.sin(angle)
         rate = rate + line.amplitude * line.order * np.cos(angle) * speed[line.coordinate]
-    return PortMotion(here, rate, load)
+    turning = position[next(iter(port.motion))] if port.followed else None
+    return PortMotion(here, rate, load, turning)
 
 
 def load_at_port(
@@ -64,7 +75,7 @@ def law_force(law: Law, motion: PortMotion | SmoothedMotion, stiffness: float) -
     state = PortState(
         motion.position - rests * motion.position[0],
         motion.speed,
-        periodic_phase(motion.position),
+        periodic_phase(motion.shaft if isinstance(motion, PortMotion) else motion.position),
         np.full(1, stiffness),
         path=lambda values: values[None, :],
         back=lambda values: values[0],
