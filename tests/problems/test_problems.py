@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from night import others_at_night
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.optimize import minimize
 
@@ -75,6 +76,9 @@ def test_gradients_equal_finite_differences(moments):
         assert dF[:, :, variable] == pytest.approx(expected, rel=1e-4, abs=rounding)
 
 
+@pytest.mark.parametrize(
+    "problem", others_at_night(["calibrated", "resonant"], "resonant"), indirect=True
+)
 def test_exact_objectives_are_the_model_averaged_over_its_scatter(problem):
     """100,000 samples of the surrogate at each design against the exact moments."""
     sampled = RobustDTE(problem.model, moments="sample", n_samples=100_000)

@@ -115,6 +115,7 @@ def errors_of_the_model(data):
     return worst[True], worst[False]
 
 
+@pytest.mark.nightly
 def test_the_accuracy_of_the_drive_model_is_that_of_its_harmonics():
     exact, others = errors_of_the_model(EMPTY)
     # The rule is no smaller than the model's error, and not so large that it would hide others'.

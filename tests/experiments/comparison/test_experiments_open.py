@@ -217,6 +217,7 @@ def test_algorithms_get_the_population_that_was_asked_for(name, kind, size):
     assert algorithm.pop_size == size
 
 
+@pytest.mark.nightly
 def test_three_objectives_are_compared_too(tmp_path):
     setting = Setting(("dtlz2",), ("NSGA2", "NSGA3"), 1, 20, 200)
     (one,) = compare(Context(2, tmp_path, Campaign(tmp_path), setting=setting), (), "open")
