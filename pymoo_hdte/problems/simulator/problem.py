@@ -13,7 +13,7 @@ from pymoo.core.problem import Problem
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.problems.simulator.around import Around, CommonSamples
 from pymoo_hdte.problems.simulator.inputs import Inputs
-from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic
+from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic, place_of
 from pymoo_hdte.problems.simulator.stored import read_problem, write_problem
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.moments import divide_or_zero
@@ -113,8 +113,7 @@ class SimulatorProblem(Problem):
         Raises
         ------
         InvalidInput
-            If a distribution or a statistic is of a user's own class, or the file would be too
-            large.
+            If a distribution or a statistic is a user's own, or the file would be too large.
         OSError
             If the file cannot be written.
         """
@@ -124,6 +123,15 @@ class SimulatorProblem(Problem):
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SimulatorProblem:
         """Return the problem that `save` wrote; it needs the simulator no more.
+
+        Parameters
+        ----------
+        path : str or path-like
+            Of the file.
+
+        Returns
+        -------
+        SimulatorProblem
 
         Raises
         ------
@@ -279,18 +287,3 @@ class SimulatorProblem(Problem):
         weights = np.zeros((len(x), len(self.responses), slope.shape[1]))
         weights[:, place] = slope
         return self._fit.moments.pulled_back(x, weights)[:, place]
-
-
-def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
-    """Return the position of the statistic's response.
-
-    Raises
-    ------
-    InvalidInput
-        If there is none of that name, or none is named and there are several.
-    """
-    if statistic.response is None and len(responses) == 1:
-        return 0
-    if statistic.response not in responses:
-        raise InvalidInput("response of a statistic", statistic.response, f"one of {responses}")
-    return responses.index(statistic.response)

@@ -14,9 +14,15 @@ from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
 from pymoo_hdte.problems.simulator.inputs import Design, Inputs
-from pymoo_hdte.problems.simulator.problem import SimulatorProblem, place_of
+from pymoo_hdte.problems.simulator.problem import SimulatorProblem
 from pymoo_hdte.problems.simulator.runs import RunFile, Simulator
-from pymoo_hdte.problems.simulator.statistics import Mean, RobustConstraint, Statistic, Std
+from pymoo_hdte.problems.simulator.statistics import (
+    Mean,
+    RobustConstraint,
+    Statistic,
+    Std,
+    place_of,
+)
 from pymoo_hdte.problems.simulator.trust import (
     failing,
     inaccurate,
