@@ -24,7 +24,6 @@ from pymoo_hdte.problems.simulator.statistics import (
     WorstCase,
 )
 from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
-from pymoo_hdte.surrogate.sparse.leja import HIGHEST_DEGREE
 from pymoo_hdte.surrogate.sparse.moments import SparseMoments
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 
@@ -34,6 +33,8 @@ STATISTICS: dict[str, type[Statistic]] = {
     one.__name__: one
     for one in (Mean, Std, MeanPlusStd, WorstCase, Quantile, CVaR, FailureProbability)
 }
+HIGHEST_DEGREE = 100
+"""Largest degree that is read from a file; surrogates have 60 at most."""
 _OF_RESPONSES = ("mean_error", "std_error", "smallest_scatter")
 _OF_POINTS = ("failed", "held_out_points")
 
@@ -169,11 +170,11 @@ def _read_constraint(table: Mapping[str, Any]) -> RobustConstraint:
     return statistic <= table["bound"] if table["side"] > 0 else statistic >= table["bound"]
 
 
-def _with_tails(fit: AdaptiveFit) -> bool:
-    """Return whether the moments take the scatter beyond all runs into account."""
+def _with_tails(fit: AdaptiveFit) -> list[bool]:
+    """Return of which inputs the moments take the scatter beyond all runs into account."""
     whole = SparseMoments(fit.polynomial, fit.moments.axes)
     pairs = zip(whole.orthonormal, fit.moments.orthonormal, strict=True)
-    return all(np.array_equal(one.nodes, other.nodes) for one, other in pairs)
+    return [np.array_equal(one.nodes, other.nodes) for one, other in pairs]
 
 
 def _read_fit(
@@ -199,13 +200,14 @@ def _read_fit(
     for name in ("coefficients", *_OF_RESPONSES):
         if not np.all(np.isfinite(arrays[name])):
             raise InvalidInput(f"{name} of the file", arrays[name].tolist(), "finite")
-    if not isinstance(tails, bool):
-        raise InvalidInput("tails", tails, "true or false")
+    if not isinstance(tails, list) or [type(one) for one in tails] != [bool] * len(axes):
+        raise InvalidInput("tails", tails, f"{len(axes)} times true or false")
     polynomial = SparsePolynomial(indices.astype(int), coefficients)
-    cut = None if tails else [axis.cut for axis in axes]
+    pairs = zip(axes, tails, strict=True)
+    measures = [axis.measure if one else axis.cut for axis, one in pairs]
     return AdaptiveFit(
         polynomial=polynomial,
-        moments=SparseMoments(polynomial, axes, cut),
+        moments=SparseMoments(polynomial, axes, measures),
         n_runs=n_runs,
         **{name: np.array(arrays[name]) for name in FORMAT.arrays[2:]},
     )
