@@ -289,7 +289,7 @@ def made(name, problem):
     arguments = {}
     if "ref_dirs" in takes or name == "NSDER":
         arguments["ref_dirs"] = get_reference_directions(
-            "das-dennis", problem.n_obj, n_partitions=11 if problem.n_obj == 2 else 4
+            "das-dennis", problem.n_obj, n_partitions=19 if problem.n_obj == 2 else 5
         )
     if "ref_points" in takes:
         front = problem.pareto_front()
@@ -299,9 +299,10 @@ def made(name, problem):
     elif "pop_size" in takes or (
         "ref_dirs" not in arguments and any(one.kind is one.VAR_KEYWORD for one in takes.values())
     ):
-        arguments["pop_size"] = 12
+        arguments["pop_size"] = 20
     if name == "PINSGA2":
-        arguments["automated_dm"] = Chooser()
+        # It fails where the first generation has no feasible design.
+        arguments |= {"automated_dm": Chooser(), "pop_size": 100}
     return ALGORITHMS[name](**arguments)
 
 
