@@ -79,7 +79,7 @@ def _wave(x: Array) -> Array:
 class ExponentialNoise(ClosedFormProblem):
     """Mean and 99 % quantile of a response with exponential noise; a limit on its CVaR of 90 %.
 
-    y = |x - a|^2 + (0.2 + |x - b|^2) e with e exponential of mean 1, a = (0.2, .., 0.2) and
+    ``y = |x - a|^2 + (0.2 + |x - b|^2) e`` with e exponential of mean 1, a = (0.2, .., 0.2) and
     b = (0.8, .., 0.8), all x in 0..1: what lowers the mean is not what lowers the tail. Level
     lines of all three statistics are spheres with centres on the line from a to b.
 

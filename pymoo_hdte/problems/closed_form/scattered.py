@@ -26,8 +26,8 @@ class WorstCaseSchaffer(ClosedFormProblem):
     """The worst case of two distances under scatter, after Schaffer's first problem.
 
     The responses are f1 = sum x_j^2 and f2 = sum (x_j - a_j)^2 with a = (1, 0.7, 0.4, ..), at least
-    0.1. Their largest values within d of the design are sum (|x_j| + d)^2 and the like: they have
-    kinks where the front ends, and each variable stops there at another place.
+    0.1. Their largest values within d of the design are ``sum (|x_j| + d)^2`` and the like: they
+    have kinks where the front ends, and each variable stops there at another place.
 
     Parameters
     ----------
