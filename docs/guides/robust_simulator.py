@@ -181,10 +181,11 @@ print(f"with logarithms: {wide.n_runs} runs")
 #
 # ``executor`` takes any executor of `concurrent.futures`, or a Dask client, and ``at_once`` the
 # number of workers. Finished runs go to the file ``cache`` one by one: if the process is killed,
-# the same call goes on from there and makes no run twice but the first, which tells whether the
-# file is this simulator's. A run that raises or gives NaN is made again, then left out; the
-# coordinates are in ``problem.failed``. A program that is called by `subprocess` is a simulator
-# like any other.
+# the same call goes on from there and makes no run twice. Where the study had come to its end, or
+# the simulator's source has changed since, the first run is made again, to see whether the file is
+# this simulator's. A run that raises or gives NaN is made again, then left out; the coordinates are
+# in ``problem.failed``. :ref:`Three simulators <sphx_glr_auto_guides_robust_examples.py>` shows an
+# equation of motion, a program that is called by `subprocess`, and the drive.
 
 calls = []
 

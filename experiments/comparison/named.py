@@ -25,7 +25,7 @@ from experiments.runner.setting import Setting
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import PRESETS
-from pymoo_hdte.problems import RobustToy, robust_dte_family
+from pymoo_hdte.problems import robust_benchmarks, robust_dte_family
 
 OF_PROBLEMS, OF_ALGORITHMS = "--problems", "--algorithms"
 _OF_PYMOO = "a name of this package or of pymoo, or module:name of a module that can be imported"
@@ -54,7 +54,7 @@ def problem_named(name: str) -> Problem:
     InvalidInput
         If there is none, or it has fewer than two objectives or variables that are not real.
     """
-    own: dict[str, Callable[[], Problem]] = {**robust_dte_family(), "toy": RobustToy}
+    own: dict[str, Callable[[], Problem]] = {**robust_dte_family(), **robust_benchmarks()}
     if name in PRESETS:
         problem = robust_problem(name)
     elif name in own:

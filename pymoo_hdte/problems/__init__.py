@@ -1,5 +1,6 @@
 """Robust design problems for pymoo."""
 
+from pymoo_hdte.problems.catalogue import robust_benchmarks
 from pymoo_hdte.problems.family import robust_dte_family
 from pymoo_hdte.problems.operating_conditions import (
     OperatingCondition,
@@ -46,6 +47,7 @@ __all__ = [
     "WorstCase",
     "hs_20_100_duty_cycle",
     "load_conditions",
+    "robust_benchmarks",
     "robust_dte_family",
     "robust_problem",
 ]

@@ -28,7 +28,8 @@ LOWEST_FIRST = (
         "discrepancy.joint",
     ),
     *("discrepancy.report", "virtual"),
-    *("problems.simulator", "problems", "algorithms", "decision", "discrepancy", "cli"),
+    *("problems.simulator", "problems.closed_form", "problems"),
+    *("algorithms", "decision", "discrepancy", "cli"),
 )
 """Rooms of the package; a folder stands for the modules in it, not for the folders below it.
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.problems.simulator.distributions import joint_distribution
 from pymoo_hdte.surrogate.sparse.axes import Axis, Scatter, noise_axis, standard_normal
 from pymoo_hdte.surrogate.sparse.measures import Distribution, Measure
 
@@ -126,6 +127,8 @@ class Inputs:
 
     Attributes
     ----------
+    designs, noise : dict
+        As given.
     axes : list of Axis
         The designs first, in their order.
     names : tuple of str
@@ -143,6 +146,7 @@ class Inputs:
             raise InvalidInput("designs", designs, "a mapping of one or more names to a Design")
         if not isinstance(noise, Mapping):
             raise InvalidInput("noise", noise, "a mapping of names to distributions")
+        self.designs, self.noise = dict(designs), dict(noise)
         self.axes: list[Axis] = []
         names: list[str] = []
         for name, design in designs.items():
@@ -165,9 +169,7 @@ class Inputs:
         if len(group) == 1:
             self.axes.append(noise_axis(group[0], _noise(group[0], given)))
             return
-        if not hasattr(given, "inv") or len(given) != len(group):
-            allowed = f"a joint distribution of chaospy of {len(group)} variables"
-            raise InvalidInput(f"noise[{group!r}]", given, allowed)
+        given = joint_distribution(f"noise[{group!r}]", given, len(group))
         if not given.stochastic_dependent:
             for place, name in enumerate(group):
                 self._add_noise((name,), given[place], first + place)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +13,8 @@ from pymoo.core.problem import Problem
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.problems.simulator.around import Around, CommonSamples
 from pymoo_hdte.problems.simulator.inputs import Inputs
-from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic
+from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic, place_of
+from pymoo_hdte.problems.simulator.stored import read_problem, write_problem
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sensitivity import SobolIndices
@@ -64,6 +66,8 @@ class SimulatorProblem(Problem):
         Of all inputs of the simulator, the designs first.
     design_box : Box
         The search space.
+    responses, objectives, constraints
+        As given.
     """
 
     def __init__(
@@ -75,7 +79,7 @@ class SimulatorProblem(Problem):
         constraints: Sequence[RobustConstraint],
         n_runs: int,
     ) -> None:
-        self._inputs_axes = inputs.axes
+        self._inputs, self._inputs_axes = inputs, inputs.axes
         bounds = np.array([axis.design for axis in inputs.axes if axis.designed])
         self.design_box = Box(inputs.designed, *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
@@ -102,6 +106,41 @@ class SimulatorProblem(Problem):
     def degrees(self) -> dict[str, int]:
         """Degree of the surrogate in each input, by name."""
         return dict(zip(self.input_names, self._fit.polynomial.degrees, strict=True))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the problem to ``path``, replacing it in one step (``docs/file_format.md``).
+
+        Raises
+        ------
+        InvalidInput
+            If a distribution or a statistic is a user's own, or the file would be too large.
+        OSError
+            If the file cannot be written.
+        """
+        parts = self.responses, self.objectives, self.constraints, self.n_runs
+        write_problem(path, self._inputs, self._fit, *parts)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> SimulatorProblem:
+        """Return the problem that `save` wrote; it needs the simulator no more.
+
+        Parameters
+        ----------
+        path : str or path-like
+            Of the file.
+
+        Returns
+        -------
+        SimulatorProblem
+
+        Raises
+        ------
+        InvalidInput
+            If the file is damaged, incomplete, of another format or of a later version.
+        OSError
+            If the file cannot be read.
+        """
+        return cls(*read_problem(path))
 
     def band(self, designs: ArrayLike) -> Array:
         """Return the half-width of the estimated error of F, shape (n, n_obj), in its units.
@@ -248,18 +287,3 @@ class SimulatorProblem(Problem):
         weights = np.zeros((len(x), len(self.responses), slope.shape[1]))
         weights[:, place] = slope
         return self._fit.moments.pulled_back(x, weights)[:, place]
-
-
-def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
-    """Return the position of the statistic's response.
-
-    Raises
-    ------
-    InvalidInput
-        If there is none of that name, or none is named and there are several.
-    """
-    if statistic.response is None and len(responses) == 1:
-        return 0
-    if statistic.response not in responses:
-        raise InvalidInput("response of a statistic", statistic.response, f"one of {responses}")
-    return responses.index(statistic.response)

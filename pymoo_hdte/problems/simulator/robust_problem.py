@@ -14,9 +14,16 @@ from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
 from pymoo_hdte.problems.simulator.inputs import Design, Inputs
-from pymoo_hdte.problems.simulator.problem import SimulatorProblem, place_of
-from pymoo_hdte.problems.simulator.runs import RunFile, Simulator
-from pymoo_hdte.problems.simulator.statistics import Mean, RobustConstraint, Statistic, Std
+from pymoo_hdte.problems.simulator.problem import SimulatorProblem
+from pymoo_hdte.problems.simulator.run_file import RunFile, identity
+from pymoo_hdte.problems.simulator.runs import Simulator
+from pymoo_hdte.problems.simulator.statistics import (
+    Mean,
+    RobustConstraint,
+    Statistic,
+    Std,
+    place_of,
+)
 from pymoo_hdte.problems.simulator.trust import (
     failing,
     inaccurate,
@@ -92,8 +99,9 @@ def robust_problem(
         How often a run is made that raises or gives NaN, before it is left out. What a vectorised
         simulator raises is passed on.
     cache : path, optional
-        File of finished runs: with it, no run is made twice, though the process be killed, but the
-        first, which tells whether the file is this simulator's.
+        File of finished runs: with it, no run is made twice, though the process be killed. The
+        first is made again, to see whether the file is this simulator's, where the study that wrote
+        it came to its end, or the simulator's source or state are others or cannot be told.
     seed : int
         Of the points not used.
     progress : bool
@@ -124,7 +132,7 @@ def robust_problem(
     least = least_runs(inputs)
     budget = whole_number("budget", budget, least)
     _check_statistics(objectives, constraints)
-    file = None if cache is None else RunFile(cache, inputs.names)
+    file = None if cache is None else RunFile(cache, inputs.names, identity(simulator))
     count, batch = whole_number("tries", tries, 1), whole_number("at_once", at_once, 1)
     random_state = np.random.default_rng(whole_number("seed", seed, 0))
     bar = _announce(inputs, least, budget) if progress else tqdm(disable=True)
@@ -141,6 +149,8 @@ def robust_problem(
             ),
             batch,
         )
+    if file:
+        file.finish()
     responses = simulate.responses
     for one in [*objectives, *(limit.statistic for limit in constraints)]:
         place_of(one, responses)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
@@ -14,6 +11,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems.simulator.run_file import RunFile
 
 Array = NDArray[np.float64]
 
@@ -26,72 +24,6 @@ SMALLEST, LARGEST = 1e-100, 1e100
 
 class SimulatorFailed(RuntimeError):
     """The simulator fails where no surrogate can do without it; the message names the place."""
-
-
-class RunFile:
-    """Finished runs on disk, one line each, written before the next is waited for.
-
-    A line that a killed process left unfinished is dropped. Numbers are kept to the last bit.
-
-    Parameters
-    ----------
-    path : str or path-like
-        Of the file; made if it is not there.
-    names : tuple of str
-        Of the simulator's inputs. A file of others is refused.
-
-    Raises
-    ------
-    InvalidInput
-        If the file holds runs of other inputs or is none of these files.
-    OSError
-        If it cannot be read or written.
-    """
-
-    def __init__(self, path: str | os.PathLike[str], names: tuple[str, ...]) -> None:
-        self.path = Path(path)
-        self._names = names
-        self.runs: dict[tuple[float, ...], Any] = {}
-        self.responses: tuple[str, ...] = ()
-        if self.path.exists() and self.path.stat().st_size:
-            self._read()
-        else:
-            self._append({"inputs": list(names)})
-
-    def _read(self) -> None:
-        text = self.path.read_text(encoding="utf-8")
-        head, *lines = text.splitlines(keepends=True)
-        try:
-            found = json.loads(head)["inputs"]
-        except (ValueError, KeyError, TypeError):
-            raise InvalidInput("cache", str(self.path), "a file of finished runs") from None
-        if found != list(self._names):
-            raise InvalidInput("cache", str(self.path), f"runs of the inputs {self._names}")
-        for line in lines:
-            if not line.endswith("\n"):
-                continue
-            run = json.loads(line)
-            if "responses" in run:
-                self.responses = tuple(run["responses"])
-            else:
-                self.runs[tuple(map(float.fromhex, run["at"]))] = run["gave"]
-        if lines and not lines[-1].endswith("\n"):
-            whole = text[: -len(lines[-1])]
-            self.path.write_text(whole, encoding="utf-8")
-
-    def keep(self, at: tuple[float, ...], gave: Any, responses: tuple[str, ...]) -> None:
-        """Write a run to the disk, before the first the names of the responses."""
-        if not self.responses:
-            self.responses = responses
-            self._append({"responses": list(responses)})
-        self.runs[at] = gave
-        self._append({"at": [value.hex() for value in at], "gave": gave})
-
-    def _append(self, line: dict[str, Any]) -> None:
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
 
 
 class Simulator:
@@ -142,7 +74,7 @@ class Simulator:
         self.responses = file.responses if file else ()
         self._ran = self._sized = False
         self._last_error: BaseException | None = None
-        if file and file.runs:
+        if file and file.runs and not file.goes_on:
             self._check_kept(file)
 
     def _check_kept(self, file: RunFile) -> None:

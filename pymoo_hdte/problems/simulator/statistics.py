@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import one_of, real_number
+from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.problems.simulator.around import Around
 from pymoo_hdte.surrogate.moments import divide_or_zero
 
@@ -225,3 +225,18 @@ class WorstCase(Statistic):
 def reach_of(values: Array, around: Around) -> Array:
     """Return how many deviations values lie from the mean, shape (n,), 0 without scatter."""
     return np.abs(divide_or_zero(values - around.mean, around.std))
+
+
+def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
+    """Return the position of the statistic's response.
+
+    Raises
+    ------
+    InvalidInput
+        If there is none of that name, or none is named and there are several.
+    """
+    if statistic.response is None and len(responses) == 1:
+        return 0
+    if statistic.response not in responses:
+        raise InvalidInput("response of a statistic", statistic.response, f"one of {responses}")
+    return responses.index(statistic.response)

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.surrogate.inputs import TruncatedNormal
+from pymoo_hdte.surrogate.sparse.unusable import named, unusable
 
 _NODES_OF_PANEL = 64
 _PANEL_ERROR = 1e-13
@@ -57,26 +58,33 @@ class Distribution:
     """
 
     def __init__(self, field: str, given: Any) -> None:
-        allowed = "a continuous distribution of chaospy or a frozen one of scipy.stats"
         if isinstance(given, TruncatedNormal):
             given = _truncated(given)
-        from_chaospy = all(hasattr(given, name) for name in ("inv", "pdf", "cdf"))
-        from_scipy = all(hasattr(given, name) for name in ("ppf", "pdf", "cdf", "dist"))
-        if not (from_chaospy or from_scipy) or getattr(given, "interpret_as_integer", False):
-            raise InvalidInput(field, given, allowed)
-        if from_chaospy and len(given) != 1:
-            raise InvalidInput(field, given, allowed + " of one variable")
+        wrong = unusable(given)
+        if wrong:
+            raise InvalidInput(field, given, wrong)
+        allowed = "a distribution with a finite, positive scatter"
+        # Libraries find impossible numbers when they are asked, and raise anything.
+        try:
+            self._ask(given)
+            spread = self.lower < self.upper and np.isfinite([self.lower, self.upper]).all()
+            if spread and self._has_no_variance():
+                allowed, spread = "a distribution with a finite variance", False
+        except Exception as error:
+            raise InvalidInput(field, given, f"{allowed} ({error}){named(given)}") from error
+        if not spread:
+            raise InvalidInput(field, given, f"{allowed}{named(given)}")
+
+    def _ask(self, given: Any) -> None:
         self._given = given
-        self._quantile = given.inv if from_chaospy else given.ppf
+        from_chaospy = hasattr(given, "inv")
+        quantile = "inv" if from_chaospy else "ppf" if hasattr(given, "ppf") else "icdf"
+        self._quantile = getattr(given, quantile)
         ends = (given.lower[0], given.upper[0]) if from_chaospy else given.support()
         self.lower, self.upper = (
             float(end if np.isfinite(end) else self._quantile(p))
             for end, p in zip(ends, (1e-16, 1.0 - 1e-16), strict=True)
         )
-        if not (np.isfinite([self.lower, self.upper]).all() and self.lower < self.upper):
-            raise InvalidInput(field, given, allowed + " with a finite, positive scatter")
-        if self._has_no_variance():
-            raise InvalidInput(field, given, allowed + " with a finite variance")
 
     def _has_no_variance(self) -> bool:
         """Whether a tail falls so slowly that squares have no mean, as Student's t(2).

@@ -1,0 +1,139 @@
+"""Finished runs of a simulator on disk, from which a killed study goes on."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+import json
+import os
+import pickle
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pymoo_hdte.checks import InvalidInput
+
+_BEGINNING = '{"inputs": '
+"""Of every such file; a shorter one is what a kill left of it."""
+
+
+class RunFile:
+    """Finished runs on disk, one line each, written before the next is waited for.
+
+    The file only grows. A line that a killed process left unfinished is dropped. Numbers are kept
+    to the last bit.
+
+    Parameters
+    ----------
+    path : str or path-like
+        Of the file; made if it is not there.
+    names : tuple of str
+        Of the simulator's inputs. A file of others is refused.
+    simulator : str or None
+        What tells the simulator from others, as `identity` returns it.
+
+    Attributes
+    ----------
+    runs : dict
+        What the simulator gave, by inputs.
+    responses : tuple of str
+        Names of what it gives; empty before the first run.
+    goes_on : bool
+        Whether this simulator wrote the file and was stopped before the study's end.
+
+    Raises
+    ------
+    InvalidInput
+        If the file holds runs of other inputs or is none of these files.
+    OSError
+        If it cannot be read or written.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike[str], names: tuple[str, ...], simulator: str | None
+    ) -> None:
+        self.path = Path(path)
+        self._names, self._simulator = names, simulator
+        self.runs: dict[tuple[float, ...], Any] = {}
+        self.responses: tuple[str, ...] = ()
+        self.goes_on = self._finished = False
+        contents = self.path.read_bytes() if self.path.exists() else b""
+        whole = contents[: contents.rfind(b"\n") + 1]
+        if not whole and not _BEGINNING.startswith(contents[: len(_BEGINNING)].decode("latin-1")):
+            raise InvalidInput("cache", str(self.path), "a file of finished runs")
+        if whole:
+            self._read(whole)
+        if len(whole) < len(contents):
+            # Not written anew: a kill would then leave less than there was.
+            os.truncate(self.path, len(whole))
+        if not whole:
+            self._append({"inputs": list(names), "simulator": simulator})
+
+    def _read(self, contents: bytes) -> None:
+        try:
+            head, *lines = contents.decode().split("\n")[:-1]
+            header = json.loads(head)
+            found = header["inputs"]
+        except (ValueError, KeyError, TypeError):
+            raise InvalidInput("cache", str(self.path), "a file of finished runs") from None
+        if found != list(self._names):
+            raise InvalidInput("cache", str(self.path), f"runs of the inputs {self._names}")
+        for line in lines:
+            run = json.loads(line)
+            self._finished = "finished" in run
+            if "responses" in run:
+                self.responses = tuple(run["responses"])
+            elif "at" in run:
+                self.runs[tuple(map(float.fromhex, run["at"]))] = run["gave"]
+        known = self._simulator is not None and header.get("simulator") == self._simulator
+        self.goes_on = known and not self._finished
+
+    def keep(self, at: tuple[float, ...], gave: Any, responses: tuple[str, ...]) -> None:
+        """Write a run to the disk, before the first the names of the responses."""
+        if not self.responses:
+            self.responses = responses
+            self._append({"responses": list(responses)})
+        self.runs[at] = gave
+        self._append({"at": [value.hex() for value in at], "gave": gave})
+        self._finished = False
+
+    def finish(self) -> None:
+        """Note that the study came to its end."""
+        if not self._finished:
+            self._append({"finished": True})
+            self._finished = True
+
+    def _append(self, line: dict[str, Any]) -> None:
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def identity(simulator: Callable[..., Any]) -> str | None:
+    """Return what tells a simulator from others: its state and the source file it is defined in.
+
+    What it reads or calls elsewhere is not seen.
+
+    Parameters
+    ----------
+    simulator : callable
+        A function, a method, an object with a state, or a `functools.partial` of these.
+
+    Returns
+    -------
+    str or None
+        None where it cannot be told: there is no source file, or the state cannot be written down.
+    """
+    inner: Any = simulator
+    while isinstance(inner, functools.partial):
+        inner = inner.func
+    # A user's object may raise anything when it is pickled.
+    try:
+        source = inspect.getsourcefile(sys.modules[inner.__module__])
+        contents = pickle.dumps(simulator, protocol=4) + Path(str(source)).read_bytes()
+    except Exception:
+        return None
+    return hashlib.sha256(contents).hexdigest()

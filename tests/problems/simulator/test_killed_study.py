@@ -1,0 +1,165 @@
+"""A study killed at any moment goes on: no call is made twice, and the bytes are the same."""
+
+import math
+import multiprocessing
+import os
+import signal
+import time
+from functools import partial
+
+import chaospy
+import numpy as np
+import pytest
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems import Design, robust_problem
+from pymoo_hdte.problems.simulator.run_file import RunFile, identity
+
+NAMES = ("x", "a")
+RUNS, PROBLEM = "runs.jsonl", "problem.npz"
+OPTIONS = {"accuracy": 0.05, "progress": False}
+
+
+def noting(log, x, a):
+    """Note the call on disk, as a kill leaves nothing in memory, and work for a while."""
+    with open(log, "a") as file:
+        file.write(f"{x.hex()} {a.hex()}\n")
+    time.sleep(1e-3)
+    return np.exp(x * a)
+
+
+def study(folder, simulator=None):
+    """Make a problem, whose cache, log of calls and file are in the folder."""
+    designs, noise = {"x": Design(0.5, 1.0, deviation=0.05)}, {"a": chaospy.Uniform(0.0, 1.0)}
+    simulator = simulator or partial(noting, str(folder.resolve() / "log"))
+    problem = robust_problem(simulator, designs, noise, cache=folder / RUNS, **OPTIONS)
+    problem.save(folder / PROBLEM)
+
+
+def calls(folder):
+    log = folder / "log"
+    return log.read_text().splitlines() if log.exists() else []
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a study that nobody killed."""
+    folder = tmp_path_factory.mktemp("whole")
+    study(folder)
+    assert len(calls(folder)) == len(set(calls(folder)))
+    return folder
+
+
+def same(folder, whole):
+    """Check what a study left behind; its log has another path, which the cache knows of."""
+    lines = [(one / RUNS).read_bytes().split(b"\n", 1)[1] for one in (folder, whole)]
+    assert lines[0] == lines[1]
+    assert (folder / PROBLEM).read_bytes() == (whole / PROBLEM).read_bytes()
+
+
+def killed_at(folder, count, target=study):
+    """Run a study in a process of its own and kill it when it has made so many calls."""
+    process = multiprocessing.get_context("fork").Process(target=target, args=(folder,))
+    process.start()
+    while process.is_alive() and len(calls(folder)) < count:
+        time.sleep(1e-4)
+    if process.is_alive():
+        os.kill(process.pid, signal.SIGKILL)
+    process.join()
+    return process.exitcode
+
+
+# From Python 3.12 on a fork warns where there are threads, as progress bars have.
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(k, marks=pytest.mark.nightly) for k in range(2, 12))]
+)
+def test_a_killed_process_goes_on_without_a_call_made_twice(tmp_path, whole, seed):
+    rng = np.random.default_rng(seed)
+    total, kills = len(calls(whole)), 0
+    for count in np.sort(rng.choice(total - 2, 4, replace=False)) + 1:
+        kills += killed_at(tmp_path, count) == -signal.SIGKILL
+        made, kept = calls(tmp_path), (tmp_path / RUNS).read_bytes().count(b'"at"')
+        assert kept <= len(set(made))
+    assert kills >= 2
+    study(tmp_path)
+    made = calls(tmp_path)
+    # A call that the kill interrupted has no result, so that it is made again.
+    again = len(made) - len(set(made))
+    assert again <= kills
+    assert set(made) == set(calls(whole))
+    same(tmp_path, whole)
+
+
+def test_any_part_of_the_file_that_a_kill_leaves_is_gone_on_from(tmp_path, whole):
+    """The file only grows, so that a kill leaves one of its beginnings."""
+    contents = (whole / RUNS).read_bytes()
+    ends = np.cumsum([len(line) for line in contents.splitlines(keepends=True)])
+    cuts = [0, 1, ends[0] - 1, ends[0], ends[1] - 3, ends[1], ends[9] + 9]
+    for place, cut in enumerate([*cuts, ends[-2], ends[-1] - 1]):
+        folder = tmp_path / str(place)
+        folder.mkdir()
+        # The simulator's identity holds the path of its log.
+        simulator = partial(noting, str(whole / "log"))
+        (folder / RUNS).write_bytes(contents[:cut])
+        before = len(calls(whole))
+        study(folder, simulator)
+        kept = contents[:cut].count(b"\n") - 2
+        assert len(calls(whole)) - before == (ends.size - 3) - max(min(kept, ends.size - 3), 0)
+        assert (folder / RUNS).read_bytes() == contents
+        same(folder, whole)
+
+
+def test_the_first_run_is_made_again_where_the_simulator_may_be_another(tmp_path, whole):
+    before = (whole / RUNS).read_bytes()
+    unfinished = before[: before.rindex(b"\n", 0, -1) + 1]
+    (tmp_path / RUNS).write_bytes(unfinished)
+    again = []
+
+    def other(x, a):
+        again.append((x, a))
+        return np.exp(x * a)
+
+    study(tmp_path, other)
+    assert len(again) == 1
+    # A study that came to its end may be looked at much later, by another version of the program.
+    count = len(calls(whole))
+    study(whole)
+    assert len(calls(whole)) - count == 1
+    assert (whole / RUNS).read_bytes() == before
+    with pytest.raises(InvalidInput, match="runs of this simulator"):
+        study(tmp_path, lambda x, a: 1.1 * np.exp(x * a))
+
+
+def function(x, a):
+    return x * a
+
+
+def test_a_simulator_is_known_by_its_state_and_its_source(tmp_path, monkeypatch):
+    class Local:
+        def __call__(self, x, a):
+            return x
+
+    assert identity(function) == identity(function)
+    assert identity(partial(function, 1.0)) != identity(partial(function, 2.0))
+    # What cannot be told is not guessed.
+    for one in (lambda x, a: x, Local(), math.hypot):
+        assert identity(one) is None
+    sources = [tmp_path / "own.py", tmp_path / "own.py"]
+    monkeypatch.syspath_prepend(tmp_path)
+    found = []
+    for text in ("LENGTH = 1.0\n", "LENGTH = 2.0\n"):
+        sources[0].write_text(text + "def beam(x):\n    return LENGTH * x\n")
+        import own
+
+        found.append(identity(own.beam))
+    assert found[0] != found[1]
+
+
+def test_a_file_of_no_runs_is_refused_and_left_alone(tmp_path):
+    file = tmp_path / "notes.txt"
+    for text in ("my notes\n", "my notes", '{"inputs": 3}\n', '{"inputs": ["y"]}\n'):
+        file.write_text(text)
+        with pytest.raises(InvalidInput, match="cache"):
+            RunFile(file, NAMES, None)
+        assert file.read_text() == text
