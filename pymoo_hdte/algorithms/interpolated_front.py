@@ -1,12 +1,12 @@
-"""The front of two expensive objectives: interpolated, asked where it seems to lie, again and again.
+"""The front of two expensive objectives: interpolated, evaluated where it seems to lie, repeated.
 
 The logarithms of both objectives are interpolated by radial basis functions over the designs that
-were evaluated and are not far worse. A swarm finds the front of the interpolation, designs along it are evaluated,
-and that is repeated until interpolation and evaluation agree along the front. Every design that is
-returned was evaluated: a wrong interpolation costs rounds, never truth. Some designs of each round
-lie anywhere, so that a better region elsewhere has its chance. Interpolation as a guide of
-expensive searches: Gutmann, Journal of Global Optimization 19, 2001; Regis and Shoemaker, INFORMS
-Journal on Computing 19, 2007.
+were evaluated and are not far worse. A swarm finds the front of the interpolation, designs along it
+are evaluated, and that is repeated until interpolation and evaluation agree along the front. Every
+design that is returned was evaluated: a wrong interpolation costs rounds, never truth. Some designs
+of each round lie anywhere, so that a better region elsewhere has its chance. Interpolation as a
+guide of expensive searches: Gutmann, Journal of Global Optimization 19, 2001; Regis and Shoemaker,
+INFORMS Journal on Computing 19, 2007.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Values = NDArray[np.float64]
 Evaluate = Callable[[Values], Values]
 
 POINTS = 20
-"""Designs along the front that are evaluated in a round."""
+"""Designs along the front that are evaluated in a round, if nothing else is asked for."""
 EXPLORERS = 16
 """Designs anywhere that are evaluated in a round."""
 _FIRST = 64
@@ -41,7 +41,7 @@ _POPULATION, _GENERATIONS = 100, 60
 _SAME = 1e-4
 """Distance in the unit cube below which a design counts as evaluated already."""
 _FAR = 2.0
-"""Designs worse than the front by this factor, as near a resonance, would bend the interpolation."""
+"""Designs worse than the front by this factor, as in a resonance, would bend the interpolation."""
 _BEYOND = 1.0
 """Above the largest logarithm interpolated by this much, an interpolation is cut off."""
 
@@ -85,6 +85,7 @@ def interpolated_front(
     least_width: float,
     start: Values | None = None,
     most: int = 600,
+    points: int = POINTS,
     notify: Callable[[int, float], None] | None = None,
 ) -> FoundFront:
     """Return the front of two positive objectives over a box, in some hundred evaluations.
@@ -106,6 +107,8 @@ def interpolated_front(
         Designs to evaluate first, beside some all over the box.
     most : int
         Evaluations after which no further round begins.
+    points : int
+        Designs along the front that are evaluated in a round.
     notify : callable, optional
         Called after each round with the number of evaluations and the difference.
 
@@ -124,7 +127,7 @@ def interpolated_front(
         raise ArithmeticError(f"none of {len(known.cubes)} designs over the whole box has values")
     difference = np.inf
     while difference > accuracy and len(known.cubes) < most:
-        difference = _round(known, rng)
+        difference = _round(known, points, rng)
         if notify is not None:
             notify(len(known.cubes), difference)
     return known.found(difference)
@@ -156,7 +159,7 @@ class _Known:
     @property
     def good(self) -> NDArray[np.bool_]:
         """Which have objectives, shape (n,)."""
-        return np.isfinite(self.values).all(axis=1)
+        return np.asarray(np.isfinite(self.values).all(axis=1))
 
     @property
     def front_rows(self) -> NDArray[np.int_]:
@@ -205,12 +208,12 @@ class _Interpolation(Problem):
         out["F"] = np.exp(np.where(near[:, None], logarithms, self._highest))
 
 
-def _round(known: _Known, rng: np.random.Generator) -> float:
+def _round(known: _Known, points: int, rng: np.random.Generator) -> float:
     """Evaluate designs along the interpolated front and anywhere; return their difference."""
     swarm = ElitistSwarm(pop_size=_POPULATION)
     seed = int(rng.integers(2**31))
     result = minimize(_Interpolation(known), swarm, ("n_gen", _GENERATIONS), seed=seed)
-    along = _spread(result.F, POINTS)
+    along = _spread(result.F, points)
     new = _not_known(known.cubes, result.X[along])
     expected = result.F[along][new]
     explorers = rng.random((EXPLORERS, known.cubes.shape[1]))

@@ -173,19 +173,27 @@ def _apart(study: DesignStudy) -> str:
 
 def _agreement(study: DesignStudy) -> str:
     """Say what agreement means here."""
-    search, problem = study.search, study.problem
-    mean, std = search.width
-    off = [
-        f"{100.0 * value:.1f} %" if np.isfinite(value) else "without end"
-        for value in (search.difference, study.quadrature)
+    search = study.search
+    mean, std = (number(float(one)) for one in search.width)
+    parts = [
+        f"Its values are the model's own, at {math.prod(study.problem.moments.nodes)} nodes a "
+        "design."
     ]
-    return (
-        f"Every design of the front is the drive model's own, at {math.prod(problem.moments.nodes)} "
-        f"nodes; what was expected between {search.evaluated} designs is off by {off[0]}, and "
-        f"{SETS * DRIVES} other drives of each of {len(study.checks)} designs by {off[1]} beyond "
-        f"chance, of {number(float(mean))} arcsec in the mean and {number(float(std))} in the "
-        "standard deviation."
+    if np.isfinite(search.difference):
+        parts.append(
+            f"Interpolated between {search.evaluated} designs they are off by "
+            f"{100.0 * search.difference:.1f} %."
+        )
+    if np.isfinite(study.quadrature):
+        parts.append(
+            f"On {SETS * DRIVES} other drives each, {len(study.checks)} designs differ by "
+            f"{100.0 * study.quadrature:.1f} % beyond chance."
+        )
+    parts.append(
+        f"The width counts as {mean} arcsec in the mean and {std} in the standard deviation, "
+        f"{100.0 * HARDLY_WORTH:g} % of the least value if it is less."
     )
+    return " ".join(parts)
 
 
 def _moved(what: str, before: float, after: float) -> str:

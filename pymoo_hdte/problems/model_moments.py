@@ -22,7 +22,7 @@ from pymoo_hdte.surrogate.sparse.measures import Distribution, Measure, Orthonor
 
 Values = NDArray[np.float64]
 
-FIRST_NODES = (6, 3, 3, 1, 2)
+FIRST_NODES: tuple[int, ...] = (6, 3, 3, 1, 2)
 """Nodes of theta_s, K, J_in, B_in, B_fc: on the front of `calibrated` to 1.4 % of its width."""
 MOST_NODES = 4096
 _RUNS_AT_ONCE = 8192
@@ -141,12 +141,13 @@ class ModelMoments:
 
     def lost(self, design: Values) -> dict[str, float] | None:
         """Return `PARAMETERS` of the first node of a design without a steady state, or None."""
-        nodes = self._drives(design[None])[0]
-        dte = self._at_nodes(design[None])[0]
-        gone = np.flatnonzero(np.isnan(dte))
-        if not gone.size:
+        gone = np.isnan(self._at_nodes(design[None])[0])
+        if not gone.any():
             return None
-        return dict(zip(PARAMETERS, nodes[gone[0]].tolist(), strict=True))
+        # Where an outermost one is lost, the others have not been tried.
+        tried = self._outermost[gone[self._outermost]]
+        first = tried[0] if tried.size else np.flatnonzero(gone)[0]
+        return dict(zip(PARAMETERS, self._drives(design[None])[0, first].tolist(), strict=True))
 
     def _moments_over(self, dte: Values, axes: Sequence[int]) -> tuple[Values, Values]:
         """Return expectation and deviation over some axes of values on the grid."""
@@ -163,8 +164,8 @@ class ModelMoments:
         takes longer than one that succeeds.
         """
         drives = self._drives(designs)
-        found = np.full(drives.shape[:2], np.nan)
-        outermost = np.isin(np.arange(found.shape[1]), self._outermost)
+        found = np.full((len(designs), len(self._points)), np.nan)
+        outermost = np.isin(np.arange(len(self._points)), self._outermost)
         rows = np.arange(len(designs))
         for nodes in (np.flatnonzero(outermost), np.flatnonzero(~outermost)):
             place = np.ix_(rows, nodes)
@@ -205,7 +206,7 @@ def _expectation(values: Values, rules: Sequence[Values]) -> float:
 
 
 def _doubled(nodes: tuple[int, ...], axis: int) -> tuple[int, ...]:
-    return (*nodes[:axis], 2 * nodes[axis], *nodes[axis + 1 :])
+    return tuple(2 * count if place == axis else count for place, count in enumerate(nodes))
 
 
 def _checked_nodes(nodes: Sequence[int]) -> tuple[int, ...]:

@@ -102,10 +102,13 @@ class RobustDTEDirect(StoredFront, Problem):
 
     def without_steady_state(self, design: NDArray[np.float64]) -> str:
         """Say around which design, and where, there is no steady state."""
-        node = self.moments.lost(design) or {}
+        node = self.moments.lost(design)
         around = ", ".join(self._values(dict(zip(self.var_names, design, strict=True))))
-        where = ", ".join(self._values({name: node[name] for name in self.var_names if node}))
-        return f"no steady state around the design {around}: none at {where}"
+        found = f"no steady state around the design {around}"
+        if node is None:
+            return found
+        where = ", ".join(self._values({name: node[name] for name in self.var_names}))
+        return f"{found}: none at {where}"
 
     def _values(self, entries: dict[str, float]) -> list[str]:
         return [f"{name} = {value:.4g} {self.units[name]}" for name, value in entries.items()]

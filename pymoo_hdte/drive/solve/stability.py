@@ -20,6 +20,10 @@ _LARGEST_DENOMINATOR = 1000
 _PHASE_PER_STEP = 1.0
 """Radians of the fastest torsional vibration that one step may span."""
 _ROUNDING = 1e-9
+_IN_MOTION = (
+    "stiffness", "damping", "input_inertia", "input_damping", "output_inertia", "output_damping",
+)  # fmt: skip
+"""What the free motion of a design depends on, beside the variation of its stiffness."""
 
 
 class UnstableDrive(ArithmeticError):
@@ -115,7 +119,13 @@ def _largest_multipliers(coefficients: Coefficients) -> NDArray[np.float64]:
     period, cycles = _period(coefficients)
     if _phase(coefficients, period) > 2.0 * _MOST_STEPS * cycles:
         return np.zeros(n)
-    return np.abs(floquet_multipliers(coefficients)).max(axis=1)
+    # theta_s has no part in it: designs that differ in nothing else are solved once.
+    parts = np.broadcast_arrays(*(getattr(coefficients, name) for name in _IN_MOTION))
+    _, rows, which = np.unique(
+        np.column_stack(parts), axis=0, return_index=True, return_inverse=True
+    )
+    largest = np.abs(floquet_multipliers(coefficients.rows(rows))).max(axis=1)
+    return np.asarray(largest[which.ravel()])
 
 
 def _bounded(moduli: NDArray[np.float64]) -> NDArray[np.bool_]:
