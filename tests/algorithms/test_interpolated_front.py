@@ -1,4 +1,4 @@
-"""The front of expensive objectives: exact where it is known, in few evaluations, lost ones told."""
+"""The front of expensive objectives: exact where known, in few evaluations, lost ones told."""
 
 import numpy as np
 import pytest
@@ -86,7 +86,7 @@ def test_without_agreement_it_ends_and_says_so():
 
 
 def test_nothing_can_be_said_of_a_box_without_objectives():
-    with pytest.raises(ArithmeticError, match="none of .* designs over the whole box has values"):
+    with pytest.raises(ArithmeticError, match=r"none of .* designs over the whole box has values"):
         search(lambda designs: np.full((len(designs), 2), np.nan))
 
 

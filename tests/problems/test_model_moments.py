@@ -1,4 +1,4 @@
-"""Moments of the DTE by quadrature of the drive model, and the problem whose front is the model's."""
+"""Moments of the DTE by quadrature of the drive model, and the problem of that front."""
 
 import copy
 import pickle
