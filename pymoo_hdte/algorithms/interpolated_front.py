@@ -53,18 +53,20 @@ class FoundFront:
     Attributes
     ----------
     designs : ndarray, shape (n, n_var)
-        No evaluated design is better in both objectives than one of these; by rising first one.
+        In their own units; no evaluated design is better in both objectives than one of these. By
+        rising first objective.
     front : ndarray, shape (n, 2)
-        Their objectives, as evaluated.
+        Their objectives as evaluated, in their own units.
     width : ndarray, shape (2,)
-        Of the front in each objective, or ``least_width`` of its least value if that is more.
+        Of the front in each objective's unit, or ``least_width`` of its least value if that is
+        more.
     difference : float
-        Largest difference, in widths, of interpolation and evaluation along the last front, and
-        by which a design anywhere was better; inf if a design along it had no objectives.
+        Dimensionless, in widths: largest difference of interpolation and evaluation along the last
+        front, and by which a design anywhere was better; inf if one along it had no objectives.
     evaluated : int
         Number of designs evaluated.
     lost : ndarray, shape (k, n_var)
-        Those of them without objectives.
+        Those of them without objectives, in their own units.
     """
 
     designs: Values
@@ -93,24 +95,29 @@ def interpolated_front(
     Parameters
     ----------
     evaluate : callable
-        Takes designs, shape (n, n_var), and returns objectives, shape (n, 2), above 0, or NaN for a
-        design that has none.
+        Takes designs in their own units, shape (n, n_var), and returns objectives in theirs, shape
+        (n, 2), above 0, or NaN for a design that has none.
     lower, upper : ndarray, shape (n_var,)
-        The box.
+        The box, in the designs' own units.
     rng : numpy.random.Generator
     accuracy : float
-        The search ends when interpolation and evaluation differ by less along the front, in
-        widths, and no design anywhere is better by more.
+        Dimensionless, in widths: the search ends when interpolation and evaluation differ by less
+        along the front, and no design anywhere is better by more.
     least_width : float
-        Share of an objective's least value below which its width counts as that.
+        Dimensionless share of an objective's least value below which its width counts as that.
     start : ndarray, shape (m, n_var), optional
-        Designs to evaluate first, beside some all over the box.
+        Designs in their own units to evaluate first, beside some all over the box.
     most : int
         Evaluations after which no further round begins.
     points : int
         Designs along the front that are evaluated in a round.
     notify : callable, optional
-        Called after each round with the number of evaluations and the difference.
+        Called after each round with the number of evaluations and the difference in widths, both
+        dimensionless.
+
+    Returns
+    -------
+    FoundFront
 
     Raises
     ------

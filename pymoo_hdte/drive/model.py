@@ -157,7 +157,25 @@ class DriveModel:
         return self.steady_state(parameters).peak_to_peak(self.sheet.ratio) / ARCSEC
 
     def dte_where_found(self, parameters: ArrayLike) -> NDArray[np.float64]:
-        """Return `dte_arcsec`, shape (n,), NaN for designs without a steady state."""
+        """Return `dte_arcsec` of those of n designs that have a steady state.
+
+        Parameters
+        ----------
+        parameters : array_like, shape (n, 5)
+            As in `coefficients`.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            arcsec; NaN for a design whose motion grows or is not found.
+
+        Raises
+        ------
+        InvalidInput
+            As `coefficients`.
+        ArithmeticError
+            If the harmonics of a deeply varying stiffness do not die out.
+        """
         found, spectrum = found_steady_states(self.coefficients(parameters))
         dte = np.full(len(found), np.nan)
         dte[found] = spectrum.peak_to_peak(self.sheet.ratio) / ARCSEC

@@ -101,7 +101,17 @@ class RobustDTEDirect(StoredFront, Problem):
         out["F"] = found
 
     def without_steady_state(self, design: NDArray[np.float64]) -> str:
-        """Say around which design, and where, there is no steady state."""
+        """Say around which design, and where, there is no steady state.
+
+        Parameters
+        ----------
+        design : ndarray, shape (4,)
+            SI; one whose moments are NaN.
+
+        Returns
+        -------
+        str
+        """
         node = self.moments.lost(design)
         around = ", ".join(self._values(dict(zip(self.var_names, design, strict=True))))
         found = f"no steady state around the design {around}"
