@@ -181,7 +181,7 @@ def _agreement(study: DesignStudy) -> str:
     ]
     if np.isfinite(search.difference):
         parts.append(
-            f"Interpolated between {search.evaluated} designs they are off by "
+            f"Those asked last, of {search.evaluated} designs, were predicted to "
             f"{100.0 * search.difference:.1f} %."
         )
     if np.isfinite(study.quadrature):
