@@ -38,6 +38,8 @@ _FIRST = 64
 _CORNERS_UP_TO = 6
 """Variables up to which all corners of the box are evaluated."""
 _POPULATION, _GENERATIONS = 100, 60
+_AT_ONCE = 16
+"""Designs evaluated before somebody who waits is told."""
 _SAME = 1e-4
 """Distance in the unit cube below which a design counts as evaluated already."""
 _FAR = 2.0
@@ -112,8 +114,8 @@ def interpolated_front(
     points : int
         Designs along the front that are evaluated in a round.
     notify : callable, optional
-        Called after each round with the number of evaluations and the difference in widths, both
-        dimensionless.
+        Called often with the number of evaluations and the difference of the last round in widths,
+        both dimensionless; inf in the first.
 
     Returns
     -------
@@ -124,7 +126,7 @@ def interpolated_front(
     ArithmeticError
         If no design of the first round has objectives.
     """
-    known = _Known(evaluate, lower, upper, least_width)
+    known = _Known(evaluate, lower, upper, least_width, notify)
     first = _first_cubes(len(lower), min(_FIRST, most // 4), rng)
     if start is not None:
         cubes = known.cube_of(start)
@@ -132,22 +134,26 @@ def interpolated_front(
     known.add(first)
     if not known.good.any():
         raise ArithmeticError(f"none of {len(known.cubes)} designs over the whole box has values")
-    difference = np.inf
-    while difference > accuracy and len(known.cubes) < most:
-        difference = _round(known, points, rng)
-        if notify is not None:
-            notify(len(known.cubes), difference)
-    return known.found(difference)
+    while known.difference > accuracy and len(known.cubes) < most:
+        known.difference = _round(known, points, rng)
+        known.tell()
+    return known.found()
 
 
 class _Known:
     """The designs that were evaluated, in the unit cube, and their objectives."""
 
     def __init__(
-        self, evaluate: Evaluate, lower: Values, upper: Values, least_width: float
+        self,
+        evaluate: Evaluate,
+        lower: Values,
+        upper: Values,
+        least_width: float,
+        notify: Callable[[int, float], None] | None,
     ) -> None:
         self._evaluate, self._lower, self._span = evaluate, lower, upper - lower
-        self._upper, self._least_width = upper, least_width
+        self._upper, self._least_width, self._notify = upper, least_width, notify
+        self.difference = np.inf
         self.cubes, self.values = np.empty((0, len(lower))), np.empty((0, 2))
 
     def cube_of(self, designs: Values) -> Values:
@@ -158,10 +164,20 @@ class _Known:
         return np.clip(self._lower + self._span * cubes, self._lower, self._upper)
 
     def add(self, cubes: Values) -> Values:
-        """Evaluate designs and return their objectives."""
-        values = self._evaluate(self.designs_of(cubes))
-        self.cubes, self.values = np.vstack([self.cubes, cubes]), np.vstack([self.values, values])
-        return values
+        """Evaluate designs, some at once, and return their objectives."""
+        before = len(self.values)
+        for first in range(0, len(cubes), _AT_ONCE):
+            some = cubes[first : first + _AT_ONCE]
+            values = self._evaluate(self.designs_of(some))
+            self.cubes = np.vstack([self.cubes, some])
+            self.values = np.vstack([self.values, values])
+            self.tell()
+        return self.values[before:]
+
+    def tell(self) -> None:
+        """Notify of the number of designs evaluated and of the last difference."""
+        if self._notify is not None:
+            self._notify(len(self.cubes), self.difference)
 
     @property
     def good(self) -> NDArray[np.bool_]:
@@ -180,11 +196,11 @@ class _Known:
         front = self.values[self.front_rows]
         return np.maximum(np.ptp(front, axis=0), self._least_width * front.min(axis=0))
 
-    def found(self, difference: float) -> FoundFront:
+    def found(self) -> FoundFront:
         rows = self.front_rows
         lost = self.designs_of(self.cubes[~self.good])
         designs, front = self.designs_of(self.cubes[rows]), self.values[rows]
-        return FoundFront(designs, front, self.width, difference, len(self.cubes), lost)
+        return FoundFront(designs, front, self.width, self.difference, len(self.cubes), lost)
 
 
 class _Interpolation(Problem):

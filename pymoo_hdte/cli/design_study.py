@@ -197,7 +197,7 @@ def run_design_study(
         One of `PREFERENCES`.
     settings : Settings
     notify : callable, optional
-        Called after every round with the number of designs evaluated and the difference.
+        Called often with the number of designs evaluated and the last round's difference.
 
     Raises
     ------

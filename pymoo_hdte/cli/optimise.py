@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from pymoo_hdte.cli.command import Command, Outcome, Say, outcome_of
@@ -77,7 +78,8 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     with tqdm(unit="design", leave=False, disable=silent) as bar:
 
         def notify(evaluated: int, difference: float) -> None:
-            bar.set_postfix_str(f"front known to {100.0 * difference:.1f} % of its width")
+            if math.isfinite(difference):
+                bar.set_postfix_str(f"front known to {100.0 * difference:.1f} % of its width")
             bar.update(evaluated - bar.n)
 
         study = run_design_study(model, preference, settings, notify)

@@ -32,7 +32,10 @@ def test_a_known_front_is_found_in_few_evaluations():
         asked.append(len(designs))
         return objectives(designs)
 
-    found = search(evaluate)
+    told = []
+    found = search(evaluate, notify=lambda *words: told.append(words))
+    assert told[-1] == (found.evaluated, found.difference)
+    assert told[0] == (16, np.inf)
     known = front_at(np.linspace(0.0, 1.0, 2001))
     assert found.difference <= 0.01
     assert found.evaluated == sum(asked) < 200
