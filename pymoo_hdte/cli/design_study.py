@@ -26,7 +26,7 @@ A front that is narrower counts as that wide: nobody needs its designs apart.
 """
 LITTLE = 1e-3
 """Share of mean and standard deviation that a variable must move, over its box, to matter."""
-CHECKED = 5
+CHECKED = 4
 """Designs along the front that are checked, beside those that preferences choose."""
 _SEARCHES = 3
 """Searches at most, each but the first with more nodes."""

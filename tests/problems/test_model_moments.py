@@ -72,10 +72,10 @@ def test_a_design_without_steady_state_is_nan_and_named():
 
 
 def test_nodes_are_added_until_doubling_them_changes_little(direct):
-    designs = direct.pareto_set()[[0, 300]]
+    designs = direct.pareto_set()[:1]
     wanted = np.array([0.05, 0.02])
     refined = direct.moments.with_nodes((2, 2, 1, 1, 1)).refined(designs, wanted)
-    finest = direct.moments.with_nodes((16, 4, 4, 1, 3))(designs)
+    finest = direct.moments.with_nodes((16, 4, 4, 1, 2))(designs)
     assert np.prod(refined.nodes) > 4
     assert np.all(np.abs(refined(designs) - finest) <= wanted)
 
