@@ -57,7 +57,7 @@ results = {
 }
 
 # %%
-# The true front of the surrogate
+# The true front of the order-3 surrogate
 # -------------------------------
 #
 # ``pareto_front()`` and ``pareto_set()`` hold 1000 points or more, found by gradients from many
@@ -74,7 +74,7 @@ igd = IGD(front, zero_to_one=True, ideal=ideal, nadir=nadir)
 corner = nadir + 0.1 * (nadir - ideal)
 hv = HV(ref_point=corner, zero_to_one=True, ideal=ideal, nadir=nadir)
 
-print(f"front of the surrogate: {len(front)} points, hypervolume {hv(front):.4f}")
+print(f"front of the order-3 surrogate: {len(front)} points, hypervolume {hv(front):.4f}")
 for name, result in results.items():
     print(f"{name:12}  {len(result.F):3} points  IGD {igd(result.F):.4f}  HV {hv(result.F):.4f}")
 
@@ -84,7 +84,7 @@ for name, result in results.items():
 # ``AMPMOPSO`` holds 50, the others return up to 100.
 
 fig, ax = plt.subplots(figsize=(6.5, 4.0), layout="constrained")
-ax.plot(*front.T, color="0.6", lw=3, label="front of the surrogate")
+ax.plot(*front.T, color="0.6", lw=3, label="front of the order-3 surrogate")
 for (name, result), marker in zip(results.items(), "ox+", strict=True):
     ax.plot(*result.F.T, marker, ms=5, fillstyle="none", label=name)
 ax.set(xlabel="mean DTE [arcsec]", ylabel="standard deviation of the DTE [arcsec]")
@@ -142,9 +142,10 @@ print(f"end of the front {front[:, 0].min():.4f} arcsec")
 # The family
 # ----------
 #
-# ``robust_dte_family()`` names all members with a stored front of their surrogate. They differ in
-# what makes a problem hard: ``resonant`` has a front of two pieces at order 3, a duty cycle
-# averages over speeds and loads, and the last has three objectives.
+# ``robust_dte_family()`` names all members with a stored front. They differ in what makes a problem
+# hard: ``resonant`` has a front of two pieces at order 3, a duty cycle averages over speeds and
+# loads, and with a free tolerance there are three objectives. Their fronts are those of their
+# surrogates, but for that of the last: `RobustDTEDirect` has none and asks the drive model itself.
 
 for name, build in robust_dte_family().items():
     if "_order" not in name:

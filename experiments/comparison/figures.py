@@ -70,7 +70,7 @@ def fronts(comparisons: Sequence[Comparison]) -> Figure:
 
 def _draw_reference(axis: Axes, comparison: Comparison) -> None:
     if comparison.is_true and len(comparison.objectives) == 2:
-        own = "surrogate's true front" if comparison.model in MODELS else "true front"
+        own = "front of the order-3 surrogate" if comparison.model in MODELS else "true front"
         draw_true_front(axis, comparison.truth.pieces, own)
         return
     label = "true front" if comparison.is_true else "union of runs"
@@ -78,7 +78,7 @@ def _draw_reference(axis: Axes, comparison: Comparison) -> None:
 
 
 def draw_true_front(
-    axis: Axes, pieces: Sequence[NDArray[np.float64]], name: str = "surrogate's true front"
+    axis: Axes, pieces: Sequence[NDArray[np.float64]], name: str = "front of the order-3 surrogate"
 ) -> None:
     """Draw the pieces (n, 2) of a true front as one grey line each."""
     for number, piece in enumerate(pieces):

@@ -17,7 +17,7 @@ from pymoo_hdte.problems.drive_response import SURROGATE_BOX
 
 MODEL = "calibrated"
 INITIAL = "initial"
-TRUE_FRONT = "surrogate's true front"
+TRUE_FRONT = "front of the order-3 surrogate"
 PAPER_DESIGN = "paper's design"
 BAND = 0.05
 """Tolerance of every optimised design."""

@@ -27,7 +27,7 @@ def study_designs(problem: RobustDTE) -> Iterator[tuple[str, tuple[float, ...], 
     """Yield name, design (4,) and band of the initial and the chosen designs.
 
     The initial design comes with the range of the surrogate and with the band of the optima; the
-    three preferences choose from the true front of the surrogate.
+    three preferences choose from the true front of the order-3 surrogate.
     """
     initial = tuple(problem.nominal.tolist())
     yield INITIAL, initial, SURROGATE_BOX

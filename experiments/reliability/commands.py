@@ -31,7 +31,7 @@ def simulate(folder: Path) -> None:
 
 def optimise(folder: Path) -> None:
     """Optimise the drive in a folder over its duty cycle, shortly; errors as `_run`."""
-    shortly = ["--cycle", str(folder / "cycle.csv"), "--order", "2", "--evaluations", "200"]
+    shortly = ["--cycle", str(folder / "cycle.csv"), "--designs", "40"]
     _run(["optimise", *_drive(folder), *shortly], folder, optimum_report.FOLDER)
 
 

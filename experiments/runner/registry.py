@@ -269,5 +269,11 @@ EXPERIMENTS = (
         "The true fronts of the surrogates, computed anew and compared: 35 minutes",
         by_default=False,
     ),
+    Experiment(
+        "direct_front",
+        "fronts.direct_front",
+        "The front of the drive model itself, found twice, on a finer quadrature too: 5 minutes",
+        by_default=False,
+    ),
 )
 """In the order in which they run and are reported."""

@@ -3,6 +3,7 @@
 from pymoo_hdte.algorithms.archive import LeaderArchive
 from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.inertia import EntropyWeight, LinearDecrease
+from pymoo_hdte.algorithms.interpolated_front import FoundFront, interpolated_front
 from pymoo_hdte.algorithms.pyramid import Flat, Pyramid
 from pymoo_hdte.algorithms.swarm import ParticleSwarm
 from pymoo_hdte.algorithms.variants import AMOPSO, AMPMOPSO, MOPSO, MPMOPSO
@@ -15,8 +16,10 @@ __all__ = [
     "ElitistSwarm",
     "EntropyWeight",
     "Flat",
+    "FoundFront",
     "LeaderArchive",
     "LinearDecrease",
     "ParticleSwarm",
     "Pyramid",
+    "interpolated_front",
 ]

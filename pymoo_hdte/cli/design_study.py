@@ -1,30 +1,40 @@
-"""A robust design study: the front, the design that a preference chooses, and a check of both."""
+"""A robust design study: the front of the drive model, a design of it, and whether both hold."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from pymoo.core.algorithm import Algorithm
-from pymoo.core.callback import Callback
-from pymoo.optimize import minimize
-from tqdm import tqdm
 
-from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms import FoundFront, interpolated_front
+from pymoo_hdte.cli.design_check import Check, check_designs, standard_error
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import DriveModel
-from pymoo_hdte.problems import OperatingCondition, RobustDTE
-from pymoo_hdte.problems.operating_conditions import duty_cycle_dte_arcsec
-from pymoo_hdte.surrogate import SobolIndices, sobol_indices
+from pymoo_hdte.problems import OperatingCondition, RobustDTEDirect
+from pymoo_hdte.problems.model_moments import FIRST_NODES
+from pymoo_hdte.surrogate import SobolIndices
 
-POPULATION = 100
-CHECKED_DRIVES = 1000
+AGREEMENT = 0.05
+"""Share of the front's width to which front and drive model have to agree."""
+HARDLY_WORTH = 0.02
+"""Share of an objective below which a gain is hardly worth a change of design.
+
+A front that is narrower counts as that wide: nobody needs its designs apart.
+"""
 LITTLE = 1e-3
 """Share of mean and standard deviation that a variable must move, over its box, to matter."""
+CHECKED = 4
+"""Designs along the front that are checked, beside those that preferences choose."""
+_SEARCHES = 3
+"""Searches at most, each but the first with more nodes."""
+_OF_QUADRATURE = 0.25
+"""Share of `AGREEMENT` that doubled nodes may change when nodes are chosen anew."""
 
 Values = NDArray[np.float64]
+Notify = Callable[[int, float], None]
 
 
 @dataclass(frozen=True)
@@ -35,64 +45,18 @@ class Settings:
     ----------
     tolerance, box : float
         Relative half-widths of the parts' scatter and of the search space.
-    order : int
-        Of the surrogate.
     conditions : tuple of OperatingCondition or None
         The duty cycle; None for the rated condition.
-    evaluations : int
-        Of the swarm, in whole generations of `POPULATION`.
+    designs : int
+        Evaluated on the drive model in one search before it gives up.
     seed : int
     """
 
     tolerance: float
     box: float
-    order: int
     conditions: tuple[OperatingCondition, ...] | None
-    evaluations: int
+    designs: int
     seed: int
-
-
-class Progress(Callback):
-    """Moves a bar of tqdm on to the evaluations made so far."""
-
-    def __init__(self, bar: tqdm) -> None:
-        super().__init__()
-        self.bar = bar
-
-    def notify(self, algorithm: Algorithm) -> None:
-        """Follow the algorithm."""
-        self.bar.update(algorithm.evaluator.n_eval - self.bar.n)
-
-
-@dataclass(frozen=True, eq=False)
-class Check:
-    """What the drive model itself says of a design, where the study asked its surrogate.
-
-    Attributes
-    ----------
-    mean, std : float
-        Of the DTE, arcsec: the surrogate's exact moments, corrected by what surrogate and model
-        differ in on the same drives (a control variate).
-    mean_influence : ndarray, shape (CHECKED_DRIVES,)
-        Of every drive on ``mean``: its DTE by the model less that by the surrogate, arcsec.
-    std_influence : ndarray, shape (CHECKED_DRIVES,)
-        Of every drive on ``std``, to first order, arcsec.
-    """
-
-    mean: float
-    std: float
-    mean_influence: Values
-    std_influence: Values
-
-    @property
-    def mean_error(self) -> float:
-        """Standard error of ``mean``, arcsec."""
-        return _error_of_mean(self.mean_influence)
-
-    @property
-    def std_error(self) -> float:
-        """Standard error of ``std``, arcsec."""
-        return _error_of_mean(self.std_influence)
 
 
 @dataclass(frozen=True)
@@ -101,31 +65,17 @@ class Gain:
 
     Attributes
     ----------
-    promised : float
-        By the surrogate, arcsec.
     found : float
-        By the drive model itself, arcsec.
+        By the drive model on the checked drives, arcsec.
     error : float
         Standard error of ``found``, arcsec.
     share : float
         Of ``found`` in the value at the nominal design.
     """
 
-    promised: float
     found: float
     error: float
     share: float
-
-    @property
-    def refuted(self) -> bool:
-        """Whether the model does not confirm that the objective falls, as promised."""
-        return self.promised > 0.0 and self.found <= 2.0 * self.error
-
-    @property
-    def coarse(self) -> bool:
-        """Whether the surrogate is off by more than half of what it promises, beyond chance."""
-        off = abs(self.promised - self.found)
-        return off > max(0.5 * abs(self.promised), 2.0 * self.error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,34 +84,44 @@ class DesignStudy:
 
     Attributes
     ----------
-    problem : RobustDTE
+    problem : RobustDTEDirect
+        With as many nodes as it took.
     settings : Settings
-    designs : ndarray, shape (n, 4)
-        K, J_in, B_in, B_fc of the front, SI, by rising mean DTE.
-    front : ndarray, shape (n, 2)
-        Mean and standard deviation of the DTE, arcsec, row for row.
+    search : FoundFront
+        The front, by rising mean DTE.
     chosen : dict of int
-        Row that each of `PREFERENCES` chooses.
+        Row of the front that each of `PREFERENCES` chooses.
     preference : str
         The one that was asked for.
     initial : ndarray, shape (2,)
         Mean and standard deviation at the nominal design, at the same tolerance.
-    initial_check, optimum_check : Check
-        Of the nominal and of the chosen design, on the same random drives.
+    initial_check : Check
+        Of the nominal design.
+    checks : dict of Check
+        By row of the front, of the chosen designs and of `CHECKED` along it.
     sources : SobolIndices
         What causes the scatter that is left at the chosen design.
     """
 
-    problem: RobustDTE
+    problem: RobustDTEDirect
     settings: Settings
-    designs: Values
-    front: Values
+    search: FoundFront
     chosen: dict[str, int]
     preference: str
     initial: Values
     initial_check: Check
-    optimum_check: Check
+    checks: dict[int, Check]
     sources: SobolIndices
+
+    @property
+    def designs(self) -> Values:
+        """K, J_in, B_in, B_fc of the front, SI, shape (n, 4)."""
+        return self.search.designs
+
+    @property
+    def front(self) -> Values:
+        """Mean and standard deviation of the DTE, arcsec, row for row, shape (n, 2)."""
+        return self.search.front
 
     @property
     def design(self) -> Values:
@@ -173,6 +133,26 @@ class DesignStudy:
         """Its mean and standard deviation, shape (2,), arcsec."""
         return self.front[self.chosen[self.preference]]
 
+    @property
+    def optimum_check(self) -> Check:
+        """Of the chosen design, on the same drives as the nominal one."""
+        return self.checks[self.chosen[self.preference]]
+
+    @property
+    def quadrature(self) -> float:
+        """Largest difference of front and drive model on the checked drives, in widths."""
+        return _difference(self.search, self.checks)
+
+    @property
+    def disagreement(self) -> float:
+        """Largest difference of front and drive model, in widths."""
+        return max(self.search.difference, self.quadrature)
+
+    @property
+    def recommended(self) -> bool:
+        """Whether front and drive model agree, so that a design may be recommended."""
+        return self.disagreement <= AGREEMENT
+
     @cached_property
     def free(self) -> tuple[str, ...]:
         """Names of the variables that move neither objective by `LITTLE` over their whole box."""
@@ -180,8 +160,9 @@ class DesignStudy:
         moved = np.repeat(self.design[None], 2 * problem.n_var, axis=0)
         for row, bound in enumerate((problem.xl, problem.xu)):
             np.fill_diagonal(moved[row * problem.n_var :], bound)
-        changes = np.abs(problem.evaluate(moved) / self.objectives - 1.0).max(axis=1)
-        largest = changes.reshape(2, problem.n_var).max(axis=0)
+        changes = np.abs(problem.moments(moved) / self.objectives - 1.0).max(axis=1)
+        # Without a steady state at a bound the variable matters.
+        largest = np.nan_to_num(changes, nan=np.inf).reshape(2, problem.n_var).max(axis=0)
         return tuple(
             name for name, one in zip(problem.var_names, largest, strict=True) if one < LITTLE
         )
@@ -190,21 +171,24 @@ class DesignStudy:
     def gains(self) -> dict[str, Gain]:
         """Gains in mean and standard deviation; both designs were checked on the same drives."""
         before, after = self.initial_check, self.optimum_check
-        promised = (self.initial - self.objectives).tolist()
-        errors = (
-            _error_of_mean(before.mean_influence - after.mean_influence),
-            _error_of_mean(before.std_influence - after.std_influence),
-        )
-        found = (before.mean - after.mean, before.std - after.std)
-        shares = (found[0] / before.mean, found[1] / before.std)
-        gains = map(Gain, promised, found, errors, shares)
-        return dict(zip(("mean", "standard deviation"), gains, strict=True))
+        changes = (before.means - after.means, before.stds - after.stds)
+        values = (before.mean, before.std)
+        return {
+            name: Gain(float(change.mean()), standard_error(change), float(change.mean() / value))
+            for name, change, value in zip(
+                ("mean", "standard deviation"), changes, values, strict=True
+            )
+        }
 
 
 def run_design_study(
-    model: DriveModel, preference: str, settings: Settings, callback: Callback | None = None
+    model: DriveModel, preference: str, settings: Settings, notify: Notify | None = None
 ) -> DesignStudy:
-    """Optimise a drive and choose a design.
+    """Optimise a drive on its own model and choose a design.
+
+    The moments of a design are those of the model by quadrature (`ModelMoments`). Its front is
+    interpolated between designs that were evaluated (`interpolated_front`), then checked on other
+    drives; if it does not hold there, nodes are added and the search is repeated from it.
 
     Parameters
     ----------
@@ -212,74 +196,74 @@ def run_design_study(
     preference : str
         One of `PREFERENCES`.
     settings : Settings
-    callback : pymoo.core.callback.Callback, optional
-        Called after every generation.
+    notify : callable, optional
+        Called often with the number of designs evaluated and the last round's difference.
 
     Raises
     ------
     InvalidInput
         For a setting that is not allowed, or a theta_s that could become negative.
-    UnstableDrive
-        If a design of the search space has no steady state.
+    ArithmeticError
+        If the nominal design has no steady state somewhere within its scatter; names where.
     """
-    problem = RobustDTE(
-        model,
-        order=settings.order,
-        tolerance=settings.tolerance,
-        box=settings.box,
-        conditions=settings.conditions,
-    )
-    result = minimize(
-        problem,
-        ElitistSwarm(pop_size=POPULATION),
-        ("n_eval", settings.evaluations),
-        seed=settings.seed,
-        callback=callback or Callback(),
-    )
-    order = np.argsort(result.F[:, 0], kind="stable")
-    designs, front = result.X[order], result.F[order]
-    chosen = {word: WeightedUtopia(PREFERENCES[word]).do(front) for word in PREFERENCES}
-    design = designs[chosen[preference]]
-    initial_check, optimum_check = (
-        _check(problem, one, settings.seed) for one in (problem.nominal, design)
-    )
+    rng = np.random.default_rng(settings.seed)
+    nodes, start, before = FIRST_NODES, None, 0
+    for number in range(_SEARCHES):
+        problem = RobustDTEDirect(
+            model, settings.tolerance, settings.box, settings.conditions, nodes
+        )
+        initial = problem.evaluate(problem.nominal[None])[0]
+        search = interpolated_front(
+            problem.moments,
+            problem.xl,
+            problem.xu,
+            rng,
+            accuracy=AGREEMENT,
+            least_width=HARDLY_WORTH,
+            start=start,
+            most=settings.designs,
+            notify=_later(notify, before),
+        )
+        chosen = {word: WeightedUtopia(PREFERENCES[word]).do(search.front) for word in PREFERENCES}
+        rows = _rows_to_check(len(search.front), list(chosen.values()))
+        # The same drives in every search, and for the nominal design.
+        drives = np.random.default_rng(settings.seed)
+        looked_at = np.vstack([problem.nominal, search.designs[rows]])
+        initial_check, *others = check_designs(problem, looked_at, drives)
+        checks = dict(zip(rows, others, strict=True))
+        off = _difference(search, checks)
+        if off <= AGREEMENT or not np.isfinite(off) or number == _SEARCHES - 1:
+            break
+        wanted = _OF_QUADRATURE * AGREEMENT * search.width
+        refined = problem.moments.refined(search.designs[rows], wanted)
+        if refined.nodes == nodes:
+            break
+        nodes, start, before = refined.nodes, search.designs, before + search.evaluated
+    sharp = problem.moments.with_nodes([max(2, count) for count in nodes])
     return DesignStudy(
         problem=problem,
         settings=settings,
-        designs=designs,
-        front=front,
+        search=search,
         chosen=chosen,
         preference=preference,
-        initial=problem.evaluate(problem.nominal[None])[0],
+        initial=initial,
         initial_check=initial_check,
-        optimum_check=optimum_check,
-        sources=sobol_indices(problem.surrogate, problem.inputs, design),
+        checks=checks,
+        sources=sharp.sources(search.designs[chosen[preference]]),
     )
 
 
-def _check(problem: RobustDTE, design: Values, seed: int) -> Check:
-    """Judge a design by the model on random drives, the same ones for every design."""
-    rng = np.random.default_rng(seed)
-    drives = np.column_stack([entry.sample(rng, CHECKED_DRIVES) for entry in problem.inputs])
-    drives[:, 1:] *= design
-    by_model = duty_cycle_dte_arcsec(problem.model, problem.conditions, drives)
-    by_surrogate = problem.surrogate(drives)
-    mean, std = problem.evaluate(design[None])[0]
-    difference = by_model - by_surrogate
-    corrected = float(std * by_model.std() / by_surrogate.std())
-    # Half the difference of two relative variances is the influence of a drive on log std.
-    influence = 0.5 * (_relative_square(by_model) - _relative_square(by_surrogate))
-    return Check(
-        mean=float(mean + difference.mean()),
-        std=corrected,
-        mean_influence=difference,
-        std_influence=corrected * influence,
-    )
+def _difference(search: FoundFront, checks: dict[int, Check]) -> float:
+    return max(one.differs(search.front[row], search.width) for row, one in checks.items())
 
 
-def _relative_square(values: Values) -> Values:
-    return (values - values.mean()) ** 2 / values.var()
+def _rows_to_check(n: int, chosen: list[int]) -> list[int]:
+    along = np.linspace(0, n - 1, CHECKED).round().astype(int)
+    return sorted({*along.tolist(), *chosen})
 
 
-def _error_of_mean(values: Values) -> float:
-    return float(values.std(ddof=1) / len(values) ** 0.5)
+def _later(notify: Notify | None, before: int) -> Notify | None:
+    """Return what notifies with the designs of earlier searches added."""
+    if notify is None:
+        return None
+    return lambda evaluated, difference: notify(before + evaluated, difference)

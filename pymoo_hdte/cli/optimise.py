@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from pymoo_hdte.cli.command import Command, Outcome, Say, outcome_of
 from pymoo_hdte.cli.drive_arguments import DRIVE_DETAILS, add_drive_arguments, read_drive
+
+LEAST_DESIGNS = 40
+"""Designs below which nothing could be said between them."""
 
 _DETAILS = f"""example:
   pymoo-hdte optimise hs_20_100 --preference balanced --out reports/optimum
@@ -15,8 +19,9 @@ _DETAILS = f"""example:
 CYCLE.csv has the columns speed_rpm, load_Nm and weight.
 DIR gets report.html, optimum.json, front.csv (all designs of the front), and the chosen drive as
 optimum_sheet.toml and optimum_model.toml, which this command and simulate read; an earlier report
-there is replaced, anything else refused.
-Exit codes: 0 a design was chosen; 2 the input is at fault."""
+there is replaced, anything else refused. The front is that of the drive model; where that could
+not be shown to 5 % of its width, the first sentence says so, and no drive is chosen.
+Exit codes: 0 a report was written; 2 the input is at fault."""
 
 
 def _add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,9 +44,11 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         default=0.25,
         help="how far a design may leave the data sheet, as a share (default 0.25)",
     )
-    parser.add_argument("--order", type=int, default=3, help="of the surrogate (default 3)")
     parser.add_argument(
-        "--evaluations", type=int, default=20_000, help="of the swarm, in hundreds (default 20000)"
+        "--designs",
+        type=int,
+        default=600,
+        help="at most so many are asked of the drive model in a search (default 600)",
     )
     parser.add_argument("--seed", type=int, default=1, help="of the random numbers (default 1)")
 
@@ -50,28 +57,32 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from tqdm import tqdm
 
     from pymoo_hdte.checks import one_of, whole_number
-    from pymoo_hdte.cli.design_study import POPULATION, Progress, Settings, run_design_study
+    from pymoo_hdte.cli.design_study import Settings, run_design_study
     from pymoo_hdte.cli.optimum_report import FOLDER, write_optimum_report
     from pymoo_hdte.decision import PREFERENCES
     from pymoo_hdte.problems import load_conditions
 
     FOLDER.check(options.out)
     preference = one_of("--preference", options.preference, tuple(PREFERENCES))
-    evaluations = whole_number("--evaluations", options.evaluations, POPULATION)
     settings = Settings(
         tolerance=options.tolerance,
         box=options.box,
-        order=options.order,
         conditions=load_conditions(options.cycle) if options.cycle is not None else None,
-        evaluations=evaluations // POPULATION * POPULATION,
+        designs=whole_number("--designs", options.designs, LEAST_DESIGNS),
         seed=whole_number("--seed", options.seed, 0),
     )
     model, notes = read_drive(options)
-    say("fitting the surrogate to the drive model, and optimising")
+    say("searching the front on the drive model")
     # Without a terminal, or if quiet, there is no bar.
     silent = True if options.quiet else None
-    with tqdm(total=settings.evaluations, unit="design", leave=False, disable=silent) as bar:
-        study = run_design_study(model, preference, settings, Progress(bar))
+    with tqdm(unit="design", leave=False, disable=silent) as bar:
+
+        def notify(evaluated: int, difference: float) -> None:
+            if math.isfinite(difference):
+                bar.set_postfix_str(f"front known to {100.0 * difference:.1f} % of its width")
+            bar.update(evaluated - bar.n)
+
+        study = run_design_study(model, preference, settings, notify)
     say("writing the report")
     document = write_optimum_report(study, notes, options.out)
     return outcome_of(document, options.out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.cli.command import heading
-from pymoo_hdte.cli.design_study import CHECKED_DRIVES, LITTLE, POPULATION, Check, DesignStudy, Gain
+from pymoo_hdte.cli.design_check import DRIVES, SETS, Check
+from pymoo_hdte.cli.design_study import AGREEMENT, HARDLY_WORTH, LITTLE, DesignStudy, Gain
 from pymoo_hdte.decision import tolerance_band
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
@@ -22,24 +24,20 @@ from pymoo_hdte.reports.html import number, page
 FRONT_FILE = "front.csv"
 SHEET_FILE = "optimum_sheet.toml"
 MODEL_FILE = "optimum_model.toml"
-FOLDER = ReportFolder("optimum.json", (FRONT_FILE, SHEET_FILE, MODEL_FILE))
-
-_WORTHLESS = 0.02
-"""Share of an objective below which a gain is hardly worth a change of design."""
+FOLDER = ReportFolder("optimum.json", (FRONT_FILE,), optional=(SHEET_FILE, MODEL_FILE))
 
 
 def write_optimum_report(study: DesignStudy, notes: Sequence[str], out: Path) -> dict[str, Any]:
     """Write a report and return its document; errors as `ReportFolder.write`.
 
-    ``notes`` are sentences on the drive that belong to the limits of the result.
+    ``notes`` are sentences on the drive that belong to the limits of the result. Without a design
+    that may be recommended there are no files of a chosen drive.
     """
     document = optimum_document(study, notes)
-    optimum = optimum_model(study)
-    others = {
-        FRONT_FILE: _front_csv(study),
-        SHEET_FILE: sheet_toml(optimum.sheet),
-        MODEL_FILE: model_toml(optimum),
-    }
+    others = {FRONT_FILE: _front_csv(study)}
+    if study.recommended:
+        optimum = optimum_model(study)
+        others |= {SHEET_FILE: sheet_toml(optimum.sheet), MODEL_FILE: model_toml(optimum)}
     FOLDER.write(out, _page(study, document), document, others)
     return document
 
@@ -60,44 +58,58 @@ def optimum_model(study: DesignStudy) -> DriveModel:
 
 
 def optimum_document(study: DesignStudy, notes: Sequence[str]) -> dict[str, Any]:
-    """Return what ``optimum.json`` holds; designs in SI, moments of the DTE in arcsec."""
-    problem, settings = study.problem, study.settings
+    """Return what ``optimum.json`` holds; designs in SI, moments of the DTE in arcsec.
+
+    Where front and drive model do not agree, ``designs`` and ``tolerance_band`` are empty.
+    """
+    problem, settings, search = study.problem, study.settings, study.search
     lower, upper = tolerance_band(study.design, settings.tolerance)
+    bands = zip(problem.var_names, lower.tolist(), upper.tolist(), strict=True)
     return heading("optimum", sentences(study), limits(study, notes)) | {
         "preference": study.preference,
-        "designs": {
-            word: {
-                "row_of_front": row,
-                **_design(study, row),
-            }
-            for word, row in study.chosen.items()
+        "recommended": study.recommended,
+        "agreement": {
+            "of_width": _finite(study.disagreement),
+            "of_interpolation": _finite(search.difference),
+            "of_quadrature": _finite(study.quadrature),
+            "allowed": AGREEMENT,
+            "width_arcsec": search.width.tolist(),
         },
+        "designs": {
+            word: {"row_of_front": row, **_design(study, row)} for word, row in study.chosen.items()
+        }
+        if study.recommended
+        else {},
         "tolerance_band": {
             name: {"lower": low, "upper": high, "unit": problem.units[name]}
-            for name, low, high in zip(
-                problem.var_names, lower.tolist(), upper.tolist(), strict=True
-            )
+            for name, low, high in bands
+            if study.recommended
         },
         "matter_little": list(study.free),
         "initial": dict(zip(problem.obj_names, study.initial.tolist(), strict=True)),
         "checked_on_the_model": {
-            "drives": CHECKED_DRIVES,
+            "drives": SETS * DRIVES,
             "initial": _checked(study.initial_check),
-            "optimum": _checked(study.optimum_check),
+            "front": {str(row): _checked(check) for row, check in study.checks.items()},
             "falls_by_arcsec": {
-                name: _gained(gain)
+                name: {"model": gain.found, "standard_error": gain.error}
                 for name, gain in zip(problem.obj_names, study.gains.values(), strict=True)
+                if np.isfinite(gain.found)
             },
         },
         "sources_of_scatter": dict(
             zip(study.sources.names, study.sources.first.tolist(), strict=True)
         ),
         "settings": {
-            "algorithm": "ElitistSwarm",
-            "population": POPULATION,
-            "evaluations": settings.evaluations,
+            "designs": settings.designs,
             "seed": settings.seed,
             **problem.settings,
+        },
+        "evaluated": {"designs": search.evaluated, "model_runs": problem.moments.n_runs},
+        "left_out": {
+            "why": "no steady state somewhere within the scatter",
+            "variables": list(problem.var_names),
+            "designs": search.lost.tolist(),
         },
         "model": problem.model.to_dict(),
         "front": {"file": FRONT_FILE, "designs": len(study.front)},
@@ -112,21 +124,29 @@ def _design(study: DesignStudy, row: int) -> dict[str, Any]:
     )
 
 
-def _checked(check: Check) -> dict[str, float]:
+def _finite(value: float) -> float | None:
+    """Return the number, or None, since JSON has no other way to say that there is none."""
+    return value if np.isfinite(value) else None
+
+
+def _checked(check: Check) -> dict[str, float | None]:
     return {
-        "mean_dte_arcsec": check.mean,
-        "std_dte_arcsec": check.std,
-        "standard_error_of_mean_arcsec": check.mean_error,
-        "standard_error_of_std_arcsec": check.std_error,
+        "mean_dte_arcsec": _finite(check.mean),
+        "std_dte_arcsec": _finite(check.std),
+        "standard_error_of_mean_arcsec": _finite(check.mean_error),
+        "standard_error_of_std_arcsec": _finite(check.std_error),
     }
 
 
-def _gained(gain: Gain) -> dict[str, float]:
-    return {"surrogate": gain.promised, "model": gain.found, "standard_error_of_model": gain.error}
-
-
 def sentences(study: DesignStudy) -> list[str]:
-    """Say which design was chosen, what it gains by the model, and what the surrogate promised."""
+    """Say which design was chosen, what it gains, and how far front and drive model agree."""
+    if not study.recommended:
+        return [
+            f"No design is recommended: front and drive model {_apart(study)}, "
+            f"{100.0 * AGREEMENT:g} % are allowed.",
+            "What is said of designs below is not to be built upon; more --designs may do.",
+            _agreement(study),
+        ]
     problem = study.problem
     changes = 100.0 * (study.design / problem.nominal - 1.0)
     parts = [
@@ -135,15 +155,45 @@ def sentences(study: DesignStudy) -> list[str]:
     ]
     mean, std = study.gains.values()
     before, after = study.initial_check, study.optimum_check
-    (mean_before, std_before), (mean_after, std_after) = study.initial, study.objectives
     return [
         f"Take {', '.join(parts)}.",
         f"By the drive model {_moved('the mean DTE', before.mean, after.mean)} arcsec "
         f"({_by(mean)}), {_moved('the standard deviation', before.std, after.std)} "
         f"({_by(std)}; two standard errors).",
-        f"By its surrogate, which was optimised, {_moved('the mean DTE', mean_before, mean_after)} "
-        f"arcsec, {_moved('the standard deviation', std_before, std_after)}.",
+        f"Front and drive model agree to {100.0 * study.disagreement:.1f} % of the front's width "
+        f"({100.0 * AGREEMENT:g} % are allowed). {_agreement(study)}",
     ]
+
+
+def _apart(study: DesignStudy) -> str:
+    if np.isfinite(study.disagreement):
+        return f"differ by {100.0 * study.disagreement:.1f} % of the front's width"
+    return "do not agree, as designs along the front have no steady state within their scatter"
+
+
+def _agreement(study: DesignStudy) -> str:
+    """Say what agreement means here."""
+    search = study.search
+    mean, std = (number(float(one)) for one in search.width)
+    parts = [
+        f"Its values are the model's own, at {math.prod(study.problem.moments.nodes)} nodes a "
+        "design."
+    ]
+    if np.isfinite(search.difference):
+        parts.append(
+            f"Those asked last, of {search.evaluated} designs, were predicted to "
+            f"{100.0 * search.difference:.1f} %."
+        )
+    if np.isfinite(study.quadrature):
+        parts.append(
+            f"On {SETS * DRIVES} other drives each, {len(study.checks)} designs differ by "
+            f"{100.0 * study.quadrature:.1f} % beyond chance."
+        )
+    parts.append(
+        f"The width counts as {mean} arcsec in the mean and {std} in the standard deviation, "
+        f"{100.0 * HARDLY_WORTH:g} % of the least value if it is less."
+    )
+    return " ".join(parts)
 
 
 def _moved(what: str, before: float, after: float) -> str:
@@ -157,30 +207,24 @@ def _by(gain: Gain) -> str:
 def limits(study: DesignStudy, notes: Sequence[str]) -> list[str]:
     """Say what a reader should know before quoting the result; ``notes`` are of the drive."""
     found = list(notes)
-    gains = study.gains
+    lost = study.search.lost
+    if len(lost):
+        found.append(
+            f"Of {study.search.evaluated} designs {len(lost)} are left out, the first for "
+            f"{study.problem.without_steady_state(lost[0])}."
+        )
     if study.free:
         found.append(
             f"No value of {' or '.join(study.free)} within the box moves mean or standard "
             f"deviation by {100.0 * LITTLE:g} %: what is said of it carries no information."
         )
-    found += [
-        f"The drive model does not confirm a lower {what}: do not build this design for it."
-        for what, gain in gains.items()
-        if gain.refuted
-    ]
-    shares = {what: gain.share for what, gain in gains.items()}
-    if max(shares.values()) < _WORTHLESS:
+    shares = {what: gain.share for what, gain in study.gains.items()}
+    if max(shares.values()) < HARDLY_WORTH:
         changes = ", ".join(f"{what} {-100.0 * share:+.1f} %" for what, share in shares.items())
         found.append(
-            f"Neither falls by {100.0 * _WORTHLESS:g} % ({changes}): this model has next to "
+            f"Neither falls by {100.0 * HARDLY_WORTH:g} % ({changes}): this model has next to "
             "nothing to gain by these design variables."
         )
-    found += [
-        f"The surrogate is off by {abs(gain.promised - gain.found):.2f} arcsec in how the {what} "
-        "changes, more than half of the change; a higher --order is sharper."
-        for what, gain in gains.items()
-        if gain.coarse
-    ]
     return found
 
 
@@ -194,7 +238,9 @@ def _front_csv(study: DesignStudy) -> str:
 def _page(study: DesignStudy, document: dict[str, Any]) -> str:
     problem = study.problem
     values = design_rows(study.designs, problem.nominal)
-    words = {word.replace("_", " "): row for word, row in study.chosen.items()}
+    # Without agreement no design is pointed at.
+    chosen = study.chosen if study.recommended else {}
+    words = {word.replace("_", " "): row for word, row in chosen.items()}
     return page(
         "pymoo_hdte.cli",
         "optimum.html.j2",
@@ -211,7 +257,14 @@ def _page(study: DesignStudy, document: dict[str, Any]) -> str:
             )
         ),
         rows=list(zip(study.front.tolist(), values, strict=True)),
+        checked=[
+            ("data sheet", study.initial, study.initial_check),
+            *(
+                (f"row {row + 1} of the front", study.front[row], check)
+                for row, check in study.checks.items()
+            ),
+        ],
         variables=[(name, problem.units[name]) for name in problem.var_names],
         sources=sorted(document["sources_of_scatter"].items(), key=lambda one: -one[1]),
-        checked_drives=CHECKED_DRIVES,
+        checked_drives=SETS * DRIVES,
     )

@@ -33,7 +33,10 @@ def optimum_shift(before: DriveModel, after: DriveModel, seed: int = 1) -> Optim
         return OptimumShift((), f"One of the models has no robust optimum: {error}")
     fronts = [_front(problem, seed) for problem in (old, new)]
     choices = tuple(_choice(word, old, new, fronts) for word in PREFERENCES)
-    method = f"Surrogate of order {SURROGATE_ORDER}, {EVALUATIONS} evaluations by ElitistSwarm"
+    method = (
+        f"Front of the order-{SURROGATE_ORDER} surrogate of each model, not of the model itself; "
+        f"{EVALUATIONS} evaluations by ElitistSwarm"
+    )
     return OptimumShift(choices, fronts=tuple(values for _, values in fronts), method=method)
 
 

@@ -18,7 +18,7 @@ from pymoo_hdte.drive.datasheet_file import datasheet_from_fields, hs_20_100, sh
 from pymoo_hdte.drive.effects import DriveEffect, effect_from_fields
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.hill import hill_steady_state
+from pymoo_hdte.drive.solve.hill import found_steady_states, hill_steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.effects.effect import place_of
 from pymoo_hdte.effects.quantities import with_unit
@@ -155,6 +155,31 @@ class DriveModel:
         errors as in `steady_state`.
         """
         return self.steady_state(parameters).peak_to_peak(self.sheet.ratio) / ARCSEC
+
+    def dte_where_found(self, parameters: ArrayLike) -> NDArray[np.float64]:
+        """Return `dte_arcsec` of those of n designs that have a steady state.
+
+        Parameters
+        ----------
+        parameters : array_like, shape (n, 5)
+            As in `coefficients`.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            arcsec; NaN for a design whose motion grows or is not found.
+
+        Raises
+        ------
+        InvalidInput
+            As `coefficients`.
+        ArithmeticError
+            If the harmonics of a deeply varying stiffness do not die out.
+        """
+        found, spectrum = found_steady_states(self.coefficients(parameters))
+        dte = np.full(len(found), np.nan)
+        dte[found] = spectrum.peak_to_peak(self.sheet.ratio) / ARCSEC
+        return dte
 
     def at(self, input_speed: float, load_torque: float) -> DriveModel:
         """Return the model at another operating condition.

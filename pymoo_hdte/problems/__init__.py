@@ -9,6 +9,7 @@ from pymoo_hdte.problems.operating_conditions import (
 )
 from pymoo_hdte.problems.robust import RobustProblem
 from pymoo_hdte.problems.robust_dte import RobustDTE
+from pymoo_hdte.problems.robust_dte_direct import RobustDTEDirect
 from pymoo_hdte.problems.robust_dte_tolerance import RobustDTETolerance
 from pymoo_hdte.problems.simulator.existing import Robust
 from pymoo_hdte.problems.simulator.inputs import Design
@@ -37,6 +38,7 @@ __all__ = [
     "Robust",
     "RobustConstraint",
     "RobustDTE",
+    "RobustDTEDirect",
     "RobustDTETolerance",
     "RobustProblem",
     "RobustToy",

@@ -151,6 +151,19 @@ def duty_cycle_dte_arcsec(
     return average
 
 
+def duty_cycle_dte_where_found(
+    model: DriveModel,
+    conditions: Sequence[OperatingCondition],
+    parameters: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return `duty_cycle_dte_arcsec`, NaN for designs without a steady state somewhere."""
+    average = np.zeros(len(parameters))
+    for condition, share in zip(conditions, shares(conditions), strict=True):
+        there = model.at(condition.input_speed, condition.load_torque)
+        average += share * there.dte_where_found(parameters)
+    return average
+
+
 def _condition(place: str, speed: float, load: float, weight: float) -> OperatingCondition:
     # Checked before the change of units, so that an error shows what the file says.
     speed = real_number(f"{place}: speed_rpm", speed, above=0.0)

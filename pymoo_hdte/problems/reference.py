@@ -1,6 +1,7 @@
-"""Stored fronts of surrogates: reading, writing, and matching a front to its problem.
+"""Stored fronts: reading, writing, and matching a front to its problem.
 
-`experiments/fronts/reference_front.py` computes them. A file is a CSV with one header comment that
+`experiments/fronts` computes them: `reference_front.py` those of surrogates, `direct_front.py` that
+of the drive model. A file is a CSV with one header comment that
 holds the settings of the problem as JSON; a front is only used for a problem of the same settings.
 """
 
@@ -20,7 +21,7 @@ _FOLDER = files("pymoo_hdte.problems") / "data"
 
 @dataclass(frozen=True)
 class ReferenceFront:
-    """The true Pareto front of a surrogate and its set, row for row.
+    """The true Pareto front of a surrogate, or of the drive model, and its set, row for row.
 
     Those of two objectives are sorted by the first.
 
@@ -35,7 +36,7 @@ class ReferenceFront:
 
 
 class StoredFront:
-    """Mixin for a pymoo problem on a surrogate, the true front of which is stored.
+    """Mixin for a pymoo problem, the true front of which is stored.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ class StoredFront:
         return load_reference(self.variant, self.settings, self.n_obj)
 
     def _calc_pareto_front(self) -> NDArray[np.float64] | None:
-        """Return the surrogate's true front, shape (n, n_obj), or None if none is stored."""
+        """Return the stored front, shape (n, n_obj), or None if none is stored."""
         reference = self._reference()
         return None if reference is None else reference.front
 

@@ -28,7 +28,7 @@ class Front:
     marked : dict of int
         Row that has its own marker and label, by label.
     initial : ndarray, shape (2,)
-        Drawn beside the front.
+        Drawn beside the front, or told in the legend if it is far away.
     axes : tuple of str
         Labels of the two axes.
     """
@@ -37,6 +37,16 @@ class Front:
     marked: dict[str, int]
     initial: NDArray[np.float64]
     axes: tuple[str, str]
+
+
+_BEYOND = 10.0
+"""Widths of the front from which on the initial design would make a heap of it, and is left out."""
+
+
+def _far(initial: NDArray[np.float64], points: NDArray[np.float64]) -> bool:
+    width = np.ptp(points, axis=0)
+    off = np.maximum(points.min(axis=0) - initial, initial - points.max(axis=0))
+    return bool(np.all(width > 0.0) and np.any(off > _BEYOND * width))
 
 
 def front_svg(front: Front) -> str:
@@ -49,7 +59,11 @@ def front_svg(front: Front) -> str:
         axis.plot(
             *front.points[row], sign, markersize=11, fillstyle="none", color="black", label=word
         )
-    axis.plot(*front.initial, "x", color=BEFORE, markersize=9, mew=2.2, label="data sheet")
+    if _far(front.initial, front.points):
+        label = "data sheet: {:.4g}, {:.4g}, beyond".format(*front.initial)
+        axis.plot([], [], "x", color=BEFORE, markersize=9, mew=2.2, label=label)
+    else:
+        axis.plot(*front.initial, "x", color=BEFORE, markersize=9, mew=2.2, label="data sheet")
     axis.set_xlabel(front.axes[0])
     axis.set_ylabel(front.axes[1])
     axis.grid(alpha=0.3)

@@ -2,40 +2,49 @@
 
 import csv
 import json
-import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import qmc, truncnorm
 
 from pymoo_hdte.cli import __main__ as cli
-from pymoo_hdte.cli import design_study, optimum_report
-from pymoo_hdte.cli.design_study import Gain, Settings, _check, run_design_study
+from pymoo_hdte.cli import optimum_report
+from pymoo_hdte.cli.design_check import Check, check_designs
+from pymoo_hdte.cli.design_study import AGREEMENT, Settings, run_design_study
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
-from pymoo_hdte.problems import RobustDTE
-from pymoo_hdte.surrogate import TruncatedNormal
+from pymoo_hdte.problems import RobustDTEDirect
 
-QUICK = ("--order", "2", "--evaluations", "1000")
-SETTINGS = Settings(0.05, 0.25, 3, None, 1000, 1)
+CASES = Path(__file__).parents[3] / "shared" / "cases"
+BOX = 0.03
+"""Half-width of a box in which the front is found at once."""
+QUICK = ("--box", str(BOX), "--designs", "60")
+SETTINGS = Settings(0.05, BOX, None, 60, 1)
 
 
 def optimise(*arguments):
     return cli.main(["optimise", *map(str, arguments)])
 
 
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    out = tmp_path_factory.mktemp("optimise") / "report"
-    assert optimise("hs_20_100", "--out", out, "--quiet", *QUICK) == 0
-    return out
+def size_32(name):
+    """Return a model of the size-32 drive whose optimum was far off on surrogates."""
+    if not CASES.is_dir():
+        pytest.skip("the cases are not here")
+    return load_model(CASES / f"{name}.toml", load_datasheet(CASES / "csg32.toml"))
 
 
 @pytest.fixture(scope="module")
 def study():
     return run_design_study(preset("calibrated"), "balanced", SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory, study):
+    out = tmp_path_factory.mktemp("optimise") / "report"
+    optimum_report.write_optimum_report(study, (), out)
+    return out
 
 
 @pytest.fixture(scope="module")
@@ -49,9 +58,10 @@ def front(written):
         return np.array(list(csv.reader(file))[1:], dtype=float)
 
 
-def test_the_front_holds_what_the_problem_says_of_its_designs(front):
-    problem = RobustDTE(order=2)
-    np.testing.assert_allclose(problem.evaluate(front[:, 2:]), front[:, :2], rtol=1e-13)
+def test_the_front_holds_what_the_drive_model_says_of_its_designs(front, document):
+    problem = RobustDTEDirect(box=BOX, nodes=document["settings"]["nodes"])
+    rows = [0, len(front) // 2, -1]
+    np.testing.assert_allclose(problem.evaluate(front[rows, 2:]), front[rows, :2], rtol=1e-12)
     assert np.all(np.diff(front[:, 0]) > 0.0)
     assert np.all(np.diff(front[:, 1]) < 0.0)
 
@@ -84,144 +94,152 @@ def test_limits_to_order_enclose_the_design_by_the_tolerance(document):
         assert band["upper"] == pytest.approx(1.05 * value)
 
 
-def test_the_same_seed_gives_the_same_bytes(written, tmp_path):
-    assert optimise("hs_20_100", "--out", tmp_path / "again", "--quiet", *QUICK) == 0
+def test_the_command_writes_what_the_study_says_and_prints_it(tmp_path, capsys):
+    out, again = tmp_path / "out", tmp_path / "again"
+    assert optimise("hs_20_100", "--model", "published", "--out", out, "--json", *QUICK) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document == json.loads((out / "optimum.json").read_text())
+    # As printed the model has no trade-off.
+    assert any("next to nothing to gain" in one for one in document["limits"])
+    study = run_design_study(preset("published"), "balanced", SETTINGS)
+    optimum_report.write_optimum_report(study, (), again)
     for name in optimum_report.FOLDER.files:
-        assert (tmp_path / "again" / name).read_bytes() == (written / name).read_bytes()
+        assert (again / name).read_bytes() == (out / name).read_bytes()
 
 
-def test_another_preference_goes_into_the_sheet(written, tmp_path, document):
-    arguments = ("--preference", "robustness_first", "--out", tmp_path / "out", "--quiet")
-    assert optimise("hs_20_100", *arguments, *QUICK) == 0
+def test_another_preference_goes_into_the_sheet(study, tmp_path, document):
+    optimum_report.write_optimum_report(
+        replace(study, preference="robustness_first"), (), tmp_path / "out"
+    )
     sheet = load_datasheet(tmp_path / "out" / "optimum_sheet.toml")
-    wanted = document["designs"]["robustness_first"]["K"]["value"]
-    assert sheet.nominal.stiffness == wanted != document["designs"]["balanced"]["K"]["value"]
+    wanted = document["designs"]["robustness_first"]["B_fc"]["value"]
+    assert sheet.nominal.mesh_damping == wanted != document["designs"]["balanced"]["B_fc"]["value"]
 
 
-def test_the_words_say_what_the_document_holds(written, capsys, tmp_path, document):
-    assert optimise("hs_20_100", "--out", tmp_path / "out", *QUICK) == 0
-    printed = capsys.readouterr().out
-    chosen = document["designs"]["balanced"]
-    assert f"to {chosen['mean_dte_arcsec']:.2f}" in printed
-    for gain in document["checked_on_the_model"]["falls_by_arcsec"].values():
-        assert f"(by {gain['model']:.2f} ± {2.0 * gain['standard_error_of_model']:.2f}" in printed
-    assert str(tmp_path / "out" / "report.html") in printed
+class TestAgreement:
+    def test_the_front_agrees_with_other_drives(self, study):
+        assert study.recommended
+        problem = study.problem
+        checks = check_designs(problem, study.designs[:1], np.random.default_rng(7))
+        sharp = problem.moments.with_nodes((24, 3, 3, 1, 2))(study.designs[:1])[0]
+        for value, name in zip(sharp, ("mean", "std"), strict=True):
+            error = getattr(checks[0], f"{name}_error")
+            assert getattr(checks[0], name) == pytest.approx(value, abs=4.0 * error)
+        assert checks[0].differs(study.front[0], study.search.width) < AGREEMENT
+
+    @pytest.mark.parametrize("part", ["search", "check"])
+    def test_without_agreement_nothing_is_recommended(self, study, part, tmp_path):
+        if part == "search":
+            off = replace(study, search=replace(study.search, difference=0.2))
+        else:
+            first = next(iter(study.checks))
+            known = study.checks[first]
+            wrong = Check(known.means + 0.3 * study.search.width[0], known.stds)
+            off = replace(study, checks=study.checks | {first: wrong})
+        document = optimum_report.write_optimum_report(off, (), tmp_path / "out")
+        assert document["sentences"][0].startswith("No design is recommended: front and drive")
+        assert not document["recommended"]
+        assert document["designs"] == document["tolerance_band"] == {}
+        assert {path.name for path in (tmp_path / "out").iterdir()} == {
+            *("report.html", "optimum.json", "front.csv")
+        }
+        page = (tmp_path / "out" / "report.html").read_text()
+        assert "Take K" not in page
+        assert "Three preferences" not in page
+        # An earlier report without a chosen drive is replaced like any other.
+        optimum_report.write_optimum_report(study, (), tmp_path / "out")
+        assert (tmp_path / "out" / "optimum_sheet.toml").is_file()
+
+    def test_a_drive_without_steady_state_among_the_checked_is_no_agreement(self, study):
+        first = next(iter(study.checks))
+        lost = Check(np.full(8, np.nan), np.full(8, np.nan))
+        off = replace(study, checks=study.checks | {first: lost})
+        assert not off.recommended
+        assert "no steady state within their scatter" in optimum_report.sentences(off)[0]
+        json.dumps(optimum_report.optimum_document(off, ()), allow_nan=False)
 
 
-def test_json_is_the_document(written, capsys, tmp_path, document):
-    assert optimise("hs_20_100", "--out", tmp_path / "out", "--json", *QUICK) == 0
-    assert json.loads(capsys.readouterr().out) == document
+class TestFindings:
+    """A drive of size 32 whose optimum on surrogates was promised 13.2 arcsec and had 85.0."""
+
+    def test_its_most_accurate_design_is_as_good_as_a_direct_search(self):
+        settings = Settings(0.05, 0.25, None, 600, 1)
+        found = run_design_study(size_32("csg32_model"), "accuracy_first", settings)
+        assert found.recommended
+        # 3,000 designs at 64 common samples found a mean of 51.3 at K -25 %, J_in +25 %.
+        assert found.optimum_check.mean < 1.05 * 51.3
+        changes = found.design / found.problem.nominal
+        assert changes[:2] == pytest.approx([0.75, 1.25], abs=1e-3)
+        problem = found.problem
+        rng = np.random.default_rng(1)
+        designs = rng.uniform(problem.xl, problem.xu, (200, 4))
+        means, _ = problem.moments.with_nodes((2, 2, 2, 1, 1))(designs).T
+        assert np.min(means) > found.objectives[0]
+
+    @pytest.mark.parametrize(
+        ("model", "designs"),
+        [
+            ("csg32_windup_model", 40),
+            pytest.param("csg32_windup_model", 600, marks=pytest.mark.nightly),
+            pytest.param("csg32_coulomb_model", 600, marks=pytest.mark.nightly),
+        ],
+    )
+    def test_laws_that_lose_nodes_give_a_front(self, model, designs, monkeypatch):
+        if designs < 100:
+            monkeypatch.setattr("pymoo_hdte.cli.design_study.FIRST_NODES", (2, 2, 2, 1, 1))
+            monkeypatch.setattr("pymoo_hdte.cli.design_check.DRIVES", 16)
+            monkeypatch.setattr("pymoo_hdte.cli.design_study._SEARCHES", 1)
+        settings = Settings(0.05, 0.25, None, designs, 1)
+        found = run_design_study(size_32(model), "accuracy_first", settings)
+        assert len(found.search.lost) > 0
+        assert found.objectives[0] < 1.05 * 52.3
+        limits = optimum_report.limits(found, ())
+        assert any("are left out, the first for no steady state around" in one for one in limits)
+        named = optimum_report.optimum_document(found, ())["left_out"]["designs"]
+        assert named == found.search.lost.tolist()
+        if designs > 100:
+            assert found.recommended
 
 
-@pytest.fixture(scope="module")
-def checks(study):
-    """The checks of the nominal and of the chosen design on 25 small sets of random drives."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(design_study, "CHECKED_DRIVES", 250)
-        designs = (study.problem.nominal, study.design)
-        return [[_check(study.problem, design, seed) for design in designs] for seed in range(25)]
-
-
-class TestCheck:
-    def test_where_the_surrogate_is_exact_the_model_confirms_it(self):
-        # As printed, the DTE is proportional to theta_s and next to constant in the design.
-        study = run_design_study(preset("published"), "balanced", SETTINGS)
-        check = study.optimum_check
-        assert check.mean == pytest.approx(study.objectives[0], rel=1e-5)
-        assert check.std == pytest.approx(study.objectives[1], rel=1e-4)
-        assert check.mean_error < 1e-4
-
-    def test_where_it_is_coarse_the_check_agrees_with_quasi_random_runs_of_the_model(self, study):
-        cube = qmc.Sobol(5, rng=np.random.default_rng(1)).random(2**12)
-        mean, std = study.problem.model.nominal[0], study.problem.model.kinematic_error.std
-        theta_s = truncnorm(-3.0, 3.0, loc=mean, scale=std).ppf(cube[:, 0])
-        drives = np.column_stack([theta_s, study.design * (0.95 + 0.1 * cube[:, 1:])])
-        dte = study.problem.model.dte_arcsec(drives)
-        assert abs(study.objectives[0] - dte.mean()) > 0.3
-        assert study.optimum_check.mean == pytest.approx(dte.mean(), abs=0.06)
-        assert study.optimum_check.std == pytest.approx(dte.std(), abs=0.1)
-
-    @pytest.mark.nightly
-    def test_standard_errors_are_the_scatter_over_other_random_drives(self, checks):
-        of_nominal = [before for before, _ in checks]
-        means, stds = np.array([(one.mean, one.std) for one in of_nominal]).T
-        errors = np.mean([(one.mean_error, one.std_error) for one in of_nominal], axis=0)
-        assert errors == pytest.approx([means.std(), stds.std()], rel=0.4)
-
-    def test_a_design_that_the_model_refutes_is_not_to_be_built(self, study):
-        worse = replace(study.optimum_check, mean=study.initial_check.mean + 1.0)
-        refuted = replace(study, optimum_check=worse)
-        words = optimum_report.sentences(refuted)[1]
-        assert re.search(r"the mean DTE rises from \S+ to \S+ arcsec \(by 1\.00 ±", words)
-        refusals = [one for one in optimum_report.limits(refuted, ()) if "do not build" in one]
-        assert len(refusals) == 1
-        assert "lower mean" in refusals[0]
-        assert not any("do not build" in one for one in optimum_report.limits(study, ()))
-
-    def test_more_scatter_than_promised_is_refuted_as_well(self, study):
-        worse = replace(study.optimum_check, std=study.initial_check.std + 1.0)
-        limits = optimum_report.limits(replace(study, optimum_check=worse), ())
-        assert any("lower standard deviation: do not build" in one for one in limits)
-
-    def test_a_mean_that_is_meant_to_rise_refutes_nothing(self, study):
-        # A design for less scatter may cost in the mean; only what was promised can be refuted.
-        costly = replace(
-            study,
-            front=study.front + study.initial - study.objectives + [2.0, -1.0],
-            optimum_check=replace(
-                study.initial_check,
-                mean=study.initial_check.mean + 2.0,
-                std=study.initial_check.std - 1.0,
-            ),
-        )
-        assert not any(
-            "build" in one or "off by" in one for one in optimum_report.limits(costly, ())
-        )
-        assert "(by 2.00 ± 0.00)" in optimum_report.sentences(costly)[1]
+class TestStudy:
+    def test_words_are_what_the_other_drives_say(self, study):
+        before, after = study.initial_check, study.optimum_check
+        words = optimum_report.sentences(study)[1]
+        assert f"falls from {before.mean:.2f} to {after.mean:.2f} arcsec" in words
+        for gain in study.gains.values():
+            assert f"by {gain.found:.2f} ± {2.0 * gain.error:.2f}" in words
 
     def test_what_moves_neither_moment_is_said_to_carry_no_information(self, study):
         problem = study.problem
         spans = {}
         for place, name in enumerate(problem.var_names):
-            along = np.tile(study.design, (5, 1))
-            along[:, place] = np.linspace(problem.xl[place], problem.xu[place], 5)
+            along = np.tile(study.design, (3, 1))
+            along[:, place] = np.linspace(problem.xl[place], problem.xu[place], 3)
             spans[name] = np.ptp(problem.evaluate(along) / study.objectives, axis=0).max()
         assert study.free == ("B_in",) == tuple(name for name, one in spans.items() if one < 1e-3)
         assert "No value of B_in within the box" in optimum_report.limits(study, ())[0]
 
-    def test_the_surrogate_is_coarse_only_beyond_chance(self):
-        assert Gain(promised=1.0, found=0.4, error=0.1, share=0.01).coarse
-        assert not Gain(promised=1.0, found=0.6, error=0.1, share=0.01).coarse
-        assert not Gain(promised=0.1, found=0.0, error=0.2, share=0.0).coarse
-
     def test_gains_are_known_better_than_either_value(self, study):
         before, after = study.initial_check, study.optimum_check
         mean, std = study.gains.values()
-        assert mean.found == before.mean - after.mean
-        assert std.found == before.std - after.std
+        assert mean.found == pytest.approx(before.mean - after.mean)
+        assert std.found == pytest.approx(before.std - after.std)
         assert 0.0 < mean.error < before.mean_error + after.mean_error
         assert 0.0 < std.error < before.std_error + after.std_error
 
     @pytest.mark.nightly
-    def test_the_errors_of_gains_are_their_scatter_over_other_random_drives(self, study, checks):
-        gains = [
-            replace(study, initial_check=before, optimum_check=after).gains.values()
-            for before, after in checks
-        ]
-        found = np.array([[gain.found for gain in pair] for pair in gains])
-        errors = np.array([[gain.error for gain in pair] for pair in gains])
-        np.testing.assert_allclose(errors.mean(0), found.std(0, ddof=1), rtol=0.4)
+    def test_standard_errors_are_the_scatter_over_other_drives(self, study):
+        design = study.design[None]
+        rngs = map(np.random.default_rng, range(25))
+        checks = [check_designs(study.problem, design, rng)[0] for rng in rngs]
+        means, stds = np.array([(one.mean, one.std) for one in checks]).T
+        errors = np.mean([(one.mean_error, one.std_error) for one in checks], axis=0)
+        assert errors == pytest.approx([means.std(), stds.std()], rel=0.5)
 
     def test_sources_are_those_of_the_chosen_design(self, study):
-        problem, design = study.problem, study.design
-        rng = np.random.default_rng(1)
-        mean, std = problem.model.nominal[0], problem.model.kinematic_error.std
-        theta_s = TruncatedNormal(mean, std).sample(rng, 20_000)
-        fixed = np.column_stack([theta_s, np.tile(design, (20_000, 1))])
-        # What theta_s alone explains is nearly all: the rest is additive to first order.
-        share = problem.surrogate(fixed).var() / study.objectives[1] ** 2
-        assert study.sources.first[0] == pytest.approx(share, abs=0.03)
-        assert study.sources.variance**0.5 == pytest.approx(study.objectives[1], rel=1e-9)
+        assert study.sources.first[0] > 0.95
+        assert study.sources.mean == pytest.approx(study.objectives[0], rel=1e-4)
+        assert study.sources.variance**0.5 == pytest.approx(study.objectives[1], rel=1e-3)
 
 
 @pytest.mark.nightly
@@ -239,26 +257,10 @@ def test_a_preset_on_another_drive_is_said_to_be_borrowed(tmp_path, capsys):
     assert "need not hold" not in capsys.readouterr().out
 
 
-def test_a_model_without_trade_off_is_said_to_gain_nothing(tmp_path, capsys):
-    arguments = ("--model", "published", "--out", tmp_path / "out")
-    assert optimise("hs_20_100", *arguments, *QUICK) == 0
-    assert "next to nothing to gain" in capsys.readouterr().out
-
-
-def test_what_the_model_refutes_is_said(written, tmp_path, capsys):
-    files = (written / "optimum_sheet.toml", "--model", written / "optimum_model.toml")
-    assert optimise(*files, "--out", tmp_path / "again", "--box", "0.02", *QUICK) == 0
-    printed = capsys.readouterr().out
-    assert "next to nothing to gain" in printed
-    assert "in how the mean changes, more than half of the change" in printed
-    assert "in how the standard deviation changes, more than half" in printed
-    assert "need not hold" not in printed
-
-
 def test_a_duty_cycle_is_averaged_over(tmp_path, capsys):
     cycle = tmp_path / "cycle.csv"
     cycle.write_text("speed_rpm,load_Nm,weight\n200,40,1\n2000,40,3\n")
-    arguments = ("--cycle", cycle, "--out", tmp_path / "out", "--json")
+    arguments = ("--cycle", cycle, "--model", "published", "--out", tmp_path / "out", "--json")
     assert optimise("hs_20_100", *arguments, *QUICK) == 0
     shares = [row["share"] for row in json.loads(capsys.readouterr().out)["settings"]["conditions"]]
     assert shares == [0.25, 0.75]
@@ -270,8 +272,7 @@ def test_a_duty_cycle_is_averaged_over(tmp_path, capsys):
         (("--preference", "cheap"), "--preference is 'cheap'"),
         (("--tolerance", "1.5"), "tolerance is 1.5"),
         (("--box", "nan"), "box is nan"),
-        (("--order", "9"), "order is 9"),
-        (("--evaluations", "50"), "--evaluations is 50"),
+        (("--designs", "39"), "--designs is 39"),
         (("--seed", "-1"), "--seed is -1"),
         (("--model", "nowhere.toml"), "nowhere.toml"),
         (("--cycle", "nowhere.csv"), "nowhere.csv"),

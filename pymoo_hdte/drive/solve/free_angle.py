@@ -9,6 +9,9 @@ step with its memory: the torque of a sticking spring depends on the torsion whe
 from __future__ import annotations
 
 import numpy as np
+
+# Parts of SciPy load when they are first used: signals and statistics take longer than a study.
+import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
@@ -125,6 +128,36 @@ def harmonic_balance(
     return SteadyMotion(
         torus, *(np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE)
     )
+
+
+def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) -> SteadyMotion:
+    """Return the motion of n designs with lost ones solved again from their nearest neighbours.
+
+    A design whose iteration failed from rest, as at a kink of a law or near a resonance, is started
+    from the steady state of the design that differs least from it. What fails again stays marked.
+
+    Parameters
+    ----------
+    coefficients : Coefficients
+        Of n designs.
+    motion : SteadyMotion
+        What `harmonic_balance` found for them.
+    """
+    lost, kept = np.flatnonzero(~motion.converged), np.flatnonzero(motion.converged)
+    if not (lost.size and kept.size):
+        return motion
+    sizes = np.abs(coefficients.error_phasors).sum(axis=1)
+    parts = (coefficients.stiffness, coefficients.input_inertia, coefficients.damping, sizes)
+    places = np.log(np.maximum(np.column_stack(parts), 1e-300))
+    nearest = kept[scipy.spatial.cKDTree(places[kept]).query(places[lost])[1]]
+    again = harmonic_balance(
+        coefficients.rows(lost), torus=motion.torus, start=motion.rows(nearest)
+    )
+    solved = lost[again.converged]
+    values = {name: getattr(motion, name).copy() for name in BY_CASE}
+    for name, whole in values.items():
+        whole[solved] = getattr(again, name)[again.converged]
+    return SteadyMotion(torus=motion.torus, **values)
 
 
 class _Solver:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.free_angle import harmonic_balance
+from pymoo_hdte.drive.solve.free_angle import continued_from_neighbours, harmonic_balance
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
-from pymoo_hdte.drive.solve.stability import require_stable
+from pymoo_hdte.drive.solve.stability import require_stable, stable_rows
 
 _COUPLINGS = (6, 12, 24, 48, 96, 192)
 """Numbers of orders kept beyond the excited ones; the first sufficient one is used."""
@@ -76,16 +76,44 @@ def hill_steady_state(coefficients: Coefficients) -> OrderSpectrum:
         of a deeply varying stiffness do not die out.
     """
     require_stable(coefficients)
+    found, spectrum = _solved(coefficients)
+    lost = int(np.sum(~found))
+    if lost:
+        raise ArithmeticError(f"no steady state found for {lost} of {len(found)}")
+    return spectrum
+
+
+def found_steady_states(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectrum]:
+    """Return which of n designs have a steady state, shape (n,), and theta_d of those, rad.
+
+    As `hill_steady_state`, but designs whose motion grows or is not found are left out.
+
+    Raises
+    ------
+    ArithmeticError
+        If the harmonics of a deeply varying stiffness do not die out.
+    """
+    found = stable_rows(coefficients)
+    rows = np.flatnonzero(found)
+    solved, spectrum = _solved(coefficients.rows(rows))
+    found[rows] = solved
+    return found, OrderSpectrum(spectrum.orders, spectrum.phasors[solved])
+
+
+def _solved(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectrum]:
+    """Return which of n stable designs were solved, and a row of the spectrum for each design.
+
+    Rows that were not are 0.
+    """
     if coefficients.laws or coefficients.reaction:
-        balance = harmonic_balance(coefficients)
-        lost = int(np.sum(~balance.converged))
-        if lost:
-            raise ArithmeticError(f"no steady state found for {lost} of {len(balance.converged)}")
-        return balance.spectrum()
+        balance = continued_from_neighbours(coefficients, harmonic_balance(coefficients))
+        phasors = np.where(balance.converged[:, None], balance.transmission_error, 0.0)
+        return balance.converged, OrderSpectrum(balance.torus.orders, phasors)
+    everywhere = np.ones(len(coefficients.stiffness), dtype=bool)
     if coefficients.stiffness_depth == 0.0:
         orders = coefficients.error_orders
         response = transfer_function(coefficients, orders) * coefficients.error_phasors
-        return OrderSpectrum(orders, response)
+        return everywhere, OrderSpectrum(orders, response)
     # The mean torque belongs to the family of order 0, whether or not an error line does.
     orders = np.concatenate([coefficients.error_orders, [0.0]])
     firsts, family = np.unique(np.round(np.mod(orders, 2.0), 9) % 2.0, return_inverse=True)
@@ -93,7 +121,7 @@ def hill_steady_state(coefficients: Coefficients) -> OrderSpectrum:
         _family(coefficients, float(first), np.flatnonzero(family[:-1] == number))
         for number, first in enumerate(firsts)
     ]
-    return OrderSpectrum(
+    return everywhere, OrderSpectrum(
         np.concatenate([orders for orders, _ in parts]),
         np.concatenate([phasors for _, phasors in parts], axis=1),
     )

@@ -20,6 +20,10 @@ _LARGEST_DENOMINATOR = 1000
 _PHASE_PER_STEP = 1.0
 """Radians of the fastest torsional vibration that one step may span."""
 _ROUNDING = 1e-9
+_IN_MOTION = (
+    "stiffness", "damping", "input_inertia", "input_damping", "output_inertia", "output_damping",
+)  # fmt: skip
+"""What the free motion of a design depends on, beside the variation of its stiffness."""
 
 
 class UnstableDrive(ArithmeticError):
@@ -86,25 +90,46 @@ def _phase(coefficients: Coefficients, period: float) -> float:
 
 
 def require_stable(coefficients: Coefficients) -> None:
-    """Raise `UnstableDrive`, naming the design, if a multiplier lies outside the unit circle.
-
-    A stiffness that varies a thousand times more slowly than the drive vibrates transfers no energy
-    to it (tongues of parametric resonance shrink exponentially with their order), so such drives
-    pass as stable without integration, as does a constant stiffness.
-    """
-    if not (len(coefficients.stiffness) and coefficients.stiffness_variations):
-        return
-    period, cycles = _period(coefficients)
-    if _phase(coefficients, period) > 2.0 * _MOST_STEPS * cycles:
-        return
-    largest = np.abs(floquet_multipliers(coefficients)).max(axis=1)
-    worst = int(np.argmax(largest))
-    if largest[worst] > 1.0 + _ROUNDING:
+    """Raise `UnstableDrive`, naming the design, if the motion of one grows (`stable_rows`)."""
+    largest = _largest_multipliers(coefficients)
+    worst = int(np.argmax(largest)) if len(largest) else 0
+    if not np.all(_bounded(largest)):
         raise UnstableDrive(
             f"design {worst} (K = {coefficients.stiffness[worst]:g} N.m/rad, "
             f"c = {coefficients.damping[worst]:g} N.m.s/rad) has a Floquet multiplier of modulus "
             f"{largest[worst]:.6f}, allowed: at most 1"
         )
+
+
+def stable_rows(coefficients: Coefficients) -> NDArray[np.bool_]:
+    """Return whether the multipliers of a design lie within the unit circle, shape (n,).
+
+    A stiffness that varies a thousand times more slowly than the drive vibrates transfers no energy
+    to it (tongues of parametric resonance shrink exponentially with their order), so such drives
+    pass as stable without integration, as does a constant stiffness.
+    """
+    return _bounded(_largest_multipliers(coefficients))
+
+
+def _largest_multipliers(coefficients: Coefficients) -> NDArray[np.float64]:
+    """Return the largest modulus of each design, shape (n,); 0 for what passes as stable."""
+    n = len(coefficients.stiffness)
+    if not (n and coefficients.stiffness_variations):
+        return np.zeros(n)
+    period, cycles = _period(coefficients)
+    if _phase(coefficients, period) > 2.0 * _MOST_STEPS * cycles:
+        return np.zeros(n)
+    # theta_s has no part in it: designs that differ in nothing else are solved once.
+    parts = np.broadcast_arrays(*(getattr(coefficients, name) for name in _IN_MOTION))
+    _, rows, which = np.unique(
+        np.column_stack(parts), axis=0, return_index=True, return_inverse=True
+    )
+    largest = np.abs(floquet_multipliers(coefficients.rows(rows))).max(axis=1)
+    return np.asarray(largest[which.ravel()])
+
+
+def _bounded(moduli: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return np.asarray(moduli <= 1.0 + _ROUNDING)
 
 
 def _state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.float64]:

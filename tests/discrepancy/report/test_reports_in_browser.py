@@ -19,7 +19,7 @@ from pymoo_hdte.cli import __main__ as cli
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 WIDE, NARROW = 1280, 500
-QUICK = ("--order", "2", "--evaluations", "1000", "--quiet")
+QUICK = ("--box", "0.03", "--designs", "60", "--quiet")
 
 
 def looked_at(page, tmp_path, width, script="null"):

@@ -1,0 +1,73 @@
+"""Designs without a steady state among others: left out, or continued from their neighbours."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pymoo_hdte.drive import (
+    DampingReference,
+    LoadInertia,
+    MeshStiffnessVariation,
+    UnstableDrive,
+    preset,
+)
+from pymoo_hdte.drive.effects import LawAtPort
+from pymoo_hdte.drive.solve.free_angle import continued_from_neighbours, harmonic_balance
+from pymoo_hdte.effects.stiffness import SoftWindup
+
+MODEL = preset("calibrated")
+
+
+def around(model, n, spread=0.3, seed=1):
+    return model.nominal * np.random.default_rng(seed).uniform(1 - spread, 1 + spread, (n, 5))
+
+
+def test_where_all_are_found_they_are_the_plain_ones():
+    designs = around(MODEL, 20)
+    assert np.array_equal(MODEL.dte_where_found(designs), MODEL.dte_arcsec(designs))
+    assert MODEL.dte_where_found(designs[:0]).shape == (0,)
+
+
+def test_a_motion_that_grows_leaves_the_others_as_they_are():
+    effects = (LoadInertia(0.395), DampingReference(0.01), MeshStiffnessVariation(0.3, 0.0))
+    shaky = replace(MODEL, effects=effects).at(280.0, 40.0)
+    designs = around(shaky, 30)
+    found = shaky.dte_where_found(designs)
+    for row, value in enumerate(found):
+        if np.isnan(value):
+            with pytest.raises(UnstableDrive):
+                shaky.dte_arcsec(designs[[row]])
+        else:
+            assert value == pytest.approx(shaky.dte_arcsec(designs[[row]])[0], rel=1e-9)
+    assert 0 < np.isnan(found).sum() < 30
+
+
+@pytest.fixture
+def soft():
+    """A drive that softens near zero torque."""
+    windup = LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 5e-4, 4.0))
+    return replace(MODEL, effects=(LoadInertia(0.395), DampingReference(1.1), windup))
+
+
+def test_lost_designs_start_from_their_neighbours(soft):
+    coefficients = soft.coefficients(around(soft, 200))
+    # So few steps that not all get there from rest.
+    alone = harmonic_balance(coefficients, steps=6)
+    lost = np.flatnonzero(~alone.converged)
+    assert 0 < len(lost) < 200
+    found = continued_from_neighbours(coefficients, alone)
+    assert found.converged[lost].any()
+    rest = harmonic_balance(coefficients)
+    assert rest.converged.all()
+    regained = lost[found.converged[lost]]
+    assert found.torsion[regained] == pytest.approx(rest.torsion[regained], rel=1e-6, abs=1e-9)
+    kept = np.flatnonzero(alone.converged)
+    assert np.array_equal(found.torsion[kept], alone.torsion[kept])
+
+
+def test_without_any_neighbour_nothing_changes(soft):
+    coefficients = soft.coefficients(around(soft, 3))
+    alone = harmonic_balance(coefficients, steps=1)
+    assert not alone.converged.any()
+    assert continued_from_neighbours(coefficients, alone) is alone
