@@ -200,8 +200,8 @@ def _examined(sensors: MeasuredData) -> tuple[MeasuredData, Verdict]:
     base = fit(sensors)
     seen = position_orders(sensors, base)
     candidates = partial(_candidates, sensors, base, seen)
-    data, every = with_rest(sensors, base, candidates)
-    return data, judged(sensors, data, every)
+    data, every, best = with_rest(sensors, base, candidates)
+    return data, judged(sensors, data, every, best)
 
 
 def _candidates(
