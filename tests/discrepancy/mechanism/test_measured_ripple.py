@@ -26,6 +26,7 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
 from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.io.even_steps import even_steps
 from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
 from tests.helpers.places import SHARED
 
@@ -310,6 +311,28 @@ def test_a_ripple_has_the_size_of_the_fitted_gain():
     assert accepted.values[names.index("gain of torque")] == pytest.approx(1.0, rel=0.03)
     (one,) = finding.ripples.found
     assert one.parts[0].values["amplitude"][0] == pytest.approx(0.1, rel=0.04)
+
+
+@pytest.mark.parametrize("kind", ["torque_ripple", "position_dependent_friction"])
+def test_a_ripple_in_rows_at_uneven_times_has_its_size(kind):
+    """A curve through such rows is too flat near the Nyquist frequency."""
+    generator = np.random.default_rng(21)
+    fine = np.linspace(0.0, TIME[-1], 20 * len(TIME))
+    swung = 0.5 * np.interp(fine, TIME, swings(generator))
+    time = np.cumsum(STEP * generator.uniform(0.5, 1.5, len(TIME)))
+    time = time[time < TIME[-1]]
+    q = np.interp(time, fine, swung)
+    turns = np.sign(np.interp(time, fine, np.gradient(swung)))
+    torque = 0.3 * (turns if kind != "torque_ripple" else -1.0) * np.cos(1010.0 * q)
+    torque = torque + 0.02 * generator.standard_normal(len(time))
+    even = even_steps(time, {"q": q, "torque": torque})
+    assert even.interpolated
+    one = Record("uneven", "train", even.time, even.signals, interpolated=True)
+    (found, *_) = find_ripples(JOINT, [one], CUTOFF).found
+    print(found.frequencies, [(p.law.name, p.values) for p in found.parts], found.order)
+    (size, variance), *_ = found.parts[0].values.values()
+    assert found.parts[0].law.name == kind
+    assert size == pytest.approx(0.3, rel=0.05)
 
 
 def test_a_range_of_orders_that_is_too_long_is_cut_at_its_end_and_that_is_said():
