@@ -351,6 +351,27 @@ def test_a_ripple_in_rows_at_uneven_times_has_its_size(kind):
     assert size == pytest.approx(0.3, rel=0.05)
 
 
+def test_a_ripple_that_hides_the_gain_is_told_with_the_gain_that_is_found_without_it():
+    generator = np.random.default_rng(20)
+    mechanism = Mechanism(
+        {"q": BelievedValue(0.5)},
+        [Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, 1.0))],
+        [Input("torque", {"q": 1.0}, BelievedValue(0.7, 0.5))],
+    )
+    speed = 4.0 * np.sin(0.6 * TIME) + 1.2 * np.sin(2.1 * TIME)
+    q = STEP * np.cumsum(speed)
+    torque = 0.5 * np.gradient(speed, STEP) + 0.5 * speed + 0.3 * np.sign(speed)
+    # Between whole numbers, so that it is seen beyond the band only, and within it as well.
+    torque = torque + 0.5 * np.cos(20.6 * q + 1.0)
+    torque = torque + 0.02 * generator.standard_normal(len(TIME))
+    finding = examine_mechanism(mechanism, [record(q, torque, generator)], 8.0)
+    assert [one.name for one in finding.accepted.candidates] == ["coulomb_friction"]
+    assert finding.accepted.values[:2] == pytest.approx([0.5, 1.0], rel=0.01)
+    (one,) = finding.ripples.found
+    assert one.parts[0].values["amplitude"][0] == pytest.approx(0.5, rel=0.02)
+    assert finding.believed == ()
+
+
 def test_a_range_of_orders_that_is_too_long_is_cut_at_its_end_and_that_is_said():
     generator = np.random.default_rng(19)
     rules = Rules(most_tried_orders=100)
