@@ -24,6 +24,7 @@ from pymoo_hdte.mechanism.port_motion import (
     motion_at_port,
 )
 from pymoo_hdte.mechanism.records import Record
+from pymoo_hdte.mechanism.rests import weight_of_rows
 from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, working_rows
 
 Values = NDArray[np.float64]
@@ -53,6 +54,8 @@ class ForceBalance:
     cutoff : float
         Hz, up to which the motion is known. Force sensors are compared with the motion up to ten
         samples in a period.
+    known : sequence of LawAt
+        Dry friction that is known leaves rests out: see `weight_of_rows`.
 
     Attributes
     ----------
@@ -69,6 +72,8 @@ class ForceBalance:
         Standard deviation that the sensors' noise gives them, for the believed quantities.
     ports : dict of str to PortMotion
         At the working rate.
+    weight : ndarray, shape (n,)
+        Of the rows of the working rate, 0 for those that are left out.
     motions : dict of str to Motion
         Of the coordinates, at the rate of the record.
     cutoff : float
@@ -80,7 +85,9 @@ class ForceBalance:
         cutoff beyond ten samples in a period.
     """
 
-    def __init__(self, mechanism: Mechanism, record: Record, cutoff: float) -> None:
+    def __init__(
+        self, mechanism: Mechanism, record: Record, cutoff: float, known: Sequence[LawAt] = ()
+    ) -> None:
         self.mechanism, self.record = mechanism, record
         self._known: dict[tuple[LawAt, float], Values] = {}
         self._rows = working_rows(mechanism, record, cutoff)
@@ -109,6 +116,8 @@ class ForceBalance:
             {name: one.speed[self._rows] for name, one in self.motions.items()},
             self._inputs,
         )
+        step = record.step * stride
+        self.weight = weight_of_rows(mechanism, record, cutoff, self.ports, step, known)
         self._finer = finer_than(cutoff, record.step * stride)
         self._fine = self.ports if self._finer == 1 else self._between(stride, signals)
         self.terms = self._terms()
@@ -161,6 +170,11 @@ class ForceBalance:
         return np.asarray(dct(np.pad(coefficients, (0, n - self._bins)), type=3, norm="ortho"))
 
     @property
+    def left_out(self) -> int:
+        """Number of rows of the record that have no weight: see `weight_of_rows`."""
+        return round(float(np.mean(self.weight == 0.0)) * len(self.record.time))
+
+    @property
     def time(self) -> Values:
         """Times of the working rate, s, shape (n,)."""
         return self.record.time[self._rows]
@@ -192,7 +206,8 @@ class ForceBalance:
         )
 
     def _transform(self, signal: Values) -> Values:
-        return np.asarray(dct(signal, type=2, norm="ortho")[: self._bins])
+        weight = np.repeat(self.weight, len(signal) // len(self.weight))
+        return np.asarray(dct(weight * signal, type=2, norm="ortho")[: self._bins])
 
     def _rows_of(self, port: Port) -> dict[str, float]:
         """Return the share of a force at a port in each balance."""
@@ -247,7 +262,7 @@ class ForceBalance:
             own = (stiffness[:, place, None] - inertial * omega**2) ** 2 + (viscous * omega) ** 2
             power += own * noise**2
             power += ends * ((inertial * speed) ** 2 + (viscous * position) ** 2)
-        return np.sqrt(power / stride)
+        return np.sqrt(power / stride * np.mean(self.weight**2))
 
     def _matrices(self) -> tuple[Values, Values, Values]:
         """Return believed inertia, damping and stiffness, (n_balances, n_coordinates)."""
