@@ -183,7 +183,7 @@ KNOWN_RIGS = (
     KnownRig(
         "lara8_joint_3",
         "lara8_j3",
-        "none published",
+        "none published, of torques or torsion",
         "allwinlucious/MasterThesis",
     ),
 )

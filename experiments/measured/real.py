@@ -28,6 +28,8 @@ from experiments.measured.real_numbers import (
     named,
     nearest_order,
     pooled,
+    share_in_words,
+    torsion_errors,
 )
 from experiments.measured.rigs import MEASURED, Study
 from experiments.runner.committed import (
@@ -59,6 +61,8 @@ VERDICTS = (
     Column("window", "s", 3, "simulation"),
     Column("R2 before", digits=5, group="simulation"),
     Column("R2 after", digits=5, group="simulation"),
+    Column("before", "arcsec", 3, "held-out torsion"),
+    Column("after", "arcsec", 3, "held-out torsion"),
 )
 TOOLS = (
     Column("rig"),
@@ -70,8 +74,6 @@ TOOLS = (
 )
 ARROW = "silverbox"
 """Rig whose held-out record is simulated without a break as well, which takes a minute."""
-LOST = -10.0
-"""R2 below which a prediction is lost."""
 SETTING = (
     "Published measurements with known answers. The first 60 % of a log are fitted and the rest is "
     "held out where nothing else is given; the files say what is believed "
@@ -166,10 +168,10 @@ def verdict_row(rig: KnownRig, one: Study) -> list[str]:
     rms = [pooled(one, kind, side) for kind in ("balance", "simulation") for side in (0, 1)]
     extents = [gap.extent.length for gap in one.gaps if gap.extent is not None]
     numbers = [off, order, rig.order, *rms, min(extents, default=None)]
-    status = one.finding.verdict.status
     shown = ["" if number is None else f"{number:.4g}" for number in numbers]
     by_simulation = [f"{value:.5f}" for value in explained(one)]
-    return [rig.name, judgement, status, words, rig.answer, *shown, *by_simulation]
+    told = rig.name, judgement, one.status, words, rig.answer
+    return [*told, *shown, *by_simulation, *torsion_errors(one)]
 
 
 def shortfalls(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
@@ -184,12 +186,11 @@ def shortfalls(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
 
 def _said(rig: KnownRig, one: Study) -> tuple[str, str]:
     """Return the judgement on a verdict, and what it names."""
-    status, names = one.finding.verdict.status, _names(one)
-    return judged(rig, status, names), " + ".join(names).replace("_", " ") or "nothing"
-
-
-def _names(one: Study) -> list[str]:
-    return list(dict.fromkeys(effect["name"] for effect in named(one)))
+    names = list(dict.fromkeys(effect["name"] for effect in named(one)))
+    words = " + ".join(names).replace("_", " ") or "nothing"
+    if one.joint and one.joint.torsion.verdict.status == "unlisted":
+        words += "; of the torsion nothing"
+    return judged(rig, one.status, names), words
 
 
 def _tool_row(rig: KnownRig, answer: Answer) -> list[str]:
@@ -198,13 +199,8 @@ def _tool_row(rig: KnownRig, answer: Answer) -> list[str]:
         answer.tool,
         judgement,
         answer.words,
-        *(_share(one) for one in (answer.of_force, answer.of_motion)),
+        *(share_in_words(one) for one in (answer.of_force, answer.of_motion)),
     ]
-
-
-def _share(value: float | None) -> str:
-    """Return an R2 as a text; far below zero, digits mean nothing."""
-    return "" if value is None else f"{value:.5f}" if value > LOST else f"below {LOST:g}"
 
 
 def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:

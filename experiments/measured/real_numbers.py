@@ -11,17 +11,35 @@ from experiments.measured.known_answers import KnownRig
 from experiments.measured.other_tools import terms_of
 from experiments.measured.rigs import Study, fitted_values
 from pymoo_hdte.discrepancy.report.mechanism_document import effects
+from pymoo_hdte.discrepancy.report.torsion import torsion_document
 from pymoo_hdte.effects.effect import place_of
 from pymoo_hdte.mechanism.motion import SmoothedMotion
 from pymoo_hdte.mechanism.port_motion import law_force
+from pymoo_hdte.units import ARCSEC
 
 Values = NDArray[np.float64]
+
+LOST = -10.0
+"""R2 below which a prediction is lost."""
 
 
 def named(one: Study) -> list[dict[str, Any]]:
     """Return what a verdict names with its values, ripple beyond the band included."""
     beyond = (effect for ripple in one.finding.ripples.found for effect in ripple.as_dicts())
-    return [*effects(one.finding), *beyond]
+    twist = torsion_document(one.joint)["effects"] if one.joint else []
+    return [*effects(one.finding), *beyond, *twist]
+
+
+def torsion_errors(one: Study) -> list[str]:
+    """Return the errors of the held-out torsion before and after, arcseconds, where measured."""
+    gaps = one.joint.gaps if one.joint else ()
+    sizes = ([getattr(gap, side) for gap in gaps] for side in ("before", "after"))
+    return [f"{np.sqrt(np.mean(np.square(each))) / ARCSEC:.4g}" if each else "" for each in sizes]
+
+
+def share_in_words(value: float | None) -> str:
+    """Return an R2 as a text; far below zero, digits mean nothing."""
+    return "" if value is None else f"{value:.5f}" if value > LOST else f"below {LOST:g}"
 
 
 def determinations(one: Study) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from experiments.runner.committed import DATA
 from experiments.runner.result import Column, Picture, Result, Table
+from pymoo_hdte.discrepancy.joint.analysis import JointFinding, examine_joint
+from pymoo_hdte.discrepancy.joint.halves import joint_of, rigid_half
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
@@ -34,16 +36,26 @@ _BANDS = 12
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """A rig, what the workflow finds in its records, and the proof."""
+    """A rig, what the workflow finds in its records, and the proof.
+
+    Of a joint with two encoders the rig, the finding and the proof are those of its torques;
+    ``joint`` has the torsion as well.
+    """
 
     rig: MeasuredMechanism
     finding: MechanismFinding
     gaps: tuple[MeasuredGap, ...]
+    joint: JointFinding | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the effects that the verdict names, in its order."""
         return tuple(candidate.name for candidate in self.finding.accepted.candidates)
+
+    @property
+    def status(self) -> str:
+        """Of the verdict; of a joint, of both verdicts."""
+        return self.joint.status if self.joint else self.finding.verdict.status
 
 
 def study(name: str, folder: str) -> Study | None:
@@ -51,8 +63,22 @@ def study(name: str, folder: str) -> Study | None:
     if not (MEASURED / folder).is_dir():
         return None
     rig = read_rig(RIGS / f"{name}.toml", MEASURED / folder)
-    finding = examine_mechanism(rig.mechanism, rig.records, rig.cutoff, rig.effects)
-    return Study(rig, finding, prove_measured(finding))
+    believed = rig.records, rig.cutoff, rig.effects
+    joint = joint_of(rig.mechanism)
+    if joint is None:
+        finding = examine_mechanism(rig.mechanism, *believed)
+        return Study(rig, finding, prove_measured(finding))
+    both = examine_joint(joint, *believed)
+    return Study(torques_of(rig), both.torque, prove_measured(both.torque), both)
+
+
+def torques_of(rig: MeasuredMechanism) -> MeasuredMechanism:
+    """Return a joint with two encoders as a rigid body, and any other rig as it is."""
+    joint = joint_of(rig.mechanism)
+    if joint is None:
+        return rig
+    half = rigid_half(joint, rig.records, rig.effects)
+    return replace(rig, mechanism=half.mechanism, records=half.records, effects=half.known)
 
 
 def absent(title: str, folder: str, command: str, source: str) -> Result:

@@ -116,14 +116,17 @@ def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
 def _summary(document: dict[str, Any], out: Path) -> str:
     from pymoo_hdte.effects.sentence_blanks import in_words
 
-    names = " + ".join(_name(one) for one in document["effects"])
+    torsion: dict[str, Any] = document.get("torsion", {"effects": [], "limits": []})
+    names = " + ".join(_name(one) for one in (*document["effects"], *torsion["effects"]))
     lines = [
         f"{document['status']}{': ' + names if names else ''}",
         document["sentence"],
         *([relevance["sentence"]] if (relevance := document.get("relevance")) else []),
         document["location"]["sentence"],
         *document["limits"],
+        *torsion["limits"],
         f"Next: {in_words(document['next_experiment']['description'])}",
+        *([f"For the torsion: {test}"] if (test := torsion.get("next_experiment")) else []),
         f"Report: {out / PAGE_FILE}",
     ]
     return "\n".join(lines)

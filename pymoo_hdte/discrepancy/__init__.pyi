@@ -1,5 +1,6 @@
 from pymoo_hdte.discrepancy.analysis import (
     DriveAnalysis,
+    JointAnalysis,
     MechanismAnalysis,
     analyse,
     check_report_folder,
@@ -24,6 +25,7 @@ __all__ = [
     "BelievedDrive",
     "Campaign",
     "DriveAnalysis",
+    "JointAnalysis",
     "MeasuredMechanism",
     "MechanismAnalysis",
     "MechanismModel",

@@ -18,6 +18,8 @@ from pymoo_hdte.discrepancy.drive.proof import Proof, prove
 from pymoo_hdte.discrepancy.drive.revision import revised_model
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.joint.analysis import JointFinding, examine_joint, revised_joint
+from pymoo_hdte.discrepancy.joint.halves import joint_of
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism
 from pymoo_hdte.discrepancy.mechanism.held_out import Progress
@@ -101,8 +103,13 @@ def analyse(
         register(effect)
     if isinstance(measured, Campaign):
         return DriveAnalysis(examine_drive(measured, rules))
-    believed = measured.mechanism, measured.records, measured.cutoff, measured.effects
-    return MechanismAnalysis(measured, examine_mechanism(*believed, rules, progress))
+    believed = measured.records, measured.cutoff, measured.effects
+    joint = joint_of(measured.mechanism)
+    if joint is not None:
+        return JointAnalysis(measured, examine_joint(joint, *believed, rules, progress))
+    return MechanismAnalysis(
+        measured, examine_mechanism(measured.mechanism, *believed, rules, progress)
+    )
 
 
 class DriveAnalysis:
@@ -270,6 +277,62 @@ class MechanismAnalysis:
     @ONE_THREAD
     def _test(self) -> NextTest:
         return next_test(self.finding)
+
+
+class JointAnalysis(MechanismAnalysis):
+    """The analysis of a joint with two encoders; made by `analyse`.
+
+    Its verdict, location, proof and next experiment are those of the balance of torques.
+
+    Attributes
+    ----------
+    measured : MeasuredMechanism
+        The joint as it is believed, and its records.
+    joint : JointFinding
+        With the verdict on the torsion beside that on the torques, and the ``status`` of both.
+    """
+
+    def __init__(self, measured: MeasuredMechanism, joint: JointFinding) -> None:
+        super().__init__(measured, joint.torque)
+        self.joint = joint
+
+    @property
+    def torsion(self) -> Verdict:
+        """What is missing in the torsion."""
+        return self.joint.torsion.verdict
+
+    def revised_model(self) -> MechanismModel:
+        """Return the joint with fitted values, and the effects that it has."""
+        return revised_joint(self.measured.title, self.joint)
+
+    @ONE_THREAD
+    def report(self, out: str | Path) -> dict[str, Any]:
+        """Write the report as `MechanismAnalysis.report`, with the torsion; return the verdict.
+
+        Parameters
+        ----------
+        out : str or Path
+            A folder that is new, empty, or an earlier report, which is replaced.
+
+        Returns
+        -------
+        dict
+            What ``verdict.json`` holds.
+
+        Raises
+        ------
+        InvalidInput
+            If the folder holds anything else.
+        OSError
+            If it cannot be written.
+        """
+        from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
+
+        check_report_folder(out)
+        found = self.prove(), self.next_experiment()
+        return write_mechanism_report(
+            self.measured.title, self.finding, *found, out, joint=self.joint
+        )
 
 
 def check_report_folder(out: str | Path) -> None:

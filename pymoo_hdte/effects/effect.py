@@ -160,7 +160,7 @@ class Effect:
 
     def _name_of(self, part: Any) -> str:
         """Return the name of a part: an effect may include the law of another."""
-        if type(part) in (self.law, self.change):
+        if any(kind is not None and isinstance(part, kind) for kind in (self.law, self.change)):
             return self.name
         for one in _EFFECTS.values():
             if one.law is type(part):

@@ -57,6 +57,9 @@ class Sizes:
         All orders at which records could show lines; further harmonics could not be determined.
     together : bool
         Whether the variation at all seen orders is searched for as one effect.
+    between : bool
+        Whether the port lies between two measured angles: its position is the torsion of a gear,
+        and what is periodic there varies with the angle of its input.
     """
 
     force: float
@@ -78,6 +81,7 @@ class Sizes:
     seen: tuple[float, ...] = ()
     shown: tuple[float, ...] = ()
     together: bool = False
+    between: bool = False
 
     def family(self, order: float, most: int = 2) -> Family:
         """Return an order of the port with those of its first ``most`` harmonics in ``shown``."""

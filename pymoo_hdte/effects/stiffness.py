@@ -265,7 +265,7 @@ def _uneven(sizes: Sizes) -> list[Guess]:
     Its least width is an unknown of its own: a play with negative width would be clipped to zero,
     where a search has no gradient.
     """
-    if sizes.stiffness == 0.0:
+    if sizes.stiffness == 0.0 or sizes.between:
         return []
     travel, found = sizes.travel, []
     size, widest = 0.02 * travel, 0.5 * travel

@@ -9,6 +9,7 @@ Linear in the quantities of the mechanism (Gautier, Robotics and Autonomous Syst
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,11 @@ from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
 from pymoo_hdte.mechanism.motion import finer_than, motion_of, smooth, smoothed_noise
 from pymoo_hdte.mechanism.port_motion import (
     PortMotion,
+    followed_angles,
     law_force,
     load_at_port,
     motion_at_port,
+    torsion_noise,
 )
 from pymoo_hdte.mechanism.records import Record
 from pymoo_hdte.mechanism.rests import weight_of_rows
@@ -39,8 +42,12 @@ def balance_names(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def quantity_names(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the quantities on which balances depend: of the mechanism, and zeros of sensors."""
-    zeros = [f"zero of {port.name}" for port in mechanism.ports if port.read]
+    """Return the quantities on which balances depend: of the mechanism, and zeros of sensors.
+
+    The zero of a force sensor is added to its force, that of a port with a followed angle to the
+    force of its spring.
+    """
+    zeros = [f"zero of {port.name}" for port in mechanism.ports if port.read or port.followed]
     return (*mechanism.quantities, *zeros)
 
 
@@ -75,7 +82,7 @@ class ForceBalance:
     weight : ndarray, shape (n,)
         Of the rows of the working rate, 0 for those that are left out.
     motions : dict of str to Motion
-        Of the coordinates, at the rate of the record.
+        Of the coordinates and of followed angles, at the rate of the record.
     cutoff : float
 
     Raises
@@ -89,7 +96,7 @@ class ForceBalance:
         self, mechanism: Mechanism, record: Record, cutoff: float, known: Sequence[LawAt] = ()
     ) -> None:
         self.mechanism, self.record = mechanism, record
-        self._known: dict[tuple[LawAt, float], Values] = {}
+        self._known: dict[tuple[LawAt, float, float], Values] = {}
         self._rows = working_rows(mechanism, record, cutoff)
         stride, highest = self._rows.step, highest_known(mechanism, record, cutoff)
         frequency = frequencies(len(record.time[self._rows]), record.step * stride)
@@ -101,10 +108,10 @@ class ForceBalance:
         self.cutoff = cutoff
         self.motions = {
             name: motion_of(self.record.channel(name), record.step, cutoff)
-            for name in mechanism.coordinates
+            for name in (*mechanism.coordinates, *followed_angles(mechanism))
         }
         self._acceleration = {
-            name: motion.acceleration[self._rows] for name, motion in self.motions.items()
+            name: self.motions[name].acceleration[self._rows] for name in mechanism.coordinates
         }
         signals = {
             one.name: smooth(self.record.channel(one.name), record.step, highest)
@@ -130,7 +137,10 @@ class ForceBalance:
         self.noise = self._noise(stride)
 
     def forces(
-        self, effects: Sequence[LawAt], stiffness: Mapping[str, float] | None = None
+        self,
+        effects: Sequence[LawAt],
+        stiffness: Mapping[str, float] | None = None,
+        zeros: Mapping[str, float] | None = None,
     ) -> Values:
         """Return the coefficients of the forces of laws in the balances, (n_balances, n_bins).
 
@@ -139,27 +149,32 @@ class ForceBalance:
         effects : sequence of LawAt
         stiffness : mapping of str to float, optional
             Of ports, N/m or N.m/rad, for play and curved springs; by default the believed one.
+        zeros : mapping of str to float, optional
+            Of ports with a followed angle, N or N.m; by default 0.
         """
         names = balance_names(self.mechanism)
         found = np.zeros((len(names), self._bins))
         for effect in effects:
             port = self.mechanism.port(effect.port)
             here = (stiffness or {}).get(port.name, port.stiffness.value)
-            force = self._law_coefficients(effect, here)
+            zero = (zeros or {}).get(port.name, 0.0) if port.followed else 0.0
+            force = self._law_coefficients(effect, here, zero / here if zero else 0.0)
             for name, share in self._rows_of(port).items():
                 found[names.index(name)] += share * force
         return found
 
-    def _law_coefficients(self, effect: LawAt, stiffness: float) -> Values:
-        """Return the coefficients of the force of one effect, (n_bins,).
+    def _law_coefficients(self, effect: LawAt, stiffness: float, shift: float) -> Values:
+        """Return the coefficients of the force of one effect, (n_bins,), its port being shifted.
 
         The last results are cached: in a difference quotient all laws but one are unchanged.
         """
-        key = effect, stiffness
+        key = effect, stiffness, shift
         if key not in self._known:
             while len(self._known) >= _KEPT:
                 self._known.pop(next(iter(self._known)))
-            force = law_force(effect.law, self._fine[effect.port], stiffness)
+            motion = self._fine[effect.port]
+            motion = replace(motion, position=motion.position + shift) if shift else motion
+            force = law_force(effect.law, motion, stiffness)
             # The finer samples are centred on the others, so that their cosines are the same.
             self._known[key] = self._transform(force) / np.sqrt(self._finer)
         return self._known[key]
@@ -253,6 +268,10 @@ class ForceBalance:
             spread = one.gain.value * self.record.noise_of(one.name, jumps=True)
             for name, share in one.acts.items():
                 power[names.index(name)] += (share * spread) ** 2
+        for port in mechanism.ports:
+            spread = port.stiffness.value * torsion_noise(port, record) if port.followed else 0.0
+            for row, share in self._rows_of(port).items():
+                power[names.index(row)] += (share * spread) ** 2
         step = record.step * stride
         ends = 4.0 * stride / (len(self.time) * step**2)
         for place, name in enumerate(mechanism.coordinates):
@@ -275,5 +294,5 @@ class ForceBalance:
                 for name, part in port.motion.items():
                     at = names.index(row), mechanism.coordinates.index(name)
                     damping[at] += share * part * port.damping.value
-                    stiffness[at] += share * part * port.stiffness.value
+                    stiffness[at] += share * part * port.stiffness.value * (not port.followed)
         return inertia, damping, stiffness

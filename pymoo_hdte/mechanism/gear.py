@@ -17,7 +17,7 @@ _PER_FIELD = (1, 2, 6)
 
 @dataclass(frozen=True)
 class Gear:
-    """A gear in front of a port, whose motion is that of the gear's output.
+    """A gear in front of a port, whose motion is that of the gear's output or its torsion.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Gear:
         return found
 
     def check_at(self, port: str, motion: Mapping[str, float], angles: Collection[str]) -> None:
-        """Refuse a port that cannot be the output of a gear.
+        """Refuse a port that can be neither the output of a gear nor its torsion.
 
         Parameters
         ----------
@@ -80,11 +80,16 @@ class Gear:
         Raises
         ------
         InvalidInput
-            If the motion is not that of one coordinate, or this is no angle.
+            If the motion is neither that of one coordinate nor a `torsion_of` two, or one of them
+            is no angle.
         """
         moved = [name for name, share in motion.items() if share]
-        if len(moved) != 1 or moved[0] not in angles:
-            allowed = "a port whose motion is the angle of the gear's output"
+        one = len(moved) == 1 or torsion_of(motion) is not None
+        if not one or any(name not in angles for name in moved):
+            allowed = (
+                "a port whose motion is the angle of the gear's output; or its torsion, 1 the "
+                "input's angle, divided by the ratio already, and -1 the output's"
+            )
             raise InvalidInput(f"gear of {port}", dict(motion), allowed)
 
     def meaning(self, order: float, within: float) -> str:
@@ -105,3 +110,18 @@ class Gear:
         off = {one: abs(one - order) for one in self.expected}
         near = sorted((one for one in off if off[one] <= within), key=off.__getitem__)
         return "; ".join(f"{one:.5g} is {self.expected[one]}" for one in near)
+
+
+def torsion_of(motion: Mapping[str, float]) -> tuple[str, str] | None:
+    """Return the angles of input and output whose difference a motion is; None for another one.
+
+    Parameters
+    ----------
+    motion : mapping of str to float
+        Share of each coordinate, by name: 1 of the input's angle, divided by the gear's ratio, and
+        -1 of the output's.
+    """
+    shares = {share: name for name, share in motion.items() if share}
+    if set(shares) != {1.0, -1.0} or sum(map(bool, motion.values())) != 2:
+        return None
+    return shares[1.0], shares[-1.0]

@@ -39,7 +39,10 @@ class Port:
         Share of the force of inputs, by name, in the load that the port passes on, on which laws
         may depend; positive where it opposes a positive motion.
     gear : Gear or None
-        Whose output is the port.
+        Whose output is the port; or, of a motion between two angles, whose torsion it is.
+    followed : mapping of str to float
+        Share of measured angles that are no coordinates: they move the port, and it does not move
+        them. The zero of d is then unknown, and periodic laws vary with the first coordinate.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Port:
     error: tuple[ErrorLine, ...] = ()
     load: Mapping[str, float] = field(default_factory=dict)
     gear: Gear | None = None
+    followed: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -162,7 +166,8 @@ class Mechanism:
         for port in self.ports:
             self._check_shares(f"motion of {port.name}", port.motion)
             for line in port.error:
-                one_of(f"error of {port.name}", line.coordinate, self.coordinates)
+                moving = (*self.coordinates, *port.followed)
+                one_of(f"error of {port.name}", line.coordinate, moving)
             if port.gear:
                 # Where the mechanism does not tell its angles, the gear is believed.
                 turning = self.coordinates if self.angles is None else self.angles
@@ -200,7 +205,7 @@ class Mechanism:
     def turns(self, port: Port) -> bool:
         """Tell whether the motion of a port is the angle of one shaft, geared or not."""
         moved = [name for name, share in port.motion.items() if share]
-        return len(moved) == 1 and moved[0] in (self.angles or ())
+        return len(moved) == 1 and moved[0] in (self.angles or ()) and not port.followed
 
     @property
     def quantities(self) -> dict[str, BelievedValue]:

@@ -91,6 +91,10 @@ def simulate_mechanism(
     real_number("rtol", rtol, at_least=1e-12, at_most=1e-2)
     for effect in effects:
         one_of(f"port of effect {effect.name}", effect.port, mechanism.port_names)
+    for port in mechanism.ports:
+        if port.followed:
+            allowed = "empty: a simulation moves coordinates only"
+            raise InvalidInput(f"{port.name}.followed", dict(port.followed), allowed)
     begin = _start(mechanism, record, start or {})
     passed = _history(mechanism, begin, history)
     state = mechanism, passed, record

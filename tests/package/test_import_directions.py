@@ -25,6 +25,7 @@ LOWEST_FIRST = (
         "discrepancy.drive.plan",
         "discrepancy.mechanism.beyond_band",
         "discrepancy.mechanism",
+        "discrepancy.joint",
     ),
     *("discrepancy.report", "virtual"),
     *("problems.simulator", "problems", "algorithms", "decision", "discrepancy", "cli"),

@@ -140,10 +140,10 @@ def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int
 def alike(one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules) -> bool:
     """Tell whether another hypothesis is indistinguishable from the chosen one with these data.
 
-    The true form of an effect may differ from the listed one. Two laws of no exact form whose
-    predictions differ by less than such forms do are therefore alike, unless one is a special case
-    of the other. Where even the chosen form leaves more than noise, differences of chi-square are
-    compared with this residual.
+    The true form of an effect may differ from the listed one. Two laws of no exact form are
+    therefore alike if what one leaves beyond the other is no more than such forms leave, unless one
+    is a special case of the other. Where even the chosen form leaves more than noise, differences
+    of chi-square are compared with this residual.
     """
     if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
         return False

@@ -22,7 +22,8 @@ def is_earned(
 ) -> bool:
     """Tell whether a set explains most of what is left without one of its members.
 
-    Beside laws of exact form whatever leads from a misfit down to the noise is earned.
+    Beside laws of exact form whatever leads from a misfit down to the noise is earned, if it is
+    most of what they leave.
     What a law without exact form leaves may be an error of its form: unless the whole set
     explains the data down to the noise, a member must also be large relative to the base's
     excess at the port of another, and relative to the model's own error elsewhere.
@@ -32,10 +33,10 @@ def is_earned(
         return False
     left = rest.fit.chi_square - degrees_of_freedom
     removed = rest.fit.chi_square - one.fit.chi_square
-    if rest.exact and down_to_noise(one.fit, degrees_of_freedom, rules):
-        return True
     if rest.exact:
-        return left > 0.0 and removed >= rules.explained_share * left
+        to_noise = down_to_noise(one.fit, degrees_of_freedom, rules)
+        share = rules.explained_part_share if to_noise else rules.explained_share
+        return left > 0.0 and removed >= share * left
     per_degree = rest.fit.chi_square / degrees_of_freedom
     if per_degree > rules.contradicting_chi_square and down_to_noise(
         one.fit, degrees_of_freedom, rules

@@ -193,8 +193,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules):
     form_accuracy: float = rule(
         0.02,
         "relative amplitude",
-        "Two laws of no exact form belong to one class if their predictions differ by no more than "
-        "this part of the amplitude of the misfit.",
+        "Two laws of no exact form belong to one class if what one leaves beyond the other is at "
+        "most this part of the amplitude of the misfit.",
         f"{BY_HAND}, after foreign forms of 18 effects on a bench written apart: a play with a "
         "soft skin is fitted better by a soft wind-up than by the listed play by up to 1.2e-2.",
         at_least=0.0,

@@ -53,6 +53,14 @@ class MechanismRules(RuleSet):
         "Simulation: as `most_fitted`, without its margin.",
     )
 
+    fewest_error_periods: float = rule(
+        1.0,
+        "periods in a record",
+        "Least periods of a low whole order of a shaft within the travel of a record for it to be "
+        "a candidate error of a gear between two encoders.",
+        f"{BY_HAND}: fewer are a slope or a bow, which the torque explains as well.",
+    )
+
     # How are held-out records simulated?
     window_drift: float = rule(
         0.1,

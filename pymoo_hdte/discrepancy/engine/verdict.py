@@ -12,12 +12,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.stats import chi2, norm
-
 from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
+from pymoo_hdte.discrepancy.engine.doubts import (
+    NOT_PROVEN,
+    bounded_unknowns,
+    doubts_of,
+    left_by,
+)
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     alike,
@@ -25,12 +28,12 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     down_to_noise,
     explains,
     gains_enough,
+    label_of,
 )
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.search import Search
 
-NOT_PROVEN = "the error on the records kept out of the fit does not shrink"
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted", "partial")
 EXPLAINED = ("named", "class", "parameter", "partial")
 """Statuses that say what is missing."""
@@ -123,12 +126,15 @@ def judge(
     if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
         equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
         chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
+    certain = _explains(search, chosen)
+    if not certain:
+        chosen = _simpler_law(search, chosen)
+        others = [one for one in search.found if one is not chosen]
     vote = data.held_out_vote(base, chosen.fit)
     shown = vote is None or vote.counts(rules)
     doubts = doubts_of(search, chosen, vote if shown else None)
-    certain = _explains(search, chosen)
     if not certain and _stands_out(search, chosen):
-        certain, left = True, _left_by(chosen.fit.chi_square / degrees_of_freedom)
+        certain, left = True, left_by(chosen.fit.chi_square / degrees_of_freedom)
         doubts += [left] if left not in doubts else []
     status = _status(chosen, certain, equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()
@@ -194,92 +200,45 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
     )
 
 
-def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
-    """Return what forbids to name a set plainly, in words; nothing if it may be named."""
-    found, fitted = [], chosen.fit
-    for (candidate, bounded), (_, place) in zip(
-        bounded_unknowns(fitted), fitted.places, strict=True
-    ):
-        if bounded:
-            found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
-        elif not strength_is_certain(fitted, candidate, place, search.data.rules):
-            found.append(f"the interval of {candidate.label} contains nothing")
-    if any(one.frees in fitted.at_bounds for one in chosen.candidates):
-        found.append("a base parameter ended at ten times or a tenth of what is believed")
-    curves = [one.label for one in chosen.candidates if not one.exact]
-    freed = any(one.frees is not None for one in chosen.candidates)
-    if curves and freed and not search.enough(chosen):
-        found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
-    if vote is not None and vote.after >= vote.before:
-        found.append(NOT_PROVEN)
-    per_degree = fitted.chi_square / search.degrees_of_freedom
-    if per_degree > search.data.rules.contradicting_chi_square:
-        found.append(_left_by(per_degree))
-    return found
-
-
-def _left_by(per_degree: float) -> str:
-    """Say what a chi-square per degree of freedom means."""
-    return f"what is left is {np.sqrt(per_degree):.3g} times the noise"
-
-
-def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
-    """Return for each candidate of a fit which of its unknowns ended at a bound.
-
-    A level that ended at zero is a part that the effect does not have.
-    """
-    found = []
-    for candidate, place in fitted.places:
-        names = []
-        for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
-            none = parameter.linear and parameter.lower == 0.0 and side < 0.0
-            if side != 0.0 and not none:
-                names.append(parameter.name)
-        found.append((candidate, names))
-    return found
-
-
-def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: Rules) -> bool:
-    """Tell whether the strength of an effect differs from nothing, by its own interval.
-
-    Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
-    friction that falls with speed may have no level. Shapes, which are not zero, do not count.
-    """
-    if not candidate.parameters:
-        return True
-    limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
-    for row, parameter in enumerate(candidate.parameters, place.start):
-        if parameter.name.endswith("_cosine"):
-            pair = np.array([row, row + 1])
-            block = fitted.covariance[np.ix_(pair, pair)]
-            if fitted.values[pair] @ np.linalg.solve(block, fitted.values[pair]) > limit:
-                return True
-        elif parameter.lower <= 0.0 and not parameter.name.endswith("_sine"):
-            deviation = np.sqrt(fitted.covariance[row, row])
-            if abs(fitted.values[row]) > rules.certain_deviations * deviation:
-                return True
-    return all(parameter.lower > 0.0 for parameter in candidate.parameters)
-
-
 def _stands_out(search: Search, chosen: Hypothesis) -> bool:
     """Tell whether a set that leaves more than the noise is certain as far as it goes.
 
     It removes most of the misfit, and all other sets of its size leave plainly more: what is left
-    may be the form of a law, or a further effect.
+    may be the form of a law, or a further effect. Sets that say the same and more do not count as
+    others; those that the screening left out are far behind.
     """
-    rules, degrees_of_freedom = search.data.rules, search.degrees_of_freedom
-    left = chosen.fit.chi_square - degrees_of_freedom
+    rules = search.data.rules
     others = (
         one
         for one in search.found
         if len(one.members) == len(chosen.members)
         and one.names != chosen.names
         and not contains(one, chosen)
+        and not label_of(one.candidates) > label_of(chosen.candidates)
     )
     enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
-    return enough and all(
-        one.fit.chi_square - degrees_of_freedom >= rules.form_ratio * left for one in others
+    least = rules.form_ratio * _left(search, chosen)
+    return enough and all(_left(search, one) >= least for one in others)
+
+
+def _simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
+    """Return the special case of a set that leaves about as little, where neither explains enough.
+
+    A law with more unknowns follows more of the form of any other law: that it leaves less of a
+    misfit that is no noise does not show it.
+    """
+    most = search.data.rules.form_ratio * _left(search, chosen)
+    special = (
+        one
+        for one in search.found
+        if one.names != chosen.names and contains(chosen, one) and _left(search, one) < most
     )
+    return next((one for one in special if search.earned(one)), chosen)
+
+
+def _left(search: Search, one: Hypothesis) -> float:
+    """Return the excess chi-square that a set leaves."""
+    return one.fit.chi_square - search.degrees_of_freedom
 
 
 def _status(

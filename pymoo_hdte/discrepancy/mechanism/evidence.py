@@ -19,10 +19,12 @@ from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Response, Unknowns, Vector, built
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.effects.unknowns import Parameter
-from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import ForceBalance, balance_names, quantity_names
 
 Values = NDArray[np.float64]
+
+_OF_LAWS = ("stiffness of ", "zero of ")
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +75,17 @@ class MeasuredData:
                 least, most = one.limits
                 found.append(Parameter(name, one.value, least, most, (most - least) / 2.0))
         for port in self.mechanism.ports:
-            if port.read:
-                largest = max(
-                    float(np.abs(one.record.channels[port.name]).max()) for one in self.spectra
-                )
-                size = max(largest, 1e-12)
+            if port.read or port.followed:
+                size = max(*(self._peak(port, one) for one in self.spectra), 1e-12)
                 found.append(Parameter(f"zero of {port.name}", 0.0, -2.0 * size, 2.0 * size, size))
         return tuple(found)
+
+    @staticmethod
+    def _peak(port: Port, balance: ForceBalance) -> float:
+        """Return the largest force of a sensor, or of the spring between two angles."""
+        if port.read:
+            return float(np.abs(balance.record.channels[port.name]).max())
+        return port.stiffness.limits[1] * float(np.abs(balance.ports[port.name].position).max())
 
     @cached_property
     def _linear(self) -> tuple[Vector, Values]:
@@ -101,15 +107,17 @@ class MeasuredData:
 
     def whitened_forces(self, base: Vector, effects: Sequence[LawAt]) -> Vector:
         """Return how effects reduce whitened residuals, (n,), at base parameters (n_base,)."""
-        prefix = "stiffness of "
-        stiffness = {
-            one.name.removeprefix(prefix): float(value)
-            for one, value in zip(self.base, base, strict=True)
-            if one.name.startswith(prefix)
-        }
+        stiffness, zeros = (
+            {
+                one.name.removeprefix(prefix): float(value)
+                for one, value in zip(self.base, base, strict=True)
+                if one.name.startswith(prefix)
+            }
+            for prefix in _OF_LAWS
+        )
         return np.concatenate(
             [
-                (balance.forces(effects, stiffness) / deviation)[balance.kept]
+                (balance.forces(effects, stiffness, zeros) / deviation)[balance.kept]
                 for balance, deviation in zip(self.spectra, self.deviation, strict=True)
             ]
         )
@@ -226,6 +234,8 @@ class BalanceObjective(Unknowns):
     def __init__(self, data: MeasuredData, candidates: Sequence[Candidate]) -> None:
         super().__init__(data.base, candidates)
         self.data = data
+        self._of_laws = {f"stiffness of {port.name}" for port in data.mechanism.ports}
+        self._of_laws |= {f"zero of {port.name}" for port in data.mechanism.ports if port.followed}
 
     def residuals(self, values: Vector) -> Vector:
         """Return residuals at values (n_parameters,)."""
@@ -239,8 +249,8 @@ class BalanceObjective(Unknowns):
         found[:, :n_base] = self.data._linear[1] * self.scale[:n_base]
         stands = self._forces(values)
         for place, parameter in enumerate(self.parameters):
-            # A law may depend on the stiffness of its port, but not on masses and dampers.
-            if place >= n_base or parameter.name.startswith("stiffness of "):
+            # A law may depend on stiffness and zero of its port, but not on masses and dampers.
+            if place >= n_base or parameter.name in self._of_laws:
                 moved = values.copy()
                 moved[place] += steps[place] * self.scale[place]
                 found[:, place] -= (self._forces(moved) - stands) / steps[place]

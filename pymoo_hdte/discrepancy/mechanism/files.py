@@ -15,7 +15,9 @@ the records have units of their own::
     damping = { value = 300.0, tolerance = 1.0 }   # optional, as stiffness
     read = false                                   # optional; true for a force sensor
     load = { brake = 1.0 }                         # optional: share of inputs in its load
-    gear = { ratio = 101, kind = "harmonic drive" }  # optional, as `Gear`: its output is the port
+    gear = { ratio = 101, kind = "harmonic drive" }  # optional, as `Gear`: its output is the port,
+                                                   # or with motion = { motor = 1.0, load = -1.0 }
+                                                   # its torsion: a joint with two encoders
     [[ports.joint.error]]                          # optional: kinematic error, as `ErrorLine`
     coordinate = "q"
     order = 2.0

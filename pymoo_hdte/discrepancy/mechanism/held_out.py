@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.engine.doubts import NOT_PROVEN
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
 from pymoo_hdte.discrepancy.engine.rules import Rules
-from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN, Verdict
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.discrepancy.mechanism.rest import fitted_values
 from pymoo_hdte.discrepancy.mechanism.windows import Reach, Windows, reach_of, windows_of

@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.doubts import bounded_unknowns, doubts_of
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
@@ -19,7 +20,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     unexplained,
 )
 from pymoo_hdte.discrepancy.engine.search import Search
-from pymoo_hdte.discrepancy.engine.verdict import Verdict, bounded_unknowns, doubts_of, judge
+from pymoo_hdte.discrepancy.engine.verdict import Verdict, judge
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.discrepancy.mechanism.rest import share_removed
 
@@ -228,7 +229,8 @@ def _with_substitutes(
     for member in chosen.candidates:
         kept = tuple(one for one in chosen.candidates if one is not member)
         for other in candidates:
-            if (other.instead_of, other.port) == (member.name, member.port):
+            instead = (other.instead_of, other.port) == (member.name, member.port)
+            if instead and all(other.goes_with(one) for one in kept):
                 start = np.append(chosen.values_of(kept), other.starts[0])
                 fitted = fit(data, (*kept, other), start)
                 if _does_as_well(data, fitted, chosen.fit):

@@ -44,9 +44,7 @@ def position_orders(data: MeasuredData, base: Fit) -> dict[str, tuple[float, ...
             # A force at the port would enter all of them with these shares.
             rows = [data.names.index(name) for name in shares]
             residual = np.array(list(shares.values())) @ left_by_row[rows]
-            signals.append(
-                (balance.ports[port.name].position, _detrended(balance.in_time(residual)))
-            )
+            signals.append((balance.ports[port.name].shaft, _detrended(balance.in_time(residual))))
         found[port.name] = _strongest(signals, data.rules)
     return found
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pymoo_hdte.discrepancy.joint.analysis import JointFinding, revised_joint
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
@@ -22,6 +23,8 @@ from pymoo_hdte.discrepancy.report.mechanism_figures import (
     overlay,
 )
 from pymoo_hdte.discrepancy.report.tables import STATUSES
+from pymoo_hdte.discrepancy.report.torsion import torsion_document
+from pymoo_hdte.discrepancy.report.torsion_figure import torsion_picture
 from pymoo_hdte.discrepancy.report.write import FOLDER
 from pymoo_hdte.reports.figures import data_uri
 from pymoo_hdte.reports.html import page
@@ -36,6 +39,7 @@ def write_mechanism_report(
     gaps: Sequence[MeasuredGap],
     test: NextTest,
     out: str | Path,
+    joint: JointFinding | None = None,
 ) -> dict[str, Any]:
     """Write a report with verdict and revised model; return the verdict's document.
 
@@ -48,6 +52,8 @@ def write_mechanism_report(
     test : NextTest
     out : str or Path
         New, empty, or an earlier report, which is replaced.
+    joint : JointFinding, optional
+        Of a joint with two encoders, ``finding`` being on its torques.
 
     Returns
     -------
@@ -64,13 +70,26 @@ def write_mechanism_report(
     FOLDER.check(Path(out))
     document = mechanism_verdict_document(title, finding, gaps, test)
     document["revised_model"] = {"file": MODEL_FILE}
-    model = model_text(revised_mechanism(title, finding))
-    FOLDER.write(Path(out), _page(finding, document, gaps), document, {MODEL_FILE: model})
+    revised = revised_mechanism(title, finding)
+    if joint is not None:
+        revised = revised_joint(title, joint)
+        torsion = torsion_document(joint)
+        words = f"Torques: {document['sentence']} Torsion: {torsion['sentence']}"
+        document |= {"status": joint.status, "sentence": words, "torsion": torsion}
+        document["location"]["sentence"] += f" {torsion['location']}"
+    page_text = _page(finding, document, gaps, joint)
+    FOLDER.write(Path(out), page_text, document, {MODEL_FILE: model_text(revised)})
     return document
 
 
-def _page(finding: MechanismFinding, document: dict[str, Any], gaps: Sequence[MeasuredGap]) -> str:
+def _page(
+    finding: MechanismFinding,
+    document: dict[str, Any],
+    gaps: Sequence[MeasuredGap],
+    joint: JointFinding | None,
+) -> str:
     pictures = {
+        "torsion": data_uri(torsion_picture(joint)) if joint else "",
         "motion": data_uri(misfit_over_motion(finding)),
         "frequency": data_uri(misfit_over_frequency(finding)),
         "gaps": data_uri(gaps_figure(gaps)) if gaps else "",
@@ -83,7 +102,9 @@ def _page(finding: MechanismFinding, document: dict[str, Any], gaps: Sequence[Me
         "pymoo_hdte.discrepancy.report",
         "mechanism.html.j2",
         document=document,
-        status=STATUSES[finding.verdict.status],
+        status=STATUSES[document["status"]],
+        torsion=document.get("torsion"),
+        torsion_rows=_effect_rows(document["torsion"]["effects"]) if joint else [],
         rows=rows,
         sizes=sizes[:_SIZES],
         more=len(sizes) > _SIZES,
@@ -154,6 +175,7 @@ def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             "lower": parameter["interval95"][0],
             "upper": parameter["interval95"][1],
             "at_bound": parameter["at_bound"],
+            "unit": parameter.get("unit", "SI"),
         }
         for one in effects
         for name, parameter in one["parameters"].items()

@@ -50,7 +50,7 @@ def mechanism_verdict_document(
         ],
         "offered": offered(finding),
         "alternatives": [
-            _evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
+            evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
         ],
         "base": quantities(finding),
         **with_believed_effects(
@@ -229,7 +229,8 @@ def _by_bic(one: Hypothesis) -> float:
     return one.bic
 
 
-def _evidence(finding: MechanismFinding, one: Hypothesis) -> dict[str, Any]:
+def evidence(finding: MechanismFinding, one: Hypothesis) -> dict[str, Any]:
+    """Return how a set of effects compares with the chosen one."""
     chosen = finding.verdict.chosen
     return {
         "effects": [{"name": c.name, "port": c.port} for c in one.candidates],

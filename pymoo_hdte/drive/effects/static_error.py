@@ -15,6 +15,7 @@ from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.friction import PeriodicTorque
 from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.law import PortState, Response
 from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 
 
@@ -60,8 +61,29 @@ class KinematicErrorLine(DriveEffect):
         )
 
 
+@dataclass(frozen=True)
+class KinematicTorsion(PeriodicTorque):
+    """The torque K amplitude cos(order angle + phase) of an error in rad, added to the torsion.
+
+    Of a port between the encoders of input and output, of which it is no driving torque.
+    """
+
+    drives: ClassVar[bool] = False
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents."""
+        return Response(state.stiffness * self.amplitude * self.cosine(state))
+
+    @property
+    def driving(self) -> complex:
+        """None: it is an angle."""
+        return 0.0
+
+
 def _lines(sizes: Any) -> list[Guess]:
-    """Guess lines at seen orders: of a drive's static error, or of a sensor's reading."""
+    """Guess lines at seen orders: of a drive's static error, of a torsion, or of a reading."""
+    if isinstance(sizes, Sizes) and sizes.between:
+        return _of_torsion(sizes)
     return _of_reading(sizes) if sizes.read else _of_drive(sizes)
 
 
@@ -95,6 +117,22 @@ def _of_reading(sizes: Sizes) -> list[Guess]:
             "at all speeds run: it is kinematic, and no {force} that moves inertias."
         )
         starts = starts_along_each(unknowns)
+        found.append(Guess(unknowns, starts, build, family, family.form, sentence))
+    return found
+
+
+def _of_torsion(sizes: Sizes) -> list[Guess]:
+    """Guess each expected order by itself, and all seen ones together."""
+    found, size = [], sizes.residual / sizes.stiffness
+    for family in (*(Family((order,)) for order in sizes.expected), *sizes.lines):
+        unknowns = family.waves("amplitude", sizes.largest / sizes.stiffness, size)
+
+        def build(values: Sequence[float], family: Family = family) -> tuple[PeriodicTorque, ...]:
+            lines = family.lines(values)
+            return tuple(KinematicTorsion(order, phase, size) for order, size, phase in lines)
+
+        starts = starts_along_each(unknowns)
+        sentence = "The {port} errs with its angle, order {order} per turn, whatever the {force}."
         found.append(Guess(unknowns, starts, build, family, family.form, sentence))
     return found
 

@@ -116,7 +116,10 @@ class _Mesh:
         """Return the first torsions beyond ``before`` (n, 1) that carry the torques (m,).
 
         Newton's method in a bracket; a step that would leave it, as at a kink, halves it instead.
+        Without a law the torsion follows the torque.
         """
+        if not self.laws:
+            return np.asarray(held / self.stiffness)
 
         def beyond(way: Values) -> tuple[Values, Values]:
             response = self.respond(before + direction * way, turns)

@@ -1,5 +1,6 @@
 """What forbids a plain name."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,9 +8,9 @@ import pytest
 
 from pymoo_hdte.discrepancy.engine import verdict
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.hypothesis import contains
 from pymoo_hdte.discrepancy.engine.rules import RULES
-from pymoo_hdte.discrepancy.engine.verdict import doubts_of
 
 FREEDOM = 1000
 
@@ -110,3 +111,63 @@ def test_two_lines_of_one_name_are_no_special_case_of_one_of_them_and_another():
     assert not contains(twice, mixed)
     assert not contains(mixed, twice)
     assert contains(twice, lines("eccentricity", "eccentricity"))
+
+
+def set_of(*members, left, explained=0.9):
+    """A set of laws, and values set free, that leaves so many times the noise beyond it."""
+    fitted = SimpleNamespace(chi_square=(1.0 + left) * FREEDOM, n_base=0)
+    freed = tuple(each for each in members if each.frees is not None)
+    alone = [(each,) for each in members if each.frees is None]
+    return SimpleNamespace(
+        fit=fitted,
+        candidates=members,
+        members=alone + ([freed] if freed else []),
+        names=frozenset((each.name, each.port) for each in members),
+        explained=explained,
+    )
+
+
+def a_law(name, frees=None):
+    return Candidate(name, "mesh", (), ((),), lambda values: (), "", frees=frees)
+
+
+def search_among(*found):
+    base = SimpleNamespace(chi_square=40.0 * FREEDOM, residuals=np.zeros(FREEDOM))
+    return SimpleNamespace(
+        data=SimpleNamespace(rules=RULES),
+        base=base,
+        degrees_of_freedom=FREEDOM,
+        found=found,
+        earned=lambda one: True,
+    )
+
+
+def freed(*names):
+    return tuple(replace(a_law("parameter", name), port=name) for name in names)
+
+
+@pytest.mark.parametrize(
+    ("others", "certain"),
+    [
+        ([set_of(a_law("backlash"), left=12.0)], True),
+        ([set_of(a_law("backlash"), left=9.0)], False),
+        # The same values and one more say nothing else.
+        ([set_of(a_law("backlash"), left=12.0), set_of(*freed("damping", "drag"), left=5.0)], True),
+        ([set_of(a_law("backlash"), left=12.0), set_of(*freed("inertia"), left=5.0)], False),
+    ],
+)
+def test_a_set_stands_out_from_others_that_say_something_else(others, certain):
+    chosen = set_of(*freed("damping"), left=5.0)
+    assert verdict._stands_out(search_among(chosen, *others), chosen) == certain
+
+
+@pytest.mark.parametrize(("special_left", "name"), [(9.0, "hysteresis"), (11.0, "richer")])
+def test_a_richer_law_that_leaves_a_misfit_is_no_more_certain_than_its_special_case(
+    special_left, name, monkeypatch
+):
+    """Friction that varies with position left 5.311 times the noise, dry friction 5.328 times."""
+    monkeypatch.setattr(Candidate, "holds", lambda one, other: one.name == "richer")
+    rich = set_of(a_law("richer"), left=5.0)
+    special = set_of(a_law("hysteresis"), left=special_left)
+    ((chosen, _),) = verdict._simpler_law(search_among(rich, special), rich).names
+    assert chosen == name

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from measured_oscillator import OSCILLATOR, nothing
 
+from pymoo_hdte.discrepancy.engine.doubts import NOT_PROVEN
 from pymoo_hdte.discrepancy.engine.rules import RULES
-from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
 from pymoo_hdte.discrepancy.mechanism.windows import Reach, windows_of

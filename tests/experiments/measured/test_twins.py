@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from experiments.measured.rigs import MEASURED, RIGS, Study
+from experiments.measured.rigs import MEASURED, RIGS, Study, torques_of
 from experiments.measured.twins import drag_at, find_twins
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
@@ -68,7 +68,7 @@ def test_twin_is_adequate_and_what_it_hides_is_named(name):
     machine = MACHINES[name]
     if not (MEASURED / machine.folder).is_dir():
         pytest.skip(f"the measurements are not at {MEASURED / machine.folder}")
-    rig = read_rig(RIGS / f"{name}.toml", MEASURED / machine.folder)
+    rig = torques_of(read_rig(RIGS / f"{name}.toml", MEASURED / machine.folder))
     finding = examine_mechanism(rig.mechanism, rig.records, rig.cutoff, rig.effects)
     one = Study(rig, finding, ())
     hidden = machine.hidden(one)

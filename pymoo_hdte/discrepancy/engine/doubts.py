@@ -1,0 +1,81 @@
+"""What forbids to name a set of effects plainly, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.discrepancy.engine.search import Search
+
+NOT_PROVEN = "the error on the records kept out of the fit does not shrink"
+
+
+def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
+    """Return what forbids to name a set plainly, in words; nothing if it may be named."""
+    found, fitted = [], chosen.fit
+    for (candidate, bounded), (_, place) in zip(
+        bounded_unknowns(fitted), fitted.places, strict=True
+    ):
+        if bounded:
+            found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
+        elif not strength_is_certain(fitted, candidate, place, search.data.rules):
+            found.append(f"the interval of {candidate.label} contains nothing")
+    if any(one.frees in fitted.at_bounds for one in chosen.candidates):
+        found.append("a base parameter ended at ten times or a tenth of what is believed")
+    curves = [one.label for one in chosen.candidates if not one.exact]
+    freed = any(one.frees is not None for one in chosen.candidates)
+    if curves and freed and not search.enough(chosen):
+        found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
+    if vote is not None and vote.after >= vote.before:
+        found.append(NOT_PROVEN)
+    per_degree = fitted.chi_square / search.degrees_of_freedom
+    if per_degree > search.data.rules.contradicting_chi_square:
+        found.append(left_by(per_degree))
+    return found
+
+
+def left_by(per_degree: float) -> str:
+    """Say what a chi-square per degree of freedom means."""
+    return f"what is left is {np.sqrt(per_degree):.3g} times the noise"
+
+
+def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
+    """Return for each candidate of a fit which of its unknowns ended at a bound.
+
+    A level that ended at zero is a part that the effect does not have.
+    """
+    found = []
+    for candidate, place in fitted.places:
+        names = []
+        for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
+            none = parameter.linear and parameter.lower == 0.0 and side < 0.0
+            if side != 0.0 and not none:
+                names.append(parameter.name)
+        found.append((candidate, names))
+    return found
+
+
+def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: Rules) -> bool:
+    """Tell whether the strength of an effect differs from nothing, by its own interval.
+
+    Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
+    friction that falls with speed may have no level. Shapes, which are not zero, do not count.
+    """
+    if not candidate.parameters:
+        return True
+    limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
+    for row, parameter in enumerate(candidate.parameters, place.start):
+        if parameter.name.endswith("_cosine"):
+            pair = np.array([row, row + 1])
+            block = fitted.covariance[np.ix_(pair, pair)]
+            if fitted.values[pair] @ np.linalg.solve(block, fitted.values[pair]) > limit:
+                return True
+        elif parameter.lower <= 0.0 and not parameter.name.endswith("_sine"):
+            deviation = np.sqrt(fitted.covariance[row, row])
+            if abs(fitted.values[row]) > rules.certain_deviations * deviation:
+                return True
+    return all(parameter.lower > 0.0 for parameter in candidate.parameters)

@@ -1,0 +1,200 @@
+"""A joint with encoders on both sides of its gear, taken apart into two mechanisms.
+
+One is the joint as a rigid body, for its balance of torques, in which the gear's torque cancels.
+The other is the input alone, driven by the motor and held by the gear's spring, whose far end
+follows the measured angle of the output. All angles and torques are those of the output side.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
+from pymoo_hdte.mechanism.believed import NOTHING
+from pymoo_hdte.mechanism.gear import torsion_of
+
+_SIDES = "input", "output"
+"""Names of the ports of the motor and of the load where a mechanism has none there."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A mechanism that is a joint with two encoders.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        Of two coordinates.
+    gear : Port
+        Whose motion is the torsion.
+    kind : Gear
+    motor, load : str
+        Coordinates of its input and output.
+    """
+
+    mechanism: Mechanism
+    gear: Port
+    kind: Gear
+    motor: str
+    load: str
+
+    def side(self, coordinate: str) -> Port:
+        """Return the port of the motor or of the load, against the housing."""
+        for port in self.mechanism.ports:
+            if port is not self.gear and port.motion.get(coordinate):
+                return port
+        return Port(_SIDES[coordinate == self.load], {coordinate: 1.0})
+
+
+def joint_of(mechanism: Mechanism) -> Joint | None:
+    """Return the joint with two encoders that a mechanism is; None for any other one.
+
+    Raises
+    ------
+    InvalidInput
+        If the gear has no stiffness, or there are other coordinates, a loop, a force sensor, or two
+        ports on one side.
+    """
+    for port in mechanism.ports:
+        between = torsion_of(port.motion)
+        if port.gear and between and not port.read:
+            joint = Joint(mechanism, port, port.gear, *between)
+            _check(joint)
+            return joint
+    return None
+
+
+def _check(joint: Joint) -> None:
+    mechanism, name = joint.mechanism, joint.gear.name
+    if joint.gear.stiffness.value == 0.0:
+        allowed = "above 0; if it is known roughly only, with factor = 10"
+        raise InvalidInput(f"stiffness of {name}", 0.0, allowed)
+    others = [port for port in mechanism.ports if port is not joint.gear]
+    moved = [one for port in others for one, share in port.motion.items() if share]
+    plain = all(set(port.motion.values()) == {1.0} and not port.read for port in others)
+    if mechanism.loops or len(mechanism.coordinates) != 2 or len(set(moved)) < len(moved):
+        plain = False
+    if not plain:
+        allowed = (
+            "beside the gear between two encoders no third coordinate, no loop, no force sensor, "
+            "and one port on each side, its motion 1 of the angle there"
+        )
+        raise InvalidInput(f"ports beside {name}", [port.name for port in others], allowed)
+
+
+@dataclass(frozen=True)
+class Half:
+    """One of the two mechanisms, with what is known of it.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    records : tuple of Record
+    known : tuple of LawAt
+    """
+
+    mechanism: Mechanism
+    records: tuple[Record, ...]
+    known: tuple[LawAt, ...]
+
+
+def rigid_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]) -> Half:
+    """Return the joint as a rigid body, its coordinate that of the load.
+
+    The ports of both sides become one, as torques do not tell on which side a friction is.
+
+    Parameters
+    ----------
+    joint : Joint
+    records : sequence of Record
+    known : sequence of LawAt
+        Effects of the joint.
+    """
+    name, mechanism = joint.load, joint.mechanism
+    load, motor = joint.side(name), joint.side(joint.motor)
+    port = replace(
+        load,
+        motion={name: 1.0},
+        stiffness=_sum(load.stiffness, motor.stiffness),
+        damping=_sum(load.damping, motor.damping),
+        load={**motor.load, **load.load},
+        gear=joint.kind,
+    )
+    inputs = [replace(one, acts={name: sum(one.acts.values())}) for one in mechanism.inputs]
+    rigid = Mechanism({name: _sum(*mechanism.inertias.values())}, [port], inputs, (), [name])
+    laws = [replace(one, port=port.name) for one in known if one.port != joint.gear.name]
+    kept = {name, *(one.name for one in inputs)}
+    return Half(rigid, tuple(_only(one, kept) for one in records), tuple(laws))
+
+
+def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]) -> Half:
+    """Return the input of the gear, which its spring holds to the measured angle of the load.
+
+    The mean torsion of the first record is taken from all of them: encoders have zeros of their
+    own, which all records share.
+
+    Parameters
+    ----------
+    joint : Joint
+    records : sequence of Record
+    known : sequence of LawAt
+        Effects of the joint.
+
+    Raises
+    ------
+    InvalidInput
+        If no input acts on the motor.
+    """
+    motor, load = joint.motor, joint.load
+    gear = replace(joint.gear, motion={motor: 1.0}, followed={load: -1.0}, gear=None)
+    inputs = [
+        Input(one.name, {motor: one.acts[motor]}, one.gain, one.scaled)
+        for one in joint.mechanism.inputs
+        if one.acts.get(motor)
+    ]
+    if not inputs:
+        raise InvalidInput("inputs", (), f"one that acts on {motor}: the torque of the motor")
+    inertia = {motor: joint.mechanism.inertias[motor]}
+    # What the motor delivers passes the shaft: a friction of tenths of it changes it by so much.
+    shaft = joint.side(motor)
+    shaft = replace(shaft, load=shaft.load or {one.name: one.acts[motor] for one in inputs})
+    half = Mechanism(inertia, [shaft, gear], inputs, (), [motor])
+    kept = {motor, load, *(one.name for one in inputs)}
+    first = records[0]
+    middle = float(np.mean(first.channel(motor) - first.channel(load)))
+    moved = [
+        _only(one, kept, {load: one.channel(load) + middle, motor: one.channel(motor)})
+        for one in records
+    ]
+    laws = tuple(one for one in known if one.port in half.port_names)
+    return Half(half, tuple(moved), laws)
+
+
+def _only(
+    record: Record, names: Collection[str], instead: dict[str, NDArray[np.float64]] | None = None
+) -> Record:
+    """Return a record with the named channels only, some of them replaced."""
+    channels = {name: record.channel(name) for name in sorted(names)} | (instead or {})
+    noise = {name: one for name, one in record.noise.items() if name in channels}
+    told = record.dropped, record.remarks, record.interpolated
+    return Record(record.name, record.role, record.time, channels, noise, *told)
+
+
+def _sum(one: BelievedValue, other: BelievedValue) -> BelievedValue:
+    """Return a sum, which is right where both parts are within their limits."""
+    if NOTHING.value in (one.value, other.value):
+        return other if one.value == NOTHING.value else one
+    value = one.value + other.value
+    lower, upper = (one.limits[end] + other.limits[end] for end in (0, 1))
+    share = max(1.0 - lower / value, upper / value - 1.0)
+    factor = max(value / lower, upper / value) if lower > 0.0 else math.inf
+    # The narrower of the two ways to say it.
+    if 2.0 * share <= factor - 1.0 / factor:
+        return BelievedValue(value, tolerance=min(share, 1.0))
+    return BelievedValue(value, factor=factor)

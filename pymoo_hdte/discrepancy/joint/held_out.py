@@ -1,0 +1,151 @@
+"""The torsion of held-out records as models predict it from the measured torque, and their vote."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
+from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN, Verdict
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
+from pymoo_hdte.discrepancy.mechanism.held_out import laws_of
+from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
+from pymoo_hdte.mechanism.port_motion import law_force, torsion_noise
+
+Values = NDArray[np.float64]
+
+KIND = "torsion"
+_STEPS = 300
+_SETTLED = 1e-9
+"""rad, 2e-4 arcseconds."""
+
+
+def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
+    """Return the gaps between the measured and the predicted torsion of held-out records, rad.
+
+    About their means: how the springs of a hysteresis are stretched at the first row is not known.
+
+    Parameters
+    ----------
+    finding : MechanismFinding
+        From `examine_torsion`.
+    """
+    (gear,) = (port for port in finding.mechanism.ports if port.followed)
+    found = []
+    for record in finding.records:
+        if record.role != "held_out":
+            continue
+        known = finding.data.known
+        data = measured_data(finding.mechanism, [record], finding.cutoff, known, finding.data.rules)
+        (balance,) = data.spectra
+        measured = balance.ports[gear.name].position
+        before, after = (
+            _about(predicted_torsion(data, one), measured)
+            for one in (finding.verdict.base, finding.accepted)
+        )
+        found.append(
+            MeasuredGap(
+                record.name,
+                gear.name,
+                KIND,
+                _size(measured - before),
+                _size(measured - after),
+                torsion_noise(gear, record),
+                balance.time,
+                measured,
+                before,
+                after,
+                finding.data.rules.least_gap_share,
+            )
+        )
+    return tuple(found)
+
+
+def _about(predicted: Values, measured: Values) -> Values:
+    return predicted + float(np.mean(measured - predicted))
+
+
+def _size(difference: Values) -> float:
+    return float(np.sqrt(np.mean(difference**2)))
+
+
+def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
+    """Return the torsion at which a model's spring and laws hold the measured torque, rad.
+
+    Parameters
+    ----------
+    data : MeasuredData
+        Of one record, up to whose cutoff the torque is known.
+    fitted : Fit
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        At the rate of the balance.
+    """
+    (balance,) = data.spectra
+    (gear,) = (port for port in data.mechanism.ports if port.followed)
+    base = dict(zip((one.name for one in data.base), fitted.values[: len(data.base)], strict=True))
+    stiffness = float(base.get(f"stiffness of {gear.name}", gear.stiffness.value))
+    zero = float(base[f"zero of {gear.name}"])
+    effects = (*data.known, *laws_of(fitted.effects))
+    laws = [one.law for one in effects if one.port == gear.name]
+    motion = balance.ports[gear.name]
+
+    def force(torsion: Values) -> Values:
+        moved = replace(motion, position=torsion + zero / stiffness)
+        of_laws = (law_force(law, moved, stiffness) for law in laws)
+        return np.asarray(stiffness * torsion + zero + sum(of_laws))
+
+    whitened = data.residuals(fitted.values[: len(data.base)], laws_of(fitted.effects))
+    left = balance.in_time(data.coefficients(whitened)[0][0])
+    wanted, torsion = force(motion.position) + left, motion.position
+    # The steepest slope anywhere, so that no step goes too far.
+    steepest = max(stiffness, _steepest(force, motion.position))
+    for _ in range(_STEPS):
+        step = (wanted - force(torsion)) / steepest
+        torsion = torsion + step
+        if np.max(np.abs(step)) < _SETTLED:
+            break
+    return torsion
+
+
+def _steepest(force: Callable[[Values], Values], torsion: Values) -> float:
+    """Return the largest slope of a force over a torsion of shape (n,).
+
+    Along two courses that lie apart by ever more, so that springs that slip stick on the way.
+    """
+    apart = 1e-3 * float(np.ptp(torsion)) * np.linspace(0.0, 1.0, len(torsion))
+    return float(np.max((force(torsion + apart) - force(torsion))[1:] / apart[1:]))
+
+
+def voted(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> Verdict:
+    """Return the verdict on a torsion, ``unlisted`` where held-out records contradict it.
+
+    Parameters
+    ----------
+    finding : MechanismFinding
+    gaps : sequence of MeasuredGap
+        From `torsion_gaps`.
+    """
+    verdict = finding.verdict
+    if verdict.accepted is verdict.base or not gaps:
+        return verdict
+    (gear,) = (port for port in finding.mechanism.ports if port.followed)
+    expected = (float(finding.remainder[0]) / gear.stiffness.value) ** 2
+    sums = np.zeros(3)
+    for gap in gaps:
+        count = finding.cutoff * 2.0 * float(gap.time[-1] - gap.time[0])
+        change = float(np.mean((gap.predicted_after - gap.predicted_before) ** 2))
+        sums += count * np.array([gap.before**2, gap.after**2, change])
+    vote = Vote(*(sums / (expected + gaps[0].noise_floor ** 2)).tolist())
+    if not vote.counts(finding.data.rules):
+        return replace(verdict, shown_in_held_out=False)
+    if vote.after < vote.before:
+        return verdict
+    doubts = (*verdict.doubts, NOT_PROVEN)
+    return replace(verdict, status="unlisted", equivalent=(), doubts=doubts, probability=None)
