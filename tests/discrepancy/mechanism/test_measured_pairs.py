@@ -49,7 +49,7 @@ def test_springs_that_slip_and_a_spring_that_hardens_are_found_together(seed):
     def resonance(omega):
         return 1.0 / (8e4 - 2.0 * omega**2 + 60j * omega)
 
-    time, motion, generator = lines(5.0, 60.0, 4.0, 750.0, 6e-4, seed, resonance)
+    time, motion, generator = lines(5.0, 60.0, 3.0, 750.0, 6e-4, seed, resonance)
     hidden = MaxwellSlip(62.0, 1.37e-3, 0.57), HardeningStiffness(1.95e10)
     force = 2.0 * motion.acceleration + 37.0 * motion.speed + 4e4 * motion.position
     force = force + sum(law_force(law, motion, 0.0) for law in hidden)

@@ -11,7 +11,7 @@ from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, R
 from pymoo_hdte.mechanism.balances import ForceBalance
 
 INERTIA, DAMPING, LEVEL = 0.5, 3.0, 2.0
-STEP, CUTOFF = 0.005, 15.0
+STEP, CUTOFF, MOVES = 0.005, 15.0, 12
 JOINT = Mechanism(
     {"q": BelievedValue(0.6, 0.5)},
     [Port("bearing", {"q": 1.0}, damping=BelievedValue(3.5, 1.0))],
@@ -25,11 +25,11 @@ def record_of(rest, drag=0.0):
     generator = np.random.default_rng(31)
     move = np.sin(np.linspace(0.0, np.pi, round(1.5 / STEP))) ** 2
     still = np.zeros(round(rest / STEP))
-    sizes = generator.uniform(0.3, 1.0, 24) * np.where(np.arange(24) % 2, -1.0, 1.0)
+    sizes = generator.uniform(0.3, 1.0, MOVES) * np.where(np.arange(MOVES) % 2, -1.0, 1.0)
     speed = np.concatenate([np.concatenate([size * move, still]) for size in sizes])
     friction = LEVEL * np.sign(speed) + drag * speed * np.abs(speed)
     # At rest the drive holds by some torque that friction balances.
-    held = np.repeat(LEVEL * generator.uniform(-0.9, 0.9, 24), len(move) + len(still))
+    held = np.repeat(LEVEL * generator.uniform(-0.9, 0.9, MOVES), len(move) + len(still))
     friction[speed == 0.0] = held[speed == 0.0]
     torque = INERTIA * np.gradient(speed, STEP) + DAMPING * speed + friction
     noise = generator.standard_normal((2, len(speed)))
@@ -45,9 +45,9 @@ def test_a_complete_model_of_a_joint_that_rests_is_adequate_and_rests_are_told()
     assert finding.verdict.status == "adequate"
     assert finding.accepted.values == pytest.approx([INERTIA, DAMPING], rel=0.01)
     (told,) = (words for words in limits(finding) if "at rest" in words)
-    # 24 s of 60 s, and what smoothed forces show of each rest: some periods of the cutoff.
+    # A second for each move, and what smoothed forces show of each rest: some periods of the cutoff.
     (balance,) = finding.data.spectra
-    assert 24.0 < balance.left_out * STEP < 24.0 + 24 * 8.0 / CUTOFF
+    assert MOVES < balance.left_out * STEP < MOVES * (1.0 + 8.0 / CUTOFF)
     assert f"Rows of moves at rest: {balance.left_out}." in told
 
 
