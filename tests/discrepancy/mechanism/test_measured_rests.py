@@ -45,7 +45,7 @@ def test_a_complete_model_of_a_joint_that_rests_is_adequate_and_rests_are_told()
     assert finding.verdict.status == "adequate"
     assert finding.accepted.values == pytest.approx([INERTIA, DAMPING], rel=0.01)
     (told,) = (words for words in limits(finding) if "at rest" in words)
-    # A second for each move, and what smoothed forces show of each rest: some periods of the cutoff.
+    # A second for each move, and some periods of the cutoff, in which smoothed forces show it.
     (balance,) = finding.data.spectra
     assert MOVES < balance.left_out * STEP < MOVES * (1.0 + 8.0 / CUTOFF)
     assert f"Rows of moves at rest: {balance.left_out}." in told
