@@ -270,7 +270,8 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 # added (``pymoo_hdte.discrepancy.mechanism.naming``): a named effect removes at least half of the
 # power of the misfit beyond the noise of the sensors; of models that leave about as much, the one
 # with the fewest unknowns is named; a law that ended at a bound gives way to its special case; and
-# a law that merely contains the named one is no other explanation.
+# a law that merely contains the named one is no other explanation. The effects that define the rest
+# are compared as well if the search finds nothing to name, and the largest force is named first.
 
 # %%
 # Change a rule

@@ -156,6 +156,8 @@ KNOWN_RIGS = (
         "hysteresis of Bouc and Wen",
         "simulated with the parameters of the public benchmark",
         (frozenset({"hysteresis"}),),
+        # With gamma + delta below 0 a loop that is loaded stiffens, unlike springs that slip.
+        frozenset({"hardening_stiffness"}),
     ),
     KnownRig(
         "emps",

@@ -6,12 +6,12 @@ records in ``../shared/measured`` are analysed and the files left in the results
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tqdm import tqdm
 
+from experiments.measured.cpu_time import SECONDS, TOOL, cpu_table, timed_study
 from experiments.measured.known_answers import (
     FALLS_SHORT,
     KNOWN_RIGS,
@@ -31,7 +31,7 @@ from experiments.measured.real_numbers import (
     share_in_words,
     torsion_errors,
 )
-from experiments.measured.rigs import MEASURED, Study, study
+from experiments.measured.rigs import MEASURED, Study
 from experiments.runner.committed import (
     committed_file,
     read_rows,
@@ -72,11 +72,8 @@ TOOLS = (
     Column("held-out force", digits=5, group="R2"),
     Column("held-out position, simulated", digits=5, group="R2"),
 )
-SECONDS = (Column("rig"), Column("tool"), Column("CPU time", "s", 3))
 ARROW = "silverbox"
 """Rig whose held-out record is simulated without a break as well, which takes a minute."""
-LONGEST = 20.0
-"""s of CPU that reading, verdict and proof of a rig may take."""
 SETTING = (
     "Published measurements with known answers. The first 60 % of a log are fitted and the rest is "
     "held out where nothing else is given; the files say what is believed "
@@ -129,14 +126,7 @@ def run(context: Context) -> Result:
                 findings=_findings(first),
             ),
             Table("tools", "Beside other tools", TOOLS, _cells(found[1]), note=TOOLS_NOTE),
-            Table(
-                "seconds",
-                "CPU time",
-                SECONDS,
-                _cells(found[2]),
-                findings=(_in_time(found[2]),),
-                wall_times=True,
-            ),
+            cpu_table(found[2]),
         ),
         headline="verdicts",
     )
@@ -153,12 +143,11 @@ def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined 
     whole : bool
         Whether the held-out record of `ARROW` is simulated without a break, too.
     """
-    began = time.process_time()
-    one = study(rig.name, rig.folder)
+    one, taken = timed_study(rig)
     if one is None:
         return None
-    seconds = [[rig.name, "workflow", f"{time.process_time() - began:.3g}"]]
-    rows = [["workflow", *_said(rig, one), *determinations(one)]]
+    seconds = [taken]
+    rows = [[TOOL, *_said(rig, one), *determinations(one)]]
     for answer in answers(one.finding) if tools else []:
         rows.append(_tool_row(rig, answer))
         seconds.append([rig.name, answer.tool, f"{answer.seconds:.3g}"])
@@ -168,7 +157,7 @@ def examined(rig: KnownRig, tools: bool = True, whole: bool = True) -> Examined 
         )
         assert gap.determination is not None
         words = f"the same, {gap.record} without a break"
-        rows.append(["workflow", "", words, "", f"{gap.determination[1]:.5f}"])
+        rows.append([TOOL, "", words, "", f"{gap.determination[1]:.5f}"])
     return Examined(verdict_row(rig, one), [[rig.name, *row] for row in rows], seconds)
 
 
@@ -240,13 +229,6 @@ def _findings(rows: Sequence[Sequence[str]]) -> tuple[Finding, ...]:
             check=True,
         ),
     )
-
-
-def _in_time(rows: Rows) -> Finding:
-    """Return whether the workflow is fast enough on every rig."""
-    seconds, rig = max((float(row[2]), row[0]) for row in rows if row[1] == "workflow")
-    words = f"The workflow takes at most {seconds:.3g} s of CPU ({rig}); {LONGEST:g} are allowed."
-    return Finding(seconds <= LONGEST, words, check=True)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -14,6 +14,7 @@ from pymoo.core.evaluator import Evaluator
 from tqdm import tqdm
 
 from experiments.comparison.runs import robust_problem
+from experiments.measured.cpu_time import measured_cpu
 from experiments.paper.models import model_sentences
 from experiments.runner.machine import machine_table
 from experiments.runner.registry import Context
@@ -58,7 +59,12 @@ def run(context: Context) -> Result:
             "run mean anything.",
             *model_sentences("calibrated", "resonant"),
         ),
-        tables=(ratio_table(ratios), machine_table(), _agreement_table(agreement)),
+        tables=(
+            ratio_table(ratios),
+            *measured_cpu(),
+            machine_table(),
+            _agreement_table(agreement),
+        ),
     )
 
 

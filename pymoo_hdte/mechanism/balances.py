@@ -8,7 +8,6 @@ Linear in the quantities of the mechanism (Gautier, Robotics and Autonomous Syst
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -18,14 +17,17 @@ from scipy.fft import dct
 from scipy.interpolate import make_interp_spline
 
 from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
-from pymoo_hdte.mechanism.motion import finer_than, motion_of, noise_of, smooth, smoothed_noise
+from pymoo_hdte.mechanism.motion import finer_than, motion_of, smooth, smoothed_noise
 from pymoo_hdte.mechanism.port_motion import (
     PortMotion,
+    followed_angles,
     law_force,
     load_at_port,
     motion_at_port,
+    torsion_noise,
 )
 from pymoo_hdte.mechanism.records import Record
+from pymoo_hdte.mechanism.rests import weight_of_rows
 from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, working_rows
 
 Values = NDArray[np.float64]
@@ -37,23 +39,6 @@ def balance_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the balances: of coordinates, and of force sensors."""
     read = [port.name for port in mechanism.ports if port.read]
     return (*mechanism.coordinates, *read)
-
-
-def followed_angles(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return the names of measured angles that move ports and are no coordinates."""
-    return tuple(dict.fromkeys(name for port in mechanism.ports for name in port.followed))
-
-
-def torsion_noise(port: Port, record: Record) -> float:
-    """Return the standard deviation of the noise of a motion that follows a measured angle, SI.
-
-    Of the difference of the angles: what jitter of the samples adds to both of them cancels there.
-    """
-    shares = {**port.motion, **port.followed}
-    if all(name in record.noise for name in shares):
-        return math.hypot(*(share * record.noise[name] for name, share in shares.items()))
-    parts = [share * record.channel(name) for name, share in shares.items()]
-    return noise_of(np.sum(parts, axis=0))
 
 
 def quantity_names(mechanism: Mechanism) -> tuple[str, ...]:
@@ -76,6 +61,8 @@ class ForceBalance:
     cutoff : float
         Hz, up to which the motion is known. Force sensors are compared with the motion up to ten
         samples in a period.
+    known : sequence of LawAt
+        Dry friction that is known leaves rests out: see `weight_of_rows`.
 
     Attributes
     ----------
@@ -92,6 +79,8 @@ class ForceBalance:
         Standard deviation that the sensors' noise gives them, for the believed quantities.
     ports : dict of str to PortMotion
         At the working rate.
+    weight : ndarray, shape (n,)
+        Of the rows of the working rate, 0 for those that are left out.
     motions : dict of str to Motion
         Of the coordinates and of followed angles, at the rate of the record.
     cutoff : float
@@ -103,7 +92,9 @@ class ForceBalance:
         cutoff beyond ten samples in a period.
     """
 
-    def __init__(self, mechanism: Mechanism, record: Record, cutoff: float) -> None:
+    def __init__(
+        self, mechanism: Mechanism, record: Record, cutoff: float, known: Sequence[LawAt] = ()
+    ) -> None:
         self.mechanism, self.record = mechanism, record
         self._known: dict[tuple[LawAt, float, float], Values] = {}
         self._rows = working_rows(mechanism, record, cutoff)
@@ -132,6 +123,8 @@ class ForceBalance:
             {name: one.speed[self._rows] for name, one in self.motions.items()},
             self._inputs,
         )
+        step = record.step * stride
+        self.weight = weight_of_rows(mechanism, record, cutoff, self.ports, step, known)
         self._finer = finer_than(cutoff, record.step * stride)
         self._fine = self.ports if self._finer == 1 else self._between(stride, signals)
         self.terms = self._terms()
@@ -192,6 +185,11 @@ class ForceBalance:
         return np.asarray(dct(np.pad(coefficients, (0, n - self._bins)), type=3, norm="ortho"))
 
     @property
+    def left_out(self) -> int:
+        """Number of rows of the record that have no weight: see `weight_of_rows`."""
+        return round(float(np.mean(self.weight == 0.0)) * len(self.record.time))
+
+    @property
     def time(self) -> Values:
         """Times of the working rate, s, shape (n,)."""
         return self.record.time[self._rows]
@@ -223,7 +221,8 @@ class ForceBalance:
         )
 
     def _transform(self, signal: Values) -> Values:
-        return np.asarray(dct(signal, type=2, norm="ortho")[: self._bins])
+        weight = np.repeat(self.weight, len(signal) // len(self.weight))
+        return np.asarray(dct(weight * signal, type=2, norm="ortho")[: self._bins])
 
     def _rows_of(self, port: Port) -> dict[str, float]:
         """Return the share of a force at a port in each balance."""
@@ -282,7 +281,7 @@ class ForceBalance:
             own = (stiffness[:, place, None] - inertial * omega**2) ** 2 + (viscous * omega) ** 2
             power += own * noise**2
             power += ends * ((inertial * speed) ** 2 + (viscous * position) ** 2)
-        return np.sqrt(power / stride)
+        return np.sqrt(power / stride * np.mean(self.weight**2))
 
     def _matrices(self) -> tuple[Values, Values, Values]:
         """Return believed inertia, damping and stiffness, (n_balances, n_coordinates)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.effects.law import Law, PortState, periodic_phase
-from pymoo_hdte.mechanism.mechanism import Input, Port
-from pymoo_hdte.mechanism.motion import SmoothedMotion
+from pymoo_hdte.mechanism.mechanism import Input, Mechanism, Port
+from pymoo_hdte.mechanism.motion import SmoothedMotion, noise_of
+from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]
 
@@ -82,3 +84,20 @@ def law_force(law: Law, motion: PortMotion | SmoothedMotion, stiffness: float) -
         load=getattr(motion, "load", None),
     )
     return np.broadcast_to(law.respond(state).torque, motion.position.shape)
+
+
+def followed_angles(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the names of measured angles that move ports and are no coordinates."""
+    return tuple(dict.fromkeys(name for port in mechanism.ports for name in port.followed))
+
+
+def torsion_noise(port: Port, record: Record) -> float:
+    """Return the standard deviation of the noise of a motion that follows a measured angle, SI.
+
+    Of the difference of the angles: what jitter of the samples adds to both of them cancels there.
+    """
+    shares = {**port.motion, **port.followed}
+    if all(name in record.noise for name in shares):
+        return math.hypot(*(share * record.noise[name] for name, share in shares.items()))
+    parts = [share * record.channel(name) for name, share in shares.items()]
+    return noise_of(np.sum(parts, axis=0))

@@ -14,8 +14,7 @@ from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.held_out import laws_of
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
-from pymoo_hdte.mechanism.balances import torsion_noise
-from pymoo_hdte.mechanism.port_motion import law_force
+from pymoo_hdte.mechanism.port_motion import law_force, torsion_noise
 
 Values = NDArray[np.float64]
 

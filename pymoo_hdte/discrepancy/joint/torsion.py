@@ -85,8 +85,8 @@ def _examined(sensors: MeasuredData) -> tuple[MeasuredData, Verdict]:
     """Return the verdict on the torsion, and the data with the residual as their noise."""
     base = fit(sensors)
     candidates = partial(_candidates, sensors, base, position_orders(sensors, base))
-    data, every = with_rest(sensors, base, candidates)
-    return data, judged(sensors, data, every)
+    data, every, best = with_rest(sensors, base, candidates)
+    return data, judged(sensors, data, every, best)
 
 
 def errors_of(ripples: Ripples) -> list[tuple[Ripple, Part]]:

@@ -176,16 +176,9 @@ def examine_mechanism(
     sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
     data, verdict = _examined(sensors)
-    # With the gains that are fitted, as all forces of the verdict are.
-    gains = [f"gain of {one.name}" for one in mechanism.inputs]
-    fitted = fitted_values(mechanism, verdict.accepted)
-    scaled = {name: fitted[name] for name in gains if name in fitted}
-    as_fitted = mechanism.with_values(scaled, exactly=False)
-    ripples = find_ripples(as_fitted, sampled, cutoff, (*known, *verdict.accepted.effects), rules)
+    ripples = _beyond(sensors, sampled, cutoff, verdict)
     if ripples.found and verdict.status == "unlisted":
-        # While the port moves slowly, a ripple is within the band as well.
-        again = _examined(replace(sensors, known=(*known, *ripples.laws)))
-        data, verdict = (data, verdict) if again[1].status == "unlisted" else again
+        data, verdict, ripples = _beside(sensors, sampled, cutoff, data, verdict, ripples)
     if ripples.found and verdict.status == "adequate":
         verdict = replace(verdict, status="named")
     # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
@@ -195,13 +188,51 @@ def examine_mechanism(
     return MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated)
 
 
+def _beyond(
+    sensors: MeasuredData, sampled: Sequence[Record], cutoff: float, verdict: Verdict
+) -> Ripples:
+    """Return the ripple beyond the band, with the gains that are fitted, as its other forces."""
+    mechanism = sensors.mechanism
+    fitted = fitted_values(mechanism, verdict.accepted)
+    gains = [f"gain of {one.name}" for one in mechanism.inputs]
+    scaled = {name: fitted[name] for name in gains if name in fitted}
+    as_fitted = mechanism.with_values(scaled, exactly=False)
+    effects = (*sensors.known, *verdict.accepted.effects)
+    return find_ripples(as_fitted, sampled, cutoff, effects, sensors.rules)
+
+
+def _beside(
+    sensors: MeasuredData,
+    sampled: Sequence[Record],
+    cutoff: float,
+    data: MeasuredData,
+    verdict: Verdict,
+    ripples: Ripples,
+) -> tuple[MeasuredData, Verdict, Ripples]:
+    """Return data, verdict and ripple with the ripple in the band as well, where that explains all.
+
+    While a port moves slowly, it is there. Twice, because the gains of the first verdict, in which
+    the ripple is told, were fitted to forces that hold it.
+    """
+    taken = ripples
+    for _ in range(2):
+        again = _examined(replace(sensors, known=(*sensors.known, *taken.laws)))
+        if again[1].status == "unlisted":
+            break
+        (data, verdict), ripples = again, taken
+        taken = _beyond(sensors, sampled, cutoff, verdict)
+        if not taken.found or taken.laws == ripples.laws:
+            break
+    return data, verdict, ripples
+
+
 def _examined(sensors: MeasuredData) -> tuple[MeasuredData, Verdict]:
     """Return the verdict on force balances, and the data with the residual as their noise."""
     base = fit(sensors)
     seen = position_orders(sensors, base)
     candidates = partial(_candidates, sensors, base, seen)
-    data, every = with_rest(sensors, base, candidates)
-    return data, judged(sensors, data, every)
+    data, every, best = with_rest(sensors, base, candidates)
+    return data, judged(sensors, data, every, best)
 
 
 def _candidates(

@@ -282,7 +282,7 @@ def measured_data(
     cutoff : float
         Hz, up to which the motion is known.
     known : sequence of LawAt
-        Effects that the mechanism has.
+        Effects that the mechanism has; rows in which one holds a port at rest are left out.
     rules : Rules
         Thresholds by which the records are judged.
 
@@ -291,6 +291,6 @@ def measured_data(
     InvalidInput
         See `ForceBalance`.
     """
-    spectra = tuple(ForceBalance(mechanism, record, cutoff) for record in records)
+    spectra = tuple(ForceBalance(mechanism, record, cutoff, known) for record in records)
     noise = tuple(one.noise for one in spectra)
     return MeasuredData(mechanism, spectra, noise, tuple(known), rules)

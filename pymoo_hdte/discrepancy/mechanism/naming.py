@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -26,7 +27,12 @@ from pymoo_hdte.discrepancy.mechanism.rest import share_removed
 _NAMING = ("named", "class", "partial")
 
 
-def judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candidate]) -> Verdict:
+def judged(
+    sensors: MeasuredData,
+    data: MeasuredData,
+    candidates: Sequence[Candidate],
+    best: Hypothesis | None = None,
+) -> Verdict:
     """Return the verdict in units of the residual, if it also holds against the sensors' noise.
 
     Parameters
@@ -34,10 +40,12 @@ def judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candi
     sensors, data : MeasuredData
         With the noise of the sensors, and with the unexplained residual as noise.
     candidates : sequence of Candidate
+    best : Hypothesis, optional
+        Effects beyond whose residual others are judged, so that they are judged themselves.
     """
     base, rules = fit(data), data.rules
     searched = [one for one in candidates if not one.instead_of]
-    verdict = _mostly_explained(sensors, data, judge(data, base, searched))
+    verdict = _mostly_explained(sensors, data, _compared(data, base, searched, best))
     verdict = _simplest(data, verdict)
     verdict = _with_true_rivals(data, _within_bounds(sensors, data, verdict))
     verdict = _with_substitutes(data, verdict, candidates)
@@ -51,7 +59,51 @@ def judged(sensors: MeasuredData, data: MeasuredData, candidates: Sequence[Candi
     least = rules.explained_share if verdict.status == "parameter" else rules.main_share
     if removed < least or out:
         return _as_unlisted(verdict, verdict.chosen)
-    return verdict
+    return replace(verdict, chosen=_largest_first(data, verdict.chosen))
+
+
+def _compared(
+    data: MeasuredData, base: Fit, candidates: Sequence[Candidate], best: Hypothesis | None
+) -> Verdict:
+    """Return the verdict on the sets of a search, and on the best effects if it missed them.
+
+    A search extends a set by what could remove most of what it leaves, to first order. That may be
+    nothing for one of two effects between which the base lies: springs that slip and a spring that
+    hardens are found together only. Some of the best effects may do, so that they are tried, too.
+    """
+    verdict = judge(data, base, candidates)
+    if verdict.status != "unlisted" or verdict.chosen is None or best is None:
+        return verdict
+    found = [verdict.chosen, *verdict.alternatives]
+    if label_of(best.candidates) in [label_of(one.candidates) for one in found]:
+        return verdict
+    some = [
+        kept for n in range(len(best.candidates)) for kept in combinations(best.candidates, n + 1)
+    ]
+    excess = base.chi_square - verdict.degrees_of_freedom
+    found += [hypothesis_of(fit(data, kept, best.values_of(kept)), excess) for kept in some]
+    return judge(data, base, candidates, sorted(found, key=lambda one: one.bic))
+
+
+def _largest_first(data: MeasuredData, one: Hypothesis) -> Hypothesis:
+    """Return a set with its effects in the order of their forces, the largest first.
+
+    A search finds them in another one: beside a large force that the base imitates, as damping does
+    dry friction, a small one that it does not imitate explains more.
+    """
+    fitted, places = one.fit, [place for _, place in one.fit.places]
+    base = fitted.values[: fitted.n_base]
+    forces = (data.whitened_forces(base, effects) for effects in fitted.effects_by_candidate)
+    order = np.argsort([-float(force @ force) for force in forces], kind="stable")
+    columns = np.r_[: fitted.n_base, *(places[k] for k in order)]
+    in_order = replace(
+        fitted,
+        candidates=tuple(fitted.candidates[k] for k in order),
+        parameters=tuple(fitted.parameters[k] for k in columns),
+        values=fitted.values[columns],
+        jacobian=fitted.jacobian[:, columns],
+    )
+    return replace(one, fit=in_order)
 
 
 def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdict) -> Verdict:

@@ -28,10 +28,11 @@ from pymoo_hdte.mechanism import Mechanism
 
 def with_rest(
     sensors: MeasuredData, base: Fit, candidates_for: Callable[[Fit], list[Candidate]]
-) -> tuple[MeasuredData, list[Candidate]]:
+) -> tuple[MeasuredData, list[Candidate], Hypothesis | None]:
     """Return the data with the residual of the best effects as the noise, and all candidates.
 
-    The best effects depend on the noise; after a few rounds they no longer change.
+    The best effects depend on the noise; after a few rounds they no longer change. They come last,
+    fitted to the data of the last round but one; None where the base is adequate.
 
     Parameters
     ----------
@@ -46,16 +47,16 @@ def with_rest(
     rules, degrees_of_freedom = sensors.rules, len(base.residuals) - len(base.values)
     candidates = candidates_for(base)
     if down_to_noise(base, degrees_of_freedom, rules):
-        return sensors, candidates
-    data = sensors.with_rest(base.residuals)
+        return sensors, candidates, None
+    data, found = sensors.with_rest(base.residuals), None
     for turn in range(rules.rest_rounds):
-        best = _best_few(data, candidates).fit
-        best = replace(best, residuals=in_units_of(sensors, data, best.residuals))
+        found = _best_few(data, candidates)
+        best = replace(found.fit, residuals=in_units_of(sensors, data, found.fit.residuals))
         data = sensors.with_rest(best.residuals)
         if turn == 0:
             labels = {one.label for one in candidates}
             candidates += [one for one in candidates_for(best) if one.label not in labels]
-    return data, candidates
+    return data, candidates, found
 
 
 def _best_few(data: MeasuredData, candidates: Sequence[Candidate]) -> Hypothesis:

@@ -201,6 +201,12 @@ def limits(finding: MechanismFinding) -> list[str]:
         for record in finding.records
         if record.dropped
     ]
+    found += [
+        f"Rows of {one.record.name} at rest: {one.left_out}. They are left out, as dry friction, "
+        "which is known to act, may have any force up to its breakaway there."
+        for one in finding.data.spectra
+        if one.left_out
+    ]
     found += [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
     found += [
         f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "

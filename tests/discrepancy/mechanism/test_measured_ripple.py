@@ -26,6 +26,7 @@ from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
 from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.io.even_steps import even_steps
 from pymoo_hdte.mechanism import BelievedValue, Gear, Input, LawAt, Mechanism, Port, Record
 from tests.helpers.places import SHARED
 
@@ -255,25 +256,42 @@ def test_a_ripple_has_one_size_by_the_angle_of_the_motor_and_by_that_of_the_outp
 
 
 @pytest.mark.parametrize("count", [40, pytest.param(400, marks=pytest.mark.nightly)])
-def test_intervals_of_a_size_and_of_an_order_hold_as_often_as_they_say(count):
+def test_intervals_of_a_size_an_order_and_a_phase_hold_as_often_as_they_say(count):
     generator = np.random.default_rng(16)
-    inside = np.zeros(2)
+    inside = np.zeros(3)
     for _ in range(count):
-        q = swings(generator)
+        # Far from position 0, at which the phase is told.
+        q = 2.0 + swings(generator)
         torque = hidden("torque_ripple", 202.0, 0.05, 1.0, q)
         bands = bands_of(q, torque + 0.1 * generator.standard_normal(len(TIME)), generator)
         resolution = 2.0 * np.pi / float(np.ptp(q))
         order = _refined(bands, 202.0 + resolution * generator.uniform(-0.2, 0.2), 0.5 * resolution)
         size = size_of("bearing", SeenOrder(order, resolution, 2.0), bands, RULES)
-        amplitude, variance = size.parts[0].values["amplitude"]
+        (amplitude, variance), (phase, spread) = size.parts[0].values.values()
+        off = math.remainder(phase - 1.0, 2.0 * math.pi)
         inside += (
             abs(amplitude - 0.05) <= 1.96 * variance**0.5,
-            (abs(order - 202.0) <= 1.96 * size.variance**0.5),
+            abs(order - 202.0) <= 1.96 * size.variance**0.5,
+            abs(off) <= 1.96 * spread**0.5,
         )
     least = 0.95 * count - 3.0 * math.sqrt(0.95 * 0.05 * count)
     assert np.all(inside >= least)
     # An interval that always holds is too wide.
     assert count < 100 or np.all(inside < 0.985 * count)
+
+
+def test_an_order_that_differs_between_the_directions_is_known_no_better_than_that():
+    """A joint that moves by half a turn does not resolve what its output and its housing have."""
+    generator = np.random.default_rng(22)
+    q = swings(generator)
+    forward = np.gradient(q) > 0.0
+    torque = 0.1 * np.where(forward, np.cos(202.0 * q), np.cos(200.0 * q))
+    torque = torque + 0.02 * generator.standard_normal(len(TIME))
+    one, *_ = find_ripples(JOINT, [record(q, torque, generator)], CUTOFF).found
+    least, most = one.as_dicts()[0]["parameters"]["order"]["interval95"]
+    assert least < 200.0 < 202.0 < most
+    assert "200 is 2 per input turn" in one.meaning
+    assert "202 is 2 per input turn" in one.meaning
 
 
 def test_in_one_direction_a_torque_is_not_told_from_friction():
@@ -310,6 +328,48 @@ def test_a_ripple_has_the_size_of_the_fitted_gain():
     assert accepted.values[names.index("gain of torque")] == pytest.approx(1.0, rel=0.03)
     (one,) = finding.ripples.found
     assert one.parts[0].values["amplitude"][0] == pytest.approx(0.1, rel=0.04)
+
+
+@pytest.mark.parametrize("kind", ["torque_ripple", "position_dependent_friction"])
+def test_a_ripple_in_rows_at_uneven_times_has_its_size(kind):
+    """A curve through such rows is too flat near the Nyquist frequency."""
+    generator = np.random.default_rng(21)
+    fine = np.linspace(0.0, TIME[-1], 20 * len(TIME))
+    swung = 0.5 * np.interp(fine, TIME, swings(generator))
+    time = np.cumsum(STEP * generator.uniform(0.5, 1.5, len(TIME)))
+    time = time[time < TIME[-1]]
+    q = np.interp(time, fine, swung)
+    turns = np.sign(np.interp(time, fine, np.gradient(swung)))
+    torque = 0.3 * (turns if kind != "torque_ripple" else -1.0) * np.cos(1010.0 * q)
+    torque = torque + 0.02 * generator.standard_normal(len(time))
+    even = even_steps(time, {"q": q, "torque": torque})
+    assert even.interpolated
+    one = Record("uneven", "train", even.time, even.signals, interpolated=True)
+    (found, *_) = find_ripples(JOINT, [one], CUTOFF).found
+    (size, _), *_ = found.parts[0].values.values()
+    assert found.parts[0].law.name == kind
+    assert size == pytest.approx(0.3, rel=0.05)
+
+
+def test_a_ripple_that_hides_the_gain_is_told_with_the_gain_that_is_found_without_it():
+    generator = np.random.default_rng(20)
+    mechanism = Mechanism(
+        {"q": BelievedValue(0.5)},
+        [Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, 1.0))],
+        [Input("torque", {"q": 1.0}, BelievedValue(0.7, 0.5))],
+    )
+    speed = 4.0 * np.sin(0.6 * TIME) + 1.2 * np.sin(2.1 * TIME)
+    q = STEP * np.cumsum(speed)
+    torque = 0.5 * np.gradient(speed, STEP) + 0.5 * speed + 0.3 * np.sign(speed)
+    # Between whole numbers, so that it is seen beyond the band only, and within it as well.
+    torque = torque + 0.5 * np.cos(20.6 * q + 1.0)
+    torque = torque + 0.02 * generator.standard_normal(len(TIME))
+    finding = examine_mechanism(mechanism, [record(q, torque, generator)], 8.0)
+    assert [one.name for one in finding.accepted.candidates] == ["coulomb_friction"]
+    assert finding.accepted.values[:2] == pytest.approx([0.5, 1.0], rel=0.01)
+    (one,) = finding.ripples.found
+    assert one.parts[0].values["amplitude"][0] == pytest.approx(0.5, rel=0.02)
+    assert finding.believed == ()
 
 
 def test_a_range_of_orders_that_is_too_long_is_cut_at_its_end_and_that_is_said():

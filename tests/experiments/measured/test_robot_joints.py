@@ -3,63 +3,37 @@
 import numpy as np
 import pytest
 
-from experiments.measured.rigs import MEASURED
+from experiments.measured.known_answers import KNOWN_RIGS
+from experiments.measured.rigs import MEASURED, RIGS
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
-from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
+from pymoo_hdte.discrepancy.mechanism.files import read_rig
 
-GAINS = {1: 10.0, 4: 9.0, 6: 10.12}
-"""Torque constants of joints of the UR10e, N.m/A."""
 SLOWEST, FASTEST = 0.05, 1.0
 """Speeds at which friction is compared, in units of the largest one."""
-TRAINED = 0.6
 
 
-def read(folder, *files, **options):
-    paths = [MEASURED / folder / file for file in files]
-    if not all(path.is_file() for path in paths):
+def verdict_on(name):
+    """Return the verdict on the first part of a log, and the largest speed there."""
+    folder = MEASURED / next(rig.folder for rig in KNOWN_RIGS if rig.name == name)
+    if not folder.is_dir():
         pytest.skip(f"the measurements, which are no part of this software, are not in {folder}")
-    return [np.loadtxt(path, delimiter=",", **options) for path in paths]
-
-
-def ur10e(joint):
-    """Return time, angle and torque of a joint of the UR10e, whose time stamps alternate."""
-    (table,) = read("ur10e", f"joint_{joint}.csv")
-    stamps, n = table[:, 0], len(table)
-    even = np.linspace(stamps[0], stamps[-1], n)
-    angle, current = (np.interp(even, stamps, table[:, place + joint]) for place in (0, 12))
-    return even - even[0], angle, GAINS[joint] * current
-
-
-def tx40():
-    """Return time, angle and torque of joint 4 of the TX40, measured at its motor."""
-    angle, torque = read("tx40_j4", "position.csv", "torque.csv", skiprows=1)
-    return np.arange(len(angle)) / 5000.0, angle / -48.0, torque * -48.0
-
-
-def verdict_on(moment, angle, torque, inertia, damping):
-    """Return the verdict on the first part of a log, with wide beliefs, and the largest speed."""
-    joint = Mechanism(
-        {"q": BelievedValue(inertia, 1.0)},
-        [Port("bearing", {"q": 1.0}, damping=BelievedValue(damping, 1.0))],
-        [Input("torque", {"q": 1.0})],
-        angles=["q"],
-    )
-    end = int(TRAINED * len(moment))
-    record = Record("log", "train", moment[:end], {"q": angle[:end], "torque": torque[:end]})
-    verdict = examine_mechanism(joint, [record]).verdict
-    return verdict, np.abs(np.gradient(angle, moment)).max()
+    rig = read_rig(RIGS / f"{name}.toml", folder)
+    train = [record for record in rig.records if record.role == "train"]
+    finding = examine_mechanism(rig.mechanism, train, rig.cutoff, rig.effects)
+    speeds = [np.abs(one.ports["bearing"].speed).max() for one in finding.data.spectra]
+    return finding.verdict, max(speeds)
 
 
 @pytest.mark.parametrize(
-    ("log", "believed", "dry", "viscous"),
+    ("name", "dry", "viscous"),
     [
-        pytest.param(lambda: ur10e(1), (8.0, 25.0), 13.7, 22.0, id="ur10e 1"),
-        pytest.param(lambda: ur10e(6), (0.5, 3.0), 2.30, None, id="ur10e 6"),
-        pytest.param(tx40, (0.1, 1.0), 2.48, 1.11, id="tx40 4", marks=pytest.mark.nightly),
+        ("ur10e_joint_1", 13.7, 22.0),
+        ("ur10e_joint_6", 2.30, None),
+        pytest.param("tx40_joint_4", 2.48, 1.11, marks=pytest.mark.nightly),
     ],
 )
-def test_dry_friction_of_a_robot_joint_is_found(log, believed, dry, viscous):
-    verdict, largest = verdict_on(*log(), *believed)
+def test_dry_friction_of_a_robot_joint_is_found(name, dry, viscous):
+    verdict, largest = verdict_on(name)
     assert verdict.status in ("named", "partial")
     assert [one.name for one in verdict.accepted.candidates] == ["coulomb_friction"]
     values = dict(
@@ -73,7 +47,7 @@ def test_dry_friction_of_a_robot_joint_is_found(log, believed, dry, viscous):
 
 
 def test_gravity_of_a_robot_joint_is_found_beside_its_friction():
-    verdict, _ = verdict_on(*ur10e(4), 1.0, 5.0)
+    verdict, _ = verdict_on("ur10e_joint_4")
     assert verdict.status == "named"
     laws = {one.name: one.law for one in verdict.accepted.effects}
     assert set(laws) == {"gravity", "coulomb_friction"}

@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+from experiments.measured import cpu_time, rigs
 from experiments.runner.machine import machine_table, usable_cores
 from experiments.studies.timing import Ratio, best_time, ratio_table
 
@@ -40,6 +41,17 @@ def test_cores_are_those_the_scheduler_leaves(monkeypatch):
     monkeypatch.delattr("os.sched_getaffinity")
     monkeypatch.setattr("os.cpu_count", lambda: None)
     assert usable_cores() == 1
+
+
+def test_the_time_of_measured_rigs_is_shown_beside_what_is_allowed(tmp_path, monkeypatch):
+    rows = [["one", "workflow", "3.5"], ["two", "workflow", "21"], ["two", "other", "99"]]
+    table = cpu_time.cpu_table(rows)
+    assert table.rows[0] == ("one", "workflow", 3.5)
+    (finding,) = table.findings
+    assert not finding.agrees
+    assert "21 s of CPU (two); 20 are allowed" in finding.sentence
+    monkeypatch.setattr(rigs, "MEASURED", tmp_path / "nowhere")
+    assert cpu_time.measured_cpu() == ()
 
 
 @pytest.mark.parametrize("seconds", [1e-9, 1.0])

@@ -2,7 +2,8 @@
 
 Beyond the cutoff a motion is too small to be measured, and so are its forces; but where a machine
 is, and how fast it moves, is known there as well. What varies with the position shows as a line of
-a frequency in proportion to the speed, up to half the sampling rate of the force.
+a frequency in proportion to the speed, up to half the sampling rate of the force, or less where
+its rows lie between those that were measured.
 """
 
 from __future__ import annotations
@@ -144,7 +145,10 @@ def high_bands(
     """
     found = []
     for record in records:
-        lowest, highest = _BEYOND * cutoff, rules.nyquist_share * 0.5 / record.step
+        lowest, share = _BEYOND * cutoff, 0.5 * rules.nyquist_share
+        if record.interpolated:
+            share = min(share, rules.interpolated_share)
+        highest = share / record.step
         margin = margin_of(cutoff, record.step)
         inner = slice(margin, len(record.time) - margin)
         count = len(record.time[inner])

@@ -270,12 +270,13 @@ def _ripple(
     per_speed = seen.order / (2.0 * np.pi)
     speeds = over_speed(seen, train, speed)
     laws = [one.law for one in size.parts]
+    half = _CENTRAL * size.variance**0.5
     return Ripple(
         port.name,
         seen.order,
         seen.resolution,
         size.variance,
-        port.gear.meaning(seen.order, seen.resolution) if port.gear else "",
+        port.gear.meaning(seen.order, seen.resolution + half) if port.gear else "",
         (per_speed * float(speed.min()), per_speed * float(speed.max())),
         size.parts,
         size.ways,

@@ -8,10 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.stats import chi2, t
 
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.mechanism.beyond_band.high_band import FEWEST_ROWS, HighBand
+from pymoo_hdte.discrepancy.mechanism.beyond_band.order_lines import phasors
 from pymoo_hdte.discrepancy.mechanism.beyond_band.order_search import NEIGHBOURS, SeenOrder
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.unknowns import line_with_variance
@@ -21,6 +22,8 @@ from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 Values = NDArray[np.float64]
 Pair = tuple[float, float]
 
+_NEAR = np.linspace(-1.0, 1.0, 81)
+"""Distances, in resolutions, between which the order of one direction is looked for."""
 _SPEEDS = 6
 """Groups of equally many rows by speed."""
 
@@ -52,13 +55,19 @@ class _Line:
         N or N.m.
     variance : float
         Of it, real and imaginary part together, by the powers of the neighbouring orders.
-    spread : float
-        Variance of the positions.
+    middle, spread : float
+        Mean and variance of the positions.
     """
 
     amplitude: complex
     variance: float
+    middle: float
     spread: float
+
+    @property
+    def known(self) -> float:
+        """Inverse of the variance of the order: it is the slope of a phase over the position."""
+        return 2.0 * abs(self.amplitude) ** 2 * self.spread / self.variance
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,14 +93,28 @@ def size_of(port: str, seen: SeenOrder, bands: Sequence[HighBand], rules: Rules)
     """Return the parts of a line; while a port moves one way, all of it counts as a torque."""
     lines = [_line(seen, bands, way) for way in (1.0, -1.0)]
     both = [one for one in lines if one is not None]
-    # An order is the slope of a phase over the position, as in a regression.
-    known = sum(2.0 * abs(one.amplitude) ** 2 * one.spread / one.variance for one in both)
-    return Size(_parts(port, seen, both, rules), len(both), 1.0 / known)
+    variance = 1.0 / sum(one.known for one in both)
+    if len(both) == 2:
+        # Several orders that the travel does not resolve add up otherwise in either direction.
+        apart = (_nearest(seen, bands, 1.0) - _nearest(seen, bands, -1.0)) ** 2
+        if apart > chi2.isf(rules.second_speed_chance, 1) * sum(1.0 / one.known for one in both):
+            variance += apart / 4.0
+    return Size(_parts(port, seen, both, variance, rules), len(both), variance)
 
 
-def _parts(port: str, seen: SeenOrder, both: Sequence[_Line], rules: Rules) -> tuple[Part, ...]:
+def _nearest(seen: SeenOrder, bands: Sequence[HighBand], way: float) -> float:
+    """Return the order of largest power within the resolution while the port moves one way."""
+    near = seen.order + seen.resolution * _NEAR
+    powers = np.abs(phasors(*_moving(seen, bands, way), near))
+    return float(near[np.argmax(powers)])
+
+
+def _parts(
+    port: str, seen: SeenOrder, both: Sequence[_Line], of_order: float, rules: Rules
+) -> tuple[Part, ...]:
     mean = sum(one.amplitude for one in both) / len(both)
     variance = sum(one.variance for one in both) / len(both) ** 2
+    middle = sum(one.middle for one in both) / len(both)
     # A driving torque acts with the motion, a force of friction against it.
     lines = [("torque_ripple", "amplitude", -mean)]
     if len(both) == 2:
@@ -103,6 +126,8 @@ def _parts(port: str, seen: SeenOrder, both: Sequence[_Line], rules: Rules) -> t
     for name, size, line in lines:
         if abs(line) >= least:
             amplitude, phase = line_with_variance(line.real, line.imag, 0.5 * variance * np.eye(2))
+            # The phase is that at position 0, as far from the rows as their mean position.
+            phase = phase[0], float(phase[1] + of_order * middle**2)
             numbers = {"order": seen.order, size: amplitude[0], "phase": phase[0]}
             law = LawAt(name, port, effect_named(name).law_of(numbers))
             found.append((abs(line), Part(law, {size: amplitude, "phase": phase})))
@@ -126,13 +151,7 @@ def _line(
     slowest, fastest : float
         Speeds between which rows are taken.
     """
-    turned, force = [], []
-    for band in bands:
-        speed = way * band.speed
-        rows = band.inside(seen.order) & (speed > slowest) & (speed <= fastest)
-        turned.append(band.position[rows])
-        force.append(band.plain[rows])
-    position, signal = np.concatenate(turned), np.concatenate(force)
+    position, signal = _moving(seen, bands, way, slowest, fastest)
     if len(signal) < FEWEST_ROWS:
         return None
     line = np.exp(1j * seen.order * position)
@@ -143,7 +162,25 @@ def _line(
     around = np.abs(np.exp(-1j * np.outer(orders, position)) @ left) ** 2
     # Powers of noise are exponential, with a median of log 2.
     variance = 4.0 * float(np.median(around)) / np.log(2.0) / len(signal) ** 2
-    return _Line(amplitude, max(variance, 1e-300), float(np.var(position)))
+    middle, spread = float(np.mean(position)), float(np.var(position))
+    return _Line(amplitude, max(variance, 1e-300), middle, spread)
+
+
+def _moving(
+    seen: SeenOrder,
+    bands: Sequence[HighBand],
+    way: float,
+    slowest: float = 0.0,
+    fastest: float = np.inf,
+) -> tuple[Values, Values]:
+    """Return positions and forces, (n,) each, of the rows of a line: see `_line`."""
+    turned, force = [], []
+    for band in bands:
+        speed = way * band.speed
+        rows = band.inside(seen.order) & (speed > slowest) & (speed <= fastest)
+        turned.append(band.position[rows])
+        force.append(band.plain[rows])
+    return np.concatenate(turned), np.concatenate(force)
 
 
 def over_speed(seen: SeenOrder, bands: Sequence[HighBand], speed: Values) -> Values:

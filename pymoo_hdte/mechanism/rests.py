@@ -1,0 +1,84 @@
+"""Rests: where a port stands still, dry friction may have any force up to that of its breakaway.
+
+A joint without compliance does not tell which: a law of the speed would give it the sign of noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism
+from pymoo_hdte.mechanism.motion import smoothed_noise
+from pymoo_hdte.mechanism.port_motion import PortMotion
+from pymoo_hdte.mechanism.records import Record
+
+Values = NDArray[np.float64]
+
+_STILL = 6.0
+"""Standard deviations of the noise of a speed, below which its sign tells nothing."""
+_FADES = 2.5
+"""Periods of the cutoff before and after a rest in which smoothed forces still show it: a jump has
+faded to 0.2 % there. In the period after, the weight of the rows rises, so that no edge of it looks
+like a force."""
+_FEWEST = 0.25
+"""Share of the rows that has to be left; a record that mostly rests is taken as it is."""
+
+
+def weight_of_rows(
+    mechanism: Mechanism,
+    record: Record,
+    cutoff: float,
+    ports: dict[str, PortMotion],
+    step: float,
+    known: Sequence[LawAt],
+) -> Values:
+    """Return the weight of each row of the motion of ports, (n,): 0 at rest, 1 while all move.
+
+    A rest lasts a period of the cutoff at least; a reversal is none.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    record : Record
+        With the noise of its channels.
+    cutoff : float
+        Hz, up to which the motion is known.
+    ports : dict of str to PortMotion
+    step : float
+        Of them, s.
+    known : sequence of LawAt
+        Only ports with one that holds them at rest have rests.
+    """
+    period = max(round(1.0 / (cutoff * step)), 2)
+    rests = np.zeros(len(next(iter(ports.values())).speed), dtype=bool)
+    for name in {one.port for one in known if one.law.breakaway > 0.0}:
+        port = mechanism.port(name)
+        noise = [
+            share * smoothed_noise(record.noise_of(one), record.step, cutoff)[1]
+            for one, share in port.motion.items()
+        ]
+        rests |= _long(np.abs(ports[name].speed) < _STILL * np.hypot.reduce(noise), period)
+    near = _spread(rests, round((_FADES + 0.5) * period))
+    window = np.hanning(period + 2)
+    edges = len(window) // 2, len(window) - 1 - len(window) // 2
+    away = np.convolve(np.pad(~near, edges, mode="edge"), window / window.sum(), mode="valid")
+    enough = rests.any() and np.mean(away**2) >= _FEWEST
+    return away if enough else np.ones_like(away)
+
+
+def _long(still: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:
+    """Return only those runs of True that have at least so many rows, (n,)."""
+    edges = np.flatnonzero(np.diff(np.pad(still.astype(int), 1)))
+    found = np.zeros_like(still)
+    for start, end in edges.reshape(-1, 2):
+        found[start:end] = end - start >= least
+    return found
+
+
+def _spread(rows: NDArray[np.bool_], way: int) -> NDArray[np.bool_]:
+    """Return rows, (n,), and those up to ``way`` rows before and after each of them."""
+    count = np.cumsum(np.pad(rows.astype(int), (way + 1, way)))
+    return np.asarray(count[2 * way + 1 :] > count[: -2 * way - 1])
