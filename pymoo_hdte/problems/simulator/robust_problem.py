@@ -23,7 +23,7 @@ from pymoo_hdte.problems.simulator.trust import (
     negative_somewhere,
     positive_places,
 )
-from pymoo_hdte.surrogate.sparse.adaptive import HELD_OUT_DESIGNS, AdaptiveFit, fit_adaptively
+from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, first_runs, fit_adaptively
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
 Array = NDArray[np.float64]
@@ -152,7 +152,7 @@ def robust_problem(
 
 def least_runs(inputs: Inputs) -> int:
     """Return the number of runs below which no surrogate is made."""
-    return 2 * HELD_OUT_DESIGNS + 1 + len(inputs.axes)
+    return first_runs(len(inputs.axes))
 
 
 def _refuse_untrusted(
