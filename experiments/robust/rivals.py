@@ -15,7 +15,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from functools import partial
-from itertools import count
 from typing import Any
 
 import chaospy
@@ -34,8 +33,10 @@ Step = tuple[int, float, float]
 FIRST_BUDGET = 10
 STEP = 1.1
 MOST_TERMS = 1000
-"""Terms among which a sparse regression may choose; OpenTURNS's own limit for 1000 runs is alike."""
+"""Terms among which OpenTURNS may choose; at most ten for each run."""
 MOST_CROSS_VALIDATED = 500
+"""The same for scikit-learn, which fits five times; at most five for each run."""
+HIGHEST_DEGREE = 15
 NORMS = (0.4, 0.7, 1.0)
 STAYS = 1.33
 """An error stays below a bound if it is so up to this factor in runs."""
@@ -89,9 +90,9 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
         for norm in NORMS:
             enumerate_ = ot.HyperbolicAnisotropicEnumerateFunction(len(laws), norm)
             basis = ot.OrthogonalProductPolynomialFactory(families, enumerate_)
-            for degree in count(1):
+            for degree in range(1, HIGHEST_DEGREE + 1):
                 size = enumerate_.getBasisSizeFromTotalDegree(degree)
-                if size > min(MOST_TERMS, 10 * runs) or degree > runs:
+                if size > min(MOST_TERMS, 10 * runs):
                     break
                 chaos = ot.FunctionalChaosAlgorithm(
                     points[:runs],

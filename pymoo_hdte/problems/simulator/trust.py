@@ -73,7 +73,8 @@ def negative_somewhere(inputs: Inputs, fit: AdaptiveFit, places: list[int]) -> R
         return None
     random_state = np.random.default_rng(0)
     designs = draw_designs(inputs.axes, _LOOKED_AT, random_state)
-    points = draw_around(inputs.axes, designs, 2, random_state).reshape(-1, len(inputs.axes))
+    draws, _ = draw_around(inputs.axes, designs, 2, random_state)
+    points = draws.reshape(-1, len(inputs.axes))
     values = fit.polynomial(points)[:, places]
     if values.min() >= 0.0:
         return None

@@ -14,11 +14,13 @@ from pymoo_hdte.surrogate.sparse.draws import (
     draw_around,
     draw_designs,
     nearest_designs,
+    relevance,
 )
 from pymoo_hdte.surrogate.sparse.kernel import PolynomialFamilies
 from pymoo_hdte.surrogate.sparse.moments import SparseMoments
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.sparse.response import LOST, Judged, ResponseFit, fitted
+from pymoo_hdte.surrogate.sparse.tails import beyond_all_runs
 from pymoo_hdte.surrogate.sparse.terms import closed
 
 Array = NDArray[np.float64]
@@ -27,11 +29,11 @@ FIRST_RUNS = 12
 """Runs before the first judgement, one more for each input; set by hand."""
 BATCH = 0.12
 """Share of the runs that is added before all is judged anew; set by hand."""
+IN_A_ROW = 2
+"""Judgements that have to pass one after the other; with few runs one may pass by chance."""
 JUDGED_DESIGNS = 32
-JUDGED_DRAWS = 64
+JUDGED_DRAWS = 128
 """Designs, and draws of the scatter at each, at which errors are judged."""
-MOST_DESIGNS = 0.95
-"""Share of the designs for which an error is told."""
 DEGREES = (6, 40)
 """Least and largest degree in one variable; between them a third of the runs."""
 LARGEST_ACCURACY = 0.01
@@ -40,18 +42,6 @@ SMALLEST_SCATTER = 0.1
 """Scatter below this share of its median over the designs is judged as if it were that; by hand."""
 SCATTER_OF_RANGE = 1e-4
 """The same, as a share of the response's deviation over all points."""
-TAIL_GROWTH = 4.0
-"""How many times what it adds at its end values the scatter beyond all runs may add; by hand.
-
-An unbounded scatter has no runs beyond its quantiles of 1e-5. Moved to these, that part adds about
-as much to mean and deviation as it does for a linear response, and a third of it for exp(1.5 a) of
-a standard normal a. A polynomial of degree 18 adds some thousand times as much: it runs away there.
-"""
-FAR_ERROR = 1e6
-"""How many times its error inside a polynomial may be off beyond all runs; by hand.
-
-An exact one, with an error of rounding, is exact there as well.
-"""
 
 
 @dataclass(frozen=True)
@@ -130,10 +120,11 @@ class _Growth:
         good = np.isfinite(self.truth).all(axis=1)
         points, truth = self.points[good], self.truth[good]
         families = PolynomialFamilies(self.axes, int(np.clip(len(points) // 3, *DEGREES)))
-        features, judged = families(points), Judged.at(self.draws, families)
+        features, judged = families(points), Judged.at(*self.draws, families)
+        weights = relevance(self.axes, points)
         starts = self.parameters or [None] * truth.shape[1]
         fits = [
-            fitted(families, features, values, judged, self.lost, start)
+            fitted(families, features, values, weights, judged, self.lost, start)
             for values, start in zip(truth.T, starts, strict=True)
         ]
         self.parameters = [one.regression.parameters for one in fits]
@@ -149,7 +140,7 @@ class _Growth:
         least = np.where(least > 0.0, least, np.finfo(float).tiny ** 0.25)
         self.scale = np.maximum(judged_std, least)
         errors = [one.errors(judged, size) for one, size in zip(fits, least.tolist(), strict=True)]
-        of_mean, of_std = np.quantile(np.array(errors), MOST_DESIGNS, axis=2).T
+        of_mean, of_std = np.sqrt(np.mean(np.square(errors), axis=2)).T
         _, std = moments(nearest_designs(self.axes, points))
         left_out = np.column_stack([one.left_out for one in fits])
         return AdaptiveFit(
@@ -164,26 +155,14 @@ class _Growth:
             left_out / np.maximum(std, least),
         )
 
-    def with_tails(self, fit: AdaptiveFit, accuracy: float) -> AdaptiveFit:
+    def with_tails(self, fit: AdaptiveFit) -> AdaptiveFit:
         """Return the fit with the scatter beyond all runs, or with the error of leaving it out."""
-        if all(len(axis.cut.nodes) == len(axis.measure.nodes) for axis in self.axes):
+        if not any(axis.is_unbounded for axis in self.axes):
             return fit
-        whole = SparseMoments(fit.polynomial, self.axes)
-        ended = SparseMoments(fit.polynomial, self.axes, [axis.ended for axis in self.axes])
-        without, added, at_ends = (
-            np.array(one(self.designs)) for one in (fit.moments, whole, ended)
+        moments, (of_mean, of_std) = beyond_all_runs(
+            fit.polynomial, self.axes, self.designs, self.scale, fit.largest_error
         )
-        beyond, at_ends = (
-            np.abs(added - without) / self.scale,
-            np.abs(at_ends - without) / self.scale,
-        )
-        if np.all(beyond <= accuracy):
-            return replace(fit, moments=whole)
-        moments, doubt = fit.moments, TAIL_GROWTH * at_ends.max(axis=1)
-        if np.all(beyond <= np.maximum(accuracy, TAIL_GROWTH * at_ends)):
-            inside = np.array([fit.mean_error, fit.std_error])
-            moments, doubt = whole, np.minimum(at_ends.max(axis=1), FAR_ERROR * inside)
-        of_mean, of_std = fit.mean_error + doubt[0], fit.std_error + doubt[1]
+        of_mean, of_std = fit.mean_error + of_mean, fit.std_error + of_std
         return replace(fit, moments=moments, mean_error=of_mean, std_error=of_std)
 
 
@@ -232,12 +211,14 @@ def fit_adaptively(
     """
     growth = _Growth(axes, function, accuracy, random_state)
     growth.run(min(first_runs(len(axes)), budget))
+    passed = 0
     while True:
         fit = growth.judge()
         if fit.largest_error <= accuracy:
-            fit = growth.with_tails(fit, accuracy)
-            if fit.largest_error <= accuracy and acceptable(fit):
-                return fit
+            fit = growth.with_tails(fit)
+        passed = passed + 1 if fit.largest_error <= accuracy and acceptable(fit) else 0
+        if passed == IN_A_ROW:
+            return fit
         count = min(max(at_once, int(BATCH * growth.n_runs)), budget - growth.n_runs)
         if count <= 0:
             return fit

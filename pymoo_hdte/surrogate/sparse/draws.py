@@ -12,6 +12,13 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate.sparse.axes import Axis
 
+OUTWARD = 0.2
+"""Exponent of 1 / (1 - z^2) in the density of the runs: ends of an input have neighbours on one side.
+
+0.5 suits polynomials of high degree in few variables, 0 those of low degree in many. Chosen among
+0, 0.2 and 0.4: piston needed more than 130, 98 and 122 runs, cantilever 88, 71 and 109, wing
+weight 59, 53 and 48, Ishigami's function 47, 42 and 42.
+"""
 _GRID = np.linspace(-1.0, 1.0, 4001)
 
 Array = NDArray[np.float64]
@@ -44,13 +51,32 @@ class SpreadPoints:
         return np.column_stack(columns)
 
 
+def relevance(axes: list[Axis], points: Array) -> Array:
+    """Return how much oftener than the runs are spread the scatter gives points, shape (n,).
+
+    Parameters
+    ----------
+    axes : list of Axis, length d
+    points : ndarray, shape (n, d)
+        In -1..1.
+    """
+    found = np.prod(np.maximum(1.0 - points**2, 0.0), axis=1) ** OUTWARD
+    for axis, z in zip(axes, points.T, strict=True):
+        if not axis.designed and axis.scatter is not None:
+            density = axis.scatter.distribution.density(axis.centre + axis.half_width * z)
+            found *= np.sqrt(np.where(np.isfinite(density), density, 0.0) * axis.half_width)
+    return found / max(float(found.mean()), np.finfo(float).tiny)
+
+
 def _spread_over(axis: Axis) -> Array:
     """Return the share of the points below each value of a grid in -1..1."""
     density = np.ones_like(_GRID)
     if not axis.designed and axis.scatter is not None:
         density = axis.scatter.distribution.density(axis.centre + axis.half_width * _GRID)
         density = np.sqrt(np.where(np.isfinite(density), density, 0.0))
-    below = np.append(0.0, np.cumsum(0.5 * (density[1:] + density[:-1])))
+    middle = 0.5 * (_GRID[1:] + _GRID[:-1])
+    outward = (1.0 - middle**2) ** -OUTWARD
+    below = np.append(0.0, np.cumsum(outward * (density[1:] + density[:-1])))
     return below / below[-1]
 
 
@@ -63,17 +89,46 @@ def draw_designs(axes: list[Axis], count: int, random_state: np.random.Generator
 
 def draw_around(
     axes: list[Axis], designs: Array, count: int, random_state: np.random.Generator
-) -> Array:
-    """Return draws of the scatter around designs of shape (v, m), shape (v, count, d), in -1..1."""
+) -> tuple[Array, Array]:
+    """Return draws of the scatter around designs of shape (v, m), and what each weighs.
+
+    Rare values of an unbounded scatter are drawn oftener than they occur and weigh less: they may
+    carry much of the deviation.
+
+    Returns
+    -------
+    points : ndarray, shape (v, count, d)
+        In -1..1.
+    weights : ndarray, shape (v, count)
+        They sum to 1 at each design.
+    """
     shape = len(designs), count
     p = scipy.stats.qmc.LatinHypercube(len(axes), rng=random_state).random(shape[0] * count)
-    points, column = np.empty((*shape, len(axes))), 0
+    # The more axes, the less each may be changed for the weights to remain alike.
+    power = 1.0 - 0.5 / max(1, sum(axis.is_unbounded for axis in axes))
+    points, weights, column = np.empty((*shape, len(axes))), np.ones(shape), 0
     for j, axis in enumerate(axes):
         own = designs[:, column] if axis.designed else None
         column += axis.designed
         offset, factor, _, _ = axis.around(own)
-        points[..., j] = offset[:, None] + factor[:, None] * axis.sample(p[:, j]).reshape(shape)
-    return np.clip(points, -1.0, 1.0)
+        values, weight = _rare_oftener(axis, p[:, j], power)
+        points[..., j] = offset[:, None] + factor[:, None] * values.reshape(shape)
+        weights *= weight.reshape(shape)
+    return np.clip(points, -1.0, 1.0), weights / weights.sum(axis=1, keepdims=True)
+
+
+def _rare_oftener(axis: Axis, p: Array, power: float) -> tuple[Array, Array]:
+    """Return values of s drawn by a power of their density, and what they weigh, same shape."""
+    if axis.scatter is None or not axis.is_unbounded:
+        return axis.sample(p), np.ones_like(p)
+    ends = axis.scatter.lower, axis.scatter.upper
+    values = np.linspace(*ends, len(_GRID))
+    density = np.maximum(axis.scatter.distribution.density(values), 0.0)
+    tempered = np.where(np.isfinite(density), density, 0.0) ** power
+    below = np.append(0.0, np.cumsum(tempered[1:] + tempered[:-1]))
+    found = np.interp(p, below / below[-1], values)
+    weight = np.interp(found, values, tempered) ** (1.0 / power - 1.0)
+    return np.log1p(found) if axis.logarithmic else found, weight
 
 
 def nearest_designs(axes: list[Axis], points: Array) -> Array:

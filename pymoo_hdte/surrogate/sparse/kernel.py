@@ -43,7 +43,7 @@ class PolynomialFamilies:
         self.degree = degree
         nodes, weights = leggauss(degree + 4)
         even = Measure(nodes, 0.5 * weights)
-        self._families = [OrthonormalPolynomials(_on_cube(axis, even), degree) for axis in axes]
+        self._families = [OrthonormalPolynomials(even, degree) for _ in axes]
 
     def __call__(self, points: Array) -> list[Array]:
         """Return p_1 .. p_k of every axis at points of shape (n, d), each of shape (k, n)."""

@@ -41,6 +41,8 @@ class Regression:
         The polynomials of every axis at the runs.
     values : ndarray, shape (n,)
         The response there, in its unit.
+    relevance : ndarray, shape (n,)
+        How much every run counts in ``surprise``.
     parameters : ndarray, shape (d, 3), optional
         Where to start learning them.
 
@@ -56,7 +58,11 @@ class Regression:
     """
 
     def __init__(
-        self, features: list[Array], values: Array, parameters: Array | None = None
+        self,
+        features: list[Array],
+        values: Array,
+        relevance: Array,
+        parameters: Array | None = None,
     ) -> None:
         self.centre = float(values.mean())
         self.unit = float(values.std()) or 1.0
@@ -74,7 +80,8 @@ class Regression:
         left_out = self.weights / diagonal
         expected = np.sqrt(max(self.size, np.finfo(float).tiny) / diagonal)
         self.left_out = self.unit * left_out
-        self.surprise = float(np.sqrt(np.mean((left_out / expected) ** 2)))
+        squares = (left_out / expected) ** 2
+        self.surprise = float(np.sqrt(np.average(squares, weights=relevance)))
 
     def predict(self, features: list[Array]) -> Array:
         """Return the mean, shape (m,), at points of these features, in the response's unit."""

@@ -14,23 +14,23 @@ from pymoo_hdte.surrogate.sparse.terms import closed, largest, likely_terms, pro
 Array = NDArray[np.float64]
 Indices = NDArray[np.int_]
 
-COVERAGE = 3.0
+COVERAGE = 4.0
 """Expected errors within which 95 % of the designs lie.
 
 2 for a normal error at one design; those of many designs belong to one function and are large or
 small together.
 """
-LEAST_SURPRISE = 0.5
+LEAST_SURPRISE = 0.3
 """Runs that are predicted better than expected make errors smaller by no more than this factor."""
 LOST = 0.05
 """Largest share of the accuracy that terms left out may cost."""
-EXACT = 0.1
+EXACT = 1e-3
 """Ratio of errors at runs left out below which few terms, fitted alone, replace the regression.
 
 They are chosen by all runs, so that their own error is told too small; polynomials of low degree
 give ratios of 1e-6 and less.
 """
-MOST_FITTED = 0.5
+MOST_FITTED = 0.4
 """Largest number of such terms as a share of the runs."""
 
 
@@ -40,19 +40,21 @@ class Judged:
 
     Attributes
     ----------
-    points : ndarray, shape (v, k, d)
-        In -1..1.
+    weights : ndarray, shape (v, k)
+        Of the draws; they sum to 1 at each design.
     features : list of list of ndarray
         By design and axis, the polynomials there.
     """
 
-    points: Array
+    weights: Array
     features: list[list[Array]]
 
     @classmethod
-    def at(cls, points: Array, families: PolynomialFamilies) -> Judged:
-        """Return it with the polynomials of these families."""
-        return cls(points, [families(one) for one in points])
+    def at(cls, points: Array, weights: Array, families: PolynomialFamilies) -> Judged:
+        """Return it with the polynomials of these families at points of shape (v, k, d)."""
+        together = families(points.reshape(-1, points.shape[-1]))
+        parts = [np.split(one, len(points), axis=1) for one in together]
+        return cls(weights, [list(one) for one in zip(*parts, strict=True)])
 
 
 @dataclass(frozen=True)
@@ -88,19 +90,19 @@ class ResponseFit:
             Scatter below which it counts as this, in the response's unit.
         """
         found = []
-        for features in judged.features:
+        for features, weights in zip(judged.features, judged.weights, strict=True):
             values = products(features, self.indices) @ self.coefficients
-            deviation = values - values.mean()
-            scatter = max(float(values.std()), least)
+            deviation = values - weights @ values
+            scatter = max(_std(values, weights), least)
             if self.alone:
                 share = float(np.sqrt(np.mean(self.left_out**2))) / scatter
                 found.append((share, share))
                 continue
             off = self.regression.predict(features) - values
-            functionals = np.array([np.ones_like(values), deviation / scatter]) / len(values)
+            functionals = np.array([weights, weights * deviation / scatter])
             expected = self.regression.spread(features, functionals)
             expected = expected * max(self.regression.surprise, LEAST_SURPRISE)
-            cut = np.array([abs(off.mean()), float(off.std())])
+            cut = np.array([abs(float(weights @ off)), _std(off, weights)])
             found.append(tuple((COVERAGE * expected + cut) / scatter))
         mean, std = np.array(found).T
         return mean, std
@@ -110,6 +112,7 @@ def fitted(
     families: PolynomialFamilies,
     features: list[Array],
     values: Array,
+    relevance: Array,
     judged: Judged,
     lost: float,
     start: Array | None,
@@ -123,14 +126,19 @@ def fitted(
         Of the runs.
     values : ndarray, shape (n,)
         The response there.
+    relevance : ndarray, shape (n,)
+        How much every run counts when errors are told.
     judged : Judged
     lost : float
         What terms left out may change, as a share of the least scatter.
     start : ndarray, shape (d, 3), or None
         Parameters of the regression to start from.
     """
-    regression = Regression(features, values, start)
-    scatters = [float(regression.predict(one).std()) for one in judged.features]
+    regression = Regression(features, values, relevance, start)
+    scatters = [
+        _std(regression.predict(one), weights)
+        for one, weights in zip(judged.features, judged.weights, strict=True)
+    ]
     looked_at = likely_terms(regression.variance)
     coefficients = _posterior(regression, features, looked_at)
     kept = largest(coefficients, lost * float(np.quantile(scatters, 0.1)))
@@ -145,6 +153,10 @@ def fitted(
         regression.left_out,
         alone=False,
     )
+
+
+def _std(values: Array, weights: Array) -> float:
+    return float(np.sqrt(weights @ (values - weights @ values) ** 2))
 
 
 def _posterior(regression: Regression, features: list[Array], indices: Indices) -> Array:
