@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,7 +17,15 @@ Step = tuple[int, float, float]
 """Runs, error of the deviation at the designs, and overall."""
 
 
-def trace(task: Task, budget: int, seed: int = 1) -> list[Step]:
+STAYS = 1.5
+"""Growth goes on up to this factor in runs from where the error is as small as asked for."""
+
+
+class _Enough(Exception):
+    """Growth has shown what is asked."""
+
+
+def trace(task: Task, budget: int, accuracy: float, seed: int = 1) -> list[Step]:
     """Return the true errors after every batch of a growth that does not stop by itself."""
     found: list[Step] = []
     points = _cube(task)
@@ -23,9 +33,14 @@ def trace(task: Task, budget: int, seed: int = 1) -> list[Step]:
     def watch(fit: AdaptiveFit) -> bool:
         values = fit.polynomial(points)[:, 0].reshape(task.judged[1].shape)
         found.append((fit.n_runs, *task.errors(values)))
+        above = [runs for runs, error, _ in found if not error < accuracy]
+        first = next((runs for runs, _, _ in found if runs > max(above, default=0)), budget)
+        if fit.n_runs >= STAYS * first:
+            raise _Enough
         return False
 
-    _grown(task, np.inf, budget, seed, watch)
+    with suppress(_Enough):
+        _grown(task, np.inf, budget, seed, watch)
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +41,8 @@ class Task:
         assert self.names[: len(self.function.designed)] == self.function.designed
         rng = np.random.default_rng(7)
         bounds = np.array([(one.lower, one.upper) for one in self.designs.values()])
-        self.X = rng.uniform(*bounds.T, (DESIGNS, len(bounds)))
+        lower, upper = bounds.T
+        self.X = rng.uniform(lower, upper, (DESIGNS, len(bounds)))
 
     def __call__(self, values: Array) -> Array:
         """Return the function, shape (n,), at inputs of shape (n, d) in their units."""
@@ -53,14 +55,14 @@ class Task:
         for name in self.function.designed:
             low, high = self._ends(name)
             margin = MIDDLE * (high - low)
-            deviation: object = margin
+            deviation: Any = margin
             if self.function.normal_deviation:
                 deviation = scipy.stats.norm(0.0, self.function.normal_deviation * (high - low))
             found[name] = Design(low + margin, high - margin, deviation=deviation)
         return found
 
     @cached_property
-    def noise(self) -> dict[str, object]:
+    def noise(self) -> dict[str, Any]:
         """The other inputs."""
         others = self.names[len(self.function.designed) :]
         return {name: _frozen(self.function.laws[name]) for name in others}
@@ -97,7 +99,7 @@ class Task:
                 )
                 columns.append(self.X[:, j, None] + law.ppf(p[:, j]))
             else:
-                own = self.noise[name].ppf(p[:, j])  # type: ignore[attr-defined]
+                own = self.noise[name].ppf(p[:, j])
                 columns.append(np.broadcast_to(own, (DESIGNS, count)))
         return np.stack(columns, axis=-1)
 
@@ -146,7 +148,7 @@ class Task:
         return law.lower, law.upper
 
 
-def _frozen(law: Uniform | Normal) -> object:
+def _frozen(law: Uniform | Normal) -> Any:
     if isinstance(law, Normal):
         return scipy.stats.norm(law.mean, law.std)
     return scipy.stats.uniform(law.lower, law.upper - law.lower)

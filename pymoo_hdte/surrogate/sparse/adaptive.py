@@ -122,7 +122,7 @@ class _Growth:
         families = PolynomialFamilies(self.axes, int(np.clip(len(points) // 3, *DEGREES)))
         features, judged = families(points), Judged.at(*self.draws, families)
         weights = relevance(self.axes, points)
-        starts = self.parameters or [None] * truth.shape[1]
+        starts: list[Array | None] = [*self.parameters] or [None] * truth.shape[1]
         fits = [
             fitted(families, features, values, weights, judged, self.lost, start)
             for values, start in zip(truth.T, starts, strict=True)

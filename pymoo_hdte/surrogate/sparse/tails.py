@@ -72,9 +72,13 @@ def beyond_all_runs(
 
 
 def _series(
-    polynomial: SparsePolynomial, axes: list[Axis], unbounded: list[int], designs: Array, mean: Array
+    polynomial: SparsePolynomial,
+    axes: list[Axis],
+    unbounded: list[int],
+    designs: Array,
+    mean: Array,
 ) -> Array:
-    """Return the variance expected beyond all runs, shape (n, r), in the responses' units squared."""
+    """Return the variance expected beyond all runs, shape (n, r), in squares of units."""
     found = np.zeros_like(mean)
     for j in unbounded:
         for upper in (False, True):

@@ -68,7 +68,7 @@ def products(features: list[Array], indices: Indices) -> Array:
 
 
 def largest(coefficients: Array, lost: float) -> NDArray[np.bool_]:
-    """Return which coefficients to keep, shape (p,): the others' squares add up to at most lost^2."""
+    """Return which coefficients to keep, shape (p,): the others have at most this norm."""
     order = np.argsort(np.abs(coefficients))
     dropped = np.sqrt(np.cumsum(coefficients[order] ** 2)) <= lost
     kept = np.ones(len(coefficients), dtype=bool)

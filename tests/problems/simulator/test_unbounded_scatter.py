@@ -67,7 +67,7 @@ def test_what_polynomials_do_beyond_all_runs_does_not_enter_the_moments(
 def test_a_design_of_unbounded_deviation_is_right_or_refused():
     design = Design(-1.0, 1.0, deviation=NORMAL)
     settings = {"vectorised": True, "progress": False}
-    with pytest.raises(UntrustedSurrogate, match="error of the standard deviation|the mean"):
+    with pytest.raises(UntrustedSurrogate, match="error of the"):
         robust_problem(lambda x: np.tanh(3.0 * x), {"x": design}, budget=60, **settings)
     problem = robust_problem(lambda x: np.tanh(3.0 * x), {"x": design}, **settings)
     X = np.linspace(problem.xl, problem.xu, 21)
@@ -85,7 +85,7 @@ def test_rare_values_that_carry_the_scatter_are_in_it_or_refused():
     made_with = lambda x, a: x * np.exp(1.5 * a), Design(1.0, 2.0), "a", NORMAL
     with pytest.raises(UntrustedSurrogate, match="standard deviation"):
         made(*made_with, budget=60)
-    problem = made(*made_with, accuracy=0.05)
+    problem = made(*made_with, accuracy=0.04)
     mean = np.exp(1.125)
     std = mean * np.sqrt(np.exp(2.25) - 1.0)
     assert problem.evaluate(np.array([1.0])) == pytest.approx([mean, std], rel=0.01)
