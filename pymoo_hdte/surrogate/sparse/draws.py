@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.surrogate.sparse.axes import Axis
 
 OUTWARD = 0.2
-"""Exponent of 1 / (1 - z^2) in the density of the runs: ends of an input have neighbours on one side.
+"""Exponent of 1 / (1 - z^2) in the density of the runs: at an end, neighbours are on one side.
 
 0.5 suits polynomials of high degree in few variables, 0 those of low degree in many. Chosen among
 0, 0.2 and 0.4: piston needed more than 130, 98 and 122 runs, cantilever 88, 71 and 109, wing

@@ -50,7 +50,7 @@ class PolynomialFamilies:
         return [one(z)[1:] for one, z in zip(self._families, points.T, strict=True)]
 
     def to_chebyshev(self, axis: int) -> Array:
-        """Return the triangular matrix of shape (k + 1, k + 1): column j holds p_j in T_0 .. T_k."""
+        """Return the triangular matrix, shape (k + 1, k + 1), of p_j in T_0 .. T_k: column j."""
         size = self.degree + 1
         angles = (2 * np.arange(size) + 1) * np.pi / (2 * size)
         values = self._families[axis](np.cos(angles))

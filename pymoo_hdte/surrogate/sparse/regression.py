@@ -112,7 +112,7 @@ def _with_nugget(matrix: Array) -> Array:
 
 
 def _learnt(features: list[Array], standard: Array, start: Array) -> Array:
-    """Return the parameters of the largest marginal likelihood, each weighed by what is expected."""
+    """Return the most probable parameters: by the marginal likelihood and what is expected."""
     count = min(len(standard), MOST_LEARNT)
     features, standard = [one[:, :count] for one in features], standard[:count]
     bounds = [end for _ in features for end in ENDS]
