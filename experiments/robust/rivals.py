@@ -47,6 +47,13 @@ GRIDS = {
 }
 
 
+CHAOSPY_WAYS = (
+    *GRIDS,
+    *(f"collocation, norm {norm:g}" for norm in NORMS),
+    "least angle regression",
+)
+
+
 def budgets(most: int) -> list[int]:
     """Return the numbers of runs that are tried."""
     found = [FIRST_BUDGET]
@@ -115,13 +122,9 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
 
 def chaospy_traces(task: Task, most: int) -> dict[str, Iterator[Step]]:
     """Return each way of chaospy, as an iterator over runs and both errors."""
-    ways: dict[str, Iterator[Step]] = {
-        name: _projected(task, most, *rules) for name, rules in GRIDS.items()
-    }
-    for norm in NORMS:
-        ways[f"collocation, norm {norm:g}"] = _collocated(task, most, norm)
-    ways["least angle regression"] = _selected(task, most)
-    return ways
+    ways = [_projected(task, most, *rules) for rules in GRIDS.values()]
+    ways += [_collocated(task, most, norm) for norm in NORMS]
+    return dict(zip(CHAOSPY_WAYS, [*ways, _selected(task, most)], strict=True))
 
 
 def _law(task: Task) -> Any:
