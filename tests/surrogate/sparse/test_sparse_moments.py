@@ -95,6 +95,16 @@ def test_moments_of_polynomials_are_exact(weights, place):
     assert std[0, 0] == pytest.approx(np.sqrt(max(variance, 0.0)), rel=1e-7, abs=1e-7)
 
 
+def test_many_designs_at_once_have_the_moments_of_few():
+    given_ = inputs()
+    two = np.random.default_rng(5).normal(size=(2, len(SET)))
+    moments = SparseMoments(SparsePolynomial(SET, two), given_.axes)
+    X = np.random.default_rng(6).uniform([1.0, -1.0, 0.0], [2.0, 1.0, 3.0], (4200, 3))
+    few = [np.concatenate(parts) for parts in zip(*map(moments, np.split(X, 4)), strict=True)]
+    for many, expected in zip(moments(X), few, strict=True):
+        assert many == pytest.approx(expected, rel=1e-12)
+
+
 def smooth(r, s, t, n, o):
     return np.exp(0.3 * r * n) + np.sin(s + t) * o
 
