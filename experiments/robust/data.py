@@ -17,6 +17,8 @@ from experiments.runner.store import write_atomically
 NAME = "robust"
 STOPS = f"{NAME}_stops"
 SEEDS = (1, 2, 3)
+FURTHER = 3
+"""Others are tried up to so many times the runs that ours needs, and at most `BUDGET`."""
 QUICK_BUDGET = 60
 QUICK_FUNCTIONS = ("Ishigami", "kink")
 CURVE_COLUMNS = ("function", "method", "way", "runs", "error_at_designs", "error_overall")
@@ -61,9 +63,15 @@ class Outcome:
         ]
         return min((one for one in counts if one is not None), default=None)
 
-    def was_run(self, function: str, method: str) -> bool:
-        """Whether a method was run on a function."""
-        return any(key[:2] == (function, method) for key in self.curves)
+    def tried(self, function: str, method: str) -> int:
+        """Return the most runs that a method was given on a function; 0 if it was not run."""
+        runs = [
+            step[0]
+            for key, steps in self.curves.items()
+            if key[:2] == (function, method)
+            for step in steps
+        ]
+        return max(runs, default=0)
 
 
 def outcome_for(context: Context) -> Outcome:
@@ -74,12 +82,19 @@ def outcome_for(context: Context) -> Outcome:
     require("sklearn", "uq")
     names = [one.name for one in FUNCTIONS] if context.full else QUICK_FUNCTIONS
     budget, seeds = (BUDGET, SEEDS) if context.full else (QUICK_BUDGET, SEEDS[:1])
-    curves = [Curve(name, method, budget) for name in names for method in METHODS]
     stops = [Stop(name, seed, budget) for name in names for seed in seeds]
-    runs = context.campaign.run([*curves, *stops], "surrogates")
-    found = gathered(
-        dict(zip(curves, runs, strict=False)), dict(zip(stops, runs[len(curves) :], strict=True))
-    )
+    stopped = dict(zip(stops, context.campaign.run(stops, "our stops"), strict=True))
+    ours = [Curve(name, OURS, budget) for name in names]
+    curves = dict(zip(ours, context.campaign.run(ours, "our curves"), strict=True))
+    needed = gathered(curves, {}).needed
+    rivals = [
+        Curve(name, method, min(budget, FURTHER * (needed(name, OURS) or budget)))
+        for name in names
+        for method in METHODS
+        if method != OURS
+    ]
+    curves |= dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True))
+    found = gathered(curves, stopped)
     for name, text in ((NAME, curves_text(found)), (STOPS, stops_text(found))):
         write_atomically(context.out / NAME / f"{name}.csv", text.encode())
     return found
@@ -138,9 +153,11 @@ def read_outcome(curves: Path, stops: Path) -> Outcome:
 
 
 def ahead(outcome: Outcome, function: str) -> bool:
-    """Whether ours needs fewer runs than every rival; a rival above the budget needs more."""
+    """Whether ours needs fewer runs than every rival, and than those it was tried with in vain."""
     ours = outcome.needed(function, OURS)
-    if ours is None:
-        return False
-    rivals = [outcome.needed(function, method) for method in METHODS if method != OURS]
-    return all(one is None or ours < one for one in rivals)
+    rivals = [
+        outcome.needed(function, method) or outcome.tried(function, method)
+        for method in METHODS
+        if method != OURS
+    ]
+    return ours is not None and all(ours < one for one in rivals)

@@ -29,7 +29,7 @@ PROTOCOL = (
     "Two inputs of every function are designed: designs are the middle half of an input's range "
     "and deviate by a quarter of it, so that runs reach over the range of the source. A method "
     "needs the least number of runs from which the error of the standard deviation is below 1 % "
-    "at 95 % of 200 random designs, and stays so for a third more runs, up to 1000. The same "
+    "at 95 % of 200 random designs, and stays so for a third more runs, within 1000. The same "
     "draws of the scatter serve the function and all surrogates. OpenTURNS and chaospy expand in "
     "all inputs together, the designed ones spread evenly over their range; of chaospy, the best "
     "of five ways counts, of OpenTURNS the set with the least corrected leave-one-out error. "

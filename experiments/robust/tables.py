@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.robust.data import SEEDS, Outcome, ahead
+from experiments.robust.data import FURTHER, SEEDS, Outcome, ahead
 from experiments.robust.functions import BY_NAME
 from experiments.robust.job import BUDGET, METHODS, OURS
 from experiments.runner.result import Cell, Column, Finding, Table
@@ -30,24 +30,23 @@ def needed_table(outcome: Outcome) -> Table:
         "Least model runs for a deviation within 1 %",
         tuple(columns),
         tuple(rows),
-        note=f"Above {BUDGET} runs nothing was looked for. A dash: not run. Ways of chaospy: the "
-        "best. The curves end where the error at designs stays, so that runs for the error "
-        "overall are looked for up to there only.",
+        note=f"Others are tried up to {FURTHER} times the runs that ours needs, at most {BUDGET}; "
+        "of their ways, the best counts. Curves end where the error at designs stays, also those "
+        "for the error overall. A dash: not run.",
         findings=tuple(_needed_findings(outcome)),
     )
 
 
 def _count(outcome: Outcome, function: str, method: str, column: int) -> Cell:
-    if not outcome.was_run(function, method):
-        return None
-    return outcome.needed(function, method, column) or f"above {BUDGET}"
+    tried = outcome.tried(function, method)
+    return outcome.needed(function, method, column) or (f"above {tried}" if tried else None)
 
 
 def _needed_findings(outcome: Outcome) -> Iterator[Finding]:
     names = [
         name
         for name in outcome.functions()
-        if all(outcome.was_run(name, method) for method in METHODS)
+        if all(outcome.tried(name, method) for method in METHODS)
     ]
     won = [name for name in names if ahead(outcome, name)]
     kept_out = [name for name in names if not BY_NAME[name].tuned]

@@ -17,8 +17,9 @@ Indices = NDArray[np.int_]
 COVERAGE = 4.0
 """Expected errors within which 95 % of the designs lie.
 
-2 for a normal error at one design; those of many designs belong to one function and are large or
-small together.
+2 for a normal error at one design; those of many designs belong to one function, are large or small
+together, and larger towards corners. With 3, 91 % of 40 designs of the borehole with a scatter of
+5 % were covered. Chosen on that and the six functions that `experiments robust` names.
 """
 LEAST_SURPRISE = 0.3
 """Runs that are predicted better than expected make errors smaller by no more than this factor."""
