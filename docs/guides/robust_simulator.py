@@ -90,7 +90,7 @@ print("error of mean + 2 std below 6 % of the scatter:", bool(np.all(problem.acc
 # sets the runs that it takes beside those of other libraries.
 #
 # There are no runs beyond the quantiles of 1e-5 of an unbounded scatter. What lies there counts as
-# the surrogate goes on, if that is tame; otherwise it is left out. An estimate of what it adds, from
+# the surrogate goes on, if that is tame; otherwise it is left out. An estimate of what it adds, by
 # what the last runs before it add, is part of the error.
 
 stiffness, damping = np.meshgrid(np.linspace(20.0, 60.0, 61), np.linspace(200.0, 800.0, 61))

@@ -52,8 +52,8 @@ def robust_problem(
     """Return the robust design problem of a simulator.
 
     A sparse polynomial surrogate, the most probable one given the runs, gets more of them until
-    mean and standard deviation of every response are as accurate as asked for, twice in a row. Their
-    values and gradients then are exact for the surrogate, whatever the independent distributions.
+    mean and standard deviation of every response are as accurate as asked for, twice in a row.
+    These and their gradients are exact for the surrogate, whatever the independent distributions.
 
     The simulator is called within the support of a scatter, or between its quantiles of 1e-5 where
     that is unbounded. What lies beyond is estimated from what the last runs before it add to the

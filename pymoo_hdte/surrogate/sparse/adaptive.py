@@ -57,15 +57,15 @@ class AdaptiveFit:
     mean_error, std_error : ndarray, shape (r,)
         Estimated errors of mean and standard deviation as shares of the scatter.
     n_runs : int
-        Calls of the function, those at held-out points among them.
+        Calls of the function.
     smallest_scatter : ndarray, shape (r,)
         What a smaller scatter is judged as, in the responses' units.
     failed : ndarray, shape (k, d)
         Points in -1..1 at which the function failed.
     held_out_points : ndarray, shape (v, d)
-        Points not used.
+        Runs that did not fail.
     held_out_error : ndarray, shape (v, r)
-        Function minus surrogate there, as a share of the scatter.
+        Each of them minus what the others predict, as a share of the scatter.
     """
 
     polynomial: SparsePolynomial
@@ -198,7 +198,7 @@ def fit_adaptively(
     budget : int
         Most points at which the function is called.
     random_state : numpy.random.Generator
-        Places the points that are not used.
+        Places the runs, and the designs at which errors are judged.
     acceptable : callable
         A further condition to stop.
     at_once : int
