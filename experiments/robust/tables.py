@@ -56,7 +56,8 @@ def _needed_findings(outcome: Outcome) -> Iterator[Finding]:
         len(won) >= WANTED_AHEAD,
         f"Ours needs fewer runs than chaospy and OpenTURNS on {len(won)} of {len(names)} "
         f"functions ({WANTED_AHEAD} wanted), among them {len(set(won) & set(kept_out))} of "
-        f"{len(kept_out)} on which nothing was chosen; not on: {lost}; not run with all three: {others}.",
+        f"{len(kept_out)} on which nothing was chosen; not on: {lost}; "
+        f"not run with all three: {others}.",
         check=True,
     )
 
