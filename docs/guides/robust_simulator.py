@@ -82,15 +82,16 @@ print("error of mean + 2 std below 6 % of the scatter:", bool(np.all(problem.acc
 # The response, its surrogate, and the error
 # ------------------------------------------
 #
-# Degrees differ from variable to variable: the surrogate grew where that paid. Its accuracy is
-# measured at runs that it does not use, relative to the *scatter* around a design: a surrogate that
-# is good over the whole range can be wrong about the little that scatters. Two constants of the
-# growth and of this measure were chosen on six functions of the literature; on a seventh, a spill
-# in a channel, the stated error is some twenty times the true one.
+# The surrogate is the most probable polynomial given the runs: how much each variable matters, how
+# fast its degrees lose weight, and whether the response is even or odd in it, is learnt from them.
+# Its accuracy is what this leaves open about mean and deviation, scaled by how well each run is
+# predicted from all others, relative to the *scatter* around a design: a surrogate that is good
+# over the whole range can be wrong about the little that scatters. ``python -m experiments robust``
+# sets the runs that it takes beside those of other libraries.
 #
 # There are no runs beyond the quantiles of 1e-5 of an unbounded scatter. What lies there counts as
-# the surrogate goes on, if that is tame; otherwise it is left out, and an estimate of what it would
-# add is part of the error.
+# the surrogate goes on, if that is tame; otherwise it is left out. An estimate of what it adds, by
+# what the last runs before it add, is part of the error.
 
 stiffness, damping = np.meshgrid(np.linspace(20.0, 60.0, 61), np.linspace(200.0, 800.0, 61))
 inputs = {"stiffness": stiffness, "damping": damping, "mass": 20.0, "speed": 80.0}

@@ -251,6 +251,13 @@ EXPERIMENTS = (
         has_small_version=True,
     ),
     Experiment(
+        "robust",
+        "robust.experiment",
+        "Model runs of a robust surrogate, beside chaospy and OpenTURNS",
+        reads_outcome=True,
+        has_small_version=True,
+    ),
+    Experiment(
         "reliability",
         "reliability.experiment",
         "Ten thousand wrong inputs, kills at any moment, full disks, memory",

@@ -19,7 +19,7 @@ from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sensitivity import SobolIndices
 from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
-from pymoo_hdte.surrogate.sparse.held_out import draw_designs
+from pymoo_hdte.surrogate.sparse.draws import draw_designs
 
 Array = NDArray[np.float64]
 

@@ -30,7 +30,7 @@ from pymoo_hdte.problems.simulator.trust import (
     negative_somewhere,
     positive_places,
 )
-from pymoo_hdte.surrogate.sparse.adaptive import HELD_OUT_DESIGNS, AdaptiveFit, fit_adaptively
+from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, first_runs, fit_adaptively
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
 Array = NDArray[np.float64]
@@ -58,15 +58,15 @@ def robust_problem(
 ) -> SimulatorProblem:
     """Return the robust design problem of a simulator.
 
-    A sparse polynomial surrogate grows, run by run, until mean and standard deviation of every
-    response are as accurate as asked for at points that it does not use. Their values and gradients
-    then are exact for the surrogate, whatever the independent distributions.
+    A sparse polynomial surrogate, the most probable one given the runs, gets more of them until
+    mean and standard deviation of every response are as accurate as asked for, twice in a row.
+    These and their gradients are exact for the surrogate, whatever the independent distributions.
 
     The simulator is called within the support of a scatter, or between its quantiles of 1e-5 where
-    that is unbounded. What lies beyond counts as the surrogate goes on there, if that changes mean
-    and deviation by no more than ``accuracy``. If by more, then what the values at these ends would
-    change is added to the error; and if by more than four times that, the surrogate runs away: what
-    lies beyond is left out, and four times that is added.
+    that is unbounded. What lies beyond is estimated from what the last runs before it add to the
+    variance, and half of that is added to the error, unless the response is a polynomial of low
+    degree. If the surrogate adds more than four times the estimate there, it runs away: what lies
+    beyond is left out, and four times the estimate is added.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def robust_problem(
         first is made again, to see whether the file is this simulator's, where the study that wrote
         it came to its end, or the simulator's source or state are others or cannot be told.
     seed : int
-        Of the points not used.
+        Of where the runs are.
     progress : bool
         Whether to tell runs and memory on the error stream before the first run, and show a bar.
 
@@ -162,7 +162,7 @@ def robust_problem(
 
 def least_runs(inputs: Inputs) -> int:
     """Return the number of runs below which no surrogate is made."""
-    return 2 * HELD_OUT_DESIGNS + 1 + len(inputs.axes)
+    return first_runs(len(inputs.axes))
 
 
 def _refuse_untrusted(

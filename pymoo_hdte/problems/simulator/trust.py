@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems.simulator.inputs import Inputs
 from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
-from pymoo_hdte.surrogate.sparse.held_out import HeldOut
+from pymoo_hdte.surrogate.sparse.draws import draw_around, draw_designs
 from pymoo_hdte.surrogate.trust import region_of
 
 Array = NDArray[np.float64]
@@ -71,7 +71,10 @@ def negative_somewhere(inputs: Inputs, fit: AdaptiveFit, places: list[int]) -> R
     """Return why and where a positive response becomes negative, or None."""
     if not places:
         return None
-    points = HeldOut.draw(inputs.axes, _LOOKED_AT, np.random.default_rng(0)).points
+    random_state = np.random.default_rng(0)
+    designs = draw_designs(inputs.axes, _LOOKED_AT, random_state)
+    draws, _ = draw_around(inputs.axes, designs, 2, random_state)
+    points = draws.reshape(-1, len(inputs.axes))
     values = fit.polynomial(points)[:, places]
     if values.min() >= 0.0:
         return None

@@ -9,38 +9,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate.sparse.axes import Axis
-from pymoo_hdte.surrogate.sparse.held_out import HeldOut, draw_designs
-from pymoo_hdte.surrogate.sparse.influence import Influence, expected_sizes
-from pymoo_hdte.surrogate.sparse.interpolation import GrowingInterpolation
+from pymoo_hdte.surrogate.sparse.draws import (
+    SpreadPoints,
+    draw_around,
+    draw_designs,
+    nearest_designs,
+    relevance,
+)
+from pymoo_hdte.surrogate.sparse.kernel import PolynomialFamilies
 from pymoo_hdte.surrogate.sparse.moments import SparseMoments
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
+from pymoo_hdte.surrogate.sparse.response import LOST, Judged, ResponseFit, fitted
+from pymoo_hdte.surrogate.sparse.tails import beyond_all_runs
+from pymoo_hdte.surrogate.sparse.terms import closed
 
 Array = NDArray[np.float64]
 
-HELD_OUT_DESIGNS = 16
-"""Designs with two points each at which the error is measured."""
-HELD_OUT_SHARE = 0.2
-"""Share of the runs at which that number is doubled; set by hand."""
+FIRST_RUNS = 12
+"""Runs before the first judgement, one more for each input; set by hand."""
+BATCH = 0.12
+"""Share of the runs that is added before all is judged anew; set by hand."""
+IN_A_ROW = 2
+"""Judgements that have to pass one after the other; with few runs one may pass by chance."""
 JUDGED_DESIGNS = 32
-"""Designs at which the size of a surplus is judged."""
+JUDGED_DRAWS = 128
+"""Designs, and draws of the scatter at each, at which errors are judged."""
+DEGREES = (6, 40)
+"""Least and largest degree in one variable; between them a third of the runs."""
+LARGEST_ACCURACY = 0.01
+"""Accuracy asked for above which no more terms are left out."""
 SMALLEST_SCATTER = 0.1
 """Scatter below this share of its median over the designs is judged as if it were that; by hand."""
 SCATTER_OF_RANGE = 1e-4
 """The same, as a share of the response's deviation over all points."""
-TAIL_GROWTH = 4.0
-"""How many times what it adds at its end values the scatter beyond all runs may add; by hand.
-
-An unbounded scatter has no runs beyond its quantiles of 1e-5. Moved to these, that part adds about
-as much to mean and deviation as it does for a linear response, and a third of it for exp(1.5 a) of
-a standard normal a. A polynomial of degree 18 adds some thousand times as much: it runs away there.
-"""
-FAR_ERROR = 1e6
-"""How many times its error inside a polynomial may be off beyond all runs; by hand.
-
-An exact one, with an error of rounding, is exact there as well.
-"""
-BATCH = 0.04
-"""Share of the set that is added at once, before all sizes are judged anew; set by hand."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +57,15 @@ class AdaptiveFit:
     mean_error, std_error : ndarray, shape (r,)
         Estimated errors of mean and standard deviation as shares of the scatter.
     n_runs : int
-        Calls of the function, those at held-out points among them.
+        Calls of the function.
     smallest_scatter : ndarray, shape (r,)
         What a smaller scatter is judged as, in the responses' units.
     failed : ndarray, shape (k, d)
         Points in -1..1 at which the function failed.
     held_out_points : ndarray, shape (v, d)
-        Points not used.
+        Runs that did not fail.
     held_out_error : ndarray, shape (v, r)
-        Function minus surrogate there, as a share of the scatter.
+        Each of them minus what the others predict, as a share of the scatter.
     """
 
     polynomial: SparsePolynomial
@@ -84,56 +85,64 @@ class AdaptiveFit:
 
 
 class _Growth:
-    """The state between two batches."""
+    """The runs so far."""
 
     def __init__(
         self,
         axes: list[Axis],
         function: Callable[[Array], Array],
+        accuracy: float,
         random_state: np.random.Generator,
     ) -> None:
-        self.axes, self.function, self.random_state = axes, function, random_state
-        self.grown = GrowingInterpolation(axes)
-        self.held_out = HeldOut.draw(axes, HELD_OUT_DESIGNS, random_state)
-        self.influence = Influence(axes, draw_designs(axes, JUDGED_DESIGNS, random_state))
-        self.failed: list[Array] = []
-        self.n_runs = 0
-        self.truth = self.run(self.held_out.points)
+        self.axes, self.function = axes, function
+        self.lost = LOST * min(accuracy, LARGEST_ACCURACY)
+        self.spread = SpreadPoints(axes, random_state)
+        self.designs = draw_designs(axes, JUDGED_DESIGNS, random_state)
+        self.draws = draw_around(axes, self.designs, JUDGED_DRAWS, random_state)
+        self.points, self.truth = np.empty((0, len(axes))), np.empty((0, 0))
+        self.parameters: list[Array] = []
 
-    def run(self, points: Array) -> Array:
-        """Return the function's values, NaN in every response where it failed in one."""
+    @property
+    def n_runs(self) -> int:
+        """Calls of the function."""
+        return len(self.points)
+
+    def run(self, count: int) -> None:
+        """Run the function at the next points; where one response fails all count as failed."""
+        points = self.spread.next(count)
         values = np.array(self.function(points), dtype=float)
-        self.n_runs += len(points)
-        bad = ~np.isfinite(values).all(axis=1)
-        values[bad] = np.nan
-        self.failed += list(points[bad])
-        return values
-
-    def grow(self, wanted: list[tuple[int, ...]]) -> None:
-        """Run the function for these indices and add them."""
-        values = self.run(np.array([self.grown.point(index) for index in wanted]))
-        for index, row in zip(wanted, values, strict=True):
-            self.grown.add(index, row)
+        values[~np.isfinite(values).all(axis=1)] = np.nan
+        self.points = np.concatenate([self.points, points])
+        self.truth = np.concatenate([self.truth.reshape(-1, values.shape[1]), values])
 
     def judge(self) -> AdaptiveFit:
-        """Measure the surrogate as it stands."""
-        self.grown.complete()
-        polynomial = self.grown.polynomial()
+        """Fit the surrogate to the runs, and measure it."""
+        good = np.isfinite(self.truth).all(axis=1)
+        points, truth = self.points[good], self.truth[good]
+        families = PolynomialFamilies(self.axes, int(np.clip(len(points) // 3, *DEGREES)))
+        features, judged = families(points), Judged.at(*self.draws, families)
+        weights = relevance(self.axes, points)
+        starts: list[Array | None] = [*self.parameters] or [None] * truth.shape[1]
+        fits = [
+            fitted(families, features, values, weights, judged, self.lost, start)
+            for values, start in zip(truth.T, starts, strict=True)
+        ]
+        self.parameters = [one.regression.parameters for one in fits]
+        polynomial = _joined(fits, families)
         # Where there are no runs the polynomial runs away: its error would hide behind a scatter
         # that is not there.
         moments = SparseMoments(polynomial, self.axes, [axis.cut for axis in self.axes])
-        _, judged = moments(self.influence.designs)
-        spread = np.nanstd(self.truth, axis=0)
-        least = np.maximum(SMALLEST_SCATTER * np.median(judged, axis=0), SCATTER_OF_RANGE * spread)
-        least = np.where(least > 0.0, least, np.finfo(float).tiny ** 0.25)
-        self.scale = np.maximum(judged, least)
-        mean, std = moments(self.held_out.designs)
-        found = polynomial(self.held_out.points)
-        scale = np.maximum(std, least)
-        left = self.truth - found
-        of_mean, of_std, self.unexplained = self.held_out.errors(
-            left, found - np.tile(mean, (2, 1)), scale
+        _, judged_std = moments(self.designs)
+        spread = np.std(truth, axis=0)
+        least = np.maximum(
+            SMALLEST_SCATTER * np.median(judged_std, axis=0), SCATTER_OF_RANGE * spread
         )
+        least = np.where(least > 0.0, least, np.finfo(float).tiny ** 0.25)
+        self.scale = np.maximum(judged_std, least)
+        errors = [one.errors(judged, size) for one, size in zip(fits, least.tolist(), strict=True)]
+        of_mean, of_std = np.sqrt(np.mean(np.square(errors), axis=2)).T
+        _, std = moments(nearest_designs(self.axes, points))
+        left_out = np.column_stack([one.left_out for one in fits])
         return AdaptiveFit(
             polynomial,
             moments,
@@ -141,53 +150,31 @@ class _Growth:
             of_std,
             self.n_runs,
             least,
-            np.array(self.failed).reshape(-1, len(self.axes)),
-            self.held_out.points,
-            left / np.tile(scale, (2, 1)),
+            self.points[~good],
+            points,
+            left_out / np.maximum(std, least),
         )
 
-    def with_tails(self, fit: AdaptiveFit, accuracy: float) -> AdaptiveFit:
+    def with_tails(self, fit: AdaptiveFit) -> AdaptiveFit:
         """Return the fit with the scatter beyond all runs, or with the error of leaving it out."""
-        if all(len(axis.cut.nodes) == len(axis.measure.nodes) for axis in self.axes):
+        if not any(axis.is_unbounded for axis in self.axes):
             return fit
-        whole = SparseMoments(fit.polynomial, self.axes)
-        ended = SparseMoments(fit.polynomial, self.axes, [axis.ended for axis in self.axes])
-        without, added, at_ends = (
-            np.array(one(self.influence.designs)) for one in (fit.moments, whole, ended)
+        moments, (of_mean, of_std) = beyond_all_runs(
+            fit.polynomial, self.axes, self.designs, self.scale, fit.largest_error
         )
-        beyond, at_ends = (
-            np.abs(added - without) / self.scale,
-            np.abs(at_ends - without) / self.scale,
-        )
-        if np.all(beyond <= accuracy):
-            return replace(fit, moments=whole)
-        moments, doubt = fit.moments, TAIL_GROWTH * at_ends.max(axis=1)
-        if np.all(beyond <= np.maximum(accuracy, TAIL_GROWTH * at_ends)):
-            inside = np.array([fit.mean_error, fit.std_error])
-            moments, doubt = whole, np.minimum(at_ends.max(axis=1), FAR_ERROR * inside)
-        of_mean, of_std = fit.mean_error + doubt[0], fit.std_error + doubt[1]
+        of_mean, of_std = fit.mean_error + of_mean, fit.std_error + of_std
         return replace(fit, moments=moments, mean_error=of_mean, std_error=of_std)
 
-    def hold_out_more(self, budget: int) -> None:
-        """Keep the points not used in step with the set: more of them tell errors better."""
-        wanted = min(HELD_OUT_SHARE * self.n_runs, budget - self.n_runs) / 2.0
-        count = int(wanted) - len(self.held_out.designs)
-        if count < len(self.held_out.designs):
-            return
-        more = HeldOut.draw(self.axes, count, self.random_state)
-        truth = self.run(more.points)
-        half, new = len(self.held_out.designs), len(more.designs)
-        self.truth = np.concatenate(
-            [self.truth[:half], truth[:new], self.truth[half:], truth[new:]]
-        )
-        self.held_out = self.held_out.joined(more)
 
-    def next_indices(self, most: int) -> list[tuple[int, ...]]:
-        """Return the candidates that are expected to matter most."""
-        candidates = self.grown.candidates()
-        sizes = self.influence.sizes(self.grown.indices, self.grown.surpluses, self.scale)
-        guesses = expected_sizes(self.grown, sizes, candidates, self.unexplained)
-        return [candidates[row] for row in np.argsort(-guesses, kind="stable")[:most]]
+def _joined(fits: list[ResponseFit], families: PolynomialFamilies) -> SparsePolynomial:
+    """Return all responses on the union of their terms."""
+    indices = closed(np.concatenate([one.indices for one in fits]))
+    places = {tuple(row): place for place, row in enumerate(indices.tolist())}
+    coefficients = np.zeros((len(fits), len(indices)))
+    for row, one in zip(coefficients, fits, strict=True):
+        row[[places[tuple(index)] for index in one.indices.tolist()]] = one.coefficients
+    matrices = [families.to_chebyshev(axis) for axis in range(indices.shape[1])]
+    return SparsePolynomial.from_triangular(indices, coefficients, matrices)
 
 
 def fit_adaptively(
@@ -211,7 +198,7 @@ def fit_adaptively(
     budget : int
         Most points at which the function is called.
     random_state : numpy.random.Generator
-        Places the points that are not used.
+        Places the runs, and the designs at which errors are judged.
     acceptable : callable
         A further condition to stop.
     at_once : int
@@ -222,18 +209,22 @@ def fit_adaptively(
     AdaptiveFit
         Of the accuracy asked for unless the budget is spent.
     """
-    growth = _Growth(axes, function, random_state)
-    growth.grow(growth.grown.candidates())
-    growth.grow(growth.grown.candidates())
+    growth = _Growth(axes, function, accuracy, random_state)
+    growth.run(min(first_runs(len(axes)), budget))
+    passed = 0
     while True:
         fit = growth.judge()
         if fit.largest_error <= accuracy:
-            fit = growth.with_tails(fit, accuracy)
-            if fit.largest_error <= accuracy and acceptable(fit):
-                return fit
-        growth.hold_out_more(budget)
-        batch = max(at_once, int(BATCH * len(growth.grown.members)))
-        wanted = growth.next_indices(min(batch, budget - growth.n_runs))
-        if not wanted:
+            fit = growth.with_tails(fit)
+        passed = passed + 1 if fit.largest_error <= accuracy and acceptable(fit) else 0
+        if passed == IN_A_ROW:
             return fit
-        growth.grow(wanted)
+        count = min(max(at_once, int(BATCH * growth.n_runs)), budget - growth.n_runs)
+        if count <= 0:
+            return fit
+        growth.run(count)
+
+
+def first_runs(inputs: int) -> int:
+    """Return the number of runs before which a surrogate of so many inputs is not judged."""
+    return FIRST_RUNS + inputs

@@ -33,6 +33,7 @@ class AxisMap:
 
     def __init__(self, indices: Indices, axis: int, rows: int) -> None:
         count, columns = len(indices), int(indices[:, axis].max()) + 1
+        self._count = count
         others = np.delete(indices, axis, axis=1)
         _, fibre = np.unique(others, axis=0, return_inverse=True)
         fibre = fibre.reshape(-1)
@@ -64,6 +65,23 @@ class AxisMap:
         """
         blocks = _gather(coefficients, self._source) @ np.swapaxes(matrix, 1, 2)[:, None]
         return _scatter(blocks, self._target, len(self.result))
+
+    def pairs(self) -> Indices:
+        """Return what a triangular matrix takes where, shape (k, 4), by rising target.
+
+        Target and source among the coefficients, row and column in the matrix.
+        """
+        found = []
+        for source, target in zip(self._source, self._target, strict=True):
+            inside = np.flatnonzero(source < self._count)
+            for row in np.flatnonzero(target < len(self.result)).tolist():
+                above = inside[inside >= row]
+                rows = np.full(len(above), row)
+                found.append(
+                    np.column_stack([np.full(len(above), target[row]), source[above], rows, above])
+                )
+        together = np.concatenate(found)
+        return together[np.argsort(together[:, 0], kind="stable")]
 
     def backward(self, weights: Array, matrix: Array, count: int) -> Array:
         """Return the gradient before the map of what has the gradient ``weights`` after it.

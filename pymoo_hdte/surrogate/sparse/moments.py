@@ -9,6 +9,7 @@ and nothing large is subtracted.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder
@@ -16,12 +17,15 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
+from pymoo_hdte.surrogate.sparse.many_designs import ManyDesigns
 from pymoo_hdte.surrogate.sparse.measures import Measure, OrthonormalPolynomials
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
 
 Array = NDArray[np.float64]
 
+_MANY = 4096
+"""Designs from which on machine code pays, which is made at its first use."""
 _AT_ONCE = 2**18
 """Numbers in one array: more exceed the processor's cache, fewer cost numpy overhead."""
 
@@ -81,8 +85,20 @@ class SparseMoments:
 
     def __call__(self, designs: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (n, r) each, in the responses' units."""
+        if len(designs) >= _MANY:
+            around = [
+                self.axes[j].around(column)[:2]
+                for j, column in zip(self.designed, designs.T, strict=True)
+            ]
+            offsets, factors = np.moveaxis(np.array(around), 1, 0)
+            return self._many(offsets, factors)
         expansion = self.expansion(designs)
         return expansion[..., 0], deviation(expansion)
+
+    @cached_property
+    def _many(self) -> ManyDesigns:
+        families = [self.orthonormal[j] for j in self.designed]
+        return ManyDesigns(self._coefficients[0], self._steps, families)
 
     def pulled_back(self, designs: Array, weights: Array) -> Array:
         """Return the gradient in the design of sums over the expansion, shape (n, r, m).

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
-from pymoo_hdte.surrogate.sparse.leja import hierarchical_to_chebyshev
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
 
 _AT_ONCE = 2**20
@@ -31,29 +30,28 @@ class SparsePolynomial:
             array.flags.writeable = False
 
     @classmethod
-    def from_hierarchical(
+    def from_triangular(
         cls,
         indices: NDArray[np.int_],
-        surpluses: NDArray[np.float64],
-        points: list[NDArray[np.float64]],
+        coefficients: NDArray[np.float64],
+        matrices: list[NDArray[np.float64]],
     ) -> SparsePolynomial:
-        """Return the polynomial with these coefficients in the hierarchical basis of the points.
+        """Return the polynomial with these coefficients in another basis that keeps degrees.
 
         Parameters
         ----------
         indices : ndarray of int, shape (p, d)
             A downward-closed set.
-        surpluses : ndarray, shape (r, p)
-        points : list of ndarray
-            The nested points of each variable.
+        coefficients : ndarray, shape (r, p)
+        matrices : list of ndarray
+            Of every variable: column j holds the polynomial of degree j in T_0, T_1, ..
         """
-        coefficients = surpluses[None]
-        for axis, nested in enumerate(points):
+        changed = coefficients[None]
+        for axis, matrix in enumerate(matrices):
             columns = int(indices[:, axis].max()) + 1
             step = AxisMap(indices, axis, columns)
-            matrix = hierarchical_to_chebyshev(nested[:columns])
-            coefficients = step.forward(coefficients, matrix[None])
-        return cls(indices, coefficients[0])
+            changed = step.forward(changed, matrix[None, :columns, :columns])
+        return cls(indices, changed[0])
 
     @property
     def degrees(self) -> tuple[int, ...]:

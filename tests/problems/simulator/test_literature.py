@@ -1,7 +1,7 @@
 """Functions of the literature of uncertainty: moments against closed forms and large samples.
 
-`COVERAGE` and `INWARD`, two constants of the growth, were chosen on cantilever, OTL circuit,
-borehole, wing weight, Ishigami's function and piston; the spill was not among them.
+Constants of the growth were chosen on cantilever, OTL circuit, borehole, wing weight, Ishigami's
+function and piston; the spill was not among them.
 """
 
 import chaospy
@@ -117,12 +117,9 @@ def spill(s, t, M, D, L, tau):
 
 @pytest.mark.nightly
 def test_a_spill_on_which_nothing_was_chosen():
-    """It shows an estimate that is too large: 10 % after 1108 runs, where the true error is 0.4 %.
-
-    With an accuracy of 1 % it is refused after 1000 runs.
-    """
+    """The stated error is some three times the true one, as elsewhere."""
     designs = {"s": Design(1.0, 2.0, deviation=0.05), "t": Design(45.0, 60.0, deviation=0.5)}
-    settings = {"accuracy": 0.1, "budget": 1500, "vectorised": True, "progress": False}
+    settings = {"accuracy": 0.01, "budget": 1000, "vectorised": True, "progress": False}
     problem = robust_problem(spill, designs, SPILL, **settings)
     shares = qmc.Sobol(6, rng=1).random(2**14).T
     noise = {
@@ -135,3 +132,5 @@ def test_a_spill_on_which_nothing_was_chosen():
     error = np.abs(problem.evaluate(X) - truth)
     assert np.all(np.mean(error <= problem.band(X) + 1e-3 * truth[:, 1:], axis=0) >= 0.95)
     assert np.all(error < 0.01 * truth[:, 1:])
+    stated = np.median(problem.band(X) / truth[:, 1:], axis=0)
+    assert np.all(stated < 6.0 * np.quantile(error / truth[:, 1:], 0.95, axis=0))

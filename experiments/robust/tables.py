@@ -1,0 +1,132 @@
+"""Tables of the runs needed, and of where ours stops and what its band covers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from experiments.robust.data import FURTHER, SEEDS, Outcome, ahead
+from experiments.robust.functions import BY_NAME
+from experiments.robust.job import BUDGET, METHODS, OURS
+from experiments.runner.result import Cell, Column, Finding, Table
+
+WANTED_AHEAD = 8
+WANTED_COVERED = 0.95
+
+
+def needed_table(outcome: Outcome) -> Table:
+    """Say how many runs every method needs on every function."""
+    columns = [Column("function"), Column("inputs"), Column("chosen on")]
+    columns += [Column(name, group="error at designs") for name in METHODS]
+    columns += [Column(name, group="error overall") for name in METHODS]
+    rows: list[tuple[Cell, ...]] = []
+    for name in outcome.functions():
+        function = BY_NAME[name]
+        counts = [_count(outcome, name, method, column) for column in (1, 2) for method in METHODS]
+        rows.append((name, len(function.laws), "yes" if function.tuned else "no", *counts))
+    return Table(
+        "needed",
+        "Least model runs for a deviation within 1 %",
+        tuple(columns),
+        tuple(rows),
+        note=f"Others are tried up to {FURTHER} times the runs that ours needs, at most {BUDGET}; "
+        "of their ways, the best counts. Curves end where the error at designs stays, also those "
+        "for the error overall. A dash: not run.",
+        findings=tuple(_needed_findings(outcome)),
+    )
+
+
+def _count(outcome: Outcome, function: str, method: str, column: int) -> Cell:
+    tried = outcome.tried(function, method)
+    return outcome.needed(function, method, column) or (f"above {tried}" if tried else None)
+
+
+def _needed_findings(outcome: Outcome) -> Iterator[Finding]:
+    names = [
+        name
+        for name in outcome.functions()
+        if all(outcome.tried(name, method) for method in METHODS)
+    ]
+    won = [name for name in names if ahead(outcome, name)]
+    kept_out = [name for name in names if not BY_NAME[name].tuned]
+    lost = ", ".join(name for name in names if name not in won) or "none"
+    others = ", ".join(name for name in outcome.functions() if name not in names) or "none"
+    yield Finding(
+        len(won) >= WANTED_AHEAD,
+        f"Ours needs fewer runs than chaospy and OpenTURNS on {len(won)} of {len(names)} "
+        f"functions ({WANTED_AHEAD} wanted), among them {len(set(won) & set(kept_out))} of "
+        f"{len(kept_out)} on which nothing was chosen; not on: {lost}; "
+        f"not run with all three: {others}.",
+        check=True,
+    )
+
+
+def stops_table(outcome: Outcome) -> Table:
+    """Say where ours stops by itself, with the worst of the seeds."""
+    rows: list[tuple[Cell, ...]] = []
+    for name in outcome.functions():
+        found = [outcome.stops[name, seed] for seed in SEEDS if (name, seed) in outcome.stops]
+        if not found:
+            continue
+        stopped = [one["runs"] for one in found if np.isfinite(one["runs"])]
+        rows.append(
+            (
+                name,
+                len(found),
+                int(np.median(stopped)) if stopped else None,
+                len(found) - len(stopped),
+                *(100.0 * max(one[key] for one in found) for key in _ERRORS),
+                *(100.0 * min(one[key] for one in found) for key in _COVERED),
+            )
+        )
+    columns = (
+        Column("function"),
+        Column("seeds"),
+        Column("runs where it stops, median"),
+        Column("refused"),
+        *(Column(one, "%", 2, group) for group in ("true error", "stated") for one in _MOMENTS),
+        *(Column(one, "%", 3, "designs that the band covers") for one in _MOMENTS),
+    )
+    return Table(
+        "stops",
+        "Where ours stops when asked for 1 %, and its band at 200 designs",
+        columns,
+        tuple(rows),
+        note="Errors as shares of the scatter: true ones of 95 % of the designs, stated ones the "
+        "median band; the worst seed. Refused: not within 1000 runs.",
+        findings=tuple(_cover_findings(outcome)),
+    )
+
+
+_MOMENTS = ("mean", "deviation")
+_COVERED = ("covered_mean", "covered_std")
+_ERRORS = ("true_mean_error", "true_std_error", "stated_mean_error", "stated_std_error")
+
+
+def _cover_findings(outcome: Outcome) -> Iterator[Finding]:
+    worst = {key: min(numbers[one] for one in _COVERED) for key, numbers in outcome.stops.items()}
+    if not worst:
+        return
+    (name, seed), least = min(worst.items(), key=lambda item: item[1])
+    yield Finding(
+        least >= WANTED_COVERED,
+        f"The stated band of {OURS} covers mean and deviation at {100.0 * least:.3g} % of 200 "
+        f"designs or more, on all {len(worst)} functions and seeds (least: {name}, seed {seed}); "
+        f"{100.0 * WANTED_COVERED:g} % wanted.",
+        check=True,
+    )
+
+
+def curves_table(outcome: Outcome) -> Table:
+    """Give the points of all curves."""
+    rows = tuple((*key, *step) for key, steps in outcome.curves.items() for step in steps)
+    columns = (
+        Column("function"),
+        Column("method"),
+        Column("way"),
+        Column("runs"),
+        Column("at designs", "", 3, "error of the deviation"),
+        Column("overall", "", 3, "error of the deviation"),
+    )
+    return Table("curves", "Errors over runs", columns, rows, folded=True)

@@ -1,0 +1,80 @@
+"""Functions, true moments and the stored outcome of `experiments robust`."""
+
+import numpy as np
+import pytest
+
+from experiments.robust.data import (
+    Outcome,
+    ahead,
+    curves_text,
+    outcome_for,
+    read_outcome,
+    stops_text,
+)
+from experiments.robust.experiment import run
+from experiments.robust.functions import FUNCTIONS, G_WEIGHTS
+from experiments.robust.job import CHAOSPY, OPENTURNS, OURS
+from experiments.robust.ours import trace
+from experiments.robust.rivals import CHAOSPY_WAYS, chaospy_traces, runs_needed, until_it_stays
+from experiments.robust.task import Task
+from experiments.runner.campaign import Campaign
+from experiments.runner.registry import Context
+
+
+@pytest.mark.parametrize("name", [one.name for one in FUNCTIONS])
+def test_a_task_has_finite_values_over_its_whole_reach(name):
+    task = Task(name)
+    points = np.vstack([task.inputs.values(np.full((1, len(task.names)), z)) for z in (-1, 0, 1)])
+    assert np.isfinite(task(points)).all()
+    assert 2 <= len(task.names) <= 20
+    assert len(task.function.designed) == 2
+
+
+def test_sampled_moments_are_those_of_closed_forms():
+    task = Task("G-function")
+    mean, std = task.true_moments
+    a = np.array(G_WEIGHTS)
+    x = task.X[:, :2, None] + np.linspace(-0.25, 0.25, 20_001)
+    designed = (np.abs(4.0 * x - 2.0) + a[:2, None]) / (1.0 + a[:2, None])
+    others = 1.0 + 1.0 / (3.0 * (1.0 + a[2:]) ** 2)
+    expected = designed.mean(axis=2).prod(axis=1)
+    square = (designed**2).mean(axis=2).prod(axis=1) * others.prod()
+    assert mean == pytest.approx(expected, rel=1e-3)
+    assert std == pytest.approx(np.sqrt(square - expected**2), rel=2e-3)
+
+
+def test_what_is_needed_is_where_the_error_stays():
+    steps = [(10, 0.5, 0.1), (20, 0.005, 0.1), (30, 0.02, 0.005), (40, 0.009, 0.005)]
+    steps += [(60, 0.008, 0.001), (80, 0.5, 0.5)]
+    assert runs_needed(until_it_stays(iter(steps), 0.01), 0.01) == 40
+    assert runs_needed(steps, 0.01) is None
+    assert runs_needed(steps[:-1], 0.01, column=2) == 30
+    rivals = {("kink", method, "way"): steps[:-1] for method in (CHAOSPY, OPENTURNS)}
+    tried = {("kink", method, "way"): steps[:1] for method in (CHAOSPY, OPENTURNS)}
+    assert not ahead(Outcome(tried | {("kink", OURS, OURS): [(39, 0.001, 0.001)]}, {}), "kink")
+    assert not ahead(Outcome(rivals, {}), "kink")
+    assert ahead(Outcome(rivals | {("kink", OURS, OURS): [(39, 0.001, 0.001)]}, {}), "kink")
+
+
+def test_both_libraries_are_run_on_the_same_task():
+    pytest.importorskip("sklearn")
+    task = Task("kink")
+    for name, steps in chaospy_traces(task, 12).items():
+        assert name in CHAOSPY_WAYS
+        assert all(np.isfinite(step).all() for step in steps)
+    (first, *_) = trace(task, 20, 0.01)
+    assert first[0] == 14
+
+
+def test_the_stored_outcome_gives_the_report(tmp_path):
+    context = Context(1, tmp_path, Campaign(tmp_path))
+    outcome = outcome_for(context)
+    for name, text in (("a", curves_text(outcome)), ("b", stops_text(outcome))):
+        (tmp_path / name).write_text(text)
+    again = read_outcome(tmp_path / "a", tmp_path / "b")
+    assert again.curves == outcome.curves
+    assert list(again.stops) == list(outcome.stops)
+    needed, stops, _ = run(context).tables
+    assert [row[0] for row in needed.rows] == [one.name for one in FUNCTIONS]
+    assert {row[0] for row in stops.rows} <= {row[0] for row in needed.rows}
+    assert all(finding.sentence for table in (needed, stops) for finding in table.findings)

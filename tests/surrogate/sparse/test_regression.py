@@ -1,0 +1,88 @@
+"""The most probable polynomial: its prior, its likelihood, runs left out, terms, few exact ones."""
+
+import chaospy
+import numpy as np
+import pytest
+
+from pymoo_hdte.problems import Design
+from pymoo_hdte.problems.simulator.inputs import Inputs
+from pymoo_hdte.surrogate.sparse import regression as module
+from pymoo_hdte.surrogate.sparse.adaptive import fit_adaptively
+from pymoo_hdte.surrogate.sparse.draws import SpreadPoints, draw_around, draw_designs
+from pymoo_hdte.surrogate.sparse.kernel import PolynomialFamilies, covariance, variances
+from pymoo_hdte.surrogate.sparse.regression import Regression
+from pymoo_hdte.surrogate.sparse.terms import closed, likely_terms, products
+
+INPUTS = Inputs(
+    {"x": Design(0.5, 1.0, deviation=0.1)},
+    {"a": chaospy.Uniform(0.0, 1.0), "b": chaospy.Normal(0.0, 1.0)},
+)
+FAMILIES = PolynomialFamilies(INPUTS.axes, 6)
+
+
+def runs(count):
+    points = SpreadPoints(INPUTS.axes, np.random.default_rng(1)).next(count)
+    x, a, b = INPUTS.values(points).T
+    return points, np.exp(x * a) + 0.1 * np.sin(b) * a
+
+
+def test_the_covariance_of_two_points_is_the_sum_over_all_terms():
+    points, _ = runs(5)
+    features = FAMILIES(points)
+    variance, _ = variances(np.random.default_rng(2).normal(size=(3, 3)), 6)
+    every = np.array(list(np.ndindex(7, 7, 7)))
+    whole = np.column_stack([np.ones(3), variance])
+    prior = np.prod(whole[np.arange(3), every], axis=1)
+    terms = products(features, every)
+    assert covariance(features, features, variance) == pytest.approx((terms * prior) @ terms.T)
+    chosen = likely_terms(variance, 60)
+    assert len(chosen) <= 60
+    assert np.array_equal(closed(chosen), np.array(sorted(map(tuple, chosen.tolist()))))
+
+
+def test_a_run_left_out_is_predicted_as_if_it_had_not_been_made():
+    points, values = runs(25)
+    features = FAMILIES(points)
+    fitted = Regression(features, values, np.ones(25))
+    standard = (values - fitted.centre) / fitted.unit
+    others = np.arange(25) != 7
+    of_others = [one[:, others] for one in features]
+    inside = covariance(of_others, of_others, fitted.variance)
+    inside += module.NUGGET * np.trace(inside) / 24 * np.eye(24)
+    across = covariance([one[:, [7]] for one in features], of_others, fitted.variance)
+    expected = standard[7] - across @ np.linalg.solve(inside, standard[others])
+    assert fitted.left_out[7] == pytest.approx(fitted.unit * expected[0], rel=1e-3)
+
+
+def test_the_slope_of_the_likelihood_equals_differences():
+    points, values = runs(20)
+    features, standard = FAMILIES(points), values - values.mean()
+    parameters = np.random.default_rng(3).normal(-1.0, 0.5, (3, 3))
+    _, slope = module._misfit(features, standard, parameters)
+    for place in np.ndindex(3, 3):
+        step = np.zeros((3, 3))
+        step[place] = 1e-5
+        ends = [module._misfit(features, standard, parameters + one)[0] for one in (step, -step)]
+        assert slope[place] == pytest.approx((ends[0] - ends[1]) / 2e-5, rel=1e-4, abs=1e-5)
+
+
+def test_draws_weigh_as_the_scatter_does():
+    designs = draw_designs(INPUTS.axes, 8, np.random.default_rng(4))
+    points, weights = draw_around(INPUTS.axes, designs, 512, np.random.default_rng(5))
+    values = INPUTS.values(points.reshape(-1, 3)).reshape(8, 512, 3)
+    mean = np.einsum("vk,vkd->vd", weights, values)
+    assert mean[:, 0] == pytest.approx(designs[:, 0], abs=0.02)
+    assert mean[:, 1:] == pytest.approx(np.tile([0.5, 0.0], (8, 1)), abs=0.15)
+    rare = np.einsum("vk,vk->v", weights, values[..., 2] ** 2)
+    assert rare.mean() == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_polynomial_of_few_terms_is_found_to_rounding():
+    def function(cube):
+        x, a, b = INPUTS.values(cube).T
+        return np.column_stack([x * a + b**2, x**3 - a])
+
+    fit = fit_adaptively(INPUTS.axes, function, 1e-9, 80, np.random.default_rng(6))
+    assert fit.n_runs < 80
+    cube = np.random.default_rng(7).uniform(-1.0, 1.0, (50, 3))
+    assert fit.polynomial(cube) == pytest.approx(function(cube), rel=1e-9, abs=1e-9)
