@@ -283,16 +283,19 @@ def test_what_the_analysis_of_a_joint_cannot_take_is_refused():
     with pytest.raises(InvalidInput, match="stiffness of gear"):
         joint_of(limp)
     twice = replace(mechanism, ports=[gear, bearing, Port("seal", {"load": 1.0})])
-    with pytest.raises(InvalidInput, match="one port on each side"):
-        joint_of(twice)
+    across = replace(mechanism, ports=[gear, Port("frame", {"motor": 1.0, "load": 1.0})])
+    for one in (twice, across):
+        with pytest.raises(InvalidInput, match="one port on each side"):
+            joint_of(one)
     pushed = joint_of(replace(mechanism, inputs=[Input("torque", {"load": 1.0})]))
     with pytest.raises(InvalidInput, match="torque of the motor"):
         torsion_half(pushed, records(Hidden()), ())
 
 
-def test_a_believed_error_of_the_gear_is_no_discrepancy():
+@pytest.mark.parametrize(("coordinate", "zero"), [("motor", 7.0), ("load", 0.0)])
+def test_a_believed_error_of_the_gear_is_no_discrepancy(coordinate, zero):
     # made_joint takes 20" cos(2 q + 0.7) from the motor's angle, of which 7 rad are the zero.
-    line = ErrorLine("motor", 2.0, 20.0 * ARCSECOND, 0.7 - 2.0 * 7.0 + np.pi / 2.0)
+    line = ErrorLine(coordinate, 2.0, 20.0 * ARCSECOND, 0.7 - 2.0 * zero + np.pi / 2.0)
     joint = joint_of(believed(error=(line,)))
     half = torsion_half(joint, records(Hidden(order=2.0, amplitude=20.0 * ARCSECOND)), ())
     assert examine_torsion(half, joint, CUTOFF).verdict.status == "adequate"
