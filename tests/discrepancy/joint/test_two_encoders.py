@@ -216,6 +216,18 @@ def test_effects_that_make_the_held_out_torsion_worse_are_not_named():
     assert "soft windup" in words
 
 
+def test_the_vote_of_held_out_records_does_not_depend_on_the_stated_stiffness():
+    train, _ = records(Hidden(SoftWindup(0.015, 6e-4, 3.0)))
+    _, other = records(Hidden())
+    mechanism = believed()
+    gear, bearing = mechanism.ports
+    stated = replace(gear, stiffness=BelievedValue(0.1 * STIFFNESS, factor=30.0))
+    joint = joint_of(replace(mechanism, ports=[stated, bearing]))
+    finding = examine_torsion(torsion_half(joint, [train, other], ()), joint, CUTOFF)
+    assert finding.verdict.status == "named"
+    assert voted(finding, torsion_gaps(finding)).status == "unlisted"
+
+
 def test_the_predicted_torsion_winds_spring_and_laws_to_the_measured_torque():
     """Where the model is exact, the measured torsion is predicted, whatever the records' noise."""
     joint = joint_of(believed())
@@ -288,8 +300,15 @@ def test_what_the_analysis_of_a_joint_cannot_take_is_refused():
         with pytest.raises(InvalidInput, match="one port on each side"):
             joint_of(one)
     pushed = joint_of(replace(mechanism, inputs=[Input("torque", {"load": 1.0})]))
+    both = records(Hidden())
     with pytest.raises(InvalidInput, match="torque of the motor"):
-        torsion_half(pushed, records(Hidden()), ())
+        torsion_half(pushed, both, ())
+    for place in (0, 1):
+        dead = list(both)
+        still = {**both[place].channels, "motor": np.full(len(both[place].time), 7.0)}
+        dead[place] = replace(both[place], channels=still)
+        with pytest.raises(InvalidInput, match="channel motor of"):
+            examine_joint(joint_of(mechanism), dead, CUTOFF)
 
 
 @pytest.mark.parametrize(("coordinate", "zero"), [("motor", 7.0), ("load", 0.0)])
