@@ -25,7 +25,11 @@ from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_dat
 from pymoo_hdte.discrepancy.mechanism.naming import judged
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_sampling, check_scale, fine_enough
-from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square, with_rest
+from pymoo_hdte.discrepancy.mechanism.rest import (
+    fitted_values,
+    root_mean_square,
+    with_rest,
+)
 from pymoo_hdte.drive.effects.static_error import KinematicErrorLine, KinematicTorsion
 from pymoo_hdte.effects.effect import Effect, place_of
 from pymoo_hdte.effects.friction import PeriodicTorque
@@ -69,6 +73,13 @@ def examine_torsion(
     train = [record for record in records if record.role == "train"]
     sensors = measured_data(half.mechanism, train, cutoff, half.known, rules)
     check_scale(sensors)
+    # Noise of the encoders is a torque by the stiffness, of which only a rough value may be known.
+    name = f"stiffness of {joint.gear.name}"
+    fitted = fitted_values(half.mechanism, fit(sensors))
+    stiff = half.mechanism.with_values({n: v for n, v in fitted.items() if n == name}, False)
+    sensors = replace(
+        measured_data(stiff, train, cutoff, half.known, rules), mechanism=half.mechanism
+    )
     data, verdict = _examined(sensors)
     ripples = _lines_beyond(half, joint, cutoff, rules)
     lines = lines_of(ripples)

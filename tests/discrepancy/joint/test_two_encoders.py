@@ -216,13 +216,30 @@ def test_effects_that_make_the_held_out_torsion_worse_are_not_named():
     assert "soft windup" in words
 
 
+def roughly_stiff(value):
+    """Return the joint whose stiffness is known roughly only."""
+    gear, bearing = believed().ports
+    stated = replace(gear, stiffness=BelievedValue(value, factor=30.0))
+    return joint_of(replace(believed(), ports=[stated, bearing]))
+
+
+def test_a_stiffness_stated_far_too_low_makes_no_discrepancy():
+    joint = roughly_stiff(0.1 * STIFFNESS)
+    finding = examine_torsion(torsion_half(joint, records(Hidden()), ()), joint, CUTOFF)
+    assert finding.verdict.status == "adequate"
+
+
+def test_a_stiffness_stated_far_too_high_hides_no_discrepancy():
+    joint = roughly_stiff(10.0 * STIFFNESS)
+    hidden = Hidden(SoftWindup(0.02, 6e-4, 3.0))
+    finding = examine_torsion(torsion_half(joint, records(hidden), ()), joint, CUTOFF)
+    assert finding.verdict.status == "named"
+
+
 def test_the_vote_of_held_out_records_does_not_depend_on_the_stated_stiffness():
     train, _ = records(Hidden(SoftWindup(0.015, 6e-4, 3.0)))
     _, other = records(Hidden())
-    mechanism = believed()
-    gear, bearing = mechanism.ports
-    stated = replace(gear, stiffness=BelievedValue(0.1 * STIFFNESS, factor=30.0))
-    joint = joint_of(replace(mechanism, ports=[stated, bearing]))
+    joint = roughly_stiff(0.1 * STIFFNESS)
     finding = examine_torsion(torsion_half(joint, [train, other], ()), joint, CUTOFF)
     assert finding.verdict.status == "named"
     assert voted(finding, torsion_gaps(finding)).status == "unlisted"
