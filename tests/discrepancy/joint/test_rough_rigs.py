@@ -39,6 +39,15 @@ def test_a_stiffness_stated_far_too_high_hides_no_discrepancy():
     assert finding.verdict.status == "named"
 
 
+def test_a_mean_torque_far_above_its_variation_is_part_of_the_zero():
+    joint, few = joint_of(believed()), record(Hidden(), "train", 4.0)
+    torque = few.channels["torque"]
+    assert np.mean(torque) > 3.0 * np.std(torque)
+    finding = examine_torsion(torsion_half(joint, [few], ()), joint, CUTOFF)
+    assert not finding.verdict.base.at_bounds
+    assert finding.verdict.status == "adequate"
+
+
 def test_the_vote_of_held_out_records_does_not_depend_on_the_stated_stiffness():
     train, _ = records(Hidden(SoftWindup(0.015, 6e-4, 3.0)))
     _, other = records(Hidden())
