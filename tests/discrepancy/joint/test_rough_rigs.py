@@ -12,16 +12,17 @@ from pymoo_hdte.discrepancy.joint.halves import joint_of, torsion_half
 from pymoo_hdte.discrepancy.joint.held_out import torsion_gaps, voted
 from pymoo_hdte.discrepancy.joint.torsion import examine_torsion
 from pymoo_hdte.discrepancy.joint.wiring import wiring_doubts
+from pymoo_hdte.discrepancy.report.torsion import torsion_document
 from pymoo_hdte.effects.stiffness import SoftWindup
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine
 
 CUTOFF = 5.0
 
 
-def roughly_stiff(value):
+def roughly_stiff(value, factor=30.0):
     """Return the joint whose stiffness is known roughly only."""
     gear, bearing = believed().ports
-    stated = replace(gear, stiffness=BelievedValue(value, factor=30.0))
+    stated = replace(gear, stiffness=BelievedValue(value, factor=factor))
     return joint_of(replace(believed(), ports=[stated, bearing]))
 
 
@@ -37,6 +38,16 @@ def test_a_stiffness_stated_far_too_high_hides_no_discrepancy():
     hidden = Hidden(SoftWindup(0.02, 6e-4, 3.0))
     finding = examine_torsion(torsion_half(joint, records(hidden), ()), joint, CUTOFF)
     assert finding.verdict.status == "named"
+
+
+def test_a_stiffness_outside_its_tolerance_makes_no_torsion_of_its_own():
+    joint = roughly_stiff(5.0 * STIFFNESS, 2.0)
+    half = torsion_half(joint, [record(Hidden(), "train")], ())
+    finding = examine_torsion(half, joint, CUTOFF)
+    (effect,) = torsion_document(JointFinding(joint, finding, finding, ()))["effects"]
+    assert finding.verdict.status == "parameter"
+    assert effect["parameters"]["stiffness of gear"]["value"] == pytest.approx(STIFFNESS, rel=1e-3)
+    assert "rms_arcsec" not in effect
 
 
 def test_a_mean_torque_far_above_its_variation_is_part_of_the_zero():
