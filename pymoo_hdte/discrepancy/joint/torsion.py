@@ -35,6 +35,7 @@ from pymoo_hdte.effects.effect import Effect, place_of
 from pymoo_hdte.effects.friction import PeriodicTorque
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.port_motion import motion_at_port
 
 BEYOND_THE_GEAR = ("gravity", "linear_stiffness", "force_offset")
 """Effects that are not looked for ahead of the gear: what varies with the position of the load
@@ -175,17 +176,22 @@ def _belongs(effect: Effect, port: Port) -> bool:
 def _lines_beyond(half: Half, joint: Joint, cutoff: float, rules: Rules) -> Ripples:
     """Return orders of the torsion beyond the band of the motion, amplitudes in rad.
 
-    They are sought in the measured angle itself, as ripple is in a measured torque.
+    They are sought in the measured angle itself, as ripple is in a measured torque; with the errors
+    that are believed, what is left of it winds the spring.
     """
-    name = joint.motor
+    name, gear = joint.motor, half.mechanism.port(joint.gear.name)
     port = Port(joint.gear.name, {name: 1.0}, gear=joint.kind)
+    still = dict.fromkeys((name, joint.load), np.zeros(1))
     angle = Mechanism({name: BelievedValue(1.0)}, [port], [Input(ANGLE, {name: 1.0})])
     records = [
         Record(
             one.name,
             one.role,
             one.time,
-            {name: one.channels[name], ANGLE: one.channels[name] - one.channels[joint.load]},
+            {
+                name: one.channels[name],
+                ANGLE: motion_at_port(gear, dict(one.channels), still).position,
+            },
         )
         for one in half.records
     ]

@@ -97,10 +97,13 @@ def test_an_encoder_of_the_motor_that_stands_still_is_refused(place):
         examine_joint(joint_of(believed()), dead, CUTOFF)
 
 
-@pytest.mark.parametrize(("coordinate", "zero"), [("motor", 7.0), ("load", 0.0)])
-def test_a_believed_error_of_the_gear_is_no_discrepancy(coordinate, zero):
-    # made_joint takes 20" cos(2 q + 0.7) from the motor's angle, of which 7 rad are the zero.
-    line = ErrorLine(coordinate, 2.0, 20.0 * ARCSECOND, 0.7 - 2.0 * zero + np.pi / 2.0)
+@pytest.mark.parametrize(
+    ("coordinate", "zero", "order"),
+    [("motor", 7.0, 2.0), ("load", 0.0, 2.0), ("motor", 7.0, 202.0)],
+)
+def test_a_believed_error_of_the_gear_is_no_discrepancy(coordinate, zero, order):
+    # made_joint takes 20" cos(order q + 0.7) from the motor's angle, of which 7 rad are the zero.
+    line = ErrorLine(coordinate, order, 20.0 * ARCSECOND, 0.7 - order * zero + np.pi / 2.0)
     joint = joint_of(believed(error=(line,)))
-    half = torsion_half(joint, records(Hidden(order=2.0, amplitude=20.0 * ARCSECOND)), ())
+    half = torsion_half(joint, records(Hidden(order=order, amplitude=20.0 * ARCSECOND)), ())
     assert examine_torsion(half, joint, CUTOFF).verdict.status == "adequate"
