@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy.joint.torsion import examine_torsion, lines_of
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.held_out import Progress, laws_of
 from pymoo_hdte.discrepancy.mechanism.models import MechanismModel
+from pymoo_hdte.discrepancy.mechanism.preconditions import check_signals
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.mechanism.rest import fitted_values
 from pymoo_hdte.drive.effects.static_error import KinematicTorsion
@@ -92,6 +93,7 @@ def examine_joint(
     InvalidInput
         See `examine_mechanism`; also if no input acts on the motor.
     """
+    check_signals(joint.mechanism, records)
     rigid = rigid_half(joint, records, known)
     torque = examine_mechanism(rigid.mechanism, rigid.records, cutoff, rigid.known, rules, progress)
     torsion = examine_torsion(torsion_half(joint, records, known), joint, torque.cutoff, rules)

@@ -77,7 +77,7 @@ def _check(joint: Joint) -> None:
         raise InvalidInput(f"stiffness of {name}", 0.0, allowed)
     others = [port for port in mechanism.ports if port is not joint.gear]
     moved = [one for port in others for one, share in port.motion.items() if share]
-    plain = all(set(port.motion.values()) == {1.0} and not port.read for port in others)
+    plain = all([*port.motion.values()] == [1.0] and not port.read for port in others)
     if mechanism.loops or len(mechanism.coordinates) != 2 or len(set(moved)) < len(moved):
         plain = False
     if not plain:
@@ -152,7 +152,14 @@ def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]
         If no input acts on the motor.
     """
     motor, load = joint.motor, joint.load
-    gear = replace(joint.gear, motion={motor: 1.0}, followed={load: -1.0}, gear=None)
+    first = records[0]
+    middle = float(np.mean(first.channel(motor) - first.channel(load)))
+    error = tuple(
+        # The load's angle is moved by the middle, its believed errors are not.
+        replace(line, phase=line.phase - line.order * middle) if line.coordinate == load else line
+        for line in joint.gear.error
+    )
+    gear = replace(joint.gear, motion={motor: 1.0}, followed={load: -1.0}, error=error, gear=None)
     inputs = [
         Input(one.name, {motor: one.acts[motor]}, one.gain, one.scaled)
         for one in joint.mechanism.inputs
@@ -166,8 +173,6 @@ def torsion_half(joint: Joint, records: Sequence[Record], known: Sequence[LawAt]
     shaft = replace(shaft, load=shaft.load or {one.name: one.acts[motor] for one in inputs})
     half = Mechanism(inertia, [shaft, gear], inputs, (), [motor])
     kept = {motor, load, *(one.name for one in inputs)}
-    first = records[0]
-    middle = float(np.mean(first.channel(motor) - first.channel(load)))
     moved = [
         _only(one, kept, {load: one.channel(load) + middle, motor: one.channel(motor)})
         for one in records

@@ -14,6 +14,7 @@ from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.held_out import laws_of
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
+from pymoo_hdte.mechanism import Port
 from pymoo_hdte.mechanism.port_motion import law_force, torsion_noise
 
 Values = NDArray[np.float64]
@@ -90,7 +91,7 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
     (balance,) = data.spectra
     (gear,) = (port for port in data.mechanism.ports if port.followed)
     base = dict(zip((one.name for one in data.base), fitted.values[: len(data.base)], strict=True))
-    stiffness = float(base.get(f"stiffness of {gear.name}", gear.stiffness.value))
+    stiffness = _stiffness(fitted, gear)
     zero = float(base[f"zero of {gear.name}"])
     effects = (*data.known, *laws_of(fitted.effects))
     laws = [one.law for one in effects if one.port == gear.name]
@@ -112,6 +113,12 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
         if np.max(np.abs(step)) < _SETTLED:
             break
     return torsion
+
+
+def _stiffness(fitted: Fit, gear: Port) -> float:
+    """Return the stiffness of a gear in a fit, N.m/rad."""
+    values = dict(zip((one.name for one in fitted.parameters), fitted.values, strict=True))
+    return float(values.get(f"stiffness of {gear.name}", gear.stiffness.value))
 
 
 def _steepest(force: Callable[[Values], Values], torsion: Values) -> float:
@@ -136,7 +143,8 @@ def voted(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> Verdict:
     if verdict.accepted is verdict.base or not gaps:
         return verdict
     (gear,) = (port for port in finding.mechanism.ports if port.followed)
-    expected = (float(finding.remainder[0]) / gear.stiffness.value) ** 2
+    # As the gaps are: with the fitted stiffness, of which the stated one may be a multiple.
+    expected = (float(finding.remainder[0]) / _stiffness(finding.accepted, gear)) ** 2
     sums = np.zeros(3)
     for gap in gaps:
         count = finding.cutoff * 2.0 * float(gap.time[-1] - gap.time[0])

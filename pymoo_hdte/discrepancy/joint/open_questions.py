@@ -8,6 +8,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN
 from pymoo_hdte.discrepancy.joint.analysis import SLOWING, JointFinding
 from pymoo_hdte.discrepancy.joint.torsion import errors_of
+from pymoo_hdte.discrepancy.joint.wiring import wiring_doubts
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.discrepancy.mechanism.rest import fitted_values, share_removed
 from pymoo_hdte.effects.sentence_blanks import in_words
@@ -46,8 +47,9 @@ def torsion_limits(finding: JointFinding) -> list[str]:
     torsion, gear = finding.torsion, finding.joint.gear.name
     shaft = torsion.mechanism.ports[0].name
     found = [
+        *wiring_doubts(finding),
         "The zeros of the two encoders are not known: a constant torque ahead of the gear, or a "
-        "constant error of it, is part of them. Held-out records are compared about their means."
+        "constant error of it, is part of them. Held-out records are compared about their means.",
     ]
     if not turns_back(torsion.data, shaft):
         found.append(

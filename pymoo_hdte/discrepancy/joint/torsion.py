@@ -25,12 +25,17 @@ from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_dat
 from pymoo_hdte.discrepancy.mechanism.naming import judged
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_sampling, check_scale, fine_enough
-from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square, with_rest
+from pymoo_hdte.discrepancy.mechanism.rest import (
+    fitted_values,
+    root_mean_square,
+    with_rest,
+)
 from pymoo_hdte.drive.effects.static_error import KinematicErrorLine, KinematicTorsion
 from pymoo_hdte.effects.effect import Effect, place_of
 from pymoo_hdte.effects.friction import PeriodicTorque
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.effects import law_effects
+from pymoo_hdte.mechanism.port_motion import motion_at_port
 
 BEYOND_THE_GEAR = ("gravity", "linear_stiffness", "force_offset")
 """Effects that are not looked for ahead of the gear: what varies with the position of the load
@@ -69,6 +74,13 @@ def examine_torsion(
     train = [record for record in records if record.role == "train"]
     sensors = measured_data(half.mechanism, train, cutoff, half.known, rules)
     check_scale(sensors)
+    # Noise of the encoders is a torque by the stiffness, of which only a rough value may be known.
+    name = f"stiffness of {joint.gear.name}"
+    fitted = fitted_values(half.mechanism, fit(sensors))
+    stiff = half.mechanism.with_values({n: v for n, v in fitted.items() if n == name}, False)
+    sensors = replace(
+        measured_data(stiff, train, cutoff, half.known, rules), mechanism=half.mechanism
+    )
     data, verdict = _examined(sensors)
     ripples = _lines_beyond(half, joint, cutoff, rules)
     lines = lines_of(ripples)
@@ -164,17 +176,22 @@ def _belongs(effect: Effect, port: Port) -> bool:
 def _lines_beyond(half: Half, joint: Joint, cutoff: float, rules: Rules) -> Ripples:
     """Return orders of the torsion beyond the band of the motion, amplitudes in rad.
 
-    They are sought in the measured angle itself, as ripple is in a measured torque.
+    They are sought in the measured angle itself, as ripple is in a measured torque; with the errors
+    that are believed, what is left of it winds the spring.
     """
-    name = joint.motor
+    name, gear = joint.motor, half.mechanism.port(joint.gear.name)
     port = Port(joint.gear.name, {name: 1.0}, gear=joint.kind)
+    still = dict.fromkeys((name, joint.load), np.zeros(1))
     angle = Mechanism({name: BelievedValue(1.0)}, [port], [Input(ANGLE, {name: 1.0})])
     records = [
         Record(
             one.name,
             one.role,
             one.time,
-            {name: one.channels[name], ANGLE: one.channels[name] - one.channels[joint.load]},
+            {
+                name: one.channels[name],
+                ANGLE: motion_at_port(gear, dict(one.channels), still).position,
+            },
         )
         for one in half.records
     ]

@@ -82,10 +82,20 @@ class MeasuredData:
 
     @staticmethod
     def _peak(port: Port, balance: ForceBalance) -> float:
-        """Return the largest force of a sensor, or of the spring between two angles."""
+        """Return the largest force of a sensor, or of the spring between two angles.
+
+        Of the spring at the measured torsion, whose zero is not known, and to hold the inputs.
+        """
         if port.read:
             return float(np.abs(balance.record.channels[port.name]).max())
-        return port.stiffness.limits[1] * float(np.abs(balance.ports[port.name].position).max())
+        wound = port.stiffness.limits[1] * float(np.abs(balance.ports[port.name].position).max())
+        held = (
+            max(map(abs, one.gain.limits))
+            * sum(map(abs, one.acts.values()))
+            * float(np.abs(balance.record.channels[one.name]).max())
+            for one in balance.mechanism.inputs
+        )
+        return wound + sum(held)
 
     @cached_property
     def _linear(self) -> tuple[Vector, Values]:

@@ -38,9 +38,9 @@ class MeasuredGap:
     ----------
     record : str
     quantity : str
-        A coordinate that was simulated, or a force balance.
+        A coordinate that was simulated, a force balance, or a gear.
     kind : str
-        ``simulation`` or ``balance``.
+        ``simulation``, ``balance`` or ``torsion``.
     before, after : float
         Of the fitted base and of the revised model, SI; nan where the model diverges.
     noise_floor : float

@@ -94,7 +94,7 @@ def _location(finding: JointFinding) -> str:
 
 
 def _effects(finding: JointFinding) -> list[dict[str, Any]]:
-    """Return the named effects, angles in arcseconds, each with the torsion that it makes."""
+    """Return the named effects, angles in arcseconds, with the torsion that their laws make."""
     torsion = finding.torsion
     found = []
     parts = zip(
@@ -108,7 +108,9 @@ def _effects(finding: JointFinding) -> list[dict[str, Any]]:
             name: _shown(value, _unit(candidate, name))
             for name, value in entry["parameters"].items()
         }
-        found.append(entry | {"parameters": parameters, **_size(finding, laws)})
+        # A believed value outside its tolerance is no torque of its own.
+        size = _size(finding, laws) if laws else {}
+        found.append(entry | {"parameters": parameters, **size})
     for one, part in errors_of(torsion.ripples):
         amplitude, variance = part.values["amplitude"]
         line = {"value": amplitude, "interval95": _about(amplitude, variance)}

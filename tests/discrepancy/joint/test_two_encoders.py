@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.joint.halves import joint_of, rigid_half, torsion_ha
 from pymoo_hdte.discrepancy.joint.held_out import predicted_torsion, torsion_gaps, voted
 from pymoo_hdte.discrepancy.joint.open_questions import torsion_limits, torsion_test
 from pymoo_hdte.discrepancy.joint.torsion import examine_torsion
+from pymoo_hdte.discrepancy.joint.wiring import wiring_doubts
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.models import model_text, read_mechanism_model
 from pymoo_hdte.discrepancy.report.torsion import torsion_document
@@ -26,7 +27,6 @@ from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import HardeningStiffness, SoftWindup
 from pymoo_hdte.mechanism import (
     BelievedValue,
-    ErrorLine,
     Gear,
     Input,
     LawAt,
@@ -212,6 +212,7 @@ def test_effects_that_make_the_held_out_torsion_worse_are_not_named():
     assert verdict.accepted is verdict.base
     told = replace(finding, verdict=verdict)
     both = JointFinding(joint, torque=told, torsion=told, gaps=())
+    assert wiring_doubts(both) == []
     (words,) = (one for one in torsion_limits(both) if "none is named" in one)
     assert "soft windup" in words
 
@@ -283,16 +284,10 @@ def test_what_the_analysis_of_a_joint_cannot_take_is_refused():
     with pytest.raises(InvalidInput, match="stiffness of gear"):
         joint_of(limp)
     twice = replace(mechanism, ports=[gear, bearing, Port("seal", {"load": 1.0})])
-    with pytest.raises(InvalidInput, match="one port on each side"):
-        joint_of(twice)
+    across = replace(mechanism, ports=[gear, Port("frame", {"motor": 1.0, "load": 1.0})])
+    for one in (twice, across):
+        with pytest.raises(InvalidInput, match="one port on each side"):
+            joint_of(one)
     pushed = joint_of(replace(mechanism, inputs=[Input("torque", {"load": 1.0})]))
     with pytest.raises(InvalidInput, match="torque of the motor"):
         torsion_half(pushed, records(Hidden()), ())
-
-
-def test_a_believed_error_of_the_gear_is_no_discrepancy():
-    # made_joint takes 20" cos(2 q + 0.7) from the motor's angle, of which 7 rad are the zero.
-    line = ErrorLine("motor", 2.0, 20.0 * ARCSECOND, 0.7 - 2.0 * 7.0 + np.pi / 2.0)
-    joint = joint_of(believed(error=(line,)))
-    half = torsion_half(joint, records(Hidden(order=2.0, amplitude=20.0 * ARCSECOND)), ())
-    assert examine_torsion(half, joint, CUTOFF).verdict.status == "adequate"

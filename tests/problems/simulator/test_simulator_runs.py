@@ -118,7 +118,7 @@ def workers(request):
             yield pool
         return
     distributed = pytest.importorskip("distributed")
-    with distributed.Client(processes=False, dashboard_address=None, n_workers=1) as client:
+    with distributed.Client(processes=False, dashboard_address="127.0.0.1:0", n_workers=1) as client:
         yield client
 
 
