@@ -118,7 +118,9 @@ def workers(request):
             yield pool
         return
     distributed = pytest.importorskip("distributed")
-    with distributed.Client(processes=False, dashboard_address="127.0.0.1:0", n_workers=1) as client:
+    # Any free port: that of the dashboard may be taken by another run of the tests.
+    local = {"processes": False, "dashboard_address": "127.0.0.1:0", "n_workers": 1}
+    with distributed.Client(**local) as client:
         yield client
 
 
