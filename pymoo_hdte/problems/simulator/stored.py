@@ -198,6 +198,19 @@ def _with_tails(fit: AdaptiveFit) -> list[bool]:
     return [np.array_equal(one.nodes, other.nodes) for one, other in pairs]
 
 
+def _check_indices(indices: Array) -> None:
+    """Refuse terms on which `SparseMoments` would not compute the moments of the polynomial."""
+    allowed = f"0 to {HIGHEST_DEGREE}"
+    if not len(indices) or not np.isin(indices, np.arange(HIGHEST_DEGREE + 1)).all():
+        raise InvalidInput("indices of the file", indices.tolist(), allowed)
+    rows = set(map(tuple, indices.tolist()))
+    below = indices[:, None] - np.eye(indices.shape[1])
+    lower = below[indices > 0.0].tolist()
+    if len(rows) < len(indices) or not rows.issuperset(map(tuple, lower)):
+        allowed += ", each row once, and with a row those of a degree less in each input"
+        raise InvalidInput("indices of the file", indices.tolist(), allowed)
+
+
 def _read_fit(
     inputs: Inputs, responses: int, n_runs: int, tails: Any, arrays: dict[str, Array]
 ) -> AdaptiveFit:
@@ -216,10 +229,7 @@ def _read_fit(
             one not in (None, other) for one, other in zip(shape, found, strict=True)
         ):
             raise InvalidInput(f"shape of {name}", found, str(shape))
-    if not len(indices) or not np.isin(indices, np.arange(HIGHEST_DEGREE + 1)).all():
-        raise InvalidInput("indices of the file", indices.tolist(), f"0 to {HIGHEST_DEGREE}")
-    if len(np.unique(indices, axis=0)) < len(indices):
-        raise InvalidInput("indices of the file", indices.tolist(), "each row once")
+    _check_indices(indices)
     for name in ("coefficients", *_OF_RESPONSES):
         if not np.all(np.isfinite(arrays[name])):
             raise InvalidInput(f"{name} of the file", arrays[name].tolist(), "finite")

@@ -248,8 +248,19 @@ def test_degrees_of_the_file_are_small_whole_numbers(parts, tmp_path, degree):
 
 
 def test_a_term_is_in_the_file_once(parts, tmp_path):
-    """Of two with the same degrees the moments would take one."""
+    """Moments and values of a polynomial with a doubled term may not agree."""
     indices = parts[1]["indices"].copy()
     indices[-1] = indices[0]
     with pytest.raises(InvalidInput, match="indices of the file"):
         SimulatorProblem.load(changed(parts, tmp_path / "file", indices=indices))
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_terms_below_a_term_are_in_the_file(parts, tmp_path, place):
+    """Moments are computed on a set with all of them: without the constant the mean was wrong."""
+    _, arrays = parts
+    order = np.argsort(arrays["indices"].sum(axis=1), kind="stable")
+    kept = np.delete(order, place)
+    fewer = {"indices": arrays["indices"][kept], "coefficients": arrays["coefficients"][:, kept]}
+    with pytest.raises(InvalidInput, match="indices of the file"):
+        SimulatorProblem.load(changed(parts, tmp_path / "file", **fewer))
