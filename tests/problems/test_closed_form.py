@@ -257,6 +257,24 @@ def test_kinks_pieces_and_switches_are_where_the_problems_have_them():
     assert second.max() < 0.3
 
 
+def test_the_front_of_the_fourth_problem_is_the_best_at_its_smallest_box():
+    """Were the mean height below 0, as in a smaller box, far from the curve would be better."""
+    problem = DebGupta4(DebGupta4.smallest)
+    chosen = problem.pareto_set()
+    far = chosen.copy()
+    far[:, 2:] = problem.xu[2:]
+    assert np.all(problem.closed_form(far)[0][:, 1] > problem.closed_form(chosen)[0][:, 1])
+
+
+def test_a_front_may_be_one_point():
+    """With this slope f2 rises from the least x1 on."""
+    problem = DebGupta12(beta=2000.0)
+    X = designs(problem, 200)
+    front = problem.pareto_front()
+    assert len(front) == 1
+    assert np.all(problem.evaluate(X) >= front)
+
+
 # --- as problems of pymoo ---------------------------------------------------------------------
 
 
@@ -359,7 +377,7 @@ def test_copies_are_the_same_problem(name):
         (lambda: DebGupta12(delta=0.2), "delta"),
         (lambda: DebGupta12(beta=-1.0), "beta"),
         (lambda: DebGupta3(n_var=1), "n_var"),
-        (lambda: DebGupta4(delta=0.0), "delta"),
+        (lambda: DebGupta4(delta=0.003), "delta"),
         (lambda: MeanDTLZ2(n_var=2), "n_var"),
         (lambda: WorstCaseSchaffer("wide"), "deviation"),
         (lambda: RobustSrinivas(2.0), "deviation"),

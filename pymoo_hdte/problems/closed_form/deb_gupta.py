@@ -208,8 +208,9 @@ class DebGupta4(DebGupta3):
     Parameters
     ----------
     delta : float
-        Half-width of the box in x1 and x2; in the others it is twice that. Dimensionless, above 0
-        and at most 0.1.
+        Half-width of the box in x1 and x2; in the others it is twice that. Dimensionless, 0.004 to
+        0.1: in a smaller box the mean height falls below 0 near x1 = 1, so that f2 has its least
+        value at the bounds of the others.
     n_var : int
         2 or more.
 
@@ -220,6 +221,11 @@ class DebGupta4(DebGupta3):
     """
 
     lowest = -0.15
+    smallest = 0.004
+    """Smallest ``delta``; the mean height is above 0 from 0.0039 on."""
+
+    def __init__(self, delta: float = 0.03, n_var: int = 5) -> None:
+        super().__init__(real_number("delta", delta, at_least=self.smallest, at_most=0.1), n_var)
 
     def _height(self, first: Array, second: Array) -> Array:
         return 2.0 - first - _valleys(first + second)

@@ -92,7 +92,9 @@ def falling_points(
         pieces.append((first, last))
         level = float(function(np.array([last]))[0])
     lengths = np.array([last - first for first, last in pieces])
-    counts = np.maximum(2, np.ceil(count * lengths / lengths.sum()).astype(int))
+    # A function that rises from the first place on has one piece without a length.
+    shares = lengths / max(lengths.sum(), np.finfo(float).tiny)
+    counts = np.maximum(2, np.ceil(count * shares).astype(int))
     chosen = np.concatenate([np.linspace(*ends, n) for ends, n in zip(pieces, counts, strict=True)])
     values = function(chosen)
     lowest = np.concatenate([[np.inf], np.minimum.accumulate(values)[:-1]])

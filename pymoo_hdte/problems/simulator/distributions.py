@@ -43,7 +43,10 @@ def joint_distribution(field: str, given: Any, count: int) -> Any:
         cannot be drawn one after the other.
     """
     allowed = f"a joint distribution of chaospy of {count} continuous variables"
-    given = _as_chaospy(given)
+    try:
+        given = _as_chaospy(given)
+    except Exception as error:  # chaospy wants more of a covariance than scipy.
+        raise InvalidInput(field, given, f"{allowed} ({error})") from error
     if isinstance(given, type) or not hasattr(given, "inv") or len(given) != count:
         raise InvalidInput(field, given, allowed)
     if np.any(given.interpret_as_integer):
@@ -59,9 +62,8 @@ def joint_distribution(field: str, given: Any, count: int) -> Any:
 
 def _as_chaospy(given: Any) -> Any:
     """Return a dependent normal distribution of `scipy.stats` as one of `chaospy`, others as is."""
-    if not all(hasattr(given, name) for name in ("mean", "cov", "logpdf")):
-        return given
-    if hasattr(given, "ppf") or hasattr(given, "df"):
+    # Of other distributions the covariance is no array but a method, or there is none.
+    if not all(isinstance(getattr(given, name, None), np.ndarray) for name in ("mean", "cov")):
         return given
     import chaospy  # Takes longer to load than a study without dependent noise.
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
+from pymoo_hdte.problems.simulator.identity import identity
 from pymoo_hdte.problems.simulator.inputs import Design, Inputs
 from pymoo_hdte.problems.simulator.problem import SimulatorProblem
-from pymoo_hdte.problems.simulator.run_file import RunFile, identity
+from pymoo_hdte.problems.simulator.run_file import RunFile
 from pymoo_hdte.problems.simulator.runs import Simulator
 from pymoo_hdte.problems.simulator.statistics import (
     Mean,
@@ -100,8 +101,10 @@ def robust_problem(
         simulator raises is passed on.
     cache : path, optional
         File of finished runs: with it, no run is made twice, though the process be killed. The
-        first is made again, to see whether the file is this simulator's, where the study that wrote
-        it came to its end, or the simulator's source or state are others or cannot be told.
+        first that does not fail is made again, to see whether the file is this simulator's, where
+        the study that wrote it came to its end, or the simulator's source, state, globals, closure
+        or the modules that it names are others or cannot be told. What else it reads or calls, as
+        files and programs, is not seen: delete the file where that has changed.
     seed : int
         Of where the runs are.
     progress : bool

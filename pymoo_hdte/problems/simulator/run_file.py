@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-import functools
-import hashlib
-import inspect
 import json
 import os
-import pickle
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
-
-_BEGINNING = '{"inputs": '
-"""Of every such file; a shorter one is what a kill left of it."""
 
 
 class RunFile:
@@ -32,7 +23,7 @@ class RunFile:
     names : tuple of str
         Of the simulator's inputs. A file of others is refused.
     simulator : str or None
-        What tells the simulator from others, as `identity` returns it.
+        What tells the simulator from others (`pymoo_hdte.problems.simulator.identity`).
 
     Attributes
     ----------
@@ -61,7 +52,9 @@ class RunFile:
         self.goes_on = self._finished = False
         contents = self.path.read_bytes() if self.path.exists() else b""
         whole = contents[: contents.rfind(b"\n") + 1]
-        if not whole and not _BEGINNING.startswith(contents[: len(_BEGINNING)].decode("latin-1")):
+        # A file without a line is what a kill left of the first one.
+        beginning = json.dumps({"inputs": list(names), "simulator": ""})[:-2].encode()
+        if not whole and not beginning.startswith(contents[: len(beginning)]):
             raise InvalidInput("cache", str(self.path), "a file of finished runs")
         if whole:
             self._read(whole)
@@ -80,15 +73,21 @@ class RunFile:
             raise InvalidInput("cache", str(self.path), "a file of finished runs") from None
         if found != list(self._names):
             raise InvalidInput("cache", str(self.path), f"runs of the inputs {self._names}")
-        for line in lines:
-            run = json.loads(line)
-            self._finished = "finished" in run
-            if "responses" in run:
-                self.responses = tuple(run["responses"])
-            elif "at" in run:
-                self.runs[tuple(map(float.fromhex, run["at"]))] = run["gave"]
+        for number, line in enumerate(lines, 2):
+            try:
+                self._read_line(json.loads(line))
+            except (ValueError, KeyError, TypeError):
+                allowed = f"a file of finished runs; line {number} is damaged"
+                raise InvalidInput("cache", str(self.path), allowed) from None
         known = self._simulator is not None and header.get("simulator") == self._simulator
         self.goes_on = known and not self._finished
+
+    def _read_line(self, run: dict[str, Any]) -> None:
+        self._finished = "finished" in run
+        if "responses" in run:
+            self.responses = tuple(run["responses"])
+        elif "at" in run:
+            self.runs[tuple(map(float.fromhex, run["at"]))] = run["gave"]
 
     def keep(self, at: tuple[float, ...], gave: Any, responses: tuple[str, ...]) -> None:
         """Write a run to the disk, before the first the names of the responses."""
@@ -110,30 +109,3 @@ class RunFile:
             file.write(json.dumps(line) + "\n")
             file.flush()
             os.fsync(file.fileno())
-
-
-def identity(simulator: Callable[..., Any]) -> str | None:
-    """Return what tells a simulator from others: its state and the source file it is defined in.
-
-    What it reads or calls elsewhere is not seen.
-
-    Parameters
-    ----------
-    simulator : callable
-        A function, a method, an object with a state, or a `functools.partial` of these.
-
-    Returns
-    -------
-    str or None
-        None where it cannot be told: there is no source file, or the state cannot be written down.
-    """
-    inner: Any = simulator
-    while isinstance(inner, functools.partial):
-        inner = inner.func
-    # A user's object may raise anything when it is pickled.
-    try:
-        source = inspect.getsourcefile(sys.modules[inner.__module__])
-        contents = pickle.dumps(simulator, protocol=4) + Path(str(source)).read_bytes()
-    except Exception:
-        return None
-    return hashlib.sha256(contents).hexdigest()

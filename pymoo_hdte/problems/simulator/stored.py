@@ -106,9 +106,9 @@ def read_problem(
         inputs = Inputs(_designs(header["designs"]), _noise(header["noise"]))
         objectives = [_read_statistic(one) for one in header["objectives"]]
         constraints = [_read_constraint(one) for one in header["constraints"]]
-        responses = tuple(header["responses"])
-        if not objectives or not all(isinstance(name, str) for name in responses):
-            raise ValueError("objectives or names of responses are missing")
+        if not objectives:
+            raise ValueError("objectives are missing")
+        responses = _responses(header["responses"])
         n_runs = whole_number("n_runs", header["n_runs"], 0)
         fit = _read_fit(inputs, len(responses), n_runs, header["tails"], arrays)
     except InvalidInput:
@@ -130,12 +130,27 @@ def _design(name: str, design: Design) -> dict[str, Any]:
 def _designs(tables: dict[str, Any]) -> dict[str, Design]:
     designs = {}
     for name, table in tables.items():
+        _check_fields(repr(name), table, Design)
         given = {
             word: rebuilt(f"{word} of {name!r}", value) if isinstance(value, dict) else value
             for word, value in table.items()
         }
         designs[name] = Design(**given)
     return designs
+
+
+def _check_fields(owner: str, table: Mapping[str, Any], kind: type[Design | Statistic]) -> None:
+    """Refuse a table without some field: its default would make another problem."""
+    wanted = sorted(one.name for one in fields(kind))
+    if sorted(table) != wanted:
+        raise InvalidInput(f"fields of {owner}", sorted(table), f"just {wanted}")
+
+
+def _responses(names: Any) -> tuple[str, ...]:
+    words = isinstance(names, list) and all(isinstance(name, str) for name in names)
+    if not words or len(set(names)) < len(names):
+        raise InvalidInput("names of the responses", names, "a list of different words")
+    return tuple(names)
 
 
 def _noise(rows: list[Any]) -> dict[Any, Any]:
@@ -158,16 +173,22 @@ def _read_statistic(table: Mapping[str, Any]) -> Statistic:
     kind = given.pop("kind", None)
     if kind not in STATISTICS:
         raise InvalidInput("statistic of the file", kind, f"one of {', '.join(STATISTICS)}")
-    if given.get("sign") not in (1.0, -1.0):
-        raise InvalidInput("sign of a statistic", given.get("sign"), "1 or -1")
+    _check_fields(kind, given, STATISTICS[kind])
+    _check_sign("sign of a statistic", given["sign"])
     return STATISTICS[kind](**given)
 
 
 def _read_constraint(table: Mapping[str, Any]) -> RobustConstraint:
     statistic = _read_statistic(table["statistic"])
-    if table["side"] not in (1.0, -1.0) or len(table) != 3:
-        raise InvalidInput("side of a constraint", table["side"], "1 or -1")
+    if len(table) != 3:
+        raise ValueError("a constraint has a statistic, a bound and a side")
+    _check_sign("side of a constraint", table["side"])
     return statistic <= table["bound"] if table["side"] > 0 else statistic >= table["bound"]
+
+
+def _check_sign(field: str, given: Any) -> None:
+    if isinstance(given, bool) or given not in (1.0, -1.0):
+        raise InvalidInput(field, given, "1 or -1")
 
 
 def _with_tails(fit: AdaptiveFit) -> list[bool]:
@@ -175,6 +196,19 @@ def _with_tails(fit: AdaptiveFit) -> list[bool]:
     whole = SparseMoments(fit.polynomial, fit.moments.axes)
     pairs = zip(whole.orthonormal, fit.moments.orthonormal, strict=True)
     return [np.array_equal(one.nodes, other.nodes) for one, other in pairs]
+
+
+def _check_indices(indices: Array) -> None:
+    """Refuse terms on which `SparseMoments` would not compute the moments of the polynomial."""
+    allowed = f"0 to {HIGHEST_DEGREE}"
+    if not len(indices) or not np.isin(indices, np.arange(HIGHEST_DEGREE + 1)).all():
+        raise InvalidInput("indices of the file", indices.tolist(), allowed)
+    rows = set(map(tuple, indices.tolist()))
+    below = indices[:, None] - np.eye(indices.shape[1])
+    lower = below[indices > 0.0].tolist()
+    if len(rows) < len(indices) or not rows.issuperset(map(tuple, lower)):
+        allowed += ", each row once, and with a row those of a degree less in each input"
+        raise InvalidInput("indices of the file", indices.tolist(), allowed)
 
 
 def _read_fit(
@@ -195,11 +229,13 @@ def _read_fit(
             one not in (None, other) for one, other in zip(shape, found, strict=True)
         ):
             raise InvalidInput(f"shape of {name}", found, str(shape))
-    if not len(indices) or not np.isin(indices, np.arange(HIGHEST_DEGREE + 1)).all():
-        raise InvalidInput("indices of the file", indices.tolist(), f"0 to {HIGHEST_DEGREE}")
+    _check_indices(indices)
     for name in ("coefficients", *_OF_RESPONSES):
         if not np.all(np.isfinite(arrays[name])):
             raise InvalidInput(f"{name} of the file", arrays[name].tolist(), "finite")
+    for name in _OF_RESPONSES:
+        if np.any(arrays[name] < 0.0):
+            raise InvalidInput(f"{name} of the file", arrays[name].tolist(), "at least 0")
     if not isinstance(tails, list) or [type(one) for one in tails] != [bool] * len(axes):
         raise InvalidInput("tails", tails, f"{len(axes)} times true or false")
     polynomial = SparsePolynomial(indices.astype(int), coefficients)

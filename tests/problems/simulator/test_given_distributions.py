@@ -45,6 +45,11 @@ def test_noise_that_cannot_be_used_is_refused_with_the_reason(given, message):
         (chaospy.J, "a joint distribution of chaospy"),
         (chaospy.J(chaospy.Binomial(4, 0.5), chaospy.Normal(0.0, 1.0)), "whole numbers"),
         (NORMAL, "of 2 continuous variables"),
+        (scipy.stats.dirichlet([1.0, 2.0]), "of 2 continuous variables"),
+        (
+            scipy.stats.multivariate_normal(cov=np.ones((2, 2)), allow_singular=True),
+            "of 2 continuous variables.*not positive definite",
+        ),
     ],
 )
 def test_joint_noise_that_cannot_be_used_is_refused_with_the_reason(given, message):

@@ -4,6 +4,7 @@ import math
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from functools import partial
 
@@ -13,7 +14,8 @@ import pytest
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import Design, robust_problem
-from pymoo_hdte.problems.simulator.run_file import RunFile, identity
+from pymoo_hdte.problems.simulator.identity import identity
+from pymoo_hdte.problems.simulator.run_file import RunFile
 
 NAMES = ("x", "a")
 RUNS, PROBLEM = "runs.jsonl", "problem.npz"
@@ -156,9 +158,129 @@ def test_a_simulator_is_known_by_its_state_and_its_source(tmp_path, monkeypatch)
     assert found[0] != found[1]
 
 
+LENGTH = 1.0
+
+
+def scaled(x, a):
+    return _with_length(x * a)
+
+
+def _with_length(value):
+    return LENGTH * value
+
+
+def times(factor):
+    """Return a function that pickle knows by its name only, without the closure."""
+
+    def decorated(x, a):
+        return factor * x * a
+
+    decorated.__qualname__ = "decorated"
+    return decorated
+
+
+class Machine:
+    def __call__(self, x, a):
+        return self.run(x, a)
+
+    def run(self, x, a):
+        return LENGTH * x * a
+
+
+@pytest.mark.parametrize("simulator", [scaled, partial(scaled, a=1.0), Machine(), Machine().run])
+def test_a_simulator_is_known_by_the_globals_it_reads(simulator, monkeypatch):
+    """A script may read them from its command line or a file, the text of both being the same."""
+    before = identity(simulator)
+    assert before is not None
+    assert identity(simulator) == before
+    monkeypatch.setitem(globals(), "UNUSED", 2.0)
+    assert identity(simulator) == before
+    monkeypatch.setitem(globals(), "LENGTH", 2.0)
+    assert identity(simulator) != before
+    # What cannot be written down is not guessed.
+    monkeypatch.setitem(globals(), "LENGTH", threading.Lock())
+    assert identity(simulator) is None
+
+
+def test_a_simulator_is_known_by_its_closure_and_its_defaults(monkeypatch):
+    found = []
+    for factor in (1.0, 2.0, 2.0):
+        monkeypatch.setitem(globals(), "decorated", times(factor))
+        found.append(identity(globals()["decorated"]))
+    assert None not in found
+    assert found[0] != found[1] == found[2]
+    before = identity(scaled)
+    monkeypatch.setitem(globals(), "_with_length", function)
+    assert identity(scaled) != before
+    before = identity(function)
+    monkeypatch.setattr(function, "__defaults__", (1.0,))
+    assert identity(function) != before
+
+
+def test_a_simulator_is_known_by_the_modules_it_calls(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "calls_helper.py").write_text(
+        "import helper\nfrom helper import solve\n"
+        "def whole(x):\n    return helper.solve(x)\n"
+        "def part(x):\n    return solve(x)\n"
+    )
+    (tmp_path / "helper.py").write_text("def solve(x):\n    return x\n")
+    import calls_helper
+
+    simulators = calls_helper.whole, calls_helper.part
+    before = [identity(one) for one in simulators]
+    assert None not in before
+    (tmp_path / "helper.py").write_text("def solve(x):\n    return 2.0 * x\n")
+    for one, old in zip(simulators, before, strict=True):
+        assert identity(one) != old
+
+
+def test_a_study_with_another_global_does_not_take_the_runs_of_a_killed_one(tmp_path, monkeypatch):
+    study(tmp_path, scaled)
+    contents = (tmp_path / RUNS).read_bytes()
+    (tmp_path / RUNS).write_bytes(contents[: contents.rindex(b"\n", 0, -1) + 1])
+    monkeypatch.setitem(globals(), "LENGTH", 1.1)
+    with pytest.raises(InvalidInput, match="runs of this simulator"):
+        study(tmp_path, scaled)
+
+
+def test_runs_that_cannot_be_made_again_are_not_taken(tmp_path):
+    """A first run that fails tells nothing: the next ones are made; if all fail, none is taken."""
+
+    def right(x, a):
+        return x * a
+
+    study(tmp_path, right)
+    kept = RunFile(tmp_path / RUNS, NAMES, None)
+    first = next(iter(kept.runs))
+
+    def failing(x, a):
+        raise ValueError("no licence")
+
+    def wrong(x, a):
+        return math.nan if (x, a) == first else 2.0 * x * a
+
+    for other in (failing, wrong):
+        with pytest.raises(InvalidInput, match="runs of this simulator"):
+            study(tmp_path, other)
+    # A run that fails now and then is no reason to refuse the others.
+    study(tmp_path, lambda x, a: math.nan if (x, a) == first else x * a)
+
+
+def test_a_damaged_line_is_refused_and_the_file_left_alone(tmp_path, whole):
+    lines = (whole / RUNS).read_bytes().split(b"\n")
+    for damaged in (b'{"at": ["0x1', b'{"at": ["x"], "gave": [1]}', b'{"at": [], "gone": 1}', b"3"):
+        contents = b"\n".join([*lines[:5], damaged, *lines[6:]])
+        (tmp_path / RUNS).write_bytes(contents)
+        with pytest.raises(InvalidInput, match=r"cache.*line 6"):
+            RunFile(tmp_path / RUNS, NAMES, None)
+        assert (tmp_path / RUNS).read_bytes() == contents
+
+
 def test_a_file_of_no_runs_is_refused_and_left_alone(tmp_path):
     file = tmp_path / "notes.txt"
-    for text in ("my notes\n", "my notes", '{"inputs": 3}\n', '{"inputs": ["y"]}\n'):
+    others = '{"inputs": [1, 2], "mine": true}', '{"inputs": ["x", "a"], "mine": true}'
+    for text in ("my notes\n", "my notes", '{"inputs": 3}\n', '{"inputs": ["y"]}\n', *others):
         file.write_text(text)
         with pytest.raises(InvalidInput, match="cache"):
             RunFile(file, NAMES, None)

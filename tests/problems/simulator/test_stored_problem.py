@@ -197,24 +197,40 @@ def changed(parts, path, **changes):
     return path
 
 
+DESIGN = {"lower": 1.0, "upper": 4.0, "tolerance": 0.0, "deviation": 0.0, "scale": "linear"}
+Y = {"sign": 1.0, "response": "y"}
+MEAN = {"kind": "Mean", **Y}
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"designs": {}}, "designs"),
-        ({"designs": {"b": {"lower": 0.0}}}, "path is"),
-        ({"designs": {"b": {"lower": 2.0, "upper": 1.0}}}, "upper is"),
+        ({"designs": {"b": {"lower": 0.0}}}, "fields of 'b'"),
+        ({"designs": {"b": {**DESIGN, "upper": 0.5}}}, "upper is"),
+        # What is missing would come back as its default: another scatter, another statistic.
+        ({"designs": {"b": {k: DESIGN[k] for k in DESIGN if k != "tolerance"}}}, "fields of 'b'"),
+        ({"objectives": [{"kind": "Mean", "sign": 1.0}]}, "fields of Mean"),
+        ({"objectives": [{"kind": "MeanPlusStd", **Y}]}, "fields of MeanPlusStd"),
+        (
+            {"constraints": [{"statistic": MEAN, "bound": 1.0, "side": True}]},
+            "side",
+        ),
         ({"noise": [["a", {"chaospy": "Normal(0, -1)"}]]}, r"noise\['a'\]"),
         ({"noise": 3}, "path is"),
-        ({"objectives": []}, "objectives or names"),
+        ({"objectives": []}, "objectives are missing"),
         ({"objectives": [{"kind": "Object", "sign": 1.0}]}, "statistic of the file"),
-        ({"objectives": [{"kind": "Mean", "sign": 2.0}]}, "sign of a statistic"),
+        ({"objectives": [{"kind": "Mean", **Y, "sign": 2.0}]}, "sign of a statistic"),
         ({"objectives": [{"kind": "Mean", "sign": 1.0, "response": "w"}]}, "response of a"),
-        ({"objectives": [{"kind": "CVaR", "sign": 1.0, "p": 7.0}]}, "p is 7"),
+        ({"objectives": [{"kind": "CVaR", **Y, "p": 7.0}]}, "p is 7"),
+        ({"responses": "yz"}, "names of the responses"),
+        ({"responses": ["y", "y"]}, "names of the responses"),
         ({"responses": ["y"]}, "shape of coefficients"),
         ({"n_runs": -1}, "n_runs"),
         ({"tails": [True, 1]}, "tails"),
         ({"indices": np.full((9, 2), 0.5)}, "shape of indices"),
         ({"mean_error": np.full(2, np.nan)}, "mean_error of the file"),
+        ({"std_error": np.array([0.1, -0.1])}, "std_error of the file"),
         ({"held_out_error": np.zeros((1, 2))}, "shape of held_out_error"),
     ],
 )
@@ -229,3 +245,22 @@ def test_degrees_of_the_file_are_small_whole_numbers(parts, tmp_path, degree):
     indices[-1, 0] = degree
     with pytest.raises(InvalidInput, match="indices of the file"):
         SimulatorProblem.load(changed(parts, tmp_path / "file", indices=indices))
+
+
+def test_a_term_is_in_the_file_once(parts, tmp_path):
+    """Moments and values of a polynomial with a doubled term may not agree."""
+    indices = parts[1]["indices"].copy()
+    indices[-1] = indices[0]
+    with pytest.raises(InvalidInput, match="indices of the file"):
+        SimulatorProblem.load(changed(parts, tmp_path / "file", indices=indices))
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_terms_below_a_term_are_in_the_file(parts, tmp_path, place):
+    """Moments are computed on a set with all of them: without the constant the mean was wrong."""
+    _, arrays = parts
+    order = np.argsort(arrays["indices"].sum(axis=1), kind="stable")
+    kept = np.delete(order, place)
+    fewer = {"indices": arrays["indices"][kept], "coefficients": arrays["coefficients"][:, kept]}
+    with pytest.raises(InvalidInput, match="indices of the file"):
+        SimulatorProblem.load(changed(parts, tmp_path / "file", **fewer))

@@ -1,0 +1,110 @@
+"""What tells a simulator from others: its state, what it reads beside its inputs, and sources."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+import pickle
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import CodeType, FunctionType, MethodType, ModuleType
+from typing import Any
+
+
+def identity(simulator: Callable[..., Any]) -> str | None:
+    """Return what tells a simulator from others.
+
+    That is its state; globals, closures and defaults of its functions, and of those of the same
+    file that they call; that file, and those of the modules named there. Files that it reads while
+    it runs, programs that it calls, and what other modules call in turn are not seen.
+
+    Parameters
+    ----------
+    simulator : callable
+        A function, a method, an object with a state, or a `functools.partial` of these.
+
+    Returns
+    -------
+    str or None
+        None where it cannot be told: there is no source file, or the state or a value that it reads
+        cannot be written down.
+    """
+    inner: Any = simulator
+    while isinstance(inner, functools.partial):
+        inner = inner.func
+    # A user's object may raise anything when it is pickled.
+    try:
+        values, modules = _surroundings(inner)
+        contents = [pickle.dumps(one, protocol=4) for one in (simulator, *values)]
+        contents.append(
+            Path(str(inspect.getsourcefile(sys.modules[inner.__module__]))).read_bytes()
+        )
+        contents += map(_source, modules)
+    except Exception:
+        return None
+    digests = [hashlib.sha256(one).digest() for one in contents]
+    return hashlib.sha256(b"".join(digests)).hexdigest()
+
+
+def _surroundings(simulator: Any) -> tuple[list[Any], list[ModuleType]]:
+    """Return the values that its functions read beside their arguments, and the modules named."""
+    waiting = _functions(simulator)
+    done: list[FunctionType] = []
+    values: list[Any] = []
+    modules: list[ModuleType] = []
+    while waiting:
+        function = waiting.pop()
+        if function in done:
+            continue
+        done.append(function)
+        for name, value in _read(function):
+            if isinstance(value, FunctionType) and value.__globals__ is function.__globals__:
+                waiting.append(value)
+                values.append((name, value.__qualname__, value.__code__.co_firstlineno))
+            elif isinstance(value, ModuleType):
+                modules.append(value)
+            else:
+                values.append((name, value))
+                if isinstance(value, FunctionType | type) and value.__module__ in sys.modules:
+                    modules.append(sys.modules[value.__module__])
+    return values, modules
+
+
+def _functions(simulator: Any) -> list[FunctionType]:
+    """Return the simulator as a function, or the methods of its class."""
+    if isinstance(simulator, FunctionType):
+        return [simulator]
+    kind = type(simulator.__self__ if isinstance(simulator, MethodType) else simulator)
+    return [
+        one for base in kind.__mro__ for one in vars(base).values() if isinstance(one, FunctionType)
+    ]
+
+
+def _read(function: FunctionType) -> Iterator[tuple[str, Any]]:
+    """Yield name and value of all that a function reads, its arguments excepted."""
+    yield "defaults", (function.__defaults__, function.__kwdefaults__)
+    cells = function.__closure__ or ()
+    for name, cell in zip(function.__code__.co_freevars, cells, strict=True):
+        yield name, cell.cell_contents
+    for name in _names(function.__code__):
+        if name in function.__globals__:
+            yield name, function.__globals__[name]
+
+
+def _names(code: CodeType) -> list[str]:
+    """Return the names in a function and in those within it; some are of attributes."""
+    inside = [one for one in code.co_consts if isinstance(one, CodeType)]
+    found = dict.fromkeys(code.co_names)
+    for one in inside:
+        found |= dict.fromkeys(_names(one))
+    return list(found)
+
+
+def _source(module: ModuleType) -> bytes:
+    """Return the source of a module, its name where that is not Python's."""
+    try:
+        return Path(str(inspect.getsourcefile(module))).read_bytes()
+    except (TypeError, OSError):
+        return module.__name__.encode()
