@@ -203,7 +203,8 @@ def limits(finding: MechanismFinding) -> list[str]:
     ]
     found += [
         f"Rows of {one.record.name} at rest: {one.left_out}. They are left out, as dry friction, "
-        "which is known to act, may have any force up to its breakaway there."
+        "which is known to act, may have any force up to its breakaway there. What acts only there "
+        "or right beside it, such as friction that falls at the slowest speeds, is not judged."
         for one in finding.data.spectra
         if one.left_out
     ]

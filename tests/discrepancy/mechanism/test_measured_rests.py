@@ -43,14 +43,15 @@ def record_of(rest, drag=0.0, noises=(1e-5, 0.02), seed=0):
     return Record("moves", "train", STEP * np.arange(len(speed)), channels)
 
 
-def test_a_complete_model_of_a_joint_that_rests_is_adequate_and_rests_are_told():
-    finding = examine_mechanism(JOINT, [record_of(1.0)], CUTOFF, [DRY])
+@pytest.mark.parametrize("rest", [1.0, 4.0])
+def test_a_complete_model_of_a_joint_that_rests_is_adequate_and_rests_are_told(rest):
+    finding = examine_mechanism(JOINT, [record_of(rest)], CUTOFF, [DRY])
     assert finding.verdict.status == "adequate"
     assert finding.accepted.values == pytest.approx([INERTIA, DAMPING], rel=0.01)
     (told,) = (words for words in limits(finding) if "at rest" in words)
-    # A second for each move, and some periods of the cutoff, in which smoothed forces show it.
+    # The rest after each move, and some periods of the cutoff, in which smoothed forces show it.
     (balance,) = finding.data.spectra
-    assert MOVES < balance.left_out * STEP < MOVES * (1.0 + 8.0 / CUTOFF)
+    assert MOVES * rest < balance.left_out * STEP < MOVES * (rest + 8.0 / CUTOFF)
     assert f"Rows of moves at rest: {balance.left_out}." in told
 
 
@@ -92,6 +93,8 @@ def test_only_rests_under_known_dry_friction_are_left_out():
         balance = ForceBalance(JOINT, record, CUTOFF, known)
         assert balance.left_out == 0
         assert np.all(balance.moving.weight == 1.0)
-    # Of a record that hardly moves nothing is left out: it would tell nothing at all.
-    hardly = record_of(20.0)
+    # Of a record that moves once nothing is left out: it would tell nothing at all.
+    once = slice(round(4.0 / STEP))
+    channels = {name: signal[once] for name, signal in record_of(20.0).channels.items()}
+    hardly = Record("once", "train", time[once], channels)
     assert ForceBalance(JOINT, hardly, CUTOFF, [DRY]).left_out == 0
