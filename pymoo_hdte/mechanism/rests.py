@@ -24,6 +24,8 @@ _FADES = 2.5
 """Periods of the cutoff before and after a rest in which smoothed forces still show it: a jump has
 faded to 0.2 % there. In the period after, the weight of the rows rises, so that no edge of it looks
 like a force."""
+_WHOLE = 0.999
+"""Weight of a row that counts fully, but for rounding."""
 _FEWEST = 100
 """Coefficients of force balances that have to be left, or the record is taken as it is. They hold
 the dozen unknowns of a mechanism with three effects, and their chi-square is known to 14 %."""
@@ -53,6 +55,11 @@ class MovingRows:
     def left_out(self) -> float:
         """Share of rows that are left out."""
         return 1.0 - self.count / len(self.weight)
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """Where rows count fully, (n,)."""
+        return self.weight > _WHOLE
 
     @property
     def power(self) -> float:
