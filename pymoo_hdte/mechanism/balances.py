@@ -180,10 +180,7 @@ class ForceBalance:
         return self._known[key]
 
     def in_time(self, coefficients: Values) -> Values:
-        """Return the signal, shape (n,), at the working rate, of coefficients (n_bins,).
-
-        Zero in rows that are left out.
-        """
+        """Return the signal, (n,), at the working rate of coefficients (n_bins,); 0 if left out."""
         missing = self.moving.count - self._bins
         return self.moving.put(dct(np.pad(coefficients, (0, missing)), type=3, norm="ortho"))
 
