@@ -27,7 +27,7 @@ from pymoo_hdte.mechanism.port_motion import (
     torsion_noise,
 )
 from pymoo_hdte.mechanism.records import Record
-from pymoo_hdte.mechanism.rests import weight_of_rows
+from pymoo_hdte.mechanism.rests import moving_rows
 from pymoo_hdte.mechanism.working_rate import frequencies, highest_known, working_rows
 
 Values = NDArray[np.float64]
@@ -62,7 +62,7 @@ class ForceBalance:
         Hz, up to which the motion is known. Force sensors are compared with the motion up to ten
         samples in a period.
     known : sequence of LawAt
-        Dry friction that is known leaves rests out: see `weight_of_rows`.
+        Dry friction that is known leaves rests out: see `moving_rows`.
 
     Attributes
     ----------
@@ -79,8 +79,8 @@ class ForceBalance:
         Standard deviation that the sensors' noise gives them, for the believed quantities.
     ports : dict of str to PortMotion
         At the working rate.
-    weight : ndarray, shape (n,)
-        Of the rows of the working rate, 0 for those that are left out.
+    moving : MovingRows
+        Rows of the working rate that are not left out.
     motions : dict of str to Motion
         Of the coordinates and of followed angles, at the rate of the record.
     cutoff : float
@@ -99,12 +99,6 @@ class ForceBalance:
         self._known: dict[tuple[LawAt, float, float], Values] = {}
         self._rows = working_rows(mechanism, record, cutoff)
         stride, highest = self._rows.step, highest_known(mechanism, record, cutoff)
-        frequency = frequencies(len(record.time[self._rows]), record.step * stride)
-        self._bins = int(np.count_nonzero(frequency <= highest))
-        self.frequency = frequency[: self._bins]
-        n_read = len(balance_names(mechanism)) - len(mechanism.coordinates)
-        limits = [cutoff] * len(mechanism.coordinates) + [highest] * n_read
-        self.kept = self.frequency <= np.array(limits)[:, None]
         self.cutoff = cutoff
         self.motions = {
             name: motion_of(self.record.channel(name), record.step, cutoff)
@@ -124,8 +118,14 @@ class ForceBalance:
             self._inputs,
         )
         step = record.step * stride
-        self.weight = weight_of_rows(mechanism, record, cutoff, self.ports, step, known)
-        self._finer = finer_than(cutoff, record.step * stride)
+        self.moving = moving_rows(mechanism, record, cutoff, self.ports, step, known)
+        frequency = frequencies(self.moving.count, step)
+        self._bins = int(np.count_nonzero(frequency <= highest))
+        self.frequency = frequency[: self._bins]
+        n_read = len(balance_names(mechanism)) - len(mechanism.coordinates)
+        limits = [cutoff] * len(mechanism.coordinates) + [highest] * n_read
+        self.kept = self.frequency <= np.array(limits)[:, None]
+        self._finer = finer_than(cutoff, step)
         self._fine = self.ports if self._finer == 1 else self._between(stride, signals)
         self.terms = self._terms()
         names = balance_names(mechanism)
@@ -180,14 +180,14 @@ class ForceBalance:
         return self._known[key]
 
     def in_time(self, coefficients: Values) -> Values:
-        """Return the signal, shape (n,), at the working rate, of coefficients (n_bins,)."""
-        n = len(self.record.time[self._rows])
-        return np.asarray(dct(np.pad(coefficients, (0, n - self._bins)), type=3, norm="ortho"))
+        """Return the signal, (n,), at the working rate of coefficients (n_bins,); 0 if left out."""
+        missing = self.moving.count - self._bins
+        return self.moving.put(dct(np.pad(coefficients, (0, missing)), type=3, norm="ortho"))
 
     @property
     def left_out(self) -> int:
-        """Number of rows of the record that have no weight: see `weight_of_rows`."""
-        return round(float(np.mean(self.weight == 0.0)) * len(self.record.time))
+        """Number of rows of the record that are left out: see `moving_rows`."""
+        return round(self.moving.left_out * len(self.record.time))
 
     @property
     def time(self) -> Values:
@@ -221,8 +221,7 @@ class ForceBalance:
         )
 
     def _transform(self, signal: Values) -> Values:
-        weight = np.repeat(self.weight, len(signal) // len(self.weight))
-        return np.asarray(dct(weight * signal, type=2, norm="ortho")[: self._bins])
+        return np.asarray(dct(self.moving.take(signal), type=2, norm="ortho")[: self._bins])
 
     def _rows_of(self, port: Port) -> dict[str, float]:
         """Return the share of a force at a port in each balance."""
@@ -273,7 +272,7 @@ class ForceBalance:
             for row, share in self._rows_of(port).items():
                 power[names.index(row)] += (share * spread) ** 2
         step = record.step * stride
-        ends = 4.0 * stride / (len(self.time) * step**2)
+        ends = 4.0 * stride / (self.moving.count * step**2)
         for place, name in enumerate(mechanism.coordinates):
             noise = self.record.noise_of(name)
             position, speed = smoothed_noise(noise, record.step, self.cutoff)
@@ -281,7 +280,7 @@ class ForceBalance:
             own = (stiffness[:, place, None] - inertial * omega**2) ** 2 + (viscous * omega) ** 2
             power += own * noise**2
             power += ends * ((inertial * speed) ** 2 + (viscous * position) ** 2)
-        return np.sqrt(power / stride * np.mean(self.weight**2))
+        return np.sqrt(power / stride * self.moving.power)
 
     def _matrices(self) -> tuple[Values, Values, Values]:
         """Return believed inertia, damping and stiffness, (n_balances, n_coordinates)."""

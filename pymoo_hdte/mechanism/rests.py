@@ -6,6 +6,7 @@ A joint without compliance does not tell which: a law of the speed would give it
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,19 +24,69 @@ _FADES = 2.5
 """Periods of the cutoff before and after a rest in which smoothed forces still show it: a jump has
 faded to 0.2 % there. In the period after, the weight of the rows rises, so that no edge of it looks
 like a force."""
-_FEWEST = 0.25
-"""Share of the rows that has to be left; a record that mostly rests is taken as it is."""
+_WHOLE = 0.999
+"""Weight of a row that counts fully, but for rounding."""
+_FEWEST = 100
+"""Coefficients of force balances that have to be left, or the record is taken as it is. They hold
+the dozen unknowns of a mechanism with three effects, and their chi-square is known to 14 %."""
 
 
-def weight_of_rows(
+@dataclass(frozen=True, eq=False)
+class MovingRows:
+    """The rows of a record of which the force balances are taken, one after the other.
+
+    Without those that are left out, so that a transform has no more coefficients than they tell:
+    with zeros in their place its coefficients would be correlated, and count as more.
+
+    Attributes
+    ----------
+    weight : ndarray, shape (n,)
+        0 for rows that are left out. It rises from there, so that what follows them joins smoothly.
+    """
+
+    weight: Values
+
+    @property
+    def count(self) -> int:
+        """Number of rows that are not left out."""
+        return int(np.count_nonzero(self.weight))
+
+    @property
+    def left_out(self) -> float:
+        """Share of rows that are left out."""
+        return 1.0 - self.count / len(self.weight)
+
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """Where rows count fully, (n,)."""
+        return self.weight > _WHOLE
+
+    @property
+    def power(self) -> float:
+        """Mean square of their weights."""
+        return float(np.sum(self.weight**2) / self.count)
+
+    def take(self, signal: Values) -> Values:
+        """Return their weighted values, (k count,), of a signal, (k n,), at k moments a row."""
+        weight = np.repeat(self.weight, len(signal) // len(self.weight))
+        return (weight * signal)[weight > 0.0]
+
+    def put(self, values: Values) -> Values:
+        """Return a signal, (n,), with values (count,) in their places and zeros elsewhere."""
+        found = np.zeros_like(self.weight)
+        found[self.weight > 0.0] = values
+        return found
+
+
+def moving_rows(
     mechanism: Mechanism,
     record: Record,
     cutoff: float,
     ports: dict[str, PortMotion],
     step: float,
     known: Sequence[LawAt],
-) -> Values:
-    """Return the weight of each row of the motion of ports, (n,): 0 at rest, 1 while all move.
+) -> MovingRows:
+    """Return the rows of the motion of ports with their weights: 0 at rest, 1 while all move.
 
     A rest lasts a period of the cutoff at least; a reversal is none.
 
@@ -58,15 +109,15 @@ def weight_of_rows(
         port = mechanism.port(name)
         noise = [
             share * smoothed_noise(record.noise_of(one), record.step, cutoff)[1]
-            for one, share in port.motion.items()
+            for one, share in {**port.motion, **port.followed}.items()
         ]
         rests |= _long(np.abs(ports[name].speed) < _STILL * np.hypot.reduce(noise), period)
     near = _spread(rests, round((_FADES + 0.5) * period))
     window = np.hanning(period + 2)
     edges = len(window) // 2, len(window) - 1 - len(window) // 2
     away = np.convolve(np.pad(~near, edges, mode="edge"), window / window.sum(), mode="valid")
-    enough = rests.any() and np.mean(away**2) >= _FEWEST
-    return away if enough else np.ones_like(away)
+    enough = 2.0 * np.count_nonzero(away) * step * cutoff >= _FEWEST
+    return MovingRows(away if enough and rests.any() else np.ones_like(away))
 
 
 def _long(still: NDArray[np.bool_], least: int) -> NDArray[np.bool_]:

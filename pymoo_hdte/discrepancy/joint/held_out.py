@@ -43,9 +43,11 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
         known = finding.data.known
         data = measured_data(finding.mechanism, [record], finding.cutoff, known, finding.data.rules)
         (balance,) = data.spectra
-        measured = balance.ports[gear.name].position
+        # Where rows are left out, no model is asked what the torsion is.
+        rows = balance.moving.whole
+        measured = balance.ports[gear.name].position[rows]
         before, after = (
-            _about(predicted_torsion(data, one), measured)
+            _about(predicted_torsion(data, one)[rows], measured)
             for one in (finding.verdict.base, finding.accepted)
         )
         found.append(
@@ -56,7 +58,7 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
                 _size(measured - before),
                 _size(measured - after),
                 torsion_noise(gear, record),
-                balance.time,
+                balance.time[rows],
                 measured,
                 before,
                 after,

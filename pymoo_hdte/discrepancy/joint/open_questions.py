@@ -10,6 +10,7 @@ from pymoo_hdte.discrepancy.joint.analysis import SLOWING, JointFinding
 from pymoo_hdte.discrepancy.joint.torsion import errors_of
 from pymoo_hdte.discrepancy.joint.wiring import wiring_doubts
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
+from pymoo_hdte.discrepancy.mechanism.proof import rests_told
 from pymoo_hdte.discrepancy.mechanism.rest import fitted_values, share_removed
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.units import ARCSEC
@@ -65,6 +66,7 @@ def torsion_limits(finding: JointFinding) -> list[str]:
         if NOT_PROVEN in torsion.verdict.doubts:
             told += f"; but {NOT_PROVEN} with the best of them"
         found.append(f"{told}: none is named.")
+    found += rests_told(torsion)
     return [*found, *_delay(finding), *_in_both(finding), *_beyond_band(finding)]
 
 

@@ -189,6 +189,17 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
     ]
 
 
+def rests_told(finding: MechanismFinding) -> list[str]:
+    """Return a sentence for each training record of which rows at rest are left out."""
+    return [
+        f"Rows of {one.record.name} at rest: {one.left_out}. They are left out, as dry friction, "
+        "which is known to act, may have any force up to its breakaway there. What acts only there "
+        "or right beside it, such as friction that falls at the slowest speeds, is not judged."
+        for one in finding.data.spectra
+        if one.left_out
+    ]
+
+
 def not_proven(finding: MechanismFinding) -> list[str]:
     """Return a sentence on what the held-out records forbid to name, if they do."""
     chosen = finding.verdict.chosen

@@ -109,7 +109,7 @@ def in_units_of(
 
 def root_mean_square(data: MeasuredData, residuals: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the root mean square of each balance, N or N.m, for whitened residuals (n,)."""
-    samples = sum(len(balance.time) for balance in data.spectra)
+    samples = sum(balance.moving.count for balance in data.spectra)
     return np.sqrt(data.power(residuals) / samples)
 
 

@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
-from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, not_proven
+from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, not_proven, rests_told
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import in_words
@@ -201,12 +201,7 @@ def limits(finding: MechanismFinding) -> list[str]:
         for record in finding.records
         if record.dropped
     ]
-    found += [
-        f"Rows of {one.record.name} at rest: {one.left_out}. They are left out, as dry friction, "
-        "which is known to act, may have any force up to its breakaway there."
-        for one in finding.data.spectra
-        if one.left_out
-    ]
+    found += rests_told(finding)
     found += [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
     found += [
         f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "

@@ -32,14 +32,15 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
         port = _port_of(finding, name)
         for record, balance in enumerate(finding.data.spectra):
             motion = balance.ports[port]
-            stride = slice(None, None, max(1, len(balance.time) * len(before) // _POINTS))
+            rows = np.flatnonzero(balance.moving.whole)
+            rows = rows[:: max(1, len(rows) * len(before) // _POINTS)]
             shown = [(before[record][row], BEFORE, ".", "before")]
             if named:
                 shown.append((after[record][row], AFTER, "x", "after"))
             for column, over in enumerate((motion.speed, motion.position)):
                 for residual, colour, marker, label in shown:
                     axes[row, column].plot(
-                        over[stride], balance.in_time(residual)[stride], marker, ms=3, color=colour,
+                        over[rows], balance.in_time(residual)[rows], marker, ms=3, color=colour,
                         alpha=0.6, label=label if record == 0 else None,
                     )  # fmt: skip
         axes[row, 0].set_ylabel(f"left of {name} [SI]")

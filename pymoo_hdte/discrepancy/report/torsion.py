@@ -165,7 +165,7 @@ def _size(finding: JointFinding, laws: tuple[LawAt, ...]) -> dict[str, float]:
     power, count = 0.0, 0
     for balance in torsion.data.spectra:
         at = {gear: finding.stiffness}, {gear: float(values[f"zero of {gear}"])}
-        force = balance.in_time(balance.forces(laws, *at)[0])
+        force = balance.in_time(balance.forces(laws, *at)[0])[balance.moving.whole]
         power, count = power + float(np.sum((force - force.mean()) ** 2)), count + len(force)
     size = (power / count) ** 0.5
     return {"rms_Nm": size, "rms_arcsec": size / finding.stiffness / ARCSEC}

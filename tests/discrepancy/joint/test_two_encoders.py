@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import made_joint
 import numpy as np
 import pytest
 from made_joint import ARCSECOND, DAMPING, STIFFNESS, Hidden, believed, record, records
@@ -21,7 +22,9 @@ from pymoo_hdte.discrepancy.joint.torsion import examine_torsion
 from pymoo_hdte.discrepancy.joint.wiring import wiring_doubts
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.models import model_text, read_mechanism_model
+from pymoo_hdte.discrepancy.mechanism.proof import rests_told
 from pymoo_hdte.discrepancy.report.torsion import torsion_document
+from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import HardeningStiffness, SoftWindup
@@ -62,6 +65,34 @@ def test_with_nothing_missing_the_torsion_is_adequate_and_its_stiffness_found():
     assert value(finding.accepted, "stiffness of gear") == pytest.approx(STIFFNESS, rel=1e-3)
     assert gap.after < 2.0 * gap.noise_floor
     assert np.std(gap.measured) > 100.0 * gap.after
+
+
+def resting(seconds, seed):
+    """Return a motion as `made_joint.motion` does, with half a second of rest after each move."""
+    time = np.arange(0.0, seconds, made_joint.STEP)
+    move = np.sin(np.linspace(0.0, np.pi, round(4.5 / made_joint.STEP))) ** 2
+    still = np.zeros(round(0.5 / made_joint.STEP))
+    sizes = np.random.default_rng(seed).uniform(0.8, 1.5, 8) * np.where(np.arange(8) % 2, -1.0, 1.0)
+    speed = np.resize(np.outer(sizes, np.append(move, still)).ravel(), len(time))
+    position = made_joint.STEP * (np.cumsum(speed) - 0.5 * speed)
+    return time, position, speed, np.gradient(speed, made_joint.STEP)
+
+
+def test_rests_that_are_left_out_are_told_and_count_as_no_prediction(monkeypatch):
+    """Dry friction ahead of the gear is known: what it holds at rest is in no force balance."""
+    monkeypatch.setattr(made_joint, "motion", resting)
+    known = [LawAt("coulomb_friction", "shaft", CoulombFriction(6.0))]
+    mechanism = believed()
+    ports = [*mechanism.ports, Port("shaft", {"motor": 1.0})]
+    joint = joint_of(replace(mechanism, ports=ports))
+    made = records(Hidden(WINDUP, dry=6.0))
+    finding = examine_torsion(torsion_half(joint, made, known), joint, 10.0)
+    assert finding.data.spectra[0].left_out > 0
+    assert any("at rest" in words for words in rests_told(finding))
+    (gap,) = torsion_gaps(finding)
+    # Where nothing is compared, a prediction would differ from what is measured by the same.
+    differences = gap.measured - gap.predicted_before
+    assert len(np.unique(np.round(differences / ARCSECOND, 9))) == len(differences)
 
 
 @pytest.mark.parametrize(

@@ -79,3 +79,11 @@ def test_dry_friction_is_named_before_its_difference_between_the_directions():
     dry, turning = (one.law for one in finding.accepted.effects)
     assert dry.level == pytest.approx(20.0, rel=0.05)
     assert turning.viscous == pytest.approx(40.0, rel=0.05)
+    # Values, residuals and their derivatives follow that order.
+    accepted = finding.accepted
+    stands = finding.data.objective(accepted.candidates)
+    assert accepted.parameters == stands.parameters
+    assert stands.residuals(accepted.values) == pytest.approx(accepted.residuals, abs=1e-9)
+    slopes = stands.jacobian(accepted.values)
+    sizes = np.linalg.norm(slopes, axis=0)
+    assert np.all(np.linalg.norm(accepted.jacobian - slopes, axis=0) <= 0.05 * sizes)

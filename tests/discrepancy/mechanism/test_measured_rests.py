@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
+from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
+from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square
 from pymoo_hdte.discrepancy.report.mechanism_document import limits
 from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
 from pymoo_hdte.effects.law import PortState, periodic_phase
@@ -20,7 +23,7 @@ JOINT = Mechanism(
 DRY = LawAt("coulomb_friction", "bearing", CoulombFriction(LEVEL))
 
 
-def record_of(rest, drag=0.0):
+def record_of(rest, drag=0.0, noises=(1e-5, 0.02), seed=0):
     """Return a record of moves there and back, each with a rest of so many seconds after it."""
     generator = np.random.default_rng(31)
     move = np.sin(np.linspace(0.0, np.pi, round(1.5 / STEP))) ** 2
@@ -32,22 +35,23 @@ def record_of(rest, drag=0.0):
     held = np.repeat(LEVEL * generator.uniform(-0.9, 0.9, MOVES), len(move) + len(still))
     friction[speed == 0.0] = held[speed == 0.0]
     torque = INERTIA * np.gradient(speed, STEP) + DAMPING * speed + friction
-    noise = generator.standard_normal((2, len(speed)))
+    noise = np.random.default_rng([31, seed]).standard_normal((2, len(speed)))
     channels = {
-        "q": STEP * (np.cumsum(speed) - 0.5 * speed) + 1e-5 * noise[0],
-        "torque": torque + 0.02 * noise[1],
+        "q": STEP * (np.cumsum(speed) - 0.5 * speed) + noises[0] * noise[0],
+        "torque": torque + noises[1] * noise[1],
     }
     return Record("moves", "train", STEP * np.arange(len(speed)), channels)
 
 
-def test_a_complete_model_of_a_joint_that_rests_is_adequate_and_rests_are_told():
-    finding = examine_mechanism(JOINT, [record_of(1.0)], CUTOFF, [DRY])
+@pytest.mark.parametrize("rest", [1.0, 4.0])
+def test_a_complete_model_of_a_joint_that_rests_is_adequate_and_rests_are_told(rest):
+    finding = examine_mechanism(JOINT, [record_of(rest)], CUTOFF, [DRY])
     assert finding.verdict.status == "adequate"
     assert finding.accepted.values == pytest.approx([INERTIA, DAMPING], rel=0.01)
     (told,) = (words for words in limits(finding) if "at rest" in words)
-    # A second for each move, and some periods of the cutoff, in which smoothed forces show it.
+    # The rest after each move, and some periods of the cutoff, in which smoothed forces show it.
     (balance,) = finding.data.spectra
-    assert MOVES < balance.left_out * STEP < MOVES * (1.0 + 8.0 / CUTOFF)
+    assert MOVES * rest < balance.left_out * STEP < MOVES * (rest + 8.0 / CUTOFF)
     assert f"Rows of moves at rest: {balance.left_out}." in told
 
 
@@ -62,6 +66,23 @@ def test_what_is_missing_in_a_joint_that_rests_is_named():
     assert found == pytest.approx(1.5 * speed**2 + DAMPING * speed, rel=0.02)
 
 
+def test_rows_that_are_left_out_count_neither_for_intervals_nor_for_chi_square():
+    """Of seventy per cent: with zeros in their place both would be off by a factor of 1.7."""
+    distances, chi_squares = [], []
+    for seed in range(30):
+        data = measured_data(JOINT, [record_of(2.0, 0.0, (1e-5, 0.2), seed)], CUTOFF, [DRY])
+        fitted = fit(data)
+        spread = np.diag(fitted.covariance) ** 0.5
+        distances.append((fitted.values - [INERTIA, DAMPING]) / spread)
+        chi_squares.append(fitted.chi_square)
+    degrees_of_freedom = len(fitted.residuals) - 2
+    assert np.sqrt(np.mean(np.square(distances))) == pytest.approx(1.0, abs=0.3)
+    assert np.std(chi_squares) / (2.0 * degrees_of_freedom) ** 0.5 == pytest.approx(1.0, abs=0.4)
+    # The noise of the torque, as far as the band holds it.
+    (noise,) = root_mean_square(data, np.ones(len(fitted.residuals)))
+    assert noise == pytest.approx(0.2 * (2.0 * CUTOFF * STEP) ** 0.5, rel=0.15)
+
+
 def test_only_rests_under_known_dry_friction_are_left_out():
     resting = record_of(1.0)
     time, noise = resting.time, 1e-5 * np.random.default_rng(1).standard_normal(len(resting.time))
@@ -71,7 +92,9 @@ def test_only_rests_under_known_dry_friction_are_left_out():
     for record, known in ((turning, [DRY]), (resting, []), (resting, [drag])):
         balance = ForceBalance(JOINT, record, CUTOFF, known)
         assert balance.left_out == 0
-        assert np.all(balance.weight == 1.0)
-    # Of a record that hardly moves nothing is left out: it would tell nothing at all.
-    hardly = record_of(20.0)
+        assert np.all(balance.moving.weight == 1.0)
+    # Of a record that moves once nothing is left out: it would tell nothing at all.
+    once = slice(round(4.0 / STEP))
+    channels = {name: signal[once] for name, signal in record_of(20.0).channels.items()}
+    hardly = Record("once", "train", time[once], channels)
     assert ForceBalance(JOINT, hardly, CUTOFF, [DRY]).left_out == 0
