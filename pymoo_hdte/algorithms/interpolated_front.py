@@ -64,7 +64,8 @@ class FoundFront:
         more.
     difference : float
         Dimensionless, in widths: largest difference of interpolation and evaluation along the last
-        front, and by which a design anywhere was better; inf if one along it had no objectives.
+        front, and by which a design anywhere undercut it or lay beyond an end; inf if one along it
+        had no objectives.
     evaluated : int
         Number of designs evaluated.
     lost : ndarray, shape (k, n_var)
@@ -104,7 +105,7 @@ def interpolated_front(
     rng : numpy.random.Generator
     accuracy : float
         Dimensionless, in widths: the search ends when interpolation and evaluation differ by less
-        along the front, and no design anywhere is better by more.
+        along the front, and no design anywhere undercuts it or extends it by more.
     least_width : float
         Dimensionless share of an objective's least value below which its width counts as that.
     start : ndarray, shape (m, n_var), optional
@@ -245,12 +246,13 @@ def _round(known: _Known, points: int, rng: np.random.Generator) -> float:
     width = known.width
     elsewhere = values[len(new) :]
     elsewhere = elsewhere[np.isfinite(elsewhere).all(axis=1)]
-    # By how much a design undercuts the front in both objectives at once.
+    # By how much a design undercuts the front in both objectives at once, or lies beyond its ends.
     undercut = ((before - elsewhere[:, None]) / width).min(axis=2)
+    beyond = (before.min(axis=0) - elsewhere) / width
     differences = np.abs(values[: len(new)] - expected) / width
     if np.isnan(differences).any():
         return np.inf
-    return float(max(differences.max(initial=0.0), undercut.max(initial=0.0)))
+    return float(max(one.max(initial=0.0) for one in (differences, undercut, beyond)))
 
 
 def _first_cubes(n_var: int, number: int, rng: np.random.Generator) -> Values:

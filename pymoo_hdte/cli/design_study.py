@@ -48,7 +48,7 @@ class Settings:
     conditions : tuple of OperatingCondition or None
         The duty cycle; None for the rated condition.
     designs : int
-        Evaluated on the drive model in one search before it gives up.
+        Evaluated on the drive model in one search, after which no further round begins.
     seed : int
     """
 
@@ -89,6 +89,8 @@ class DesignStudy:
     settings : Settings
     search : FoundFront
         The front, by rising mean DTE.
+    evaluated : int
+        Number of designs in all searches.
     chosen : dict of int
         Row of the front that each of `PREFERENCES` chooses.
     preference : str
@@ -106,6 +108,7 @@ class DesignStudy:
     problem: RobustDTEDirect
     settings: Settings
     search: FoundFront
+    evaluated: int
     chosen: dict[str, int]
     preference: str
     initial: Values
@@ -140,7 +143,7 @@ class DesignStudy:
 
     @property
     def quadrature(self) -> float:
-        """Largest difference of front and drive model on the checked drives, in widths."""
+        """Largest difference of front and drive model on other drives, at most, in widths."""
         return _difference(self.search, self.checks)
 
     @property
@@ -207,11 +210,12 @@ def run_design_study(
         If the nominal design has no steady state somewhere within its scatter; names where.
     """
     rng = np.random.default_rng(settings.seed)
-    nodes, start, before = FIRST_NODES, None, 0
+    nodes, start, before, runs = FIRST_NODES, None, 0, 0
     for number in range(_SEARCHES):
         problem = RobustDTEDirect(
             model, settings.tolerance, settings.box, settings.conditions, nodes
         )
+        problem.moments.n_runs = runs
         initial = problem.evaluate(problem.nominal[None])[0]
         search = interpolated_front(
             problem.moments,
@@ -238,18 +242,19 @@ def run_design_study(
         refined = problem.moments.refined(search.designs[rows], wanted)
         if refined.nodes == nodes:
             break
-        nodes, start, before = refined.nodes, search.designs, before + search.evaluated
-    sharp = problem.moments.with_nodes([max(2, count) for count in nodes])
+        nodes, start = refined.nodes, search.designs
+        before, runs = before + search.evaluated, refined.n_runs
     return DesignStudy(
         problem=problem,
         settings=settings,
         search=search,
+        evaluated=before + search.evaluated,
         chosen=chosen,
         preference=preference,
         initial=initial,
         initial_check=initial_check,
         checks=checks,
-        sources=sharp.sources(search.designs[chosen[preference]]),
+        sources=problem.moments.at_least_two().sources(search.designs[chosen[preference]]),
     )
 
 

@@ -48,7 +48,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
         "--designs",
         type=int,
         default=600,
-        help="at most so many are asked of the drive model in a search (default 600)",
+        help="asked of the drive model in a search, after which no round begins (default 600)",
     )
     parser.add_argument("--seed", type=int, default=1, help="of the random numbers (default 1)")
 

@@ -96,6 +96,15 @@ class ModelMoments:
         other.n_runs = self.n_runs
         return other
 
+    def at_least_two(self) -> ModelMoments:
+        """Return moments of two nodes or more for each input, as far as `MOST_NODES` goes."""
+        rule = self
+        for axis, count in enumerate(self.nodes):
+            nodes = _doubled(rule.nodes, axis)
+            if count == 1 and np.prod(nodes) <= MOST_NODES:
+                rule = rule.with_nodes(nodes)
+        return rule
+
     def refined(self, designs: Values, wanted: Values) -> ModelMoments:
         """Return moments of so many nodes that doubling those of any input changes little.
 

@@ -88,6 +88,28 @@ def test_without_agreement_it_ends_and_says_so():
     assert found.difference > 0.01
 
 
+def test_a_design_beyond_an_end_of_the_front_is_no_agreement():
+    """One design anywhere has a far better first objective, and a worse second one."""
+    designs = []
+
+    def evaluate(some):
+        designs.extend(some)
+        return objectives(some)
+
+    first = search(evaluate, accuracy=0.05)
+    # The last 16 were those anywhere.
+    pit = designs[-1]
+
+    def with_pit(some):
+        values = objectives(some)
+        values[np.all(some == pit, axis=1)] = [0.8, 3.0]
+        return values
+
+    again = search(with_pit, accuracy=0.05, most=first.evaluated + 1)
+    assert again.evaluated > first.evaluated
+    assert again.front[0] == pytest.approx([0.8, 3.0])
+
+
 def test_nothing_can_be_said_of_a_box_without_objectives():
     with pytest.raises(ArithmeticError, match=r"none of .* designs over the whole box has values"):
         search(lambda designs: np.full((len(designs), 2), np.nan))

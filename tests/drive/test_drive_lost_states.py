@@ -1,6 +1,7 @@
 """Designs without a steady state among others: left out, or continued from their neighbours."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -43,6 +44,18 @@ def test_a_motion_that_grows_leaves_the_others_as_they_are():
     assert 0 < np.isnan(found).sum() < 30
 
 
+def test_designs_that_share_their_stiffness_are_judged_one_by_one():
+    effects = (LoadInertia(0.395), DampingReference(0.01), MeshStiffnessVariation(0.3, 0.0))
+    shaky = replace(MODEL, effects=effects).at(280.0, 40.0)
+    designs = np.tile(shaky.nominal, (15, 1))
+    designs[:, 1] *= 1.2
+    # Inertia moves the resonance, and with it the growth.
+    designs[:, 2] *= np.linspace(0.7, 1.3, 15)
+    found = np.isnan(shaky.dte_where_found(designs))
+    assert np.array_equal(found, [np.isnan(shaky.dte_where_found(one[None]))[0] for one in designs])
+    assert 0 < found.sum() < 15
+
+
 @pytest.fixture
 def soft():
     """A drive that softens near zero torque."""
@@ -64,6 +77,16 @@ def test_lost_designs_start_from_their_neighbours(soft):
     assert found.torsion[regained] == pytest.approx(rest.torsion[regained], rel=1e-6, abs=1e-9)
     kept = np.flatnonzero(alone.converged)
     assert np.array_equal(found.torsion[kept], alone.torsion[kept])
+
+
+def test_the_dte_of_a_drive_uses_them(soft, monkeypatch):
+    designs = around(soft, 200)
+    few = partial(harmonic_balance, steps=6)
+    alone = few(soft.coefficients(designs)).converged
+    monkeypatch.setattr("pymoo_hdte.drive.solve.hill.harmonic_balance", few)
+    found = np.isfinite(soft.dte_where_found(designs))
+    assert found[alone].all()
+    assert found[~alone].any()
 
 
 def test_without_any_neighbour_nothing_changes(soft):

@@ -57,6 +57,13 @@ def test_sources_are_the_sobol_indices():
     assert found.variance**0.5 == pytest.approx(model.evaluate(design[None])[0, 1], rel=1e-9)
 
 
+def test_sources_need_two_nodes_of_each_input_but_never_too_many():
+    for nodes, wanted in (((6, 3, 3, 1, 2), (6, 3, 3, 2, 2)), ((24, 4, 4, 1, 6),) * 2):
+        moments = RobustDTEDirect("published", nodes=nodes).moments.at_least_two()
+        assert moments.nodes == wanted
+    assert 0.9 < moments.sources(moments.model.nominal[1:]).first[0] <= 1.0
+
+
 def test_a_design_without_steady_state_is_nan_and_named():
     problem = RobustDTEDirect(soft_windup(), nodes=(2, 2, 2, 1, 1))
     designs = problem.nominal * [[0.75, 1.25, 1.0, 1.0], [1.22, 0.8, 1.0, 1.0]]
