@@ -45,7 +45,8 @@ def judged(
     """
     base, rules = fit(data), data.rules
     searched = [one for one in candidates if not one.instead_of]
-    verdict = _mostly_explained(sensors, data, _compared(data, base, searched, best))
+    verdict, of_its_own_noise = _compared(data, base, searched, best)
+    verdict = _mostly_explained(sensors, data, verdict)
     verdict = _simplest(data, verdict)
     verdict = _with_true_rivals(data, _within_bounds(sensors, data, verdict))
     verdict = _with_substitutes(data, verdict, candidates)
@@ -59,13 +60,19 @@ def judged(
     least = rules.explained_share if verdict.status == "parameter" else rules.main_share
     if removed < least or out:
         return _as_unlisted(verdict, verdict.chosen)
-    return replace(verdict, chosen=_largest_first(data, verdict.chosen))
+    verdict = replace(verdict, chosen=_largest_first(data, verdict.chosen))
+    if of_its_own_noise and verdict.status == "named" and removed < rules.explained_share:
+        return replace(verdict, status="partial", doubts=(*verdict.doubts, _too_little(removed)))
+    return verdict
 
 
 def _compared(
     data: MeasuredData, base: Fit, candidates: Sequence[Candidate], best: Hypothesis | None
-) -> Verdict:
+) -> tuple[Verdict, bool]:
     """Return the verdict on the sets of a search, and on the best effects if it missed them.
+
+    And whether these were needed: what they leave is the noise of the data, down to which they
+    explain a misfit in any case, so that their share has to be looked at besides.
 
     A search extends a set by what could remove most of what it leaves, to first order. That may be
     nothing for one of two effects between which the base lies: springs that slip and a spring that
@@ -73,16 +80,16 @@ def _compared(
     """
     verdict = judge(data, base, candidates)
     if verdict.status != "unlisted" or verdict.chosen is None or best is None:
-        return verdict
+        return verdict, False
     found = [verdict.chosen, *verdict.alternatives]
     if label_of(best.candidates) in [label_of(one.candidates) for one in found]:
-        return verdict
+        return verdict, False
     some = [
         kept for n in range(len(best.candidates)) for kept in combinations(best.candidates, n + 1)
     ]
     excess = base.chi_square - verdict.degrees_of_freedom
     found += [hypothesis_of(fit(data, kept, best.values_of(kept)), excess) for kept in some]
-    return judge(data, base, candidates, sorted(found, key=lambda one: one.bic))
+    return judge(data, base, candidates, sorted(found, key=lambda one: one.bic)), True
 
 
 def _largest_first(data: MeasuredData, one: Hypothesis) -> Hypothesis:
@@ -126,9 +133,12 @@ def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdic
         and one.names != chosen.names
         and _does_as_well(data, one.fit, chosen.fit)
     ]
-    doubt = f"it explains {100.0 * removed:.0f} % of the misfit, less than a name takes"
-    doubts = (*_doubts(data, verdict.base, chosen), doubt)
+    doubts = (*_doubts(data, verdict.base, chosen), _too_little(removed))
     return _with_rivals(replace(verdict, doubts=doubts), rivals)
+
+
+def _too_little(removed: float) -> str:
+    return f"it explains {100.0 * removed:.0f} % of the misfit, less than a name takes"
 
 
 def _simplest(data: MeasuredData, verdict: Verdict) -> Verdict:
