@@ -144,7 +144,7 @@ def test_workers_give_the_same_and_make_failed_runs_again(workers):
 
 def test_runs_and_memory_are_told_before_the_first_run(capsys):
     def told(x, a):
-        assert "2 inputs, 14 to 1000 runs, at most" in capsys.readouterr().err
+        assert "2 inputs, 35 to 1000 runs, at most" in capsys.readouterr().err
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
