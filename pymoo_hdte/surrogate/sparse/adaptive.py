@@ -16,7 +16,7 @@ from pymoo_hdte.surrogate.sparse.draws import (
     nearest_designs,
     relevance,
 )
-from pymoo_hdte.surrogate.sparse.kernel import PolynomialFamilies
+from pymoo_hdte.surrogate.sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate.sparse.moments import SparseMoments
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.sparse.response import LOST, Judged, ResponseFit, fitted
@@ -125,16 +125,16 @@ class _Growth:
         """Fit the surrogate to the runs, and measure it."""
         good = np.isfinite(self.truth).all(axis=1)
         points, truth = self.points[good], self.truth[good]
-        families = PolynomialFamilies(self.axes, int(np.clip(len(points) // 3, *DEGREES)))
-        features, judged = families(points), Judged.at(*self.draws, families)
+        polynomials = EvenPolynomials(int(np.clip(len(points) // 3, *DEGREES)))
+        features, judged = polynomials(points), Judged.at(*self.draws, polynomials)
         weights = relevance(self.axes, points)
         starts: list[Array | None] = [*self.parameters] or [None] * truth.shape[1]
         fits = [
-            fitted(families, features, values, weights, judged, self.lost, start)
+            fitted(features, values, weights, judged, self.lost, start)
             for values, start in zip(truth.T, starts, strict=True)
         ]
         self.parameters = [one.regression.parameters for one in fits]
-        polynomial = _joined(fits, families)
+        polynomial = _joined(fits, polynomials)
         # Where there are no runs the polynomial runs away: its error would hide behind a scatter
         # that is not there.
         moments = SparseMoments(polynomial, self.axes, [axis.cut for axis in self.axes])
@@ -172,14 +172,14 @@ class _Growth:
         return replace(fit, moments=moments, mean_error=of_mean, std_error=of_std)
 
 
-def _joined(fits: list[ResponseFit], families: PolynomialFamilies) -> SparsePolynomial:
+def _joined(fits: list[ResponseFit], polynomials: EvenPolynomials) -> SparsePolynomial:
     """Return all responses on the union of their terms."""
     indices = closed(np.concatenate([one.indices for one in fits]))
     places = {tuple(row): place for place, row in enumerate(indices.tolist())}
     coefficients = np.zeros((len(fits), len(indices)))
     for row, one in zip(coefficients, fits, strict=True):
         row[[places[tuple(index)] for index in one.indices.tolist()]] = one.coefficients
-    matrices = [families.to_chebyshev(axis) for axis in range(indices.shape[1])]
+    matrices = [polynomials.to_chebyshev()] * indices.shape[1]
     return SparsePolynomial.from_triangular(indices, coefficients, matrices)
 
 
@@ -208,7 +208,7 @@ def fit_adaptively(
     acceptable : callable
         A further condition to stop.
     at_once : int
-        Least number of indices to add together.
+        Least number of runs to add together.
 
     Returns
     -------
