@@ -31,7 +31,7 @@ from pymoo_hdte.problems.simulator.trust import (
     negative_somewhere,
     positive_places,
 )
-from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, first_runs, fit_adaptively
+from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, fit_adaptively, least_runs
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
 Array = NDArray[np.float64]
@@ -68,6 +68,10 @@ def robust_problem(
     variance, and half of that is added to the error, unless the response is a polynomial of low
     degree. If the surrogate adds more than four times the estimate there, it runs away: what lies
     beyond is left out, and four times the estimate is added.
+
+    What no run meets is not seen: a jump or peak that takes up a share p of the inputs' reach is
+    missed by all of n runs with probability (1 - p)^n. At least 33 runs and one more for each input
+    are made.
 
     Parameters
     ----------
@@ -132,7 +136,7 @@ def robust_problem(
     """
     inputs = Inputs(designs, {} if noise is None else noise)
     accuracy = real_number("accuracy", accuracy, above=0.0)
-    least = least_runs(inputs)
+    least = least_runs(len(inputs.axes))
     budget = whole_number("budget", budget, least)
     _check_statistics(objectives, constraints)
     file = None if cache is None else RunFile(cache, inputs.names, identity(simulator))
@@ -161,11 +165,6 @@ def robust_problem(
     problem = SimulatorProblem(inputs, fit, responses, objectives, constraints, fit.n_runs)
     _tell_failures(problem)
     return problem
-
-
-def least_runs(inputs: Inputs) -> int:
-    """Return the number of runs below which no surrogate is made."""
-    return first_runs(len(inputs.axes))
 
 
 def _refuse_untrusted(

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
 
-from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.measures import Measure, OrthonormalPolynomials
 
 Array = NDArray[np.float64]
@@ -29,40 +28,32 @@ _LEAST = 1e-10
 """Size below which a factor of the covariance is not divided by."""
 
 
-class PolynomialFamilies:
-    """Polynomials of every axis that are orthonormal on -1..1: under the noise, or evenly.
+class EvenPolynomials:
+    """Polynomials that are orthonormal when spread evenly over -1..1, the same for every axis.
 
     Parameters
     ----------
-    axes : list of Axis, length d
     degree : int
         Highest degree k.
     """
 
-    def __init__(self, axes: list[Axis], degree: int) -> None:
+    def __init__(self, degree: int) -> None:
         self.degree = degree
         nodes, weights = leggauss(degree + 4)
-        even = Measure(nodes, 0.5 * weights)
-        self._families = [OrthonormalPolynomials(even, degree) for _ in axes]
+        self._family = OrthonormalPolynomials(Measure(nodes, 0.5 * weights), degree)
 
     def __call__(self, points: Array) -> list[Array]:
         """Return p_1 .. p_k of every axis at points of shape (n, d), each of shape (k, n)."""
-        return [one(z)[1:] for one, z in zip(self._families, points.T, strict=True)]
+        return [self._family(z)[1:] for z in points.T]
 
-    def to_chebyshev(self, axis: int) -> Array:
+    def to_chebyshev(self) -> Array:
         """Return the triangular matrix, shape (k + 1, k + 1), of p_j in T_0 .. T_k: column j."""
         size = self.degree + 1
         angles = (2 * np.arange(size) + 1) * np.pi / (2 * size)
-        values = self._families[axis](np.cos(angles))
+        values = self._family(np.cos(angles))
         matrix = 2.0 / size * np.cos(np.outer(np.arange(size), angles)) @ values.T
         matrix[0] *= 0.5
         return np.triu(matrix)
-
-
-def _on_cube(axis: Axis, even: Measure) -> Measure:
-    if axis.designed or axis.scatter is None:
-        return even
-    return Measure((axis.cut.nodes - axis.centre) / axis.half_width, axis.cut.weights)
 
 
 def variances(parameters: Array, degree: int) -> tuple[Array, Array]:

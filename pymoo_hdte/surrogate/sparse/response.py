@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.surrogate.sparse.kernel import PolynomialFamilies
+from pymoo_hdte.surrogate.sparse.kernel import EvenPolynomials
 from pymoo_hdte.surrogate.sparse.regression import Regression
 from pymoo_hdte.surrogate.sparse.terms import closed, largest, likely_terms, products
 
@@ -51,9 +51,9 @@ class Judged:
     features: list[list[Array]]
 
     @classmethod
-    def at(cls, points: Array, weights: Array, families: PolynomialFamilies) -> Judged:
-        """Return it with the polynomials of these families at points of shape (v, k, d)."""
-        together = families(points.reshape(-1, points.shape[-1]))
+    def at(cls, points: Array, weights: Array, polynomials: EvenPolynomials) -> Judged:
+        """Return it with these polynomials at points of shape (v, k, d)."""
+        together = polynomials(points.reshape(-1, points.shape[-1]))
         parts = [np.split(one, len(points), axis=1) for one in together]
         return cls(weights, [list(one) for one in zip(*parts, strict=True)])
 
@@ -110,7 +110,6 @@ class ResponseFit:
 
 
 def fitted(
-    families: PolynomialFamilies,
     features: list[Array],
     values: Array,
     relevance: Array,
@@ -122,7 +121,6 @@ def fitted(
 
     Parameters
     ----------
-    families : PolynomialFamilies
     features : list of ndarray
         Of the runs.
     values : ndarray, shape (n,)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.robust.data import (
+    STOP_NUMBERS,
     Outcome,
     ahead,
     curves_text,
@@ -16,6 +17,7 @@ from experiments.robust.functions import FUNCTIONS, G_WEIGHTS
 from experiments.robust.job import CHAOSPY, OPENTURNS, OURS
 from experiments.robust.ours import trace
 from experiments.robust.rivals import CHAOSPY_WAYS, chaospy_traces, runs_needed, until_it_stays
+from experiments.robust.tables import stops_table
 from experiments.robust.task import Task
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
@@ -64,6 +66,17 @@ def test_both_libraries_are_run_on_the_same_task():
         assert all(np.isfinite(step).all() for step in steps)
     (first, *_) = trace(task, 20, 0.01)
     assert first[0] == 14
+
+
+def test_a_band_that_was_not_looked_at_on_all_functions_is_not_said_to_hold():
+    numbers = dict.fromkeys(STOP_NUMBERS, 1.0)
+    every = {(one.name, 1): numbers for one in FUNCTIONS}
+    some = dict(list(every.items())[1:])
+    curves = {(one.name, OURS, OURS): [(39, 0.001, 0.001)] for one in FUNCTIONS}
+    for stops, holds in ((every, True), (some, False)):
+        (finding,) = stops_table(Outcome(curves, stops)).findings
+        assert finding.agrees is holds
+    assert FUNCTIONS[0].name in finding.sentence
 
 
 def test_the_stored_outcome_gives_the_report(tmp_path):

@@ -118,6 +118,19 @@ def test_what_cannot_be_trusted_is_refused_with_the_region(options, words):
     assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
 
 
+def test_a_jump_that_the_first_runs_do_not_meet_is_not_overlooked():
+    """Between 14 runs it hides: the mean was 3 % of the scatter off after 15, 0.75 % stated."""
+    with pytest.raises(UntrustedSurrogate, match="after 60 runs"):
+        quiet(
+            lambda x, a: x + a + 0.05 * (a > 0.6),
+            {"x": Design(0.1, 0.9, deviation=0.1)},
+            {"a": chaospy.Uniform(0.0, 1.0)},
+            budget=60,
+            vectorised=True,
+            seed=3,
+        )
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

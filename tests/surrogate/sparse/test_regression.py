@@ -9,7 +9,7 @@ from pymoo_hdte.problems.simulator.inputs import Inputs
 from pymoo_hdte.surrogate.sparse import regression as module
 from pymoo_hdte.surrogate.sparse.adaptive import fit_adaptively
 from pymoo_hdte.surrogate.sparse.draws import SpreadPoints, draw_around, draw_designs
-from pymoo_hdte.surrogate.sparse.kernel import PolynomialFamilies, covariance, variances
+from pymoo_hdte.surrogate.sparse.kernel import EvenPolynomials, covariance, variances
 from pymoo_hdte.surrogate.sparse.regression import Regression
 from pymoo_hdte.surrogate.sparse.terms import closed, likely_terms, products
 
@@ -17,7 +17,7 @@ INPUTS = Inputs(
     {"x": Design(0.5, 1.0, deviation=0.1)},
     {"a": chaospy.Uniform(0.0, 1.0), "b": chaospy.Normal(0.0, 1.0)},
 )
-FAMILIES = PolynomialFamilies(INPUTS.axes, 6)
+POLYNOMIALS = EvenPolynomials(6)
 
 
 def runs(count):
@@ -28,7 +28,7 @@ def runs(count):
 
 def test_the_covariance_of_two_points_is_the_sum_over_all_terms():
     points, _ = runs(5)
-    features = FAMILIES(points)
+    features = POLYNOMIALS(points)
     variance, _ = variances(np.random.default_rng(2).normal(size=(3, 3)), 6)
     every = np.array(list(np.ndindex(7, 7, 7)))
     whole = np.column_stack([np.ones(3), variance])
@@ -42,7 +42,7 @@ def test_the_covariance_of_two_points_is_the_sum_over_all_terms():
 
 def test_a_run_left_out_is_predicted_as_if_it_had_not_been_made():
     points, values = runs(25)
-    features = FAMILIES(points)
+    features = POLYNOMIALS(points)
     fitted = Regression(features, values, np.ones(25))
     standard = (values - fitted.centre) / fitted.unit
     others = np.arange(25) != 7
@@ -56,7 +56,7 @@ def test_a_run_left_out_is_predicted_as_if_it_had_not_been_made():
 
 def test_the_slope_of_the_likelihood_equals_differences():
     points, values = runs(20)
-    features, standard = FAMILIES(points), values - values.mean()
+    features, standard = POLYNOMIALS(points), values - values.mean()
     parameters = np.random.default_rng(3).normal(-1.0, 0.5, (3, 3))
     _, slope = module._misfit(features, standard, parameters)
     for place in np.ndindex(3, 3):
