@@ -55,8 +55,10 @@ class WeightedUtopia(DecisionMaking):
             raise InvalidInput("number of weights", len(array), "at least 2")
         if np.any(array < 0):
             raise InvalidInput("weights", weights, "none negative")
-        if not math.isclose(math.fsum(array), 1.0, rel_tol=0.0, abs_tol=1e-9):
-            raise InvalidInput("sum of weights", math.fsum(array), "1")
+        with np.errstate(over="ignore"):
+            total = float(array.sum())
+        if not math.isclose(total, 1.0, rel_tol=0.0, abs_tol=1e-9):
+            raise InvalidInput("sum of weights", total, "1")
         self.weights = array
 
     def distances(self, F: ArrayLike) -> NDArray[np.float64]:

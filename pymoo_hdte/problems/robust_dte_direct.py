@@ -18,13 +18,10 @@ from pymoo_hdte.problems.drive_response import (
     UNITS,
     DriveResponse,
 )
-from pymoo_hdte.problems.model_moments import ModelMoments
+from pymoo_hdte.problems.model_moments import FIRST_NODES, ModelMoments
 from pymoo_hdte.problems.operating_conditions import OperatingCondition
 from pymoo_hdte.problems.reference import StoredFront
 from pymoo_hdte.surrogate import TruncatedNormal, UniformBand
-
-NODES = (8, 3, 3, 1, 2)
-"""On the front of `calibrated` within 0.5 % of its width, by ``experiments direct_front``."""
 
 
 class RobustDTEDirect(StoredFront, Problem):
@@ -72,7 +69,7 @@ class RobustDTEDirect(StoredFront, Problem):
         tolerance: float = 0.05,
         box: float = 0.25,
         conditions: Sequence[OperatingCondition] | None = None,
-        nodes: Sequence[int] = NODES,
+        nodes: Sequence[int] = FIRST_NODES,
     ) -> None:
         response = DriveResponse(model, PAPERS_ORDER, box, conditions)
         tolerance = real_number("tolerance", tolerance, above=0.0, below=1.0)

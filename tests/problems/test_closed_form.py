@@ -119,7 +119,9 @@ def test_statistics_are_those_of_the_simulator(name):
             assert one.side * (value - one.bound) == pytest.approx(g, rel=3e-3, abs=3e-3)
 
 
-@pytest.mark.parametrize("name", ["exponential_noise", "portfolio"])
+@pytest.mark.parametrize(
+    "name", others_at_night(["exponential_noise", "portfolio"], "exponential_noise")
+)
 def test_a_surrogate_of_the_simulator_finds_them_within_its_band(name):
     problem = built(name)
     again = robust_problem(problem.simulator, **problem.settings, progress=False)

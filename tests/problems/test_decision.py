@@ -71,7 +71,16 @@ def test_distances_are_bounded_by_the_weights(w, front):
 
 @pytest.mark.parametrize(
     "bad",
-    [(1.0,), (0.5, 0.6), (1.5, -0.5), (np.nan, 1.0), (0.5, 0.5 + 2e-9), "half", ((0.5, 0.5),)],
+    [
+        (1.0,),
+        (0.5, 0.6),
+        (1.5, -0.5),
+        (np.nan, 1.0),
+        (0.5, 0.5 + 2e-9),
+        "half",
+        ((0.5, 0.5),),
+        (1e308, 1e308),
+    ],
 )
 def test_weights_are_checked(bad):
     with pytest.raises(InvalidInput, match="weights"):

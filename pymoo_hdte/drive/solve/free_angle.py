@@ -124,7 +124,7 @@ def harmonic_balance(
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
             solver.solve(tolerance, steps)
-        parts.append(solver.result())
+            parts.append(solver.result())
     return SteadyMotion(
         torus, *(np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE)
     )

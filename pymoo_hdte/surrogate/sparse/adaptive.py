@@ -35,6 +35,12 @@ of 8 % in one of twenty cases for 35 runs, but in one of three for 14.
 """
 BATCH = 0.12
 """Share of the runs that is added before all is judged anew; set by hand."""
+LOOSEST = 0.02
+"""Accuracy up to which a surrogate is grown even where less is asked for.
+
+The stated errors were held against true ones at 1 %; from few runs, at 10 %, one was three times
+too small. A surrogate that the budget leaves between this and what is asked for is accepted.
+"""
 IN_A_ROW = 2
 """Judgements that have to pass one after the other; with few runs one may pass by chance."""
 JUDGED_DESIGNS = 32
@@ -200,7 +206,7 @@ def fit_adaptively(
     function : callable
         Maps points of shape (n, d) in -1..1 to (n, r) values, NaN where it fails.
     accuracy : float
-        Largest error of both as a share of the scatter.
+        Largest error of both as a share of the scatter; it grows to `LOOSEST` at least.
     budget : int
         Most points at which the function is called.
     random_state : numpy.random.Generator
@@ -217,12 +223,12 @@ def fit_adaptively(
     """
     growth = _Growth(axes, function, accuracy, random_state)
     growth.run(min(first_runs(len(axes)), budget))
-    passed = 0
+    passed, goal = 0, min(accuracy, LOOSEST)
     while True:
         fit = growth.judge()
         if fit.largest_error <= accuracy:
             fit = growth.with_tails(fit)
-        passed = passed + 1 if fit.largest_error <= accuracy and acceptable(fit) else 0
+        passed = passed + 1 if fit.largest_error <= goal and acceptable(fit) else 0
         if passed >= IN_A_ROW and growth.n_runs >= least_runs(len(axes)):
             return fit
         count = min(max(at_once, int(BATCH * growth.n_runs)), budget - growth.n_runs)

@@ -309,6 +309,7 @@ def test_in_one_direction_a_torque_is_not_told_from_friction():
         assert ("one direction only" in one.sentence) == (ways == 1)
 
 
+@pytest.mark.nightly
 def test_a_ripple_has_the_size_of_the_fitted_gain():
     """The inertia is known, the gain of the input is believed to be 30 % too small."""
     generator = np.random.default_rng(18)
