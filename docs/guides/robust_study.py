@@ -58,7 +58,7 @@ results = {
 
 # %%
 # The true front of the order-3 surrogate
-# -------------------------------
+# ---------------------------------------
 #
 # ``pareto_front()`` and ``pareto_set()`` hold 1000 points or more, found by gradients from many
 # starts and even in arc length. No algorithm that you may want to compare produced them. Indicators
