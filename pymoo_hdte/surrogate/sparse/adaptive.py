@@ -228,7 +228,8 @@ def fit_adaptively(
         fit = growth.judge()
         if fit.largest_error <= accuracy:
             fit = growth.with_tails(fit)
-        passed = passed + 1 if fit.largest_error <= goal and acceptable(fit) else 0
+        good = fit.largest_error <= accuracy and acceptable(fit)
+        passed = passed + 1 if good and fit.largest_error <= goal else 0
         if passed >= IN_A_ROW and growth.n_runs >= least_runs(len(axes)):
             return fit
         count = min(max(at_once, int(BATCH * growth.n_runs)), budget - growth.n_runs)

@@ -93,6 +93,7 @@ def test_a_killed_process_goes_on_without_a_call_made_twice(tmp_path, whole, see
     same(tmp_path, whole)
 
 
+@pytest.mark.nightly
 def test_any_part_of_the_file_that_a_kill_leaves_is_gone_on_from(tmp_path, whole):
     """The file only grows, so that a kill leaves one of its beginnings."""
     contents = (whole / RUNS).read_bytes()

@@ -88,6 +88,7 @@ def test_what_is_no_response_is_refused(gives, words):
         quiet(gives, PLAIN[0])
 
 
+@pytest.mark.nightly
 def test_a_killed_study_goes_on_without_a_run_made_twice(tmp_path):
     whole = Flaky()
     expected = quiet(whole, *PLAIN, **PRECISE).evaluate(np.array([[0.7]]))
