@@ -266,7 +266,14 @@ class MechanismAnalysis:
 
         check_report_folder(out)
         found = self.prove(), self.next_experiment()
-        return write_mechanism_report(self.measured.title, self.finding, *found, out)
+        return write_mechanism_report(
+            self.measured.title, self.finding, *found, out, joint=self._beside
+        )
+
+    @property
+    def _beside(self) -> JointFinding | None:
+        """What a report tells besides."""
+        return None
 
     @cached_property
     @ONE_THREAD
@@ -305,34 +312,9 @@ class JointAnalysis(MechanismAnalysis):
         """Return the joint with fitted values, and the effects that it has."""
         return revised_joint(self.measured.title, self.joint)
 
-    @ONE_THREAD
-    def report(self, out: str | Path) -> dict[str, Any]:
-        """Write the report as `MechanismAnalysis.report`, with the torsion; return the verdict.
-
-        Parameters
-        ----------
-        out : str or Path
-            A folder that is new, empty, or an earlier report, which is replaced.
-
-        Returns
-        -------
-        dict
-            What ``verdict.json`` holds.
-
-        Raises
-        ------
-        InvalidInput
-            If the folder holds anything else.
-        OSError
-            If it cannot be written.
-        """
-        from pymoo_hdte.discrepancy.report.mechanism import write_mechanism_report
-
-        check_report_folder(out)
-        found = self.prove(), self.next_experiment()
-        return write_mechanism_report(
-            self.measured.title, self.finding, *found, out, joint=self.joint
-        )
+    @property
+    def _beside(self) -> JointFinding:
+        return self.joint
 
 
 def check_report_folder(out: str | Path) -> None:

@@ -16,8 +16,6 @@ from pymoo_hdte.mechanism.motion import noise_of, timing_noise
 
 ROLES = ("train", "held_out")
 FEWEST_SAMPLES = 16
-FINER = 4
-"""Samples of a simulation per sample of a record."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ residual, in total or in the part that the first explains worst.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     doubts_of,
     left_by,
 )
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     alike,
@@ -90,6 +90,15 @@ class Verdict:
         degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
         return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
 
+    def after_vote(self, vote: Vote) -> Verdict:
+        """Return it with the vote of held-out records: ``unlisted`` where they contradict it."""
+        if not vote.counts(self.rules):
+            return replace(self, shown_in_held_out=False)
+        if vote.after < vote.before:
+            return self
+        doubts = (*self.doubts, NOT_PROVEN)
+        return replace(self, status="unlisted", equivalent=(), doubts=doubts, probability=None)
+
 
 def judge(
     data: Evidence,
@@ -121,15 +130,14 @@ def judge(
         if not search.enough(search.found[0]):
             search.grow()
     chosen = _special_case(search, _best(search))
+    certain = _explains(search, chosen)
+    if not certain:
+        chosen = _simpler_law(search, chosen)
     others = [one for one in search.found if one is not chosen]
     equivalent = [one for one in others if _is_rival(search, one, chosen)]
     if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
         equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
         chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
-    certain = _explains(search, chosen)
-    if not certain:
-        chosen = _simpler_law(search, chosen)
-        others = [one for one in search.found if one is not chosen]
     vote = data.held_out_vote(base, chosen.fit)
     shown = vote is None or vote.counts(rules)
     doubts = doubts_of(search, chosen, vote if shown else None)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.joint.halves import Joint, rigid_half, torsion_half
-from pymoo_hdte.discrepancy.joint.held_out import torsion_gaps, voted
+from pymoo_hdte.discrepancy.joint.held_out import stiffness_of, torsion_gaps, voted
 from pymoo_hdte.discrepancy.joint.torsion import examine_torsion, lines_of
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.held_out import Progress, laws_of
@@ -58,9 +58,7 @@ class JointFinding:
     @property
     def stiffness(self) -> float:
         """Fitted stiffness of the gear, N.m/rad."""
-        gear = self.joint.gear
-        fitted = fitted_values(self.torsion.mechanism, self.torsion.accepted)
-        return fitted.get(f"stiffness of {gear.name}", gear.stiffness.value)
+        return stiffness_of(self.torsion.accepted, self.joint.gear)
 
 
 def examine_joint(
@@ -103,8 +101,10 @@ def examine_joint(
     if verdict.status == "named" and slows:
         # The delay of one encoder behind the other explains as much.
         verdict = replace(verdict, status="class")
-    torsion = replace(torsion, verdict=verdict)
-    return JointFinding(joint, torque, torsion, torsion_gaps(torsion))
+    told = replace(torsion, verdict=verdict)
+    if told.accepted is not torsion.accepted:
+        gaps = torsion_gaps(told)
+    return JointFinding(joint, torque, told, gaps)
 
 
 def revised_joint(title: str, finding: JointFinding) -> MechanismModel:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
-from pymoo_hdte.discrepancy.engine.verdict import NOT_PROVEN, Verdict
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
 from pymoo_hdte.discrepancy.mechanism.held_out import laws_of
@@ -93,7 +93,7 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
     (balance,) = data.spectra
     (gear,) = (port for port in data.mechanism.ports if port.followed)
     base = dict(zip((one.name for one in data.base), fitted.values[: len(data.base)], strict=True))
-    stiffness = _stiffness(fitted, gear)
+    stiffness = stiffness_of(fitted, gear)
     zero = float(base[f"zero of {gear.name}"])
     effects = (*data.known, *laws_of(fitted.effects))
     laws = [one.law for one in effects if one.port == gear.name]
@@ -117,8 +117,8 @@ def predicted_torsion(data: MeasuredData, fitted: Fit) -> Values:
     return torsion
 
 
-def _stiffness(fitted: Fit, gear: Port) -> float:
-    """Return the stiffness of a gear in a fit, N.m/rad."""
+def stiffness_of(fitted: Fit, gear: Port) -> float:
+    """Return the stiffness of a gear in a fit, N.m/rad; the believed one where it is not fitted."""
     values = dict(zip((one.name for one in fitted.parameters), fitted.values, strict=True))
     return float(values.get(f"stiffness of {gear.name}", gear.stiffness.value))
 
@@ -146,16 +146,10 @@ def voted(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> Verdict:
         return verdict
     (gear,) = (port for port in finding.mechanism.ports if port.followed)
     # As the gaps are: with the fitted stiffness, of which the stated one may be a multiple.
-    expected = (float(finding.remainder[0]) / _stiffness(finding.accepted, gear)) ** 2
+    expected = (float(finding.remainder[0]) / stiffness_of(finding.accepted, gear)) ** 2
     sums = np.zeros(3)
     for gap in gaps:
         count = finding.cutoff * 2.0 * float(gap.time[-1] - gap.time[0])
         change = float(np.mean((gap.predicted_after - gap.predicted_before) ** 2))
         sums += count * np.array([gap.before**2, gap.after**2, change])
-    vote = Vote(*(sums / (expected + gaps[0].noise_floor ** 2)).tolist())
-    if not vote.counts(finding.data.rules):
-        return replace(verdict, shown_in_held_out=False)
-    if vote.after < vote.before:
-        return verdict
-    doubts = (*verdict.doubts, NOT_PROVEN)
-    return replace(verdict, status="unlisted", equivalent=(), doubts=doubts, probability=None)
+    return verdict.after_vote(Vote(*(sums / (expected + gaps[0].noise_floor ** 2)).tolist()))

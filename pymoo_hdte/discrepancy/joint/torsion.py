@@ -8,27 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, candidate_of
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.joint.halves import Half, Joint
-from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examined
 from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple import Ripple, Ripples, find_ripples
 from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple_size import Part
 from pymoo_hdte.discrepancy.mechanism.candidates import port_sizes
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData, measured_data
-from pymoo_hdte.discrepancy.mechanism.naming import judged
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_sampling, check_scale, fine_enough
 from pymoo_hdte.discrepancy.mechanism.rest import (
     fitted_values,
     root_mean_square,
-    with_rest,
 )
 from pymoo_hdte.drive.effects.static_error import KinematicErrorLine, KinematicTorsion
 from pymoo_hdte.effects.effect import Effect, place_of
@@ -81,24 +77,16 @@ def examine_torsion(
     sensors = replace(
         measured_data(stiff, train, cutoff, half.known, rules), mechanism=half.mechanism
     )
-    data, verdict = _examined(sensors)
+    data, verdict = examined(sensors, _candidates)
     ripples = _lines_beyond(half, joint, cutoff, rules)
     lines = lines_of(ripples)
     if lines and verdict.status == "unlisted":
         # While the shafts turn slowly, they are within the band as well.
-        again = _examined(replace(sensors, known=(*half.known, *lines)))
+        again = examined(replace(sensors, known=(*half.known, *lines)), _candidates)
         data, verdict = (data, verdict) if again[1].status == "unlisted" else again
     if lines and verdict.status == "adequate":
         verdict = replace(verdict, status="named")
     return MechanismFinding(half.mechanism, records, cutoff, data, verdict, ripples)
-
-
-def _examined(sensors: MeasuredData) -> tuple[MeasuredData, Verdict]:
-    """Return the verdict on the torsion, and the data with the residual as their noise."""
-    base = fit(sensors)
-    candidates = partial(_candidates, sensors, base, position_orders(sensors, base))
-    data, every, best = with_rest(sensors, base, candidates)
-    return data, judged(sensors, data, every, best)
 
 
 def errors_of(ripples: Ripples) -> list[tuple[Ripple, Part]]:

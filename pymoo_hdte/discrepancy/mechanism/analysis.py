@@ -7,7 +7,7 @@ verdict therefore names effects that are significant beyond this residual, and s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -44,6 +44,8 @@ from pymoo_hdte.discrepancy.mechanism.rest import (
     with_rest,
 )
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
+
+CandidatesOf = Callable[[MeasuredData, Fit, Mapping[str, tuple[float, ...]], Fit], list[Candidate]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +177,7 @@ def examine_mechanism(
     train = [record for record in records if record.role == "train"]
     sensors = measured_data(mechanism, train, cutoff, known, rules)
     check_scale(sensors)
-    data, verdict = _examined(sensors)
+    data, verdict = examined(sensors)
     ripples = _beyond(sensors, sampled, cutoff, verdict)
     if ripples.found and verdict.status == "unlisted":
         data, verdict, ripples = _beside(sensors, sampled, cutoff, data, verdict, ripples)
@@ -184,7 +186,7 @@ def examine_mechanism(
     # A ripple beyond the band moves nothing that could be measured, and takes a solver many steps.
     fits = verdict.base, verdict.accepted
     simulated = simulate_held_out(mechanism, records, data, fits, known, progress)
-    verdict = voted(verdict, simulated, rules)
+    verdict = voted(verdict, simulated)
     return MechanismFinding(mechanism, records, cutoff, data, verdict, ripples, simulated)
 
 
@@ -216,7 +218,7 @@ def _beside(
     """
     taken = ripples
     for _ in range(2):
-        again = _examined(replace(sensors, known=(*sensors.known, *taken.laws)))
+        again = examined(replace(sensors, known=(*sensors.known, *taken.laws)))
         if again[1].status == "unlisted":
             break
         (data, verdict), ripples = again, taken
@@ -226,12 +228,23 @@ def _beside(
     return data, verdict, ripples
 
 
-def _examined(sensors: MeasuredData) -> tuple[MeasuredData, Verdict]:
-    """Return the verdict on force balances, and the data with the residual as their noise."""
+def examined(
+    sensors: MeasuredData, candidates: CandidatesOf | None = None
+) -> tuple[MeasuredData, Verdict]:
+    """Return the verdict on force balances, and the data with the residual as their noise.
+
+    Parameters
+    ----------
+    sensors : MeasuredData
+        With the noise of the sensors.
+    candidates : callable, optional
+        From the data, the fit of their base, the orders seen in what it leaves, by port, and the
+        fit of a base to the candidates; by default all that a mechanism may have.
+    """
     base = fit(sensors)
     seen = position_orders(sensors, base)
-    candidates = partial(_candidates, sensors, base, seen)
-    data, every, best = with_rest(sensors, base, candidates)
+    of_fit = partial(candidates or _candidates, sensors, base, seen)
+    data, every, best = with_rest(sensors, base, of_fit)
     return data, judged(sensors, data, every, best)
 
 

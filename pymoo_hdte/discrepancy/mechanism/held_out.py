@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.doubts import NOT_PROVEN
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
-from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.discrepancy.mechanism.rest import fitted_values
@@ -212,7 +210,7 @@ def _state(motion: SmoothedMotion, row: int) -> tuple[float, float]:
     return float(motion.position[row]), float(motion.speed[row])
 
 
-def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord], rules: Rules) -> Verdict:
+def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord]) -> Verdict:
     """Return the verdict, ``unlisted`` where held-out records contradict what it names.
 
     Simulated, their positions do not come nearer to the measured ones, though the change is large
@@ -220,13 +218,7 @@ def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord], rules: Rules) 
     """
     if verdict.accepted is verdict.base or not simulated:
         return verdict
-    vote = _vote(simulated)
-    if not vote.counts(rules):
-        return replace(verdict, shown_in_held_out=False)
-    if vote.after < vote.before:
-        return verdict
-    doubts = (*verdict.doubts, NOT_PROVEN)
-    return replace(verdict, status="unlisted", equivalent=(), doubts=doubts, probability=None)
+    return verdict.after_vote(_vote(simulated))
 
 
 def _vote(simulated: Sequence[SimulatedRecord]) -> Vote:

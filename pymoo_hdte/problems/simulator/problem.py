@@ -79,7 +79,7 @@ class SimulatorProblem(Problem):
         constraints: Sequence[RobustConstraint],
         n_runs: int,
     ) -> None:
-        self._inputs, self._inputs_axes = inputs, inputs.axes
+        self._inputs = inputs
         bounds = np.array([axis.design for axis in inputs.axes if axis.designed])
         self.design_box = Box(inputs.designed, *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
@@ -178,7 +178,7 @@ class SimulatorProblem(Problem):
             If ``values`` is no array of finite numbers of shape (n, d).
         """
         points = finite_array("values", values, (None, len(self.input_names)))
-        columns = [axis.cube(v) for axis, v in zip(self._inputs_axes, points.T, strict=True)]
+        columns = [axis.cube(v) for axis, v in zip(self._inputs.axes, points.T, strict=True)]
         return self._fit.polynomial(np.column_stack(columns))
 
     def sobol_indices(self, design: ArrayLike, response: str | None = None) -> SobolIndices:
@@ -234,7 +234,7 @@ class SimulatorProblem(Problem):
         return np.column_stack(columns)
 
     def _accuracy(self) -> Array:
-        designs = draw_designs(self._inputs_axes, _JUDGED, np.random.default_rng(1))
+        designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
         around = self._around(designs)
         shares = self._band(around)
         for column, place in enumerate(self._places[: self.n_obj]):

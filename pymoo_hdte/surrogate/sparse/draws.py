@@ -70,10 +70,9 @@ def relevance(axes: list[Axis], points: Array) -> Array:
     """
     found = np.prod(np.maximum(1.0 - points**2, 0.0), axis=1) ** OUTWARD
     for axis, z in zip(axes, points.T, strict=True):
-        if not axis.designed and axis.scatter is not None:
-            density = axis.scatter.distribution.density(axis.centre + axis.half_width * z)
-            density = np.where(np.isfinite(density), density, 0.0) * axis.half_width
-            found *= density ** (1.0 - _power(axes, axis))
+        density = _density(axis, z)
+        if density is not None:
+            found *= (density * axis.half_width) ** (1.0 - _power(axes, axis))
     return found / max(float(found.mean()), np.finfo(float).tiny)
 
 
@@ -82,12 +81,18 @@ def _power(axes: list[Axis], axis: Axis) -> float:
     return 1.0 - (TEMPERED / sum(one.is_unbounded for one in axes) if axis.is_unbounded else 0.5)
 
 
+def _density(axis: Axis, z: Array) -> Array | None:
+    """Return the density of a noise at places in -1..1, 0 where it has none; None of a design."""
+    if axis.designed or axis.scatter is None:
+        return None
+    density = axis.scatter.distribution.density(axis.centre + axis.half_width * z)
+    return np.where(np.isfinite(density), density, 0.0)
+
+
 def _spread_over(axis: Axis, power: float) -> Array:
     """Return the share of the points below each value of a grid in -1..1."""
-    density = np.ones_like(_GRID)
-    if not axis.designed and axis.scatter is not None:
-        density = axis.scatter.distribution.density(axis.centre + axis.half_width * _GRID)
-        density = np.where(np.isfinite(density), density, 0.0) ** power
+    of_noise = _density(axis, _GRID)
+    density = np.ones_like(_GRID) if of_noise is None else of_noise**power
     middle = 0.5 * (_GRID[1:] + _GRID[:-1])
     outward = (1.0 - middle**2) ** -OUTWARD
     below = np.append(0.0, np.cumsum(outward * (density[1:] + density[:-1])))
