@@ -12,8 +12,9 @@ from contextlib import nullcontext
 from pathlib import Path
 
 from experiments.runner.campaign import Campaign
+from experiments.runner.catalogue import EXPERIMENTS
 from experiments.runner.machine import usable_cores
-from experiments.runner.registry import EXPERIMENTS, Context, Experiment, ExtraMissing
+from experiments.runner.registry import Context, Experiment, ExtraMissing
 from experiments.runner.report import check_page, write_report
 from experiments.runner.setting import Setting
 from experiments.runner.store import save

@@ -274,16 +274,21 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 # -------------
 #
 # An experiment is a module in the folder ``experiments`` with a function ``run(context)`` that
-# returns a ``Result``: paragraphs, tables, figures. It is listed with one line in
-# ``experiments/runner/registry.py``,
+# returns a ``Result``: its answer in a sentence, tables, figures. It is listed with one entry in
+# ``experiments/runner/catalogue.py``,
 #
 # .. code-block:: python
 #
-#    Experiment("stiffer", "studies.stiffer", "What a stiffer drive would gain"),
+#    Experiment(
+#        "stiffer",
+#        "studies.stiffer",
+#        "What a stiffer drive would gain",
+#        "Does a stiffer drive have a smaller error?",
+#    ),
 #
 # and from then on ``python -m experiments stiffer`` runs it, stores its tables as CSV and its
-# figures as PNG, and shows it on the page ``index.html``. The folder is no part of the installed
-# package; in a copy of the repository it is there.
+# figures as PNG, gives it a page and a card with question and answer on ``index.html``. The folder
+# is no part of the installed package; in a copy of the repository it is there.
 #
 # Long work is cut into *jobs*. A job holds all its settings, its seed included, and names itself by
 # them. The campaign runs jobs on as many processes or machines as the user allows, keeps every
@@ -293,7 +298,7 @@ for rule in (ConstantWeight(), LinearDecrease(), EntropyWeight()):
 # .. literalinclude:: ../examples/stiffer.py
 #    :language: python
 #
-# To try it without the line in the registry, all it takes is a folder and a campaign in this
+# To try it without the entry in the catalogue, all it takes is a folder and a campaign in this
 # process:
 
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "examples")]

@@ -16,6 +16,7 @@ from experiments.anytime.readings import Reading, readings
 from experiments.anytime.sentences import (
     MODEL,
     advantage_findings,
+    first_page,
     number_of_designs,
     opening,
     readings_findings,
@@ -74,7 +75,9 @@ def run(context: Context) -> Result:
         ),
         pictures=tuple(_pictures(scores, ranked)),
         notes=tuple(_extent(scores)),
-        opening=opening(scores, found, ranked),
+        answer=opening(scores, found, ranked) or next(advantage_findings(found)).sentence,
+        first_page=first_page(scores, found),
+        shown_first="anytime",
     )
 
 

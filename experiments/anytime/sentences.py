@@ -22,7 +22,7 @@ from experiments.anytime.tables import (
     standing,
     stated_place,
 )
-from experiments.runner.result import Finding, significant
+from experiments.runner.result import FAILS, HOLDS, Finding, significant
 
 MODEL = "calibrated"
 """Drive model that the first sentence of the report speaks of."""
@@ -39,7 +39,7 @@ def advantage_findings(found: Contests) -> Iterator[Finding]:
             word == "ahead of both",
             f"On {contest.model}, {OURS} is ahead of both rivals in {NAMES[contest.indicator]} "
             f"beyond chance {settings_ahead(entries) or 'nowhere'}; at the stated 100 x 100 it is "
-            f"{'level with both' if word == 'level' else word}.",
+            f"{_level(word)}.",
         )
 
 
@@ -136,6 +136,27 @@ def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
         f"{best.population} particles after {best.evaluations:,} evaluations (off by a factor of "
         f"{significant(best.factor, 2)}, against {significant(stated.factor, 2)} at 100 x 100)."
     )
+
+
+def first_page(scores: Scores, found: Contests) -> dict[str, str]:
+    """Return what holds of Table 7, and what does not, as parts of longer sentences."""
+    entries = found.get(Contest(MODEL, "igd"), [])
+    at_stated = [duel for duel in entries if (duel.population, duel.evaluations) == STATED]
+    if not at_stated:
+        return {}
+    ahead = settings_ahead(entries)
+    parts = {}
+    if ahead:
+        parts[HOLDS] = f"{OURS} is ahead of MOPSO and NSGA-II in IGD, on {MODEL}, {ahead}"
+    word = standing(at_stated)
+    if word != "ahead of both":
+        parts[FAILS] = f"at the stated 100 x 100 evaluations {OURS} is {_level(word)}"
+        parts[FAILS] += f", where {_at_stated(scores, word).partition(': ')[2][:-1]}"
+    return parts
+
+
+def _level(word: str) -> str:
+    return "level with both" if word == "level" else word
 
 
 def _at_stated(scores: Scores, word: str) -> str:

@@ -15,6 +15,7 @@ from experiments.blind.outcome import Outcome
 from experiments.blind.reliability import reliability_table
 from experiments.blind.rig.visible import LEAST
 from experiments.blind.scoring import BlindJob
+from experiments.blind.sentences import in_one_sentence, of_the_first_page
 from experiments.blind.tables import (
     effects_table,
     misses_table,
@@ -27,7 +28,7 @@ from experiments.blind.tables import (
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA, stored_outcome
 from experiments.runner.registry import Context, require
-from experiments.runner.result import Picture, Result, Table
+from experiments.runner.result import NEW, Picture, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 
 OUTCOMES = "blind.csv"
@@ -55,10 +56,11 @@ def run(context: Context) -> Result:
     return Result(
         title="Blind campaigns: what the discrepancy workflow finds",
         command=context.command("blind"),
+        answer=in_one_sentence(outcomes),
         paragraphs=(*stored, SETTING, _extent(outcomes)),
         tables=(must_reach_table(outcomes), *(_tables(outcomes) if outcomes else ())),
         pictures=_pictures(outcomes) if outcomes else (),
-        headline="must_reach",
+        first_page={NEW: of_the_first_page(outcomes)} if outcomes else {},
     )
 
 

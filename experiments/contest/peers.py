@@ -25,6 +25,7 @@ from experiments.contest.peers_rivals import (
 from experiments.contest.peers_tables import (
     NAMES,
     OURS,
+    in_one_sentence,
     median_ranks,
     median_values,
     medians_tables,
@@ -36,7 +37,7 @@ from experiments.contest.peers_tables import (
 from experiments.contest.problems import BENCHMARKS
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import Picture, Result
+from experiments.runner.result import NEW, Picture, Result
 
 FULL = Extent(budgets=(10_000, 25_000), seeds=21)
 QUICK = Extent(budgets=(2_500,), seeds=5)
@@ -66,6 +67,16 @@ PEERS_NOTE = (
 )
 
 
+def _new(scores: Scores) -> str:
+    """Say for the first page how our swarm ranks at the smallest budget."""
+    ranks = median_ranks(scores, "igd", scores.budgets[0], tuning=False)
+    place = 1 + int(np.sum(ranks < ranks[scores.algorithms.index(OURS)]))
+    return (
+        f"a swarm without settings that ranks {place} of {len(scores.algorithms)} by IGD on "
+        f"{len(scores.rows(False))} held-out problems"
+    )
+
+
 def run(context: Context) -> Result:
     """Run the comparison or read its outcome, and rank."""
     present = [name for name, entry in CONTESTANTS.items() if entry.available]
@@ -73,6 +84,7 @@ def run(context: Context) -> Result:
     return Result(
         title="The elitist swarm against its peers",
         command=context.command("peers"),
+        answer=in_one_sentence(scores),
         paragraphs=(*stored_outcome(context, "peers"), SETTING, HELD_OUT, PEERS_NOTE),
         tables=(
             must_reach_table(scores),
@@ -87,7 +99,7 @@ def run(context: Context) -> Result:
         ),
         pictures=tuple(_pictures(scores)),
         notes=(*_extent(scores), *_absent(scores), *_broken_off(scores), *_without_volume(scores)),
-        headline="must_reach",
+        first_page={NEW: _new(scores)},
     )
 
 

@@ -43,6 +43,22 @@ def median_ranks(
     return average_ranks(values, smaller_is_better=smaller_is_better(indicator))
 
 
+def in_one_sentence(scores: Scores) -> str:
+    """Say who ranks best on the held-out problems, at every budget, by each indicator."""
+    parts = []
+    for evaluations in scores.budgets:
+        best = []
+        for indicator in ("igd", "igd_plus", "hypervolume"):
+            ranks = median_ranks(scores, indicator, evaluations, tuning=False)
+            first = int(np.argmin(ranks))
+            best.append(f"{scores.algorithms[first]} by {NAMES[indicator]} ({ranks[first]:.2f})")
+        parts.append(f"after {evaluations:,} evaluations {', '.join(best)}")
+    return (
+        f"The best average rank of {len(scores.algorithms)} on the {len(scores.rows(False))} "
+        f"held-out problems has {'; '.join(parts)}."
+    )
+
+
 def ranks_tables(scores: Scores) -> list[Table]:
     """Return average ranks of every algorithm, with what the seeds leave open, for each budget."""
     rng = np.random.default_rng(1)

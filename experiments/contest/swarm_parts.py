@@ -33,17 +33,20 @@ SETTING = (
 def run(context: Context) -> Result:
     """Run the variants or read their outcome, and compare each with the whole."""
     scores = scores_for(context, "swarm_parts", [OURS, *SWARM_VARIANTS], FULL, QUICK)
+    parts, harmful = _parts_table(scores)
     return Result(
         title="What each part of the elitist swarm is worth",
         command=context.command("swarm_parts"),
+        answer="Worse than the whole beyond chance on the held-out problems, so that the part is "
+        f"shown to help: {', '.join(harmful) or 'none'}.",
         paragraphs=(*stored_outcome(context, "swarm_parts"), SETTING),
-        tables=(_parts_table(scores), _problems_table(scores)),
+        tables=(parts, _problems_table(scores)),
         notes=(f"{len(scores.seeds)} seeds, {scores.budgets[-1]:,} evaluations.",),
     )
 
 
-def _parts_table(scores: Scores) -> Table:
-    """Give the cost of every change, with its interval, apart for tuning and held-out problems."""
+def _parts_table(scores: Scores) -> tuple[Table, list[str]]:
+    """Give the cost of every change, apart for tuning and held-out problems, and what is worse."""
     rng = np.random.default_rng(1)
     columns = [Column("variant")]
     rows: list[list[Cell]] = [[name] for name in scores.algorithms[1:]]
@@ -64,7 +67,7 @@ def _parts_table(scores: Scores) -> Table:
         # The finding is about the last group, the held-out problems.
         shown = [test.rival for test in tests if test.beaten]
     order = np.argsort(-cost[1:], kind="stable")
-    return Table(
+    table = Table(
         "parts",
         f"Cost of leaving out, simplifying or adding a part, in {NAMES['igd']}",
         tuple(columns),
@@ -72,9 +75,9 @@ def _parts_table(scores: Scores) -> Table:
         note=f"{len(scores.rows(True))} tuning and {len(scores.rows(False))} held-out problems; "
         "worse and better count medians, p is Wilcoxon's over the problems, after Holm. The mean "
         "may rest on a few problems, which p does not; the interval knows the scatter of seeds "
-        "only. Worse than the whole beyond chance on the held-out problems: "
-        f"{', '.join(shown) or 'none'}.",
+        "only.",
     )
+    return table, shown
 
 
 def costs(

@@ -60,6 +60,7 @@ def run(context: Context) -> Result:
             f"Two searches differ by {differ:.1e} of the front's width and {problem.moments.nodes} "
             f"nodes from {FINER_NODES} by {coarse:.1e}; {ALLOWED:g} is allowed for both together.",
             check=True,
+            answers=True,
         ),
         Finding(
             off <= ALLOWED,
@@ -72,6 +73,7 @@ def run(context: Context) -> Result:
             behind > ALLOWED,
             f"The front of the order-3 surrogate, evaluated here, lies {behind:.2f} widths behind "
             "in the median.",
+            answers=True,
         ),
     )
     table = Table(

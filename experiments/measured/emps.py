@@ -59,12 +59,14 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
             "Mass, viscous and Coulomb friction lie within 5 % of the published values, and their "
             f"intervals cover them: {'yes' if near else 'no'}.",
             check=True,
+            answers=True,
         ),
         Finding(
             simulated.after <= 0.5 * simulated.before,
             f"The simulated position of the held-out file is off by {1e3 * simulated.before:.3g} "
             f"mm before and by {1e3 * simulated.after:.3g} mm after.",
             check=True,
+            answers=True,
         ),
         Finding(
             bool({"direction_dependent_friction", "force_offset"} & set(seconds)),

@@ -59,12 +59,18 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
     said = any("cannot separate Coulomb" in sentence for sentence in limits(one.finding))
     reverse = next_test(one.finding).rate < 0.0
     findings = (
-        Finding(bool(dry), f"Dry friction is named: {', '.join(sorted(dry)) or 'no'}.", check=True),
+        Finding(
+            bool(dry),
+            f"Dry friction is named: {', '.join(sorted(dry)) or 'no'}.",
+            check=True,
+            answers=True,
+        ),
         Finding(
             set(ORDERS) <= seen,
             f"A kinematic ripple is named with the orders {shown or 'none'}; "
             f"{' and '.join(f'{order:g}' for order in ORDERS)} must be among them.",
             check=True,
+            answers=True,
         ),
         Finding(
             said and reverse,

@@ -108,13 +108,14 @@ def run(context: Context) -> Result:
     """Analyse the rigs, or read what was found, and show it."""
     if context.full and not MEASURED.is_dir():
         sentence = f"Skipped: there are no measurements in {MEASURED}."
-        return Result("Verdicts on real machines", context.command(NAME), (sentence,))
+        return Result("Verdicts on real machines", context.command(NAME), sentence)
     found = _examined(context) if context.full else _committed()
     order = [FALLS_SHORT.index(row[1]) for row in found[0]]
     first = [row for _, row in sorted(zip(order, found[0], strict=True), key=lambda one: one[0])]
     return Result(
         title="Verdicts on real machines",
         command=context.command(NAME),
+        answer=_in_one_sentence(first),
         paragraphs=(*stored_outcome(context, NAME), *shortfalls(first), SETTING),
         tables=(
             Table(
@@ -128,7 +129,6 @@ def run(context: Context) -> Result:
             Table("tools", "Beside other tools", TOOLS, _cells(found[1]), note=TOOLS_NOTE),
             cpu_table(found[2]),
         ),
-        headline="verdicts",
     )
 
 
@@ -182,6 +182,13 @@ def shortfalls(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
     known = sum(row[1] != UNKNOWN for row in rows)
     count = f"Right: {right} of {known} whose answer is known."
     return (f"What falls short. {'; '.join(told)}. {count}",) if told else (count,)
+
+
+def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
+    """Count the judgements, those that fall short first."""
+    counts = [(one, sum(row[1] == one for row in rows)) for one in FALLS_SHORT]
+    told = ", ".join(f"{count} {word}" for word, count in counts if count)
+    return f"Of {len(rows)} machines: {told}; confidently wrong: {counts[0][1]}."
 
 
 def _said(rig: KnownRig, one: Study) -> tuple[str, str]:

@@ -64,5 +64,4 @@ def measured_result(rig: MeasuredRig, judge: Judge) -> Result:
         paragraphs=(rig.believed, *verdict_paragraphs(one)),
         tables=(judge(one, found), gaps_table(one), twins_table(found), evidence_table(one)),
         pictures=pictures(one),
-        headline="values",
     )

@@ -86,8 +86,9 @@ def absent(title: str, folder: str, command: str, source: str) -> Result:
     return Result(
         title=title,
         command=command,
+        answer="Skipped, because the measurements, which are not part of this software, are "
+        "missing.",
         paragraphs=(
-            "Skipped, because the measurements, which are not part of this software, are missing. "
             f"They are published: {source}. Put the files into {MEASURED / folder} and run the "
             "command again.",
         ),

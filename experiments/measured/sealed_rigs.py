@@ -7,6 +7,7 @@ campaigns in ``../shared/rig`` are analysed and both files left in the results f
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -65,7 +66,7 @@ def run(context: Context) -> Result:
     """Analyse the rigs, or read what was found, and show it."""
     if context.full and not RIGS.is_dir():
         sentence = f"Skipped: there are no campaigns in {RIGS}."
-        return Result("Verdicts on sealed rigs", context.command(NAME), (sentence,))
+        return Result("Verdicts on sealed rigs", context.command(NAME), sentence)
     if context.full:
         found, seconds = _analysed(context)
     else:
@@ -73,13 +74,19 @@ def run(context: Context) -> Result:
     return Result(
         title="Verdicts on sealed rigs",
         command=context.command(NAME),
+        answer=_counted([row[1] for row in found]),
         paragraphs=(*stored_outcome(context, NAME), SETTING),
         tables=(
             Table("verdicts", "What is said to be missing", COLUMNS, _cells(found), note=NOTE),
             Table("seconds", "CPU time", SECONDS, _cells(seconds), wall_times=True),
         ),
-        headline="verdicts",
     )
+
+
+def _counted(statuses: Sequence[str]) -> str:
+    """Say how many rigs end with each status."""
+    counts = Counter(statuses).most_common()
+    return f"Of {len(statuses)} rigs " + ", ".join(f"{n} are {one}" for one, n in counts) + "."
 
 
 def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:

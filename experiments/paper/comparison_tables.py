@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from experiments.comparison.paired import Comparison
 from experiments.comparison.runs import FINAL_SIZE
 from experiments.comparison.statistics import summary
-from experiments.paper.models import model_sentences
+from experiments.paper.models import models_of
 from experiments.published_values import AlgorithmQuality
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Table, significant
@@ -15,6 +15,22 @@ from pymoo_hdte.drive import PRESETS
 
 WHO = (Column("problem"), Column("algorithm"))
 INDICATOR_NAMES = {"igd": "IGD", "spacing": "Spacing", "hypervolume": "hypervolume"}
+
+
+def least_igd(comparisons: Sequence[Comparison]) -> str:
+    """Say for every problem which algorithm has the least mean IGD."""
+    sentences = []
+    for one in comparisons:
+        means = {name: float(one.values(name, "igd").mean()) for name in one.algorithms}
+        best = min(means, key=means.__getitem__)
+        least = significant(means[best], 3)
+        sentences.append(f"On {one.model}, {best} has the least mean IGD, {least}.")
+    return " ".join(sentences)
+
+
+def models_compared(comparisons: Sequence[Comparison]) -> dict[str, str]:
+    """Return what is said of the drive models among the problems compared."""
+    return models_of(*(one.model for one in comparisons if one.model in PRESETS))
 
 
 def open_paragraphs(context: Context, comparisons: Sequence[Comparison]) -> tuple[str, ...]:
@@ -77,7 +93,6 @@ def quality_table(
         "IGD and Spacing of the final sets, normalised by the reference front; smaller is better",
         (*WHO, *columns),
         _rows(comparisons, cells),
-        note=" ".join(model_sentences(*(c.model for c in comparisons if c.model in PRESETS))),
         findings=tuple(findings),
     )
 

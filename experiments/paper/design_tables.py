@@ -144,6 +144,15 @@ def _optima_finding(choices: Sequence[Choice]) -> Finding:
     )
 
 
+def dominated(model: str) -> str:
+    """Say which share of random designs dominates the paper's optima, for the first page."""
+    shares = [significant(100.0 * share, 2) for share in sorted(dominating_shares(model).values())]
+    return (
+        f"{shares[0]} to {shares[-1]} % of random designs are better than its optima in mean and "
+        f"scatter at once on the model {model}, so that it optimised another one"
+    )
+
+
 def _dominance_finding(model: str) -> Finding:
     """Whether the paper's optima are optimal on a model, as they are on the paper's own."""
     shares = dominating_shares(model)

@@ -8,7 +8,7 @@ FITTED = ("calibrated", "resonant")
 """Presets whose values were fitted to the moments of Table 8, every band of it read as ±5 %."""
 
 
-def model_sentences(*names: str) -> tuple[str, ...]:
-    """Return one paragraph for each drive model: what it is and where its values come from."""
+def models_of(*names: str) -> dict[str, str]:
+    """Return for each drive model, by its name, what it is and where its values come from."""
     models = [robust_problem(name).model for name in names]
-    return tuple(f"{m.name}: {m.description} {m.provenance}" for m in models)
+    return {m.name: f"{m.description} {m.provenance}" for m in models}

@@ -169,6 +169,7 @@ def _sizes_table() -> Table:
         f"All 13 printed pairs of W and p belong to samples of {low} to {high} values; none "
         f"fits the {N_PROTOTYPES} prototypes, at which every p would exceed 0.99. The number of "
         f"readings, {N_PROTOTYPES} x {N_REPEATS} = {N_READINGS}, fits all.",
+        answers=True,
     )
     columns = (
         Column("error"),

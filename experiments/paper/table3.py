@@ -182,6 +182,7 @@ def _coverage_table(rng: np.random.Generator) -> Table:
         f"{100 * min(counts) / N_CAMPAIGNS:.1f} to {100 * max(counts) / N_CAMPAIGNS:.1f} %; a "
         f"one-sided exact binomial test at 1 % rejects {rejected} of the {len(counts)}.",
         check=True,
+        answers=True,
     )
     columns = (
         Column("coefficient"),
@@ -242,6 +243,7 @@ def _resolution_table() -> Table:
         f"scatter that Table 3 prints leaves no more than {significant(rows[-1][2], 2)} mN.m of "
         f"noise, {share:.1e} of the rated {rated:g} N.m: a sensor for the rated torque resolves "
         f"about {SENSOR_SHARE:g}, {meaning}.",
+        answers=True,
     )
     columns = (
         Column("coefficient"),

@@ -119,7 +119,6 @@ def run(context: Context) -> Result:
             _limits_table([one for one in tallies if one.part == LIMIT]),
             _memory_table(peaks),
         ),
-        headline="inputs",
     )
 
 
@@ -189,6 +188,7 @@ def _inputs_table(tallies: list[Tally]) -> Table:
                 f"Of {inputs:,} mutated inputs {failed} raised anything but a clear error, hung, "
                 "crashed or left anything half-done.",
                 check=True,
+                answers=True,
             ),
         ),
     )
@@ -214,6 +214,7 @@ def _kills_table(tallies: list[Tally]) -> Table:
                 f"After {kills} kills, {failed} files or runs were partial, different from those "
                 "of an undisturbed run, failed to resume, or left workers behind.",
                 check=True,
+                answers=True,
             ),
         ),
     )

@@ -20,10 +20,10 @@ from __future__ import annotations
 from experiments.robust.data import NAME, outcome_for
 from experiments.robust.figures import error_over_runs
 from experiments.robust.functions import FUNCTIONS
-from experiments.robust.tables import curves_table, needed_table, stops_table
+from experiments.robust.tables import curves_table, needed_table, of_the_first_page, stops_table
 from experiments.runner.committed import stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import Picture, Result
+from experiments.runner.result import NEW, Picture, Result
 
 PROTOCOL = (
     "Two inputs of every function are designed: designs are the middle half of an input's range "
@@ -50,6 +50,7 @@ def run(context: Context) -> Result:
         title="Runs of a simulator that its robust surrogate takes",
         command=context.command(NAME),
         paragraphs=(*stored_outcome(context, NAME), PROTOCOL, CHOSEN, f"Sources. {sources}."),
+        first_page={NEW: of_the_first_page(outcome)},
         tables=(needed_table(outcome), stops_table(outcome), curves_table(outcome)),
         pictures=(
             Picture(
@@ -60,5 +61,4 @@ def run(context: Context) -> Result:
                 leading=True,
             ),
         ),
-        headline="needed",
     )

@@ -1,4 +1,4 @@
-"""Which experiments there are, and what each gets to work with."""
+"""What an experiment is, and what each gets to work with."""
 
 from __future__ import annotations
 
@@ -104,6 +104,8 @@ class Experiment:
         Where it stands, below ``experiments``.
     summary
         One line of the list of experiments.
+    question
+        What it answers; stands on its card and its page.
     by_default
         Whether it belongs to the set that runs when no name is given.
     reads_outcome
@@ -120,6 +122,7 @@ class Experiment:
     name: str
     module: str
     summary: str
+    question: str
     by_default: bool = True
     reads_outcome: bool = False
     has_small_version: bool = False
@@ -127,8 +130,17 @@ class Experiment:
     takes_seeds: bool = False
 
     def run(self, context: Context) -> Result:
-        """Import the module and run it; nothing is imported for ``--list``."""
-        return import_module(f"experiments.{self.module}").run(context)
+        """Import the module and run it; nothing is imported for ``--list``.
+
+        Raises
+        ------
+        ValueError
+            If the result does not say what came out.
+        """
+        result: Result = import_module(f"experiments.{self.module}").run(context)
+        if not result.answer:
+            raise ValueError(f"{self.name}: the result has no answer, which its page begins with")
+        return result
 
     def check(self, setting: Setting) -> None:
         """Refuse a setting that the experiment cannot run; for those that take seeds.
@@ -139,148 +151,3 @@ class Experiment:
             For a name that is unknown or does not fit, or a budget that cannot be spent.
         """
         import_module(f"experiments.{self.module}").check_setting(setting)
-
-
-EXPERIMENTS = (
-    Experiment(
-        "table7",
-        "paper.table7",
-        "Table 7 and Fig. 18: AMP-MOPSO against MOPSO and NSGA-II",
-        takes_seeds=True,
-    ),
-    Experiment(
-        "ablation",
-        "paper.ablation",
-        "Fig. 17: AMP-MOPSO without its pyramid, its entropy weight, or both",
-        takes_seeds=True,
-    ),
-    Experiment(
-        "anytime",
-        "anytime.experiment",
-        "Table 7 and Fig. 17 at every budget, and what the printed numbers may mean",
-        reads_outcome=True,
-        has_small_version=True,
-    ),
-    Experiment(
-        "table5",
-        "paper.table5",
-        "Table 5 and Fig. 11: accuracy of the Chebyshev surrogate by order",
-    ),
-    Experiment(
-        "table8",
-        "paper.table8",
-        "Tables 8 and 9, Fig. 19: the designs that three preferences choose",
-    ),
-    Experiment(
-        "published",
-        "paper.published",
-        "What Eq. (9) gives as printed, order by order, beside an integrator",
-    ),
-    Experiment(
-        "table2", "paper.table2", "Table 2, Figs. 4 and 5: error statistics and the static error"
-    ),
-    Experiment(
-        "table3",
-        "paper.table3",
-        "Tables 3 and 4, Figs. 9 and 10: stiffness and damping from records",
-    ),
-    Experiment("fig12", "paper.fig12", "Fig. 12: distribution of the DTE at the nominal design"),
-    Experiment(
-        "table6", "paper.table6", "Table 6, Figs 14 and 15: five prototypes, predicted and measured"
-    ),
-    Experiment(
-        "sensitivity",
-        "studies.sensitivity",
-        "Sobol indices of the DTE: which tolerance deserves money",
-    ),
-    Experiment(
-        "crosscheck",
-        "studies.crosscheck",
-        "chaospy beside ours, and accuracy per model run: is 1024 needed?",
-    ),
-    Experiment(
-        "dte_map",
-        "studies.dte_map",
-        "DTE over input speed and load, with the resonances of each preset",
-    ),
-    Experiment(
-        "calibration",
-        "paper.calibrating.experiment",
-        "Which effects the printed equations lack: a ladder of fitted models",
-        reads_outcome=True,
-    ),
-    Experiment(
-        "blind",
-        "blind.experiment",
-        "Blind campaigns: what the discrepancy workflow finds of what is hidden",
-        reads_outcome=True,
-        takes_cases=True,
-    ),
-    Experiment(
-        "sealed_rigs",
-        "measured.sealed_rigs",
-        "Verdicts on fourteen rigs whose truth is not known here",
-        reads_outcome=True,
-    ),
-    Experiment(
-        "real",
-        "measured.real",
-        "Machines that others measured: verdicts beside known answers and other tools",
-        reads_outcome=True,
-    ),
-    Experiment(
-        "emps", "measured.emps", "EMPS: friction of a positioning system, measured by others"
-    ),
-    Experiment(
-        "kinova",
-        "measured.kinova",
-        "Kinova Gen3: friction and ripple of a robot joint, measured by others",
-    ),
-    Experiment(
-        "peers",
-        "contest.peers",
-        "The elitist swarm against the best algorithms of other libraries",
-        reads_outcome=True,
-        has_small_version=True,
-    ),
-    Experiment(
-        "swarm_parts",
-        "contest.swarm_parts",
-        "What each part of the elitist swarm is worth",
-        reads_outcome=True,
-        has_small_version=True,
-    ),
-    Experiment(
-        "robust",
-        "robust.experiment",
-        "Model runs of a robust surrogate, beside chaospy and OpenTURNS",
-        reads_outcome=True,
-        has_small_version=True,
-    ),
-    Experiment(
-        "reliability",
-        "reliability.experiment",
-        "Ten thousand wrong inputs, kills at any moment, full disks, memory",
-        reads_outcome=True,
-        has_small_version=True,
-    ),
-    Experiment(
-        "benchmark",
-        "studies.benchmark",
-        "Speed ratios and agreement with integration",
-        by_default=False,
-    ),
-    Experiment(
-        "reference_front",
-        "fronts.reference_front",
-        "The true fronts of the surrogates, computed anew and compared: 35 minutes",
-        by_default=False,
-    ),
-    Experiment(
-        "direct_front",
-        "fronts.direct_front",
-        "The front of the drive model itself, found twice, on a finer quadrature too: 5 minutes",
-        by_default=False,
-    ),
-)
-"""In the order in which they run and are reported."""

@@ -1,20 +1,21 @@
-"""The report: one self-contained HTML page of every result found in a folder."""
+"""The report: a first page, a page for each experiment, and what the pages have in common."""
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from experiments.runner.catalogue import EXPERIMENTS
 from experiments.runner.provenance import report_fingerprint
-from experiments.runner.registry import EXPERIMENTS
-from experiments.runner.result import Finding, Table
-from experiments.runner.store import StoredResult, load, write_atomically
+from experiments.runner.result import FAILS, HOLDS, NEW, Finding
+from experiments.runner.store import TIMES, StoredPicture, StoredResult, load, write_atomically
 from pymoo_hdte.checks import InvalidInput
 
 PAGE = "index.html"
+COMPARISONS = "comparisons.html"
+MODELS = "models.html"
 _TITLE = "Robust design of a harmonic drive: results"
 _VERDICTS = {
     "Agrees": ("Agrees with the paper", "yes"),
@@ -46,14 +47,46 @@ def check_page(out: Path) -> None:
 
 
 def write_report(out: Path, notice: str = "") -> Path:
-    """Write ``out/index.html`` from every stored result in the folder ``out``; return its path.
+    """Write the pages of every stored result in the folder ``out``; return that of the first.
 
-    Results that another version of the source made are marked as such. ``notice`` is shown at the
-    top, e.g. what an interrupt left undone.
+    Each experiment has ``out/NAME/index.html`` beside its tables and figures. The first page comes
+    last, so that it never points at a page that is missing. Results that another version of the
+    source made are marked as such. ``notice`` is shown at the top, e.g. what an interrupt left
+    undone.
     """
     stored = [load(out, experiment.name) for experiment in EXPERIMENTS]
     results = [result for result in stored if result is not None]
     present = report_fingerprint()
+    common = {
+        "site": _TITLE,
+        "results": results,
+        "questions": {experiment.name: experiment.question for experiment in EXPERIMENTS},
+        "moods": {verdict: mood for verdict, (_, mood) in _VERDICTS.items()},
+        "outdated": [result.title for result in results if result.made_by != present],
+    }
+    for result in results:
+        page = _page("experiment.html", common, up="../", result=result, times=f"../{TIMES}")
+        write_atomically(out / result.name / PAGE, page)
+    models = {name: text for result in results for name, text in result.models.items()}
+    write_atomically(out / MODELS, _page(MODELS, common, up="", models=models))
+    verdicts = [
+        (heading, mood, _findings(results, verdict))
+        for verdict, (heading, mood) in _VERDICTS.items()
+    ]
+    write_atomically(out / COMPARISONS, _page(COMPARISONS, common, up="", verdicts=verdicts))
+    first = {
+        "sentences": {about: _parts(results, about) for about in (HOLDS, FAILS, NEW)},
+        "shown": _shown_first(results),
+        "verdicts": verdicts,
+        "models": list(models),
+        "notice": notice,
+    }
+    write_atomically(out / PAGE, _page(PAGE, common, up="", **first))
+    return out / PAGE
+
+
+def _page(template: str, common: Mapping[str, object], **values: object) -> bytes:
+    """Return a page; ``up`` leads from it to the folder of the first one."""
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parents[1] / "templates"),
         autoescape=True,
@@ -61,37 +94,27 @@ def write_report(out: Path, notice: str = "") -> Path:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template(PAGE).render(
-        results=results,
-        headlines=_headlines(results),
-        verdicts=[
-            (heading, mood, _findings(results, verdict))
-            for verdict, (heading, mood) in _VERDICTS.items()
-        ],
-        moods={verdict: mood for verdict, (_, mood) in _VERDICTS.items()},
-        outdated=[result.name for result in results if result.made_by != present],
-        notice=notice,
-        title=_TITLE,
-        base64=lambda png: base64.b64encode(png).decode(),
-        zip=zip,
-    )
-    path = out / PAGE
-    write_atomically(path, page.encode())
-    return path
+    environment.globals["zip"] = zip
+    return environment.get_template(template).render({**common, **values}).encode()
 
 
-def _headlines(results: Sequence[StoredResult]) -> list[tuple[StoredResult, Table]]:
+def _parts(results: Sequence[StoredResult], about: str) -> list[tuple[StoredResult, str]]:
+    """Return what the results have to say about one of the first page's sentences."""
+    return [(one, one.first_page[about]) for one in results if about in one.first_page]
+
+
+def _shown_first(results: Sequence[StoredResult]) -> list[tuple[StoredResult, StoredPicture]]:
     return [
-        (result, table)
+        (result, picture)
         for result in results
-        for table in result.tables
-        if table.name == result.headline
+        for picture in result.pictures
+        if picture.name == result.shown_first
     ]
 
 
-def _findings(results: Sequence[StoredResult], verdict: str) -> list[tuple[str, Finding]]:
+def _findings(results: Sequence[StoredResult], verdict: str) -> list[tuple[StoredResult, Finding]]:
     return [
-        (result.name, finding)
+        (result, finding)
         for result in results
         for table in result.tables
         for finding in table.findings

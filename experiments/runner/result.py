@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any
 
@@ -23,13 +23,15 @@ class Finding:
     """One sentence that sets our numbers against the paper's, and whether the two agree.
 
     A ``check`` sets them against a demand of our own instead, and says whether it holds. Where the
-    model was ``fitted`` to the paper's numbers, giving them back is no agreement.
+    model was ``fitted`` to the paper's numbers, giving them back is no agreement. What ``answers``
+    the question of its experiment is repeated at the top of the page.
     """
 
     agrees: bool
     sentence: str
     check: bool = False
     fitted: bool = False
+    answers: bool = False
 
     def __post_init__(self) -> None:
         if self.check and self.fitted:
@@ -121,22 +123,53 @@ class Picture:
     leading: bool = False
 
 
+HOLDS, FAILS, NEW = "What holds", "What does not", "What is new"
+"""The three sentences of the report's first page, of which experiments give the parts."""
+
+
 @dataclass(frozen=True)
 class Result:
     """Everything that one experiment found, ready for the report.
 
-    ``headline`` names the table that the report's first screen repeats, if any; ``opening`` is a
-    sentence that the report begins with.
+    Attributes
+    ----------
+    title
+        Heading of its page.
+    command
+        What makes it anew.
+    answer
+        The sentence with which its page begins and that stands on its card: what came out. Without
+        one, the findings that answer are joined.
+    paragraphs
+        What was done.
+    models
+        What is said of the drive models behind the numbers, by their names; once for all pages.
+    tables, pictures, notes
+        What was found.
+    first_page
+        Parts of the sentences `HOLDS`, `FAILS` and `NEW`, each beginning in lower case.
+    shown_first
+        Name of the picture that the first page shows, if any.
     """
 
     title: str
     command: str
+    answer: str = ""
     paragraphs: tuple[str, ...] = ()
+    models: Mapping[str, str] = field(default_factory=dict)
     tables: tuple[Table, ...] = ()
     pictures: tuple[Picture, ...] = ()
     notes: tuple[str, ...] = ()
-    headline: str = ""
-    opening: str = ""
+    first_page: Mapping[str, str] = field(default_factory=dict)
+    shown_first: str = ""
+
+    def __post_init__(self) -> None:
+        unknown = set(self.first_page) - {HOLDS, FAILS, NEW}
+        if unknown:
+            raise ValueError(f"no sentence of the first page: {', '.join(sorted(unknown))}")
+        if not self.answer:
+            found = (one for table in self.tables for one in table.findings if one.answers)
+            object.__setattr__(self, "answer", " ".join(one.sentence for one in found))
 
 
 def significant(value: float, digits: int) -> str:

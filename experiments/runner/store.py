@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.runner.provenance import report_fingerprint
+from experiments.runner.provenance import environment, report_fingerprint
 from experiments.runner.result import Column, Finding, Picture, Result, Table, significant
 from pymoo_hdte.io.text_table import csv_text
 from pymoo_hdte.io.whole_file import write_whole
@@ -22,27 +22,29 @@ _INFINITE = {significant(value, 1): value for value in (math.inf, -math.inf)}
 
 @dataclass(frozen=True)
 class StoredPicture:
-    """A figure read back: its PNG bytes and caption."""
+    """A figure of a stored result: the name of its PNG file and its caption."""
 
     name: str
     caption: str
-    png: bytes
     leading: bool = False
 
 
 @dataclass(frozen=True)
 class StoredResult:
-    """A result read back, with the fingerprint of the source that made it."""
+    """A result read back, with the versions and the fingerprint of the source that made it."""
 
     name: str
     title: str
     command: str
+    answer: str
     paragraphs: tuple[str, ...]
+    models: dict[str, str]
     tables: tuple[Table, ...]
     pictures: tuple[StoredPicture, ...]
     notes: tuple[str, ...]
-    headline: str
-    opening: str
+    first_page: dict[str, str]
+    shown_first: str
+    versions: dict[str, str]
     made_by: str
 
 
@@ -70,14 +72,17 @@ def save(out: Path, name: str, result: Result) -> None:
     described = {
         "title": result.title,
         "command": result.command,
+        "answer": result.answer,
         "paragraphs": result.paragraphs,
+        "models": dict(result.models),
         "tables": [asdict(table) for table in steady],
         "pictures": [
             {"name": p.name, "caption": p.caption, "leading": p.leading} for p in result.pictures
         ],
         "notes": result.notes,
-        "headline": result.headline,
-        "opening": result.opening,
+        "first_page": dict(result.first_page),
+        "shown_first": result.shown_first,
+        "versions": environment(),
         "made_by": report_fingerprint(),
     }
     _write_json(out / TIMES / name / RESULT, [asdict(table) for table in timed])
@@ -85,28 +90,27 @@ def save(out: Path, name: str, result: Result) -> None:
 
 
 def load(out: Path, name: str) -> StoredResult | None:
-    """Read the stored result of the experiment ``name``; None if there is none."""
+    """Read the stored result of the experiment ``name``.
+
+    None if there is none, or one in the form of another version of this software.
+    """
     described_in = out / name / RESULT
     if not described_in.is_file():
         return None
     described = json.loads(described_in.read_text())
     timed_in = out / TIMES / name / RESULT
     timed = json.loads(timed_in.read_text()) if timed_in.is_file() else []
-    return StoredResult(
-        name=name,
-        title=described["title"],
-        command=described["command"],
-        paragraphs=tuple(described["paragraphs"]),
-        tables=tuple(_table(entry) for entry in described["tables"] + timed),
-        pictures=tuple(
-            StoredPicture(png=(out / name / f"{p['name']}.png").read_bytes(), **p)
-            for p in described["pictures"]
-        ),
-        notes=tuple(described["notes"]),
-        headline=described["headline"],
-        opening=described.get("opening", ""),
-        made_by=described["made_by"],
-    )
+    described |= {
+        "paragraphs": tuple(described["paragraphs"]),
+        "tables": tuple(_table(entry) for entry in described["tables"] + timed),
+        "pictures": tuple(StoredPicture(**picture) for picture in described["pictures"]),
+        "notes": tuple(described["notes"]),
+    }
+    try:
+        return StoredResult(name=name, **described)
+    except TypeError:
+        # Another version of this software wrote it, with other fields.
+        return None
 
 
 def png_bytes(picture: Picture) -> bytes:

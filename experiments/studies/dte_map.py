@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, grid
 from experiments.comparison.runs import robust_problem
-from experiments.paper.models import model_sentences
+from experiments.paper.models import models_of
 from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Picture, Result, Table, significant
 from pymoo_hdte.drive import PRESETS
@@ -48,7 +48,9 @@ def run(context: Context) -> Result:
     return Result(
         title="DTE over input speed and load",
         command="python -m experiments dte_map",
-        paragraphs=(SETTING, *model_sentences(*PRESETS)),
+        paragraphs=(SETTING,),
+        answer=" ".join(map(_resonances, maps)),
+        models=models_of(*PRESETS),
         tables=(_modes_table(maps), _peaks_table(maps)),
         pictures=(
             Picture(
@@ -59,6 +61,18 @@ def run(context: Context) -> Result:
                 _figure(maps),
             ),
         ),
+    )
+
+
+def _resonances(entry: SpeedLoadMap) -> str:
+    """Say where a drive model resonates."""
+    mode = torsional_mode(entry.model)
+    met = [
+        f"order {order:g} at {significant(speed, 4)} r/min"
+        for order, speed in critical_speeds(entry.model)
+    ]
+    return f"{entry.model.name} has its torsional mode at {significant(mode.frequency, 4)} Hz, " + (
+        f"met by {', '.join(met)}." if met else "met by no excited order in the range."
     )
 
 

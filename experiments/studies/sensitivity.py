@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, grid
 from experiments.comparison.runs import robust_problem
 from experiments.paper.choices import BAND, MODEL
-from experiments.paper.models import model_sentences
+from experiments.paper.models import models_of
 from experiments.paper.shares import (
     design_indices,
     falls_when_halved,
@@ -65,7 +65,9 @@ def run(context: Context) -> Result:
     return Result(
         title="Sensitivity: which parameter causes the scatter of the DTE",
         command="python -m experiments sensitivity",
-        paragraphs=(SETTING, *model_sentences(*PRESETS)),
+        paragraphs=(SETTING,),
+        answer=_money_note(MODEL, studies),
+        models=models_of(*PRESETS),
         tables=(_indices_table(studies), _halving_table(studies), _influence_table(influences)),
         pictures=(
             Picture(
@@ -76,7 +78,7 @@ def run(context: Context) -> Result:
                 _figure(studies),
             ),
         ),
-        notes=tuple(_money_note(model, studies) for model in PRESETS),
+        notes=tuple(_money_note(model, studies) for model in PRESETS if model != MODEL),
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.runner.result import Column, Finding, Picture, Result, Table
+from experiments.runner.result import FAILS, HOLDS, Column, Finding, Picture, Result, Table
 
 HOSTILE = "<script>alert('x')</script>"
 
@@ -28,7 +28,7 @@ def example() -> Result:
     )
     findings = (
         Finding(np.bool_(True), "They agree."),
-        Finding(False, "They differ."),
+        Finding(False, "They differ.", answers=True),
         Finding(True, "A fit gives it back.", fitted=True),
         Finding(False, "A fit misses it.", fitted=True),
         Finding(True, "It holds.", check=True),
@@ -42,5 +42,7 @@ def example() -> Result:
         tables=(Table("quality", "Quality", columns, rows, "How.", findings), times),
         pictures=(Picture("line", "A line.", line_plot()),),
         notes=("A note.",),
-        headline="quality",
+        models={"calibrated": "What it is."},
+        first_page={HOLDS: "this holds", FAILS: "that does not"},
+        shown_first="line",
     )

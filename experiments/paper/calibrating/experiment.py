@@ -15,12 +15,13 @@ from experiments.paper.calibrating.tables import (
     gaps,
     ladder_table,
     numbers_table,
+    of_the_first_page,
     parameter_table,
     unexplained,
 )
 from experiments.runner.committed import committed_file, stored_outcome
 from experiments.runner.registry import Context
-from experiments.runner.result import Picture, Result
+from experiments.runner.result import HOLDS, Picture, Result
 from experiments.runner.store import write_atomically
 
 OUTCOMES = "calibration.csv"
@@ -68,6 +69,7 @@ def run(context: Context) -> Result:
             ),
         ),
         notes=tuple(unexplained(best)),
+        first_page={HOLDS: of_the_first_page(best)},
     )
 
 

@@ -68,6 +68,7 @@ def numbers_table(best: Outcome) -> Table:
             f"that of the preset calibrated is {significant(gap(presets['calibrated'], part), 2)} "
             "%.",
             check=True,
+            answers=True,
         )
         for role, part in (("fitted", seen), ("held out", unseen))
     )
@@ -102,6 +103,15 @@ def numbers_table(best: Outcome) -> Table:
     return Table("numbers", title, columns, rows, findings=(*findings, moved, step), note=note)
 
 
+def of_the_first_page(best: Outcome) -> str:
+    """Say what the best rung gives back, as part of a longer sentence."""
+    seen, effects = FITS["table8"], len(best.candidate.effects)
+    return (
+        f"with {effects} effects added and fitted, the printed equations give back the moments of "
+        f"Table 8 to {significant(gap(best.predictions, seen), 2)} %"
+    )
+
+
 def _step_finding(best: Outcome) -> Finding:
     """Whether the best rung keeps the paper's trade-off between two of its optima."""
     first, last = "balanced", "robustness_first"
@@ -116,6 +126,7 @@ def _step_finding(best: Outcome) -> Finding:
         f"{paper[1]:+.3f} in the paper. Both designs are drawn with common random numbers there, "
         "so that this step is known far better than the numbers themselves.",
         fitted=True,
+        answers=True,
     )
 
 

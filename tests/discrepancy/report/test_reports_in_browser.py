@@ -34,7 +34,7 @@ def looked_at(page, tmp_path, width, script="null"):
     assert all(rows > 1 and visible for rows, visible in seen["tables"])
     for link in seen["links"]:
         if not link.startswith(("#", "http")):
-            assert (page.parent / link).is_file()
+            assert (page.parent / link.partition("#")[0]).is_file()
     return seen
 
 
@@ -68,7 +68,9 @@ def page(name, tmp_path):
     else:
         files = files_of(name)
     put_files(files, tmp_path / name)
-    return tmp_path / name / ("index.html" if name == "experiments" else "report.html")
+    if name == "experiments":
+        return tmp_path / name / "table7" / "index.html"
+    return tmp_path / name / "report.html"
 
 
 @pytest.mark.parametrize("width", [NARROW, pytest.param(WIDE, marks=pytest.mark.nightly)])
@@ -105,6 +107,12 @@ _PRESS = """(() => {
   KEYS.forEach((key) => figure.dispatchEvent(new KeyboardEvent("keydown", { key })));
   return [...document.querySelectorAll("#front-shown td")].map((one) => one.textContent);
 })()"""
+
+
+@pytest.mark.parametrize("name", ["index", "models", "comparisons"])
+def test_a_reader_sees_the_pages_around_the_experiments(name, tmp_path):
+    put_files(files_of("experiments"), tmp_path)
+    looked_at(tmp_path / f"{name}.html", tmp_path, 360)
 
 
 @pytest.fixture

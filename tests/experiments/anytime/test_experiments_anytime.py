@@ -217,7 +217,7 @@ class TestStoredOutcome:
     @pytest.mark.nightly
     def test_the_page_opens_with_it(self, tmp_path):
         result = run(Context(20, tmp_path, Campaign(tmp_path)))
-        assert result.opening
+        assert result.answer
         assert [picture.leading for picture in result.pictures].index(True) == 0
         found = {table.name: table.findings for table in result.tables}
         # The advantage is not at the stated setting, nor are the printed numbers closest there.

@@ -18,10 +18,11 @@ import experiments
 from experiments.__main__ import main
 from experiments.runner import committed, provenance
 from experiments.runner.campaign import Campaign
+from experiments.runner.catalogue import EXPERIMENTS
 from experiments.runner.committed import read_origin, read_rows, stored_outcome, table_with_origin
-from experiments.runner.registry import EXPERIMENTS, Context, Experiment
+from experiments.runner.registry import Context, Experiment
 from experiments.runner.report import check_page, write_report
-from experiments.runner.result import Column, Finding, Result, Table, significant
+from experiments.runner.result import FAILS, HOLDS, Column, Finding, Result, Table, significant
 from experiments.runner.store import load, png_bytes, save
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.io.text_table import csv_text
@@ -81,8 +82,18 @@ def test_a_stored_result_reads_back_as_it_was(out):
         assert shown(again) == shown(table)
         places = range(len(table.columns))
         assert [again.holds_text(i) for i in places] == [table.holds_text(i) for i in places]
-    assert (read.title, read.notes, read.headline) == ("An example", ("A note.",), "quality")
-    assert read.pictures[0].png == png_bytes(written.pictures[0])
+    assert (read.title, read.notes, read.answer) == ("An example", ("A note.",), "They differ.")
+    assert (read.models, read.first_page) == (written.models, written.first_page)
+    assert (out / "table7" / "line.png").read_bytes() == png_bytes(written.pictures[0])
+
+
+def test_a_result_in_the_form_of_another_version_is_left_out(out):
+    stored = out / "table7" / "result.json"
+    content = json.loads(stored.read_text())
+    content["opening"] = content.pop("answer")
+    stored.write_text(json.dumps(content))
+    assert load(out, "table7") is None
+    assert "An example" not in write_report(out).read_text()
 
 
 def test_stored_results_are_json_that_any_reader_takes(out):
@@ -186,16 +197,37 @@ def test_a_table_with_a_short_row_is_refused():
         Table("broken", "Broken", (Column("a"), Column("b")), ((1.0,),))
 
 
-def test_the_page_holds_everything_and_asks_for_nothing(out):
-    page = write_report(out).read_text()
-    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
-    assert sources
-    assert all(s.startswith(("data:image/png;base64,", "#")) for s in sources)
-    assert "<script" not in page
-    assert "@import" not in page
+def pages(out):
+    write_report(out)
+    return sorted(out.rglob("*.html"))
 
 
-def test_the_page_is_well_formed_and_escapes_what_it_shows(out):
+def test_pages_ask_for_nothing_but_files_beside_them(out):
+    found = pages(out)
+    assert [str(page.relative_to(out)) for page in found] == [
+        "comparisons.html", "index.html", "models.html", "table7/index.html",
+    ]  # fmt: skip
+    for page in found:
+        text = page.read_text()
+        for source in re.findall(r'(?:src|href)="([^"]*)"', text):
+            path, _, anchor = source.partition("#")
+            target = page.parent / path if path else page
+            assert target.is_file(), source
+            assert not anchor or f'id="{anchor}"' in target.read_text()
+        assert "<script" not in text
+        assert "@import" not in text
+
+
+def test_every_table_is_linked_as_csv_and_every_picture_shown(out):
+    pages(out)
+    text = (out / "table7" / "index.html").read_text()
+    assert re.findall(r'href="([^"]*csv)"', text) == [
+        "quality.csv", "../times/table7/times.csv",
+    ]  # fmt: skip
+    assert re.findall(r'<img src="([^"]*)"', text) == ["line.png"]
+
+
+def test_pages_are_well_formed_and_escape_what_they_show(out):
     class Balance(HTMLParser):
         def __init__(self):
             super().__init__()
@@ -208,20 +240,31 @@ def test_the_page_is_well_formed_and_escapes_what_it_shows(out):
         def handle_endtag(self, tag):
             assert self.open.pop() == tag
 
-    page = write_report(out).read_text()
-    parser = Balance()
-    parser.feed(page)
-    assert parser.open == []
-    assert "&lt;script&gt;" in page
+    for page in pages(out):
+        parser = Balance()
+        parser.feed(page.read_text())
+        assert parser.open == []
+    assert "&lt;script&gt;" in (out / "table7" / "index.html").read_text()
 
 
-def test_the_first_screen_repeats_the_headline_and_sorts_the_findings(out):
-    page = write_report(out).read_text()
-    first_screen, rest = page.split('<section id="table7">')
-    assert "0.333" in first_screen
-    assert "0.333" in rest
-    sections = first_screen.partition('<div class="verdicts">')[2].split("<h3 ")[1:]
-    found = [re.findall(r">([^<>]+)</h3>|<li>([^<]+) <a", section) for section in sections]
+def test_the_first_page_has_three_sentences_pictures_and_a_card_for_each_result(out):
+    first = write_report(out).read_text()
+    sentences, cards = first.split('<ul class="cards">')
+    found = re.findall(r"<h2>([^<]+)</h2>\s*<p><a [^>]+>([^<]+)</a>\.</p>", sentences)
+    assert found == [(HOLDS, "This holds"), (FAILS, "That does not")]
+    assert re.findall(r'<img src="([^"]*)"', sentences) == ["table7/line.png"]
+    (card,) = cards.split("<li>")[1:]
+    question = next(one.question for one in EXPERIMENTS if one.name == "table7")
+    for words in ("An example", question.replace("'", "&#39;"), "They differ.", "table7/line.png"):
+        assert words in card
+    assert "<table>" not in first
+
+
+def test_comparisons_are_sorted_by_what_came_out(out):
+    first = write_report(out).read_text()
+    text = (out / "comparisons.html").read_text()
+    sections = text.partition('<div class="verdicts">')[2].split("<h2 ")[1:]
+    found = [re.findall(r">([^<>]+)</h2>|<li>([^<]+) <a", section) for section in sections]
     assert [[heading or sentence for heading, sentence in section] for section in found] == [
         ["Agrees with the paper", "They agree."],
         ["Does not agree with the paper", "They differ."],
@@ -230,27 +273,33 @@ def test_the_first_screen_repeats_the_headline_and_sorts_the_findings(out):
         ["Checks of our own that fail", "It fails."],
         ["Checks of our own that hold", "It holds."],
     ]
-    counts = re.findall(r'href="#(findings-\d)">([^<]+): <b>1</b>', first_screen)
+    counts = re.findall(r'href="comparisons.html#(verdict-\d)">([^<]+): <b>1</b>', first)
     assert [heading for _, heading in counts] == [heading for (heading, _), *_ in map(list, found)]
-    assert re.findall(r'<section id="(findings-\d)">', first_screen) == [link for link, _ in counts]
-    assert re.findall(r"<b>([^<]+)</b>", rest) == [
+    assert re.findall(r'<section id="(verdict-\d)">', text) == [link for link, _ in counts]
+    page = (out / "table7" / "index.html").read_text()
+    assert re.findall(r"<b>([^<]+)</b>", page) == [
         "Agrees.", "Differs.", "Fitted.", "Missed by the fit.", "Holds.", "Fails.",
     ]  # fmt: skip
 
 
-def test_the_page_begins_with_an_opening_and_its_section_with_a_leading_picture(tmp_path):
+def test_a_page_begins_with_its_answer_and_a_leading_picture(tmp_path):
     result = example()
     (picture,) = result.pictures
     leading = replace(picture, name="first", caption="Look here first.", leading=True)
-    opened = replace(result, opening="This holds, that does not.", pictures=(picture, leading))
+    opened = replace(result, answer="This came out.", pictures=(picture, leading))
     save(tmp_path, "table7", opened)
-    page = write_report(tmp_path).read_text()
-    begin, section = page.split("<main>")[1].split('<section id="table7">')
-    assert re.match(r"\s*<h1>[^<]+</h1>\s*<p [^>]+>This holds, that does not\.", begin)
+    write_report(tmp_path)
+    article = (tmp_path / "table7" / "index.html").read_text().split("<article>")[1]
+    assert re.match(r"\s*<h1>[^<]+</h1>\s*<p class=\"answer\">This came out\.", article)
     places = [
-        section.index(words) for words in ("Look here first.</fig", "<table>", picture.caption)
+        article.index(words) for words in ("Look here first.</fig", "<table>", picture.caption)
     ]
     assert places == sorted(places)
+
+
+def test_a_result_speaks_of_no_other_sentence_of_the_first_page():
+    with pytest.raises(ValueError, match="no sentence of the first page: What else"):
+        Result("", "", first_page={"What else": "this"})
 
 
 def test_a_finding_is_judged_in_one_way():
@@ -297,4 +346,4 @@ def test_the_versions_are_those_of_all_that_computes_a_result():
 def test_an_empty_folder_gives_an_empty_report(tmp_path):
     page = write_report(tmp_path, notice="Interrupted.").read_text()
     assert "Interrupted." in page
-    assert "<table>" not in page
+    assert "<img" not in page
