@@ -1,4 +1,4 @@
-"""The README's Python and commands run as printed; its pictures and numbers are reproduced."""
+"""Python and commands of README and its pages run as printed; pictures and numbers come out."""
 
 import contextlib
 import csv
@@ -51,14 +51,19 @@ from experiments.runner.registry import Context
 from pymoo_hdte.cli import __main__ as cli
 from pymoo_hdte.cli import optimum_report
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
-from pymoo_hdte.drive import harmonic_balance
+from pymoo_hdte.drive import harmonic_balance, preset
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.surrogate import accuracy, latin_hypercube
 from pymoo_hdte.units import ARCSEC
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-WORDS = " ".join(README.split())
-SNIPPETS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+PAGES = "\n\n".join(
+    (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    for name in ("model_and_measurements", "command_line", "paper", "which_algorithm")
+)
+"""Pages that the README leaves the details to."""
+WORDS = " ".join((README + PAGES).split())
+SNIPPETS = re.findall(r"```python\n(.*?)```", README + PAGES, flags=re.DOTALL)
 COMMANDS = re.findall(r"```sh\n(.*?)```", README, flags=re.DOTALL)
 
 
@@ -69,7 +74,7 @@ def output_of(snippet: str) -> str:
     return text.getvalue().strip()
 
 
-SAID = re.findall(r"prints `(.*?)`", README)
+SAID = re.findall(r"prints `(.*?)`", README + PAGES)
 
 
 def test_anyones_simulator_prints_what_the_readme_says():
@@ -178,9 +183,25 @@ def test_the_campaign_to_try_holds_the_effect_that_is_named(tmp_path, monkeypatc
     assert "Order 14, the second harmonic of order 7, is not looked at" in printed
 
 
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= 150
+
+
+@pytest.mark.nightly
+def test_the_picture_of_the_beams_is_drawn_by_its_script(tmp_path):
+    script = ROOT / "docs" / "beam_picture.py"
+    scope = {"__file__": str(script), "__name__": "picture"}
+    exec(compile(script.read_text(), str(script), "exec"), scope)
+    scope["draw"](tmp_path / "drawn.png")
+    drawn, stored = (
+        np.asarray(Image.open(path), float) for path in (tmp_path / "drawn.png", scope["PICTURE"])
+    )
+    assert np.mean(np.abs(drawn - stored)) < 0.5
+
+
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory):
-    """The first picture, drawn now and as it is stored."""
+    """The picture of the drive, drawn now and as it is stored."""
     script = ROOT / "docs" / "robust_design_picture.py"
     scope = {"__file__": str(script), "__name__": "picture"}
     exec(compile(script.read_text(), str(script), "exec"), scope)
@@ -189,7 +210,7 @@ def pictures(tmp_path_factory):
     return [Image.open(path) for path in (drawn, scope["PICTURE"])]
 
 
-def test_the_first_picture_says_what_its_script_finds(pictures):
+def test_the_picture_of_the_drive_says_what_its_script_finds(pictures):
     drawn, stored = pictures
     assert drawn.text["Description"] == stored.text["Description"]
     assert drawn.size == stored.size
@@ -198,14 +219,14 @@ def test_the_first_picture_says_what_its_script_finds(pictures):
 @pytest.mark.skipif(
     matplotlib.__version_info__ < (3, 11), reason="matplotlib lays it out otherwise before 3.11"
 )
-def test_the_first_picture_is_drawn_by_its_script(pictures):
+def test_the_picture_of_the_drive_is_drawn_by_its_script(pictures):
     drawn, stored = (np.asarray(picture, float) for picture in pictures)
     assert np.mean(np.abs(drawn - stored)) < 0.5
 
 
 def test_pictures_of_the_readme_exist_and_are_small():
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", README)
-    assert len(pictures) == 2
+    assert len(pictures) == 3
     assert sum((ROOT / name).stat().st_size for name in pictures) < 300_000
 
 
@@ -216,7 +237,7 @@ def test_links_lead_to_files():
 
 def row(words: str) -> list[list[float]]:
     """Return the numbers in the cells of the table row that holds these words."""
-    line = next(line for line in README.splitlines() if line.startswith("|") and words in line)
+    line = next(line for line in PAGES.splitlines() if line.startswith("|") and words in line)
     _, _, paper, ours, _ = line.split("|")
     return [[float(n) for n in re.findall(r"\d+\.\d+", cell)] for cell in (paper, ours)]
 
@@ -363,8 +384,15 @@ class TestNumbersBesideThePaper:
         best = front[WeightedUtopia(PREFERENCES["balanced"]).do(front)]
         assert ours == [round(value, 2) for value in best]
 
+    def test_the_readme_in_three_sentences(self):
+        published = preset("published")
+        printed = published.dte_arcsec(published.nominal[np.newaxis])[0]
+        paper = TABLE_8["initial"].mean_arcsec
+        words = f"give a transmission error of {printed:.0f} arcsec where the paper has {paper:.0f}"
+        assert words in WORDS
+
     def test_rows_have_both_sides(self):
-        with io.StringIO(README) as text:
+        with io.StringIO(PAGES) as text:
             rows = [line for line in csv.reader(text, delimiter="|") if len(line) == 5]
         assert all(cell.strip() for line in rows for cell in line[2:4])
 
@@ -391,6 +419,12 @@ def test_blind_scores_are_those_of_the_committed_cases():
     ]
 
 
+def test_the_readme_says_that_no_plain_answer_was_wrong():
+    outcomes = read_outcomes(DATA / OUTCOMES, DATA / SECONDS)
+    assert "no plain answer was wrong so far" in " ".join(README.split())
+    assert not any(one.wrong_confident for one in outcomes)
+
+
 class TestNumbersOfThePeers:
     @pytest.fixture(scope="class")
     @classmethod
@@ -398,10 +432,10 @@ class TestNumbersOfThePeers:
         return committed_scores("peers")
 
     def test_average_ranks(self, scores):
-        head = next(line for line in README.splitlines() if line.startswith("| | IGD "))
+        head = next(line for line in PAGES.splitlines() if line.startswith("| | IGD "))
         names = {shown: measure for measure, shown in NAMES.items()}
         measures = [names[cell.strip()] for cell in head.split("|")[2:-1]]
-        table = README[README.index(head) :].split("\n\n")[0].splitlines()[2:]
+        table = PAGES[PAGES.index(head) :].split("\n\n")[0].splitlines()[2:]
         assert len(table) == 5
         budgets = scores.budgets
         ranks = [
@@ -413,6 +447,18 @@ class TestNumbersOfThePeers:
             place = scores.algorithms.index(name)
             for cell, of_measure in zip(cells, ranks, strict=True):
                 assert cell == ", ".join(f"{rank[place]:.2f}" for rank in of_measure)
+
+    def test_where_ours_has_the_best_rank(self, scores):
+        words = "of twelve algorithms of pymoo, jMetalPy and pygmo it has the best average rank by"
+        assert f"{words} IGD on 25 problems" in WORDS
+        assert "and not by hypervolume after 25,000 evaluations" in WORDS
+        place = scores.algorithms.index("ElitistSwarm")
+        first = {
+            (measure, n): median_ranks(scores, measure, n, tuning=False).argmin() == place
+            for measure in ("igd", "hypervolume")
+            for n in (10_000, 25_000)
+        }
+        assert [case for case, best in first.items() if not best] == [("hypervolume", 25_000)]
 
     def test_what_is_beaten_and_what_is_not(self, scores):
         rows = {(row[0], row[1]): row for row in must_reach_table(scores).rows}
@@ -444,7 +490,7 @@ class TestNumbersOfThePeers:
         assert f"SMS-EMOA leads with {rows[-1][9]:.2f} against {rows[-1][7]:.2f}" in WORDS
 
     def test_parts_that_are_shown_to_help(self, tmp_path):
-        table = swarm_parts.run(Context(20, tmp_path, Campaign(tmp_path))).tables[0]
-        shown = table.note.rpartition(": ")[2]
+        answer = swarm_parts.run(Context(20, tmp_path, Campaign(tmp_path))).answer
+        shown = answer.rpartition(": ")[2]
         assert shown == "without exchange, equal shares of moves, with constant inertia."
         assert "the exchange of components and the shares by success are shown to help" in WORDS
