@@ -72,7 +72,7 @@ def _new(scores: Scores) -> str:
     ranks = median_ranks(scores, "igd", scores.budgets[0], tuning=False)
     place = 1 + int(np.sum(ranks < ranks[scores.algorithms.index(OURS)]))
     return (
-        f"a swarm without settings that ranks {place} of {len(scores.algorithms)} by IGD on "
+        f"a swarm without settings that takes place {place} of {len(scores.algorithms)} by IGD on "
         f"{len(scores.rows(False))} held-out problems"
     )
 
