@@ -55,8 +55,9 @@ def run(context: Context) -> Result:
         title="Benchmark: speed ratios and agreement with integration",
         command="python -m experiments benchmark",
         paragraphs=(
-            "Times are the least of several repetitions on one core; only their ratios within this "
-            "run mean anything.",
+            "Times are the least of several repetitions on one core, those of a million designs on "
+            "all; only their ratios within this run mean anything. The machine should have nothing "
+            "else to do: its load stands below.",
             *model_sentences("calibrated", "resonant"),
         ),
         tables=(

@@ -15,7 +15,7 @@ from experiments.robust.data import (
 from experiments.robust.experiment import run
 from experiments.robust.functions import FUNCTIONS, G_WEIGHTS
 from experiments.robust.job import CHAOSPY, OPENTURNS, OURS
-from experiments.robust.ours import trace
+from experiments.robust.ours import Growth
 from experiments.robust.rivals import CHAOSPY_WAYS, chaospy_traces, runs_needed, until_it_stays
 from experiments.robust.tables import stops_table
 from experiments.robust.task import Task
@@ -64,7 +64,7 @@ def test_both_libraries_are_run_on_the_same_task():
     for name, steps in chaospy_traces(task, 12).items():
         assert name in CHAOSPY_WAYS
         assert all(np.isfinite(step).all() for step in steps)
-    (first, *_) = trace(task, 20, 0.01)
+    (first, *_) = Growth(task, 0.01, 20).steps
     assert first[0] == 14
 
 
