@@ -9,7 +9,6 @@ from subprocess import run
 
 import numpy as np
 from moocore import pareto_rank
-from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
@@ -20,13 +19,15 @@ from pymoo_hdte.algorithms.crowding import least_crowded
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.drive import harmonic_balance, preset, simulate_drive
-from pymoo_hdte.problems import Design, RobustDTE
-from pymoo_hdte.problems import robust_problem as simulator_problem
+from pymoo_hdte.problems import Design, Mean, RobustDTE, Std
+from pymoo_hdte.problems.simulator.inputs import Inputs
+from pymoo_hdte.problems.simulator.problem import SimulatorProblem
+from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
+from pymoo_hdte.surrogate.sparse.moments import SparseMoments
+from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.threads import usable_cores
 from pymoo_hdte.virtual.hidden_forms import draw_effect
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
-
-Array = NDArray[np.float64]
 
 N_POINTS = 1000
 SORTED = 200
@@ -84,11 +85,9 @@ def _surrogate() -> Ratio:
 
 def _many_designs() -> Iterator[Ratio]:
     """Measure `evaluate` of pymoo, on all cores."""
-    designs = {name: Design(1.0, 2.0, tolerance=0.05) for name in "abcd"}
-    sparse = simulator_problem(fifth_power, designs, vectorised=True, progress=False)
     problems: tuple[tuple[str, Problem], ...] = (
-        ("tensor surrogate, RobustDTE(order=5)", RobustDTE(order=5)),
-        ("sparse surrogate, (a + .8 b + .6 c + .4 d)^5", sparse),
+        ("RobustDTE(order=5)", RobustDTE(order=5)),
+        ("sparse surrogate of total degree 5", _of_degree_5()),
     )
     for name, problem in problems:
         X = np.random.default_rng(4).uniform(problem.xl, problem.xu, (N_DESIGNS, 4))
@@ -104,9 +103,18 @@ def _many_designs() -> Iterator[Ratio]:
         )
 
 
-def fifth_power(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """Return a polynomial of 126 terms."""
-    return (a + 0.8 * b + 0.6 * c + 0.4 * d) ** 5
+def _of_degree_5() -> SimulatorProblem:
+    inputs = Inputs({name: Design(1.0, 2.0, tolerance=0.05) for name in "abcd"}, {})
+    indices = np.array([one for one in np.ndindex(6, 6, 6, 6) if sum(one) <= 5])
+    rng = np.random.default_rng(4)
+    coefficients = rng.normal(size=(1, len(indices))) * 0.5 ** indices.sum(axis=1)
+    polynomial = SparsePolynomial(indices, coefficients)
+    moments, none = SparseMoments(polynomial, inputs.axes), np.zeros(1)
+    no_points = np.empty((0, 4))
+    fit = AdaptiveFit(
+        polynomial, moments, none, none, 0, none, no_points, no_points, np.empty((0, 1))
+    )
+    return SimulatorProblem(inputs, fit, ("y",), (Mean(), Std()), (), 0)
 
 
 def _harmonic_balance() -> Ratio:
