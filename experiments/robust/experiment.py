@@ -38,8 +38,8 @@ PROTOCOL = (
     "all inputs together, the designed ones spread evenly over their range; of chaospy, the best "
     "of five ways counts, of OpenTURNS the set with the least corrected leave-one-out error. "
     "They are tried at numbers of runs that rise by a fifth, so that what they need is told too "
-    "large by less than that; ours is judged whenever its runs rise by an eighth. From 300 runs on, "
-    "paths of terms of OpenTURNS end where their error is 1.2 times its least, before at 2 times."
+    "large by less than that; ours is judged whenever its runs rise by an eighth. From 300 runs "
+    "on, OpenTURNS ends paths of terms where their error is 1.2 times its least, before at 2 times."
 )
 CHOSEN = (
     "Constants of the package were chosen on Ishigami's function, borehole, OTL circuit, piston, "
