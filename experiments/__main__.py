@@ -13,7 +13,6 @@ from pathlib import Path
 
 from experiments.runner.campaign import Campaign
 from experiments.runner.catalogue import EXPERIMENTS
-from experiments.runner.machine import usable_cores
 from experiments.runner.registry import Context, Experiment, ExtraMissing
 from experiments.runner.report import check_page, write_report
 from experiments.runner.setting import Setting
@@ -21,6 +20,7 @@ from experiments.runner.store import save
 from experiments.runner.workers import WorkerLost, WrongWorker, make_executor
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.parser import OneLineParser
+from pymoo_hdte.surrogate.threads import usable_cores
 
 FAILED = 1
 """Exit code where the workers or the disk fail, or a stored outcome or an extra is missing."""

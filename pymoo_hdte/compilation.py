@@ -14,10 +14,10 @@ F = TypeVar("F", bound=Callable)
 def compiled(function: F) -> Dispatcher[F]:
     """Return ``function`` as machine code, which numba makes at the first call.
 
-    If no cache can be written, as in a read-only installation for a user without a home, every
-    process compiles anew.
+    Other threads of Python go on while it runs. If no cache can be written, as in a read-only
+    installation for a user without a home, every process compiles anew.
     """
     try:
-        return njit(cache=True)(function)
+        return njit(cache=True, nogil=True)(function)
     except RuntimeError:
-        return njit(function)
+        return njit(nogil=True)(function)

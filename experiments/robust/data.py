@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from experiments.robust.functions import FUNCTIONS
-from experiments.robust.job import ACCURACY, BUDGET, METHODS, OURS, Curve, Stop
+from experiments.robust.job import ACCURACY, BUDGET, METHODS, OURS, STEP, Curve, Grown
 from experiments.robust.rivals import CHAOSPY_WAYS, Step, runs_needed
 from experiments.runner.campaign import Run
 from experiments.runner.committed import committed_file, read_rows, table_with_origin
@@ -82,37 +82,38 @@ def outcome_for(context: Context) -> Outcome:
     require("sklearn", "uq")
     names = [one.name for one in FUNCTIONS] if context.full else QUICK_FUNCTIONS
     budget, seeds = (BUDGET, SEEDS) if context.full else (QUICK_BUDGET, SEEDS[:1])
-    stops = [Stop(name, seed, budget) for name in names for seed in seeds]
-    stopped = dict(zip(stops, context.campaign.run(stops, "our stops"), strict=True))
-    ours = [Curve(name, OURS, budget) for name in names]
-    curves = dict(zip(ours, context.campaign.run(ours, "our curves"), strict=True))
-    needed = gathered(curves, {}).needed
+    # The curve is that of the first seed.
+    ours = [Grown(name, seed, seed == seeds[0], budget) for name in names for seed in seeds]
+    grown = dict(zip(ours, context.campaign.run(ours, "ours"), strict=True))
+    needed = gathered(grown, {}).needed
     rivals = [
         Curve(name, method, min(budget, FURTHER * (needed(name, OURS) or budget)))
         for name in names
         for method in METHODS
         if method != OURS
     ]
-    curves |= dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True))
-    found = gathered(curves, stopped)
+    found = gathered(grown, dict(zip(rivals, context.campaign.run(rivals, "rivals"), strict=True)))
     for name, text in ((NAME, curves_text(found)), (STOPS, stops_text(found))):
         write_atomically(context.out / NAME / f"{name}.csv", text.encode())
     return found
 
 
-def gathered(curves: dict[Curve, Run], stops: dict[Stop, Run]) -> Outcome:
+def gathered(grown: dict[Grown, Run], rivals: dict[Curve, Run]) -> Outcome:
     """Return the outcome of finished jobs."""
-    by_way: dict[tuple[str, str, str], list[Step]] = {}
-    for job, run in curves.items():
+    curves: dict[tuple[str, str, str], list[Step]] = {}
+    stops = {}
+    for growth, run in grown.items():
+        if growth.whole_curve:
+            steps = run.values[:, : len(STEP)].tolist()
+            curves[growth.function, OURS, OURS] = [(int(n), one, all_) for n, one, all_ in steps]
+        numbers = run.values[0, len(STEP) :].tolist()
+        stops[growth.function, growth.seed] = dict(zip(STOP_NUMBERS, numbers, strict=True))
+    for job, run in rivals.items():
         names = ways_of(job.method)
         for way, runs, *errors in run.values.tolist():
             key = job.function, job.method, names[int(way)]
-            by_way.setdefault(key, []).append((int(runs), errors[0], errors[1]))
-    numbers = {
-        (job.function, job.seed): dict(zip(run.columns, run.values[0].tolist(), strict=True))
-        for job, run in stops.items()
-    }
-    return Outcome(by_way, numbers)
+            curves.setdefault(key, []).append((int(runs), errors[0], errors[1]))
+    return Outcome(curves, stops)
 
 
 def ways_of(method: str) -> Sequence[str]:

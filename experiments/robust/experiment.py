@@ -11,8 +11,12 @@ The protocol, written before anything was run or tuned:
 - Beside it stands where a method stops by itself, which only ours does, and the same error of the
   deviation over designs and scatter together, for which the other libraries are mostly used.
 - Our stated band is compared at the 200 designs with moments of 16,384 draws.
+- All others are tried up to three times the runs that ours needs, at most 1000; one that has not
+  reached 1 % there needs more than it was given.
 - Constants of the package may be chosen on Ishigami, borehole, OTL circuit, piston, wing weight and
   cantilever; robot arm, G-function, kink and resonance are kept out of that.
+
+The whole, ``--full``, takes some 12 minutes of one core and 0.5 GB.
 """
 
 from __future__ import annotations
@@ -34,7 +38,8 @@ PROTOCOL = (
     "all inputs together, the designed ones spread evenly over their range; of chaospy, the best "
     "of five ways counts, of OpenTURNS the set with the least corrected leave-one-out error. "
     "They are tried at numbers of runs that rise by a fifth, so that what they need is told too "
-    "large by less than that; ours is judged whenever its runs rise by an eighth."
+    "large by less than that; ours is judged whenever its runs rise by an eighth. From 300 runs "
+    "on, OpenTURNS ends paths of terms where their error is 1.2 times its least, before at 2 times."
 )
 CHOSEN = (
     "Constants of the package were chosen on Ishigami's function, borehole, OTL circuit, piston, "

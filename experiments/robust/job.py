@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.robust.ours import stopped, trace
+from experiments.robust.ours import Growth
 from experiments.robust.rivals import chaospy_traces, openturns_trace, until_it_stays
 from experiments.robust.task import Task
 from experiments.runner.campaign import Run
@@ -18,12 +18,42 @@ CHAOSPY = "chaospy"
 METHODS = (OURS, CHAOSPY, OPENTURNS)
 ACCURACY = 0.01
 BUDGET = 1000
-CURVE = ("way", "runs", "error_at_designs", "error_overall")
+STEP = ("runs", "error_at_designs", "error_overall")
+CURVE = ("way", *STEP)
+
+
+@dataclass(frozen=True)
+class Grown:
+    """One growth of ours: where it stops by itself, what its band covers, and its errors."""
+
+    function: str
+    seed: int
+    whole_curve: bool
+    budget: int = BUDGET
+
+    @property
+    def key(self) -> str:
+        """All settings in one name."""
+        curve = "_curve" * self.whole_curve
+        return f"{self.function}_{OURS}_{self.budget}_{self.seed}{curve}".replace(" ", "_")
+
+    def execute(self) -> Run:
+        """Return the columns of `STEP` of every fit, and beside each the numbers of the stop.
+
+        Without the curve there is one row, and its `STEP` is NaN.
+        """
+        task, started = Task(self.function), time.perf_counter()
+        growth = Growth(task, ACCURACY, self.budget, self.seed, self.whole_curve)
+        stop = growth.band()
+        steps = np.array(growth.steps, dtype=float) if growth.steps else np.full((1, 3), np.nan)
+        rows = np.column_stack([steps, np.tile([*stop.values()], (len(steps), 1))])
+        columns = (*STEP, *(f"stop_{name}" for name in stop))
+        return Run(columns, rows, time.perf_counter() - started)
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Errors of one method over its runs, each way of it up to where it needs no more."""
+    """Errors of another library over its runs, each way of it up to where it needs no more."""
 
     function: str
     method: str
@@ -37,9 +67,7 @@ class Curve:
     def execute(self) -> Run:
         """Return the columns of `CURVE`, ways counted from 0."""
         task, started = Task(self.function), time.perf_counter()
-        if self.method == OURS:
-            ways = {OURS: iter(trace(task, self.budget, ACCURACY))}
-        elif self.method == OPENTURNS:
+        if self.method == OPENTURNS:
             ways = {OPENTURNS: openturns_trace(task, self.budget)}
         else:
             ways = chaospy_traces(task, self.budget)
@@ -50,24 +78,3 @@ class Curve:
         ]
         seconds = time.perf_counter() - started
         return Run(CURVE, np.array(rows, dtype=float).reshape(-1, len(CURVE)), seconds)
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Where our surrogate stops by itself, and whether its band covers its errors."""
-
-    function: str
-    seed: int
-    budget: int = BUDGET
-
-    @property
-    def key(self) -> str:
-        """All settings in one name."""
-        return f"{self.function}_stop_{self.budget}_{self.seed}".replace(" ", "_")
-
-    def execute(self) -> Run:
-        """Return the numbers of `stopped` as one row."""
-        task, started = Task(self.function), time.perf_counter()
-        found = stopped(task, ACCURACY, self.budget, self.seed)
-        seconds = time.perf_counter() - started
-        return Run(tuple(found), np.array([list(found.values())]), seconds)

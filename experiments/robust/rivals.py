@@ -38,6 +38,14 @@ MOST_TERMS = 600
 MOST_CROSS_VALIDATED = 500
 """The same for scikit-learn, which fits five times; at most five for each run."""
 HIGHEST_DEGREE = 15
+LONG_PATHS = 300
+"""Runs from which OpenTURNS ends a path of terms where the error is `ERROR_FACTOR` its least.
+
+With fewer it is 2, its default. With 258 runs on G-function, robot arm and kink the best set is the
+same for both, and so are all sets of up to 275 terms that were fitted with 924 runs on the
+resonance, in a tenth of the time or less.
+"""
+ERROR_FACTOR = 1.2
 NORMS = (0.5, 1.0)
 STAYS = 1.33
 """An error stays below a bound if it is so up to this factor in runs."""
@@ -83,6 +91,8 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
     """Yield runs and both errors of OpenTURNS's sparse chaos."""
     import openturns as ot
 
+    # The same sets and errors as with its default, singular values, in half the time.
+    ot.ResourceMap.SetAsString("LeastSquaresMetaModelSelection-DecompositionMethod", "Cholesky")
     points, values = sample(task, most)
     laws = [
         ot.Normal(one.mean, one.std)
@@ -94,13 +104,15 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
     families = [ot.StandardDistributionPolynomialFactory(one) for one in laws]
     select = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
     for runs in budgets(most):
+        factor = 2.0 if runs < LONG_PATHS else ERROR_FACTOR
+        ot.ResourceMap.SetAsScalar("LeastSquaresMetaModelSelection-MaximumErrorFactor", factor)
         best, least = None, np.inf
         for norm in NORMS:
             enumerate_ = ot.HyperbolicAnisotropicEnumerateFunction(len(laws), norm)
             basis = ot.OrthogonalProductPolynomialFactory(families, enumerate_)
             for degree in range(1, HIGHEST_DEGREE + 1):
-                size = enumerate_.getBasisSizeFromTotalDegree(degree)
-                if size > min(MOST_TERMS, 10 * runs):
+                size = terms_up_to(degree, norm, len(laws), min(MOST_TERMS, 10 * runs))
+                if size is None:
                     break
                 chaos = ot.FunctionalChaosAlgorithm(
                     points[:runs],
@@ -118,6 +130,22 @@ def openturns_trace(task: Task, most: int) -> Iterator[Step]:
             continue
         judged = task.judged[0].reshape(-1, len(laws))
         yield runs, *task.errors(np.array(best(judged)).reshape(task.judged[1].shape))
+
+
+def terms_up_to(degree: int, norm: float, inputs: int, most: int) -> int | None:
+    """Return the size of a hyperbolic set as OpenTURNS counts it, None if it is above ``most``.
+
+    Its own count does not come to an end with 20 inputs, however few terms are wanted.
+    """
+    least = (degree + 1.0) ** norm - 1e-9
+    # Sums of powers of the degrees so far, for all terms in the inputs so far.
+    sums = np.zeros(1)
+    for _ in range(inputs):
+        sums = np.add.outer(sums, np.arange(degree + 1.0) ** norm).ravel()
+        sums = sums[sums < least]
+        if len(sums) > most:
+            return None
+    return len(sums)
 
 
 def chaospy_traces(task: Task, most: int) -> dict[str, Iterator[Step]]:

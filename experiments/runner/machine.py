@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_info
 
 from experiments.runner.provenance import environment
 from experiments.runner.result import Column, Table
+from pymoo_hdte.surrogate.threads import usable_cores
 
 
 def machine_table() -> Table:
@@ -27,14 +28,6 @@ def machine_table() -> Table:
     return Table(
         "machine", "The machine", (Column("what"), Column("fact")), tuple(rows), wall_times=True
     )
-
-
-def usable_cores() -> int:
-    """Return how many cores this process may use."""
-    # A scheduler or taskset may leave this process fewer cores than the machine has.
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _processor() -> str:

@@ -56,8 +56,9 @@ def run(context: Context) -> Result:
         command="python -m experiments benchmark",
         answer=_counted(ratios, agreement),
         paragraphs=(
-            "Times are the least of several repetitions on one core; only their ratios within this "
-            "run mean anything.",
+            "Times are the least of several repetitions on one core, those of a million designs on "
+            "all; only their ratios within this run mean anything. The machine should have nothing "
+            "else to do: its load stands below.",
         ),
         models=models_of("calibrated", "resonant"),
         tables=(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,12 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.chebyshev import ChebyshevSurrogate
 from pymoo_hdte.surrogate.inputs import UncertainInput, Uncertainty
+from pymoo_hdte.surrogate.many_points import ManyPoints
 from pymoo_hdte.surrogate.tensor import (
     TensorPolynomial,
     chebyshev_basis,
     chebyshev_nodes,
     coefficients_from_nodes,
 )
+from pymoo_hdte.surrogate.threads import MANY
 
 
 class ExactMoments:
@@ -75,8 +78,15 @@ class ExactMoments:
         InvalidInput
             If ``designs`` is no array of numbers of shape (n, m).
         """
-        mean, variance = self._polynomial(self.design_box.to_cube(designs).T)
+        cube = self.design_box.to_cube(designs).T
+        mean, variance = (self._polynomial if cube.shape[1] < MANY else self._many)(cube)
         return mean, _square_root(variance)
+
+    @cached_property
+    def _many(self) -> ManyPoints:
+        mean, variance = self._polynomial.coefficients
+        # The mean is of half the degrees of the variance.
+        return ManyPoints([mean[tuple(slice((size + 1) // 2) for size in mean.shape)], variance])
 
     def gradient(self, designs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the gradients of mean and standard deviation, shape (n, m) each.

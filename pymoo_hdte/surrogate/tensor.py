@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 # OpenBLAS keeps a matrix product of up to a million multiplications on one thread. A larger one
 # starts threads that gain nothing here, and stall when several processes share the cores.
-_MULTIPLICATIONS_AT_ONCE = 1_000_000
+MULTIPLICATIONS_AT_ONCE = 1_000_000
 
 
 def chebyshev_nodes(size: int) -> NDArray[np.float64]:
@@ -89,7 +89,7 @@ class TensorPolynomial:
     def __call__(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values, shape (outputs, n), at points ``x`` of the cube, shape (d, n)."""
         largest = max(self._trailing.size, 0 if self._leading is None else self._leading.size)
-        step = max(1, _MULTIPLICATIONS_AT_ONCE // largest)
+        step = max(1, MULTIPLICATIONS_AT_ONCE // largest)
         if x.shape[1] <= step:
             return self._block(x)
         values = np.empty((len(self.coefficients), x.shape[1]))
@@ -101,8 +101,8 @@ class TensorPolynomial:
     def _block(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         basis = chebyshev_basis(x, self._longest)
         split = len(self._head)
-        leading = _products(basis[:, :split], self._head)
-        trailing = self._trailing @ _products(basis[:, split:], self._tail)
+        leading = products(basis[:, :split], self._head)
+        trailing = self._trailing @ products(basis[:, split:], self._tail)
         if self._leading is None:
             parts = trailing.reshape(len(self.coefficients), *leading.shape)
             return np.einsum("ohn,hn->on", parts, leading)
@@ -141,7 +141,7 @@ def _factors(
     return weighted.transpose(0, 2, 1).reshape(-1, rows), right[:rank]
 
 
-def _products(basis: NDArray[np.float64], sizes: tuple[int, ...]) -> NDArray[np.float64]:
+def products(basis: NDArray[np.float64], sizes: tuple[int, ...]) -> NDArray[np.float64]:
     """Return all products of one polynomial per variable (Khatri-Rao), shape (prod(sizes), n)."""
     points = basis.shape[-1]
     if not sizes:

@@ -45,6 +45,9 @@ from experiments.paper import fig12, table5
 from experiments.paper.choices import dominating_shares
 from experiments.paper.scatter import dte_samples, exact_moments
 from experiments.published_values import TABLE_7, TABLE_8, TABLE_9
+from experiments.robust.data import ahead, outcome_for
+from experiments.robust.functions import FUNCTIONS
+from experiments.robust.job import METHODS
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA
 from experiments.runner.registry import Context
@@ -249,6 +252,24 @@ def qualities(seeds, folder):
     truth = TrueFront(true_front("calibrated"))
     found = [truth.quality(objectives(run))[:2] for run in Campaign(folder).run(jobs, "all")]
     return np.reshape(found, (3, len(seeds), 2))
+
+
+def test_runs_of_robust_surrogates_are_those_of_the_stored_outcome(tmp_path):
+    outcome = outcome_for(Context(1, tmp_path, Campaign(tmp_path)))
+    names = outcome.functions()
+    fewer = [name for name in names if ahead(outcome, name)]
+    kept_out = [one.name for one in FUNCTIONS if not one.tuned]
+    assert f"on {len(fewer)} of {len(names)} functions of the literature" in WORDS
+    assert f"({len({*fewer} & {*kept_out})} of the {len(kept_out)} kept out of" in WORDS
+    assert {*names} - {*fewer} == {"robot arm"}
+    assert all(outcome.needed("robot arm", method) is None for method in METHODS)
+    covered = [min(one["covered_mean"], one["covered_std"]) for one in outcome.stops.values()]
+    held = sum(share >= 0.95 for share in covered)
+    assert f"covers 95 % of 200 designs in {held} of {len(covered)} growths" in WORDS
+    assert f"({100.0 * min(covered):g} % in one of the kink)" in WORDS
+    refused = {name for (name, _), one in outcome.stops.items() if not np.isfinite(one["runs"])}
+    assert len(refused) == 3
+    assert "three of the ten functions are refused after 1000 runs" in WORDS
 
 
 class TestNumbersBesideThePaper:

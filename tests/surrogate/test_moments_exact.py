@@ -100,6 +100,23 @@ def test_they_agree_with_chaospys_quadrature(surrogate, moments):
         assert std == pytest.approx(np.sqrt(weights @ (values - expected) ** 2), rel=1e-10)
 
 
+@pytest.mark.parametrize("order", [3, 5])
+def test_very_many_designs_have_the_moments_of_few_on_any_number_of_cores(order, monkeypatch):
+    coefficients = drive_like().coefficients
+    wider = np.pad(coefficients, [(0, order - 3)] * 5, constant_values=1e-3)
+    moments = ExactMoments(ChebyshevSurrogate(drive_like().box, wider), INPUTS, DESIGN_BOX)
+    designs = latin_hypercube(DESIGN_BOX, 4500, 3)
+    few = np.concatenate([np.array(moments(part)) for part in np.split(designs, 3)], axis=1)
+    found = {}
+    for cores in (1, 2, 5):
+        monkeypatch.setattr(
+            "os.sched_getaffinity", lambda pid, n=cores: set(range(n)), raising=False
+        )
+        found[cores] = np.array(moments(designs))
+    assert found[1] == pytest.approx(few, rel=1e-12)
+    assert found[1].tobytes() == found[2].tobytes() == found[5].tobytes()
+
+
 def test_they_agree_with_a_million_samples(surrogate, moments):
     rng = np.random.default_rng(2)
     design = latin_hypercube(DESIGN_BOX, 1, rng)

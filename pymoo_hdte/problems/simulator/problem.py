@@ -13,13 +13,18 @@ from pymoo.core.problem import Problem
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.problems.simulator.around import Around, CommonSamples
 from pymoo_hdte.problems.simulator.inputs import Inputs
-from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic, place_of
+from pymoo_hdte.problems.simulator.statistics import (
+    RobustConstraint,
+    Statistic,
+    asked_of,
+    place_of,
+)
 from pymoo_hdte.problems.simulator.stored import read_problem, write_problem
 from pymoo_hdte.surrogate.box import Box
-from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sensitivity import SobolIndices
 from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate.sparse.draws import draw_designs
+from pymoo_hdte.surrogate.threads import MANY
 
 Array = NDArray[np.float64]
 
@@ -84,8 +89,7 @@ class SimulatorProblem(Problem):
         self.design_box = Box(inputs.designed, *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
         self.responses = responses
-        asked = [*objectives, *(one.statistic for one in constraints)]
-        self._places = [place_of(one, responses) for one in asked]
+        self._asked = asked_of(objectives, constraints, responses)
         super().__init__(
             n_var=len(bounds),
             n_obj=len(objectives),
@@ -212,12 +216,7 @@ class SimulatorProblem(Problem):
         self.design_box.check_inside(point)
         moments = self._fit.moments
         expansion = moments.expansion(point)[0, place]
-        shares = expansion[1:] ** 2
-        variance = float(shares.sum())
-        shares = divide_or_zero(shares, np.full_like(shares, variance))
-        takes_part = moments.indices[1:] > 0
-        alone = takes_part.sum(axis=1) == 1
-        first, total = shares * alone @ takes_part, shares @ takes_part
+        variance, first, total = moments.divided_variance(expansion)
         return SobolIndices(self.input_names, float(expansion[0]), variance, first, total)
 
     def _around(self, X: Array) -> list[Around]:
@@ -227,7 +226,7 @@ class SimulatorProblem(Problem):
 
     def _band(self, around: list[Around]) -> Array:
         columns = []
-        for statistic, place in zip(self.objectives, self._places[: self.n_obj], strict=True):
+        for statistic, _, _, place in self._asked[: self.n_obj]:
             scatter = np.maximum(around[place].std, self._fit.smallest_scatter[place])
             errors = self._fit.mean_error[place] * scatter, self._fit.std_error[place] * scatter
             columns.append(statistic.half_width(*errors, around[place]))
@@ -237,8 +236,8 @@ class SimulatorProblem(Problem):
         designs = draw_designs(self._inputs.axes, _JUDGED, np.random.default_rng(1))
         around = self._around(designs)
         shares = self._band(around)
-        for column, place in enumerate(self._places[: self.n_obj]):
-            if self.objectives[column].relative_to_scatter:
+        for column, (statistic, _, _, place) in enumerate(self._asked[: self.n_obj]):
+            if statistic.relative_to_scatter:
                 least = self._fit.smallest_scatter[place]
                 shares[:, column] /= np.maximum(around[place].std, least)
         return np.median(shares, axis=0)
@@ -256,20 +255,31 @@ class SimulatorProblem(Problem):
         self.design_box.check_inside(x)
         slopes: list[str] = [key for key in ("dF", "dG") if key in out]
         blocks = range(0, len(x), _AT_ONCE)
-        parts = [self._block(x[start : start + _AT_ONCE], slopes) for start in blocks]
+        parts = [] if slopes else self._by_moments(x)
+        parts = parts or [self._block(x[start : start + _AT_ONCE], slopes) for start in blocks]
         for key in ["F", "G", *slopes]:
             if key[-1] == "F" or self.n_ieq_constr:
                 out[key] = np.concatenate([part[key] for part in parts])
         if "F_band" in out:
             out["F_band"] = self.band(x)
 
+    def _by_moments(self, x: Array) -> list[dict[str, Array]]:
+        """Return F and G of very many designs, or nothing if they need more than moments."""
+        if len(x) < MANY:
+            return []
+        mean, std = self._fit.moments(x)
+        values = np.empty((len(x), len(self._asked)))
+        for column, (statistic, sign, bound, place) in zip(values.T, self._asked, strict=True):
+            value = statistic.of_moments(mean[:, place], std[:, place])
+            if value is None:
+                return []
+            np.subtract(sign * value, bound, out=column)
+        return [{"F": values[:, : self.n_obj], "G": values[:, self.n_obj :]}]
+
     def _block(self, x: Array, slopes: list[str]) -> dict[str, Array]:
         around = self._around(x)
-        asked = [(one, one.sign, 0.0) for one in self.objectives]
-        for one in self.constraints:
-            asked.append((one.statistic, one.side * one.statistic.sign, one.side * one.bound))
         values, gradients = [], []
-        for (statistic, sign, bound), place in zip(asked, self._places, strict=True):
+        for statistic, sign, bound, place in self._asked:
             value, slope = statistic.value(around[place])
             values.append(sign * value - bound)
             if slopes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
@@ -79,6 +80,21 @@ class Statistic:
         """
         return self._of(around)
 
+    def of_moments(self, mean: Array, std: Array) -> Array | None:
+        """Return its values, without the sign, where mean and deviation are enough, else None.
+
+        Parameters
+        ----------
+        mean, std : ndarray, shape (n,)
+            Of the response, in its unit.
+
+        Returns
+        -------
+        ndarray, shape (n,), or None
+            In the response's unit.
+        """
+        return None
+
     def half_width(self, mean_error: Array, std_error: Array, around: Around) -> Array:
         """Return the half-width of its error band, shape (n,), in its unit; NaN if it has none.
 
@@ -133,6 +149,10 @@ class Mean(Statistic):
         slope[:, 0] = 1.0
         return around.mean, slope
 
+    def of_moments(self, mean: Array, std: Array) -> Array:
+        """Return the mean."""
+        return mean
+
 
 @dataclass(frozen=True)
 class Std(Statistic):
@@ -150,6 +170,10 @@ class Std(Statistic):
         slope = divide_or_zero(around.expansion, np.repeat(around.std[:, None], around.size, 1))
         slope[:, 0] = 0.0
         return around.std, slope
+
+    def of_moments(self, mean: Array, std: Array) -> Array:
+        """Return the standard deviation."""
+        return std
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
         return std_error
@@ -182,6 +206,10 @@ class MeanPlusStd(Statistic):
     def _of(self, around: Around) -> tuple[Array, Array]:
         parts = [one.value(around) for one in (Mean(), Std())]
         return parts[0][0] + self.k * parts[1][0], parts[0][1] + self.k * parts[1][1]
+
+    def of_moments(self, mean: Array, std: Array) -> Array:
+        """Return mean plus k standard deviations."""
+        return mean + self.k * std
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
         return mean_error + abs(self.k) * std_error
@@ -240,3 +268,24 @@ def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
     if statistic.response not in responses:
         raise InvalidInput("response of a statistic", statistic.response, f"one of {responses}")
     return responses.index(statistic.response)
+
+
+def asked_of(
+    objectives: Sequence[Statistic],
+    constraints: Sequence[RobustConstraint],
+    responses: tuple[str, ...],
+) -> list[tuple[Statistic, float, float, int]]:
+    """Return objectives and constraints as statistic, factor, bound and place of the response.
+
+    What is to be small is the factor times the statistic's value, less the bound.
+
+    Raises
+    ------
+    InvalidInput
+        As `place_of`.
+    """
+    asked = [(one, one.sign, 0.0) for one in objectives]
+    for limit in constraints:
+        one, side = limit.statistic, limit.side
+        asked.append((one, side * one.sign, side * limit.bound))
+    return [(*one, place_of(one[0], responses)) for one in asked]

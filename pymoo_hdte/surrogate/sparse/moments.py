@@ -15,17 +15,17 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder
 from numpy.typing import NDArray
 
+from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
 from pymoo_hdte.surrogate.sparse.many_designs import ManyDesigns
 from pymoo_hdte.surrogate.sparse.measures import Measure, OrthonormalPolynomials
 from pymoo_hdte.surrogate.sparse.polynomial import SparsePolynomial
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
+from pymoo_hdte.surrogate.threads import MANY, in_blocks
 
 Array = NDArray[np.float64]
 
-_MANY = 4096
-"""Designs from which on machine code pays, which is made at its first use."""
 _AT_ONCE = 2**18
 """Numbers in one array: more exceed the processor's cache, fewer cost numpy overhead."""
 
@@ -85,15 +85,25 @@ class SparseMoments:
 
     def __call__(self, designs: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (n, r) each, in the responses' units."""
-        if len(designs) >= _MANY:
-            around = [
-                self.axes[j].around(column)[:2]
-                for j, column in zip(self.designed, designs.T, strict=True)
-            ]
-            offsets, factors = np.moveaxis(np.array(around), 1, 0)
-            return self._many(offsets, factors)
+        if len(designs) >= MANY:
+            return self._many_moments(designs)
         expansion = self.expansion(designs)
         return expansion[..., 0], deviation(expansion)
+
+    def _many_moments(self, designs: Array) -> tuple[Array, Array]:
+        moments = self._many
+        mean, std = np.empty((2, len(designs), self._coefficients.shape[1]))
+
+        def fill(block: slice) -> None:
+            around = [
+                self.axes[j].around(column)[:2]
+                for j, column in zip(self.designed, designs[block].T, strict=True)
+            ]
+            offsets, factors = np.moveaxis(np.array(around), 1, 0)
+            mean[block], std[block] = moments(offsets, factors)
+
+        in_blocks(fill, len(designs), MANY)
+        return mean, std
 
     @cached_property
     def _many(self) -> ManyDesigns:
@@ -121,6 +131,18 @@ class SparseMoments:
                 gradient[block, :, place] = np.einsum("nrlk,nlk->nr", of_matrix, slope)
                 back = step.backward(back, matrix, stages[place].shape[-1])
         return gradient
+
+    def divided_variance(self, expansion: Array) -> tuple[float, Array, Array]:
+        """Return the variance of an expansion of shape (q,), and what of it is due to each input.
+
+        First the shares of the inputs alone, then those in which they take part, shape (d,) each.
+        """
+        squares = expansion[1:] ** 2
+        variance = float(squares.sum())
+        shares = divide_or_zero(squares, np.full_like(squares, variance))
+        takes_part = self.indices[1:] > 0
+        alone = takes_part.sum(axis=1) == 1
+        return variance, shares * alone @ takes_part, shares @ takes_part
 
     def basis(self, scatter: Array) -> Array:
         """Return the expansion's polynomials at values of all s, shape (n, d), as (n, q)."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
 from pymoo_hdte.surrogate.tensor import chebyshev_basis
 
-_AT_ONCE = 2**20
-"""Numbers in one array."""
+_AT_ONCE = 2**18
+"""Numbers in one array: more exceed a processor's cache."""
 
 
 class SparsePolynomial:
@@ -64,12 +66,26 @@ class SparsePolynomial:
         step = max(1, _AT_ONCE // len(self.indices))
         for start in range(0, len(cube), step):
             block = slice(start, start + step)
-            values[block] = self._products(cube[block].T) @ self.coefficients.T
+            values[block] = (self.coefficients @ self._products(cube[block].T)).T
         return values
 
+    @cached_property
+    def _factors(self) -> list[tuple[NDArray[np.int_], ...]]:
+        """By axis: terms that it is the last variable of, the same without it, and its degrees."""
+        places = {tuple(row): place for place, row in enumerate(self.indices.tolist())}
+        last = np.max(np.where(self.indices > 0, np.arange(self.indices.shape[1]), -1), axis=1)
+        found: list[tuple[NDArray[np.int_], ...]] = []
+        for axis in range(self.indices.shape[1]):
+            terms = np.flatnonzero(last == axis)
+            without = self.indices[terms]
+            without[:, axis] = 0
+            before = np.array([places[tuple(row)] for row in without.tolist()], dtype=int)
+            found.append((terms, before, self.indices[terms, axis]))
+        return found
+
     def _products(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        product = np.ones((x.shape[1], len(self.indices)))
-        for axis, degree in enumerate(self.degrees):
-            if degree:
-                product *= chebyshev_basis(x[axis], degree + 1).T[:, self.indices[:, axis]]
+        """Return the terms, shape (p, n), each from the one without its last variable."""
+        product = np.ones((len(self.indices), x.shape[1]))
+        for z, degree, (terms, before, degrees) in zip(x, self.degrees, self._factors, strict=True):
+            product[terms] = product[before] * chebyshev_basis(z, degree + 1)[degrees]
         return product

@@ -15,12 +15,19 @@ from experiments.robust.data import (
 from experiments.robust.experiment import run
 from experiments.robust.functions import FUNCTIONS, G_WEIGHTS
 from experiments.robust.job import CHAOSPY, OPENTURNS, OURS
-from experiments.robust.ours import trace
-from experiments.robust.rivals import CHAOSPY_WAYS, chaospy_traces, runs_needed, until_it_stays
+from experiments.robust.ours import Growth
+from experiments.robust.rivals import (
+    CHAOSPY_WAYS,
+    chaospy_traces,
+    runs_needed,
+    terms_up_to,
+    until_it_stays,
+)
 from experiments.robust.tables import stops_table
 from experiments.robust.task import Task
 from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
+from pymoo_hdte.problems import robust_problem
 
 
 @pytest.mark.parametrize("name", [one.name for one in FUNCTIONS])
@@ -64,8 +71,33 @@ def test_both_libraries_are_run_on_the_same_task():
     for name, steps in chaospy_traces(task, 12).items():
         assert name in CHAOSPY_WAYS
         assert all(np.isfinite(step).all() for step in steps)
-    (first, *_) = trace(task, 20, 0.01)
+    (first, *_) = Growth(task, 0.01, 20).steps
     assert first[0] == 14
+
+
+def test_hyperbolic_sets_have_the_size_that_openturns_says():
+    assert [terms_up_to(degree, 0.5, 20, 600) for degree in range(1, 6)] == [21, 41, 61, 271, None]
+    ot = pytest.importorskip("openturns")
+    for norm in (0.5, 1.0):
+        sets = ot.HyperbolicAnisotropicEnumerateFunction(4, norm)
+        for degree in range(1, 9):
+            size = sets.getBasisSizeFromTotalDegree(degree)
+            assert terms_up_to(degree, norm, 4, 600) == size
+
+
+def test_a_watched_growth_stops_where_the_problem_of_the_same_seed_does():
+    task = Task("Ishigami")
+    growth = Growth(task, 0.01, 70, whole_curve=False)
+    alone = robust_problem(
+        lambda x1, x2, x3: task.function.call(x1=x1, x2=x2, x3=x3),
+        task.designs,
+        task.noise,
+        vectorised=True,
+        progress=False,
+    )
+    assert growth.stopped
+    assert growth.steps == []
+    assert growth.stop.n_runs == alone.n_runs
 
 
 def test_a_band_that_was_not_looked_at_on_all_functions_is_not_said_to_hold():

@@ -5,8 +5,9 @@ import time
 import pytest
 
 from experiments.measured import cpu_time, rigs
-from experiments.runner.machine import machine_table, usable_cores
+from experiments.runner.machine import machine_table
 from experiments.studies.timing import Ratio, best_time, ratio_table
+from pymoo_hdte.surrogate.threads import usable_cores
 
 
 def test_the_best_of_several_times_is_taken(monkeypatch):

@@ -39,6 +39,21 @@ def problem():
     )
 
 
+def test_very_many_designs_have_the_objectives_and_constraints_of_few():
+    several = robust_problem(
+        lambda x, y, a: {"first": x * y + a, "second": x - y * a},
+        {"x": Design(2.0, 4.0, tolerance=0.1), "y": Design(1.0, 2.0)},
+        {"a": chaospy.Normal(0.0, 0.1)},
+        objectives=[-Mean(response="second"), Std(response="first")],
+        constraints=[MeanPlusStd(3.0, response="first") >= 5.0, Mean(response="second") <= 1.0],
+        progress=False,
+    )
+    X = np.random.default_rng(1).uniform(several.xl, several.xu, (4500, 2))
+    few = [several.evaluate(part) for part in np.split(X, 3)]
+    for many, expected in zip(several.evaluate(X), zip(*few, strict=True), strict=True):
+        assert many == pytest.approx(np.concatenate(expected), rel=1e-12, abs=1e-12)
+
+
 def test_statistics_of_a_normal_response_are_closed_forms(problem):
     x = np.linspace(2.0, 4.0, 9)
     F, band = problem.evaluate(x[:, None], return_values_of=["F", "F_band"])

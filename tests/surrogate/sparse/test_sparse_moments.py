@@ -95,14 +95,26 @@ def test_moments_of_polynomials_are_exact(weights, place):
     assert std[0, 0] == pytest.approx(np.sqrt(max(variance, 0.0)), rel=1e-7, abs=1e-7)
 
 
-def test_many_designs_at_once_have_the_moments_of_few():
+def test_values_are_sums_of_products_of_chebyshev_polynomials():
+    two = np.random.default_rng(5).normal(size=(2, len(SET)))
+    cube = np.random.default_rng(6).uniform(-1.0, 1.0, (50, 5))
+    angles = np.arccos(cube)[:, None]
+    expected = np.cos(np.array(SET) * angles).prod(axis=2) @ two.T
+    assert SparsePolynomial(SET, two)(cube) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_many_designs_at_once_have_the_moments_of_few(monkeypatch):
     given_ = inputs()
     two = np.random.default_rng(5).normal(size=(2, len(SET)))
     moments = SparseMoments(SparsePolynomial(SET, two), given_.axes)
     X = np.random.default_rng(6).uniform([1.0, -1.0, 0.0], [2.0, 1.0, 3.0], (4200, 3))
     few = [np.concatenate(parts) for parts in zip(*map(moments, np.split(X, 4)), strict=True)]
-    for many, expected in zip(moments(X), few, strict=True):
+    monkeypatch.setattr("os.sched_getaffinity", lambda pid: {0}, raising=False)
+    alone = moments(X)
+    monkeypatch.setattr("os.sched_getaffinity", lambda pid: {0, 1, 2}, raising=False)
+    for many, expected, same in zip(moments(X), few, alone, strict=True):
         assert many == pytest.approx(expected, rel=1e-12)
+        assert many.tobytes() == same.tobytes()
 
 
 def smooth(r, s, t, n, o):
