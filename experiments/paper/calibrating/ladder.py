@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations, product
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive import (
     DampingReference,
+    DataSheet,
     DriveEffect,
     DriveModel,
     KinematicError,
@@ -121,10 +123,16 @@ class Candidate:
             name=self.name,
             description=f"Candidate {self.name} of the calibration.",
             provenance="Fitted by experiments calibration.",
-            sheet=hs_20_100(),
+            sheet=_sheet(),
             kinematic_error=error,
             effects=tuple(_effect(name, parameters) for name in self.effects),
         )
+
+
+@cache
+def _sheet() -> DataSheet:
+    # A fit makes thousands of models, and reading the file takes as long as a steady state.
+    return hs_20_100()
 
 
 def _effect(name: str, parameters: dict[str, float]) -> DriveEffect:
