@@ -210,6 +210,12 @@ EXPERIMENTS = (
         reads_outcome=True,
     ),
     Experiment(
+        "inference",
+        "paper.inference.experiment",
+        "Whether any model gives the published trade-off, and what is known of its parameters",
+        reads_outcome=True,
+    ),
+    Experiment(
         "blind",
         "blind.experiment",
         "Blind campaigns: what the discrepancy workflow finds of what is hidden",

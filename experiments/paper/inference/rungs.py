@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from experiments.paper.calibrating.ladder import (
     EFFECTS,
     NARROW,
-    READINGS,
     WIDE,
     Candidate,
     ladder_rungs,
@@ -23,6 +22,7 @@ from experiments.paper.inference.peaks import peak_to_peak, shape_peak_to_peak
 from pymoo_hdte.drive import PARAMETERS, DriveModel, preset
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
+from pymoo_hdte.drive.solve.stability import stable_rows
 from pymoo_hdte.units import ARCSEC
 
 PERIODIC = ("phase", "phase_2", "phase_2.02")
@@ -78,12 +78,14 @@ class Rung:
 
 
 def all_rungs() -> list[Rung]:
-    """Return the ladder; on all its effects each closure; and all closures on all and on none."""
+    """Return the ladder; each closure on all its effects; and all closures on all and on none.
+
+    With closures theta_s is read as semi-amplitude: read as peak-to-peak, the ladder is far off.
+    """
     found = [Rung(candidate) for candidate in ladder_rungs()]
-    readings = [(reading, bands) for reading in READINGS for bands in (WIDE, NARROW)]
     every = tuple(CLOSURES)
-    for reading, bands in readings:
-        full, printed = Candidate(EFFECTS, reading, bands), Candidate((), reading, bands)
+    for bands in (WIDE, NARROW):
+        full, printed = (Candidate(one, "semi_amplitude", bands) for one in (EFFECTS, ()))
         found += [Rung(full, (name,)) for name in CLOSURES]
         found += [Rung(printed, every), Rung(full, every)]
     return found
@@ -101,17 +103,32 @@ def dte_arcsec(
 ) -> NDArray[np.float64]:
     """Return the DTE at values of (theta_s, K, J_in, B_fc), shape (n, 4), in arcsec; (n,).
 
-    Stability is not asked for: `require_stable_box` does that for what a search ends in.
+    Stability is not asked for, since it takes longer: see `is_stable`.
     """
-    model = rung.model(parameters)
-    theta_s, stiffness, inertia, damping = points.T
-    values = Values(theta_s, stiffness, inertia, damping, np.zeros(len(points)))
-    for name in rung.closures:
-        values = CLOSURES[name].apply(values, model, parameters)
+    model, values = rung.model(parameters), _values(rung, parameters, points)
     rest = np.column_stack([values.stiffness, values.input_inertia, values.damping])
     unique, rows = np.unique(rest, axis=0, return_inverse=True)
     spans = peak_to_peak(_coefficients(model, unique), values.theta_s, rows.ravel())
     return (spans + values.added) / ARCSEC
+
+
+def is_stable(
+    rung: Rung, parameters: dict[str, float], points: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return whether the motion at points (n, 4) does not grow, shape (n,)."""
+    values = _values(rung, parameters, points)
+    rest = np.column_stack([values.stiffness, values.input_inertia, values.damping])
+    return stable_rows(_coefficients(rung.model(parameters), rest))
+
+
+def _values(rung: Rung, parameters: dict[str, float], points: NDArray[np.float64]) -> Values:
+    """Return what enters Eq. (9) at points (n, 4), after all closures."""
+    theta_s, stiffness, inertia, damping = points.T
+    values = Values(theta_s, stiffness, inertia, damping, np.zeros(len(points)))
+    model = rung.model(parameters)
+    for name in rung.closures:
+        values = CLOSURES[name].apply(values, model, parameters)
+    return values
 
 
 def _coefficients(model: DriveModel, rest: NDArray[np.float64]) -> Coefficients:
