@@ -103,7 +103,8 @@ def run(context: Context) -> Result:
             Picture(
                 "profiles",
                 "Least deviance over each parameter, all others being fitted, above that of the "
-                "best place; the line at 3.84 bounds a 95 % interval.",
+                "best place; the line at 3.84 bounds a 95 % interval. Points that few steps did "
+                "not bring down bound the profile from above.",
                 curves(profiled),
             ),
         ),

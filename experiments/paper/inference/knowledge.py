@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from experiments.paper.calibrating.ladder import LOGARITHMIC
 from experiments.paper.inference.data import Draws, Fit, Profiled
-from experiments.paper.inference.likelihood import residuals_of
+from experiments.paper.inference.likelihood import BOX, residuals_of
 from experiments.paper.inference.posterior import scaled_jacobian
 from experiments.paper.inference.rungs import PERIODIC, Rung
 from experiments.runner.result import Cell, Column, Finding, Table, significant
@@ -20,6 +20,8 @@ RANGE = (2.5, 97.5)
 BOUND = 3.84
 """Of chi-square with one degree of freedom, at 95 %."""
 QUANTITIES = (("mean", "arcsec"), ("std", "arcsec"), ("K", ""), ("J_in", ""), ("B_fc", ""))
+SETTLED = 0.5
+"""Largest shift between the halves of a chain, in standard deviations."""
 WEAKEST = 2
 """Directions of the least curvature that are told."""
 
@@ -49,7 +51,9 @@ def optimum_table(draws: Sequence[Draws]) -> Table:
         "Where the optimum can lie: 95 % ranges over the posterior",
         tuple(columns),
         tuple(rows),
-        findings=tuple(_movement(drawn) for drawn in draws),
+        findings=tuple(
+            finding for drawn in draws for finding in (_movement(drawn), _settled(drawn))
+        ),
         note="Each draw of the parameters has its own surrogate and its own front over the box; "
         "designs on a grid of 17 values for each variable, B_in being without influence. A uniform "
         "prior within the ranges that were searched.",
@@ -57,17 +61,38 @@ def optimum_table(draws: Sequence[Draws]) -> Table:
 
 
 def _movement(drawn: Draws) -> Finding:
-    mean, std, stiffness, inertia, damping = (
-        np.percentile(drawn.optima[f"{name}_balanced"], RANGE) for name, _ in QUANTITIES
-    )
-    unknown = np.ptp(damping) > 0.25 or np.ptp(inertia) > 0.25 or np.ptp(stiffness) > 0.25
+    mean, std, stiffness, inertia, damping = balanced_ranges(drawn)
+    widest = max(np.ptp(values) for values in (stiffness, inertia, damping))
     return Finding(
-        not unknown,
+        bool(widest <= BOX),
         f"Posterior {title(drawn.target, drawn.rung)}: the balanced optimum has a mean of "
         f"{mean[0]:.1f} to {mean[1]:.1f} and a standard deviation of {std[0]:.1f} to {std[1]:.1f} "
         f"arcsec; K at {stiffness[0]:.2f} to {stiffness[1]:.2f}, J_in at {inertia[0]:.2f} to "
         f"{inertia[1]:.2f} and B_fc at {damping[0]:.2f} to {damping[1]:.2f} of the nominal "
-        f"(95 %): the design is {'not known' if unknown else 'known'} to half of the box.",
+        f"(95 %); {significant(100.0 * widest / (2.0 * BOX), 2)} % of the box in the variable that "
+        "is known least.",
+        check=True,
+    )
+
+
+def balanced_ranges(drawn: Draws) -> list[NDArray[np.float64]]:
+    """Return the 95 % ranges of `QUANTITIES` of the balanced optimum, (2,) each."""
+    return [np.percentile(drawn.optima[f"{name}_balanced"], RANGE) for name, _ in QUANTITIES]
+
+
+def _settled(drawn: Draws) -> Finding:
+    """Whether the two halves of a chain agree; draws stand in the order of its steps."""
+    half = len(drawn.deviance) // 2
+    shifts = [
+        abs(np.median(values[half:]) - np.median(values[:half])) / values.std()
+        for values in drawn.optima.values()
+        if values.std() > 0.0
+    ]
+    return Finding(
+        max(shifts) <= SETTLED,
+        f"Posterior {title(drawn.target, drawn.rung)}: between the halves of the chain, medians of "
+        f"what would be chosen shift by up to {significant(max(shifts), 2)} of their standard "
+        "deviation.",
         check=True,
     )
 
@@ -107,27 +132,26 @@ def parameter_table(
         tuple(rows),
         note="SI units, radians; std of theta_s in arcsec; damping in N^2 B_fc; angles without "
         "their whole turns. A profile without an end does not reach 3.84 within three standard "
-        "deviations of the curvature, or within the range that is searched.",
+        "deviations of the curvature, or within the range that is searched. Each point of it is "
+        "fitted from its neighbour in few steps, and bounds the profile from above.",
     )
 
 
 def interval(name: str, curve: NDArray[np.float64]) -> tuple[float | None, float | None]:
     """Return where a profile, rows of value and deviance, crosses `BOUND`; None where it does not.
 
-    Physical values; between two points by interpolation.
+    Physical values; between two points by interpolation, from the outermost below: a point that a
+    fit did not bring down bounds the profile from above alone.
     """
-    least = int(np.argmin(curve[:, 1]))
-    above = curve[:, 1] - curve[least, 1] - BOUND
+    above = curve[:, 1] - curve[:, 1].min() - BOUND
+    within = np.flatnonzero(above < 0.0)
     ends: list[float | None] = []
-    for step in (-1, 1):
-        place = least
-        while 0 <= place + step < len(curve) and above[place + step] < 0.0:
-            place += step
-        if not 0 <= place + step < len(curve):
+    for place, beyond in ((within[0], within[0] - 1), (within[-1], within[-1] + 1)):
+        if not 0 <= beyond < len(curve):
             ends.append(None)
             continue
-        share = above[place] / (above[place] - above[place + step])
-        value = float(curve[place, 0] + share * (curve[place + step, 0] - curve[place, 0]))
+        share = above[place] / (above[place] - above[beyond])
+        value = float(curve[place, 0] + share * (curve[beyond, 0] - curve[place, 0]))
         ends.append(float(np.exp(value)) if name in LOGARITHMIC else value)
     return ends[0], ends[1]
 

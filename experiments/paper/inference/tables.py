@@ -57,7 +57,16 @@ def opening(fits: Sequence[Fit]) -> str:
         "nine numbers with the steps between its optima, but in "
         f"{'each' if len(meeting) > 1 else 'it'} other designs of the box dominate the published "
         f"optima, in the likeliest by {significant(first.evaluation.depths.max(), 2)} widths of "
-        f"the published front, and no model gives both: {last}."
+        f"the published front, and no model gives both ({_nearest(fits)}): {last}."
+    )
+
+
+def _nearest(fits: Sequence[Fit]) -> str:
+    nearest = chosen_fits(fits)[-1].fit.evaluation
+    return (
+        "fitted to both, the nearest has a chi-square of "
+        f"{significant(nearest.chi_square('common'), 2)} and a depth of "
+        f"{significant(nearest.depths.max(), 2)}"
     )
 
 
