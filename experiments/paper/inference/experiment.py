@@ -127,7 +127,10 @@ def effort_for(rung: Rung) -> Effort:
     """Return how long a rung is searched: longest where it holds all others of its readings."""
     if set(rung.candidate.effects) != set(EFFECTS) or len(rung.closures) == 1:
         return SMALL
-    return LARGE if rung.candidate.reading == "semi_amplitude" else MIDDLE
+    if rung.candidate.reading != "semi_amplitude":
+        return MIDDLE
+    # Under R2 the ladder meets the numbers without closures.
+    return MIDDLE if rung.closures and rung.candidate.bands == WIDE else LARGE
 
 
 def _stored() -> tuple[list[Fit], list[Draws], list[Profiled]]:

@@ -78,22 +78,17 @@ class Rung:
 
 
 def all_rungs() -> list[Rung]:
-    """Return the ladder, and closures on it, theta_s being read as semi-amplitude.
+    """Return the ladder; each closure on all its effects; and all closures on all and on none.
 
-    Each closure alone on all effects under the reading of the bands in which the ladder comes
-    closest, all together where it does not, and all together on the printed equations.
+    With closures theta_s is read as semi-amplitude: read as peak-to-peak, the ladder is far off.
     """
+    found = [Rung(candidate) for candidate in ladder_rungs()]
     every = tuple(CLOSURES)
-    full, printed = (
-        {bands: Candidate(effects, "semi_amplitude", bands) for bands in (WIDE, NARROW)}
-        for effects in (EFFECTS, ())
-    )
-    return [
-        *(Rung(candidate) for candidate in ladder_rungs()),
-        *(Rung(full[WIDE], (name,)) for name in CLOSURES),
-        Rung(full[NARROW], every),
-        *(Rung(candidate, every) for candidate in printed.values()),
-    ]
+    for bands in (WIDE, NARROW):
+        full, printed = (Candidate(one, "semi_amplitude", bands) for one in (EFFECTS, ()))
+        found += [Rung(full, (name,)) for name in CLOSURES]
+        found += [Rung(printed, every), Rung(full, every)]
+    return found
 
 
 def rung_named(name: str) -> Rung:
