@@ -44,7 +44,7 @@ from experiments.contest.peers_tables import NAMES, median_ranks
 from experiments.paper import fig12, table5
 from experiments.paper.choices import dominating_shares
 from experiments.paper.inference import data as inference
-from experiments.paper.inference.knowledge import balanced_ranges
+from experiments.paper.inference.knowledge import balanced_ranges, shift
 from experiments.paper.inference.verdicts import (
     chosen_fits,
     gives_trade_off,
@@ -377,8 +377,10 @@ class TestNumbersBesideThePaper:
             assert words in WORDS
 
     def test_how_far_the_optimum_can_move(self):
+        draws = inference.read_draws(DATA / "inference_posterior.csv")
+        assert f"shift by up to {max(map(shift, draws)):.1f} standard deviations" in WORDS
         for drawn, words in zip(
-            inference.read_draws(DATA / "inference_posterior.csv"),
+            draws,
             ("a mean of {:.1f} to {:.1f} arcsec, J_in", "mean {:.1f} to {:.1f} arcsec, B_fc"),
             strict=True,
         ):

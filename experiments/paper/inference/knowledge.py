@@ -80,19 +80,26 @@ def balanced_ranges(drawn: Draws) -> list[NDArray[np.float64]]:
     return [np.percentile(drawn.optima[f"{name}_balanced"], RANGE) for name, _ in QUANTITIES]
 
 
-def _settled(drawn: Draws) -> Finding:
-    """Whether the two halves of a chain agree; draws stand in the order of its steps."""
+def shift(drawn: Draws) -> float:
+    """Return the largest shift of a median between the halves of a chain, in standard deviations.
+
+    Of all that would be chosen; draws stand in the order of the chain's steps.
+    """
     half = len(drawn.deviance) // 2
-    shifts = [
-        abs(np.median(values[half:]) - np.median(values[:half])) / values.std()
+    return max(
+        float(abs(np.median(values[half:]) - np.median(values[:half])) / values.std())
         for values in drawn.optima.values()
         if values.std() > 0.0
-    ]
+    )
+
+
+def _settled(drawn: Draws) -> Finding:
     return Finding(
-        max(shifts) <= SETTLED,
+        shift(drawn) <= SETTLED,
         f"Posterior {title(drawn.target, drawn.rung)}: between the halves of the chain, medians of "
-        f"what would be chosen shift by up to {significant(max(shifts), 2)} of their standard "
-        "deviation.",
+        f"what would be chosen shift by up to {significant(shift(drawn), 2)} of their standard "
+        f"deviation; where it is more than {SETTLED:g}, the chain is too short, and its ranges are "
+        "rough.",
         check=True,
     )
 

@@ -127,7 +127,8 @@ class Posterior:
     @property
     def key(self) -> str:
         """All settings in one name."""
-        return f"posterior_{self.target}_{self.rung.name}_{_digest(self.place)}_{self.steps}"
+        start = f"from{_digest(self.place)}_{self.steps}_seed{self.seed}"
+        return f"posterior_{self.target}_{self.rung.name}_{start}"
 
     def execute(self) -> Run:
         """Return `DRAWS` rows: deviance, the place, and what would be chosen there (`OPTIMA`)."""
