@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.paper.inference import experiment
+from experiments.paper.inference import experiment, posterior
 from experiments.paper.inference.data import (
     fits_of,
     format_fits,
@@ -13,7 +13,7 @@ from experiments.paper.inference.data import (
 )
 from experiments.paper.inference.experiment import DRAWN, FITS, FULL, NAME, PROFILED, searches
 from experiments.paper.inference.likelihood import OBSERVED
-from experiments.paper.inference.rungs import all_rungs
+from experiments.paper.inference.rungs import Rung, all_rungs
 from experiments.paper.inference.search import Effort, Search
 from experiments.paper.inference.verdicts import (
     chosen_fits,
@@ -89,3 +89,23 @@ def test_fits_survive_their_csv(tmp_path):
     (read,) = read_fits(path)
     assert read.parameters == pytest.approx(written[0].parameters, rel=1e-8)
     assert (read.rung, read.starts, read.reached) == (rung, 1, 1)
+
+
+@pytest.mark.nightly
+def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
+    pytest.importorskip("emcee")
+    tiny = Effort(1, (1, 1, 1))
+    for name in ("LARGE", "FRONT", "MIDDLE", "SMALL"):
+        monkeypatch.setattr(experiment, name, tiny)
+    closed = [Rung(rung.candidate, ("torsion",)) for rung in FULL.values()]
+    monkeypatch.setattr(experiment, "all_rungs", lambda: [*FULL.values(), *closed])
+    monkeypatch.setattr(experiment, "STEPS", 2)
+    monkeypatch.setattr(posterior, "DRAWS", 4)
+    monkeypatch.setattr(posterior, "PROFILE_STEPS", 1)
+    context = Context(1, tmp_path, Campaign(tmp_path), full=True)
+    first = experiment.run(context)
+    assert [len(read_fits(tmp_path / NAME / FITS))] == [len(searches())]
+    # A second run finds every job on disk and reports the same.
+    runs = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.csv")}
+    assert experiment.run(context).tables == first.tables
+    assert {path: path.stat().st_mtime_ns for path in runs} == runs
