@@ -95,6 +95,13 @@ EXPERIMENTS = (
         reads_outcome=True,
     ),
     Experiment(
+        "inference",
+        "paper.inference.experiment",
+        "Whether any model gives the published trade-off, and what is known of its parameters",
+        "Does any model give the paper's trade-off, and how far can its optimum move?",
+        reads_outcome=True,
+    ),
+    Experiment(
         "blind",
         "blind.experiment",
         "Blind campaigns: what the discrepancy workflow finds of what is hidden",

@@ -15,7 +15,7 @@ import pymoo_hdte
 
 PACKAGES = ("numpy", "scipy", "numba", "pymoo", "moocore", "chaospy", "matplotlib")
 """Installed packages whose version can change a result."""
-EXTRAS = ("jmetalpy", "pygmo", "pysindy", "sysidentpy", "openturns", "scikit-learn")
+EXTRAS = ("jmetalpy", "pygmo", "pysindy", "sysidentpy", "openturns", "scikit-learn", "emcee")
 """Packages that can as well, where they are installed."""
 
 

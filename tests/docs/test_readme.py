@@ -43,6 +43,14 @@ from experiments.contest.peers_rivals import (
 from experiments.contest.peers_tables import NAMES, median_ranks
 from experiments.paper import fig12, table5
 from experiments.paper.choices import dominating_shares
+from experiments.paper.inference import data as inference
+from experiments.paper.inference.knowledge import balanced_ranges, shift
+from experiments.paper.inference.verdicts import (
+    chosen_fits,
+    gives_trade_off,
+    steps_of,
+    undominated,
+)
 from experiments.paper.scatter import dte_samples, exact_moments
 from experiments.published_values import TABLE_7, TABLE_8, TABLE_9
 from experiments.robust.data import ahead, outcome_for
@@ -391,6 +399,37 @@ class TestNumbersBesideThePaper:
         steps = last.mean(axis=1) - first.mean(axis=1), last.std(axis=1) - first.std(axis=1)
         assert np.std(steps, axis=1) == pytest.approx(0.012, abs=0.002)
         assert "known to some 0.012 arcsec" in WORDS
+
+    def test_what_the_covariance_says_of_the_models(self):
+        fits = inference.read_fits(DATA / "inference.csv")
+        refitted, best = (named.fit for named in chosen_fits(fits)[1:3])
+        common = [one for one in fits if one.target == "common"]
+        meeting = [one for one in common if gives_trade_off(one)]
+        assert best is min(meeting, key=lambda one: one.bic)
+        assert not any(gives_trade_off(one) and undominated(one) for one in fits)
+        ours = steps_of(best.evaluation.predicted)
+        for words in (
+            f"of {len(common)} models searched, {len(meeting)} give the nine numbers",
+            f"(chi-square {best.evaluation.chi_square('common'):.1f}, and "
+            f"{ours[1]:+.2f} and {ours[3]:+.2f} arcsec for that step",
+            f"{refitted.evaluation.chi_square('common'):.0f} where it is read at ±5 %",
+            f"{best.reached} of {best.starts} starts",
+            f"by {min(one.evaluation.depths.max() for one in meeting):.2f} widths",
+        ):
+            assert words in WORDS
+
+    def test_how_far_the_optimum_can_move(self):
+        draws = inference.read_draws(DATA / "inference_posterior.csv")
+        assert f"shift by up to {max(map(shift, draws)):.1f} standard deviations" in WORDS
+        for drawn, words in zip(
+            draws,
+            ("a mean of {:.1f} to {:.1f} arcsec, J_in", "mean {:.1f} to {:.1f} arcsec, B_fc"),
+            strict=True,
+        ):
+            mean, _, _, inertia, damping = balanced_ranges(drawn)
+            assert words.format(*mean) in WORDS
+            shown = inertia if "J_in" in words else damping
+            assert f"at {shown[0]:.2f} to {shown[1]:.2f} of the nominal" in WORDS
 
     def test_the_front_of_order_3_is_dominated_at_order_5(self):
         finer = RobustDTE(order=5)

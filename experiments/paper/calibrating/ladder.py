@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import combinations, product
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive import (
     DampingReference,
+    DataSheet,
     DriveEffect,
     DriveModel,
     KinematicError,
@@ -38,7 +40,8 @@ _SHAPE = {
     # From where 3 std hold the +-35 % box of reading R1, to where theta_s stays positive.
     "std_arcsec": (4.25, 12.0),
 }
-_LOGARITHMIC = ("amplitude_1", "amplitude_2.02", "load_inertia", "damping_factor")
+LOGARITHMIC = ("amplitude_1", "amplitude_2.02", "load_inertia", "damping_factor")
+"""Searched as logarithms."""
 _OF_EFFECT = {
     LoadInertia.name: {"load_inertia": (1e-3, 3.0)},
     DampingReference.name: {"damping_factor": (0.01, 30.0)},
@@ -86,21 +89,21 @@ class Candidate:
         for effect in self.effects:
             found |= _OF_EFFECT[effect]
         return {
-            name: (float(np.log(low)), float(np.log(high))) if name in _LOGARITHMIC else (low, high)
+            name: (float(np.log(low)), float(np.log(high))) if name in LOGARITHMIC else (low, high)
             for name, (low, high) in found.items()
         }
 
     def physical(self, searched: Sequence[float] | NDArray[np.float64]) -> dict[str, float]:
         """Turn a point of the search space into named parameters."""
         return {
-            name: float(np.exp(value)) if name in _LOGARITHMIC else float(value)
+            name: float(np.exp(value)) if name in LOGARITHMIC else float(value)
             for name, value in zip(self.bounds, searched, strict=True)
         }
 
     def searched(self, parameters: dict[str, float]) -> NDArray[np.float64]:
         """Turn named parameters into a point of the search space."""
         return np.array(
-            [np.log(parameters[n]) if n in _LOGARITHMIC else parameters[n] for n in self.bounds]
+            [np.log(parameters[n]) if n in LOGARITHMIC else parameters[n] for n in self.bounds]
         )
 
     def known(self) -> NDArray[np.float64]:
@@ -121,10 +124,16 @@ class Candidate:
             name=self.name,
             description=f"Candidate {self.name} of the calibration.",
             provenance="Fitted by experiments calibration.",
-            sheet=hs_20_100(),
+            sheet=_sheet(),
             kinematic_error=error,
             effects=tuple(_effect(name, parameters) for name in self.effects),
         )
+
+
+@cache
+def _sheet() -> DataSheet:
+    # A fit makes thousands of models, and reading the file takes as long as a steady state.
+    return hs_20_100()
 
 
 def _effect(name: str, parameters: dict[str, float]) -> DriveEffect:

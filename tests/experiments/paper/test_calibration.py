@@ -112,6 +112,22 @@ def test_a_local_fit_recovers_the_model_that_made_the_numbers():
     assert rung.physical(found)["std_arcsec"] == pytest.approx(8.0, rel=1e-3)
 
 
+def test_a_local_fit_with_all_nine_parameters_off_recovers_what_made_the_numbers():
+    """As far as nine numbers tell: `test_inference_posterior` says which directions they do not."""
+    truth = KNOWN[5]
+    targets = predict(FULL_LADDER.model(truth), NARROW, FITS["table8"])
+    residuals = _residuals(FULL_LADDER, "table8", targets)
+    low, high = np.array(list(FULL_LADDER.bounds.values())).T
+    signs = np.array([1, -1, 1, -1, 1, -1, 1, -1, 1])
+    start = FULL_LADDER.searched(truth) + 0.01 * (high - low) * signs
+    assert np.sum(residuals(start) ** 2) > 100.0
+    chi_square, found = _refine(residuals, FULL_LADDER, start, Budget(0, 0, 1, 5))
+    assert chi_square < 0.01
+    again = FULL_LADDER.physical(found)
+    assert again["std_arcsec"] == pytest.approx(truth["std_arcsec"], rel=0.01)
+    assert again["load_inertia"] == pytest.approx(truth["load_inertia"], rel=1e-3)
+
+
 @pytest.mark.nightly
 def test_the_same_seed_gives_the_same_fit():
     rung = Candidate((), "semi_amplitude", NARROW)

@@ -152,7 +152,7 @@ def test_full_is_refused_where_there_is_no_long_campaign(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main(["table5", "--full", "--out", str(tmp_path / "out")])
     assert (
-        "--full is for anytime, calibration, blind, sealed_rigs, real, peers"
+        "--full is for anytime, calibration, inference, blind, sealed_rigs, real, peers"
         in capsys.readouterr().err
     )
 

@@ -1,0 +1,111 @@
+"""The stored outcome of the searches, and the report that is made of it."""
+
+import numpy as np
+import pytest
+
+from experiments.paper.inference import experiment, posterior
+from experiments.paper.inference.data import (
+    fits_of,
+    format_fits,
+    read_draws,
+    read_fits,
+    read_profiles,
+)
+from experiments.paper.inference.experiment import DRAWN, FITS, FULL, NAME, PROFILED, searches
+from experiments.paper.inference.likelihood import OBSERVED
+from experiments.paper.inference.rungs import Rung, all_rungs
+from experiments.paper.inference.search import Effort, Search
+from experiments.paper.inference.verdicts import (
+    chosen_fits,
+    gives_trade_off,
+    steps_of,
+    undominated,
+)
+from experiments.runner.campaign import Campaign
+from experiments.runner.committed import committed_file
+from experiments.runner.registry import Context
+from experiments.runner.result import significant
+
+
+@pytest.fixture(scope="module")
+def fits():
+    return read_fits(committed_file(FITS, NAME))
+
+
+def test_every_search_is_in_the_stored_outcome(fits):
+    jobs = searches()
+    assert [(one.target, one.rung.name, one.effort) for one in fits] == [
+        (job.target, job.rung.name, job.effort.name) for job in jobs
+    ]
+    assert {job.rung for job in jobs if job.target == "common"} == set(all_rungs())
+
+
+def test_stored_fits_are_as_likely_as_they_say(fits):
+    for named in chosen_fits(fits):
+        one = named.fit
+        assert one.evaluation.deviance(one.target) == pytest.approx(one.deviance, abs=0.05)
+
+
+def test_steps_of_the_paper_are_those_of_table_8():
+    assert steps_of(OBSERVED) == pytest.approx([0.484, 0.468, -0.460, -0.136])
+
+
+def test_the_report_says_what_the_fits_say(tmp_path, fits):
+    result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
+    meeting = [one for one in fits if one.target == "common" and gives_trade_off(one)]
+    both = [one for one in fits if gives_trade_off(one) and undominated(one)]
+    searched = sum(one.target == "common" for one in fits)
+    assert result.headline == "steps"
+    assert f"{searched} drive models searched" in result.opening
+    assert f"{len(meeting)} give" in result.opening
+    assert (not both) == ("no model gives both" in result.opening)
+    least = min(meeting, key=lambda one: one.bic)
+    assert f"by {significant(least.evaluation.depths.max(), 2)} widths" in result.opening
+    ladder = result.tables[1]
+    assert len(ladder.rows) == searched
+    heights = [row[6] for row in ladder.rows]
+    assert heights == sorted(heights)
+    assert heights[0] == 0.0
+
+
+def test_draws_and_profiles_belong_to_the_fits(fits):
+    draws = read_draws(committed_file(DRAWN, NAME))
+    profiled = read_profiles(committed_file(PROFILED, NAME))
+    assert [(one.target, one.rung) for one in draws] == [(one.target, one.rung) for one in profiled]
+    for drawn, curves in zip(draws, profiled, strict=True):
+        (best,) = (one for one in fits if (one.target, one.rung) == (drawn.target, drawn.rung))
+        assert drawn.deviance.min() > best.deviance - 5.0
+        for name, curve in curves.curves.items():
+            assert np.all(np.diff(curve[:, 0]) > 0.0), name
+            assert np.abs(curve[:, 1] - best.deviance).min() < 0.1
+
+
+def test_fits_survive_their_csv(tmp_path):
+    rung = FULL["R1"]
+    job = Search(rung, "common", 5, Effort(1, (1, 1, 1)))
+    written = fits_of([job], [job.execute()])
+    path = tmp_path / FITS
+    path.write_text(format_fits(written), encoding="utf-8")
+    (read,) = read_fits(path)
+    assert read.parameters == pytest.approx(written[0].parameters, rel=1e-8)
+    assert (read.rung, read.starts, read.reached) == (rung, 1, 1)
+
+
+@pytest.mark.nightly
+def test_the_full_campaign_leaves_what_the_report_reads(tmp_path, monkeypatch):
+    pytest.importorskip("emcee")
+    tiny = Effort(1, (1, 1, 1))
+    for name in ("LARGE", "FRONT", "MIDDLE", "SMALL"):
+        monkeypatch.setattr(experiment, name, tiny)
+    closed = [Rung(rung.candidate, ("torsion",)) for rung in FULL.values()]
+    monkeypatch.setattr(experiment, "all_rungs", lambda: [*FULL.values(), *closed])
+    monkeypatch.setattr(experiment, "STEPS", 2)
+    monkeypatch.setattr(posterior, "DRAWS", 4)
+    monkeypatch.setattr(posterior, "PROFILE_STEPS", 1)
+    context = Context(1, tmp_path, Campaign(tmp_path), full=True)
+    first = experiment.run(context)
+    assert [len(read_fits(tmp_path / NAME / FITS))] == [len(searches())]
+    # A second run finds every job on disk and reports the same.
+    runs = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("*.csv")}
+    assert experiment.run(context).tables == first.tables
+    assert {path: path.stat().st_mtime_ns for path in runs} == runs
