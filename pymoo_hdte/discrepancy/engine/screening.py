@@ -10,7 +10,7 @@ without linearisation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +32,15 @@ class Screened:
     start : tuple of float
     by_part : tuple of float
         The same for each part of the data alone; empty for a parameter out of tolerance.
+    signatures : ndarray, shape (n_starts, n_residuals)
+        Change of the residuals by each of its starts; empty for a parameter out of tolerance.
     """
 
     candidate: Candidate
     reduction: float
     start: tuple[float, ...]
     by_part: tuple[float, ...] = ()
+    signatures: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
 
 
 def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
@@ -50,25 +53,58 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
         The present model, perhaps with effects, whose misfit is to be explained.
     candidates : sequence of Candidate
     """
-    # A parameter at its bound cannot move beyond it.
-    orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
-    residual = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
+    orthonormal, residual = _beyond_parameters(fitted)
     response, parts = data.response(fitted), data.rows_of_parts()
     found = []
     for candidate in candidates:
         if candidate.frees is not None:
             found.append(_freed(candidate, fitted, orthonormal, residual))
             continue
-        signatures = []
-        for start in candidate.starts:
-            signature = response(candidate.build(start))
-            signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
-        every = np.array(signatures)
-        by_part = tuple(
-            _best_start(candidate, every[:, rows], residual[rows]).reduction for rows in parts
-        )
-        found.append(replace(_best_start(candidate, every, residual), by_part=by_part))
+        signatures = np.array([response(candidate.build(start)) for start in candidate.starts])
+        found.append(_screened(candidate, signatures, orthonormal, residual, parts))
     return sorted(found, key=lambda one: -one.reduction)
+
+
+def screen_by_signatures(data: Evidence, fitted: Fit, known: Sequence[Screened]) -> list[Screened]:
+    """Estimate what candidates could remove by the signatures that they have beside another fit.
+
+    This takes no prediction at all. A signature changes with effects that move a resonance or take
+    contact away, so that only candidates that stay far behind may be left out by it.
+
+    Parameters
+    ----------
+    data : Evidence
+    fitted : Fit
+        The present model.
+    known : sequence of Screened
+        Effects, as screened beside a model of the same data.
+    """
+    orthonormal, residual = _beyond_parameters(fitted)
+    parts = data.rows_of_parts()
+    return [_screened(one.candidate, one.signatures, orthonormal, residual, parts) for one in known]
+
+
+def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what parameters can do, shape (n, k), orthonormal, and what they leave, (n,)."""
+    # A parameter at its bound cannot move beyond it.
+    orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
+    return orthonormal, fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
+
+
+def _screened(
+    candidate: Candidate,
+    signatures: NDArray[np.float64],
+    orthonormal: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    parts: Sequence[NDArray[np.int_]],
+) -> Screened:
+    """Return what a candidate could remove, as a whole and in each part."""
+    beyond = signatures - (signatures @ orthonormal) @ orthonormal.T
+    by_part = tuple(
+        _best_start(candidate, beyond[:, rows], residual[rows]).reduction for rows in parts
+    )
+    best = _best_start(candidate, beyond, residual)
+    return replace(best, by_part=by_part, signatures=signatures)
 
 
 def _freed(

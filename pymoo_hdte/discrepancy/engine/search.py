@@ -22,7 +22,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     varied,
 )
 from pymoo_hdte.discrepancy.engine.membership import ill_explained, is_earned
-from pymoo_hdte.discrepancy.engine.screening import Screened, screen
+from pymoo_hdte.discrepancy.engine.screening import Screened, screen, screen_by_signatures
 from pymoo_hdte.discrepancy.engine.starts import best_fit
 
 Vector = NDArray[np.float64]
@@ -53,7 +53,8 @@ class Search:
         self._by_label: dict[frozenset[str], Hypothesis] = {}
         self._finished: set[frozenset[str]] = set()
         self._extended: set[frozenset[str]] = set()
-        self._resumed = False
+        self._resumed: set[frozenset[str]] = set()
+        self._beside_base: dict[str, Screened] = {}
 
     @property
     def found(self) -> list[Hypothesis]:
@@ -63,6 +64,7 @@ class Search:
     def singles(self, screened: Sequence[Screened]) -> None:
         """Fit the most promising single effects, and the base parameters out of tolerance."""
         rules = self.data.rules
+        self._beside_base = {one.candidate.label: one for one in screened}
         least = rules.promising_share * screened[0].reduction
         promising = [one for one in screened if one.reduction >= least]
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
@@ -95,7 +97,7 @@ class Search:
 
     def resume(self, known: Sequence[Hypothesis]) -> None:
         """Fit sets that another search has found on nearly the same data, from their values."""
-        self._resumed = True
+        self._resumed |= {label_of(one.candidates) for one in known}
         for one in known:
             self._fit(one.candidates, one.fit.values)
         for size in {len(one.members) for one in known}:
@@ -138,11 +140,11 @@ class Search:
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end: from its values, the believed base and other starts.
 
-        A resumed search needs no other starts, from which its sets come.
+        Sets of another search, which come from other starts, need no more of them.
         """
         label = label_of(one.candidates)
         if label not in self._finished or starts:
-            if self._resumed:
+            if label in self._resumed:
                 best = fit(self.data, one.candidates, one.fit.values)
             else:
                 best = best_fit(self.data, one, starts, self._by_label.values())
@@ -244,8 +246,9 @@ class Search:
         before, after = (self.data.excess(each) for each in (self.base, one.fit))
         by_part = by_part and not one.exact
         ill = ill_explained(before, after, self.data.rules) if by_part else []
-        screened = screen(self.data, one.fit, others)
         left = one.fit.chi_square - self.degrees_of_freedom
+        others = self._not_far_behind(one, others, left, [(k, after.of_parts[k]) for k in ill])
+        screened = screen(self.data, one.fit, others)
         chosen = self._hopeful(screened, [each.reduction for each in screened], left)
         for part in ill:
             reductions = [each.by_part[part] for each in screened]
@@ -253,6 +256,31 @@ class Search:
             chosen += [each for each in of_part if each not in chosen]
         for more in chosen:
             self._fit((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
+
+    def _not_far_behind(
+        self,
+        one: Hypothesis,
+        others: Sequence[Candidate],
+        left: float,
+        ill: Sequence[tuple[int, float]],
+    ) -> list[Candidate]:
+        """Return those of the effects that may remove enough of what is left beside a set.
+
+        By their signatures beside the base, where they are known, with a margin: a screening takes
+        a prediction for each start of each effect.
+        """
+        known = [self._beside_base.get(other.label) for other in others]
+        if None in known:
+            return list(others)
+        rules = self.data.rules
+        share = rules.promising_share * rules.second_hope_share
+        estimates = screen_by_signatures(self.data, one.fit, [each for each in known if each])
+        return [
+            each.candidate
+            for each in estimates
+            if each.reduction >= share * left
+            or any(each.by_part[part] >= share * of_part for part, of_part in ill)
+        ]
 
     def _leaves_the_same(self, one: Hypothesis, other: Hypothesis) -> bool:
         """Tell whether two sets explain the data so nearly alike that the same must be missing."""

@@ -105,10 +105,12 @@ def judge(
     base: Fit,
     candidates: Sequence[Candidate],
     known: Sequence[Hypothesis] = (),
+    grows: bool = False,
 ) -> Verdict:
     """Return the verdict on a fitted base, by the rules of its data.
 
-    If sets are ``known`` from nearly the same data, only these are compared.
+    If sets are ``known`` from nearly the same data, only these are compared, and those that they
+    grow to if the search ``grows`` beyond them.
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
@@ -127,8 +129,8 @@ def judge(
         search.resume(known)
     else:
         search.singles(screened)
-        if not search.enough(search.found[0]):
-            search.grow()
+    if (grows or not known) and not search.enough(search.found[0]):
+        search.grow()
     chosen = _special_case(search, _best(search))
     certain = _explains(search, chosen)
     if not certain:
