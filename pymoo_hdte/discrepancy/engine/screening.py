@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
 
@@ -65,23 +66,89 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
     return sorted(found, key=lambda one: -one.reduction)
 
 
-def screen_by_signatures(data: Evidence, fitted: Fit, known: Sequence[Screened]) -> list[Screened]:
-    """Estimate what candidates could remove by the signatures that they have beside another fit.
-
-    This takes no prediction at all. A signature changes with effects that move a resonance or take
-    contact away, so that only candidates that stay far behind may be left out by it.
+def most_hopeful(
+    data: Evidence,
+    fitted: Fit,
+    others: Sequence[Candidate],
+    known: Sequence[Screened],
+    left: float,
+    ill: Sequence[tuple[int, float]],
+) -> list[Screened]:
+    """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
 
     Parameters
     ----------
     data : Evidence
     fitted : Fit
-        The present model.
+    others : sequence of Candidate
+        Effects.
     known : sequence of Screened
-        Effects, as screened beside a model of the same data.
+        The same, as screened beside another model of these data; or nothing.
+    left : float
+        Excess chi-square of the fit.
+    ill : sequence of (int, float)
+        Parts of the data that it explains ill, and their excess.
     """
+    if known:
+        others = _not_far_behind(data, fitted, known, left, ill)
+    screened = screen(data, fitted, others) if others else []
+    chosen = _hopeful(screened, [one.reduction for one in screened], left, data.rules)
+    for part, of_part in ill:
+        reductions = [one.by_part[part] for one in screened]
+        more = _hopeful(screened, reductions, of_part, data.rules)
+        chosen += [one for one in more if one not in chosen]
+    return chosen
+
+
+def _not_far_behind(
+    data: Evidence,
+    fitted: Fit,
+    known: Sequence[Screened],
+    left: float,
+    ill: Sequence[tuple[int, float]],
+) -> list[Candidate]:
+    """Return the effects that are worth a screening, which takes a prediction for each start.
+
+    Their signatures beside another fit tell without any prediction. Effects that move a resonance
+    or take contact away change them, so that only candidates that stay far behind are left out.
+    """
+    share = data.rules.promising_share * data.rules.second_hope_share
     orthonormal, residual = _beyond_parameters(fitted)
     parts = data.rows_of_parts()
-    return [_screened(one.candidate, one.signatures, orthonormal, residual, parts) for one in known]
+    found = (
+        _screened(one.candidate, one.signatures, orthonormal, residual, parts) for one in known
+    )
+    return [
+        one.candidate
+        for one in found
+        if one.reduction >= share * left
+        or any(one.by_part[part] >= share * of_part for part, of_part in ill)
+    ]
+
+
+def _hopeful(
+    screened: Sequence[Screened], reductions: Sequence[float], left: float, rules: Rules
+) -> list[Screened]:
+    """Return the best candidates, to first order, if they remove enough of what is left."""
+    order = np.argsort([-reduction for reduction in reductions], kind="stable")
+    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
+    return varied(enough, 1)[: rules.most_seconds]
+
+
+def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
+    """Return at most the ``most`` best candidates of each name."""
+    names = [one.candidate.name for one in screened]
+    return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < most]
+
+
+def reduced(
+    one: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
+) -> Screened:
+    """Return a known candidate with what it could remove of another residual (n,).
+
+    What is done by other directions, orthonormal (n, k), is projected out of its signatures.
+    """
+    return _screened(one.candidate, one.signatures, orthonormal, residual, ())
 
 
 def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

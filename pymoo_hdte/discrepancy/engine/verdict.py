@@ -117,7 +117,7 @@ def judge(
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     quiet = down_to_noise(base, degrees_of_freedom, rules)
     # Screening is slow, and known sets need none unless the base itself may be adequate.
-    screened = screen(data, base, candidates) if quiet or not known else []
+    screened = screen(data, base, candidates) if quiet or grows or not known else []
     gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
@@ -126,10 +126,10 @@ def judge(
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
     search = Search(data, base, candidates)
     if known:
-        search.resume(known)
+        search.resume(known, screened)
     else:
         search.singles(screened)
-    if (grows or not known) and not search.enough(search.found[0]):
+    if grows or not known:
         search.grow()
     chosen = _special_case(search, _best(search))
     certain = _explains(search, chosen)
@@ -193,7 +193,9 @@ def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
 
 
 def _explains(search: Search, one: Hypothesis) -> bool:
-    return explains(search.data, one, search.base, search.degrees_of_freedom)
+    if explains(search.data, one, search.base, search.degrees_of_freedom):
+        return True
+    return search.forms.explains(one)
 
 
 def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
