@@ -93,10 +93,19 @@ class AnyForm:
         member = [each for each in one.candidates if each.label not in kept]
         return left.excess - both.excess >= self._least(without, member, left)
 
+    def only_in_another(self, one: Hypothesis, without: Hypothesis) -> bool:
+        """Tell whether a member takes less in its listed form than in any, of what others leave."""
+        both, left = self.rest(one.fit), self.rest(without.fit)
+        if both is None or left is None:
+            return False
+        in_any = left.excess - both.excess
+        listed = without.fit.chi_square - one.fit.chi_square
+        return listed < self.data.rules.explained_part_share * in_any
+
     def beside(self, one: Hypothesis, known: Sequence[Screened]) -> list[Screened]:
         """Return the effects that may remove most of what a set leaves beyond its forms.
 
-        Where none does in its listed form, those that do in any form.
+        Where none does in its listed form, and little is left, those that do in any form.
 
         Parameters
         ----------
@@ -117,7 +126,8 @@ class AnyForm:
         hopeful = [
             each for each in ranked if each.reduction >= self._least(one, (each.candidate,), rest)
         ]
-        if not hopeful and rest.excess > self.noise:
+        little = one.explained >= rules.explained_share
+        if not hopeful and little and rest.excess > self.noise:
             gains = [self._in_any_form(each, rest) for each in ranked]
             places = [k for k in np.argsort(gains)[::-1] if rest.excess - gains[k] <= self.noise]
             hopeful = [ranked[k] for k in places]
