@@ -152,32 +152,21 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
     """Judge again if the named effect changes the drive's response to non-repeatable errors.
 
     The non-repeatable error is a motion, which reaches all channels through the model's response.
-    With less noise further effects may show, which change that response once more.
     """
-    for _ in range(data.rules.most_noise_rounds):
-        renewed = _renewed(verdict, data)
-        if renewed is None:
-            break
-        known = (verdict.chosen, *verdict.alternatives) if verdict.chosen else ()
-        again = judge(renewed, fit(renewed), listed, known, grows=True)
-        if again.chosen is None:
-            break
-        data, verdict = renewed, again
-    return data, verdict
-
-
-def _renewed(verdict: Verdict, data: Data) -> Data | None:
-    """Return the data with the noise that the named effect carries; None if it hardly changes."""
     rules = data.rules
     if verdict.chosen is None or verdict.chosen.explained < rules.explained_share:
-        return None
+        return data, verdict
     fitted = verdict.chosen.fit
     values = fitted.values[: len(data.base)]
     renewed = replace(data, reference=values, reference_effects=fitted.effects)
     ratio = np.diagonal(renewed.covariance, axis1=1, axis2=2) / np.diagonal(
         data.covariance, axis1=1, axis2=2
     )
-    return renewed if ratio.max() > rules.changed_noise_ratio else None
+    if ratio.max() <= rules.changed_noise_ratio:
+        return data, verdict
+    known = (verdict.chosen, *verdict.alternatives)
+    again = judge(renewed, fit(renewed), listed, known)
+    return (data, verdict) if again.chosen is None else (renewed, again)
 
 
 def _candidates(data: Data, base: Fit) -> list[Candidate]:

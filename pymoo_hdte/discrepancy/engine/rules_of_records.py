@@ -177,12 +177,6 @@ class RecordRules(RuleSet):
         f"{BY_HAND}: chi-square of the feature that it moves most is then off by half.",
         at_least=1.0,
     )
-    most_noise_rounds: int = rule(
-        2,
-        "1",
-        "Most times that a verdict is repeated with the noise that its effects carry.",
-        f"{BY_HAND}: once for the first effect, and once for what shows beside it.",
-    )
 
     # Machines other than a drive.
     noise_power_ratio: float = rule(

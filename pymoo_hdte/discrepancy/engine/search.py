@@ -57,7 +57,7 @@ class Search:
         self._by_label: dict[frozenset[str], Hypothesis] = {}
         self._finished: set[frozenset[str]] = set()
         self._extended: set[frozenset[str]] = set()
-        self._resumed: set[frozenset[str]] = set()
+        self._resumed = False
         self._beside_base: dict[str, Screened] = {}
 
     @property
@@ -102,10 +102,9 @@ class Search:
                 self._special_cases(one)
             self._finish_near(size + 1)
 
-    def resume(self, known: Sequence[Hypothesis], screened: Sequence[Screened] = ()) -> None:
+    def resume(self, known: Sequence[Hypothesis]) -> None:
         """Fit sets that another search has found on nearly the same data, from their values."""
-        self._beside_base = {one.candidate.label: one for one in screened}
-        self._resumed |= {label_of(one.candidates) for one in known}
+        self._resumed = True
         for one in known:
             self._fit(one.candidates, one.fit.values)
         for size in {len(one.members) for one in known}:
@@ -150,11 +149,11 @@ class Search:
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end: from its values, the believed base and other starts.
 
-        Sets of another search, which come from other starts, need no more of them.
+        A resumed search needs no other starts, from which its sets come.
         """
         label = label_of(one.candidates)
         if label not in self._finished or starts:
-            if label in self._resumed:
+            if self._resumed:
                 best = fit(self.data, one.candidates, one.fit.values)
             else:
                 best = best_fit(self.data, one, starts, self._by_label.values())

@@ -105,19 +105,17 @@ def judge(
     base: Fit,
     candidates: Sequence[Candidate],
     known: Sequence[Hypothesis] = (),
-    grows: bool = False,
 ) -> Verdict:
     """Return the verdict on a fitted base, by the rules of its data.
 
-    If sets are ``known`` from nearly the same data, only these are compared, and those that they
-    grow to if the search ``grows`` beyond them.
+    If sets are ``known`` from nearly the same data, only these are compared.
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     quiet = down_to_noise(base, degrees_of_freedom, rules)
     # Screening is slow, and known sets need none unless the base itself may be adequate.
-    screened = screen(data, base, candidates) if quiet or grows or not known else []
+    screened = screen(data, base, candidates) if quiet or not known else []
     gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
@@ -126,10 +124,9 @@ def judge(
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
     search = Search(data, base, candidates)
     if known:
-        search.resume(known, screened)
+        search.resume(known)
     else:
         search.singles(screened)
-    if grows or not known:
         search.grow()
     chosen = _special_case(search, _best(search))
     certain = _explains(search, chosen)
