@@ -20,6 +20,7 @@ LOWEST_FIRST = (
         "discrepancy.engine",
         "discrepancy.campaign",
         "discrepancy.campaign.rows",
+        "discrepancy.drive.forms",
         "discrepancy.drive",
         "discrepancy.drive.misfit",
         "discrepancy.drive.plan",

@@ -13,6 +13,7 @@ from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy.drive.features import MEANS, Features, measure
+from pymoo_hdte.discrepancy.drive.forms.of_laws import Ranges, corrections
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.drive.observations import (
     Observations,
@@ -79,6 +80,10 @@ class Data(Observations):
             return np.concatenate([running, np.nan_to_num(torsion[0]), priors])
 
         return change
+
+    def corrections(self, candidate: Candidate) -> list[DriveEffect]:
+        """Return the corrections of a law's form: see `forms.of_laws`."""
+        return corrections(candidate, _ranges_of(self))
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:
         """Return the indices of the residuals of each channel, and of the sweeps."""
@@ -159,6 +164,24 @@ class Data(Observations):
         if np.all(held) or held.sum() < self.rules.fewest_records:
             return self
         return replace(self, features=self.features.rows(np.flatnonzero(held)))
+
+
+def _ranges_of(data: Observations) -> Ranges:
+    """Return what the records of some data run through."""
+    when, believed = data.features.conditions, data.campaign.believed
+    torques = [np.abs(when.output_torque).max(), *(np.abs(one.path).max() for one in data.torsion)]
+    lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
+    return Ranges(
+        np.abs(when.input_speed),
+        float(max(torques)),
+        float(max(torques)) / believed.stiffness,
+        float(np.ptp(when.elapsed)),
+        believed.ratio,
+        believed.stiffness,
+        believed.damping,
+        tuple(order for order, amplitude in lines if amplitude > 0.0),
+        tuple(data.features.orders.tolist()),
+    )
 
 
 def flanks_held(features: Features, torque_scale: float, rules: Rules) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ of its effect: see `pymoo_hdte.effects.guess`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,6 +100,13 @@ class Candidate:
     def unknowns(self) -> int:
         """Number of parameters that it adds to a fit or sets free."""
         return len(self.parameters) + (self.frees is not None)
+
+    def outside(self, base: Sequence[Parameter], values: NDArray[np.float64]) -> bool:
+        """Tell whether the base parameter that it frees lies outside its tolerance."""
+        for parameter, value in zip(base, values, strict=False):
+            if parameter.name == self.frees:
+                return not parameter.lower <= value <= parameter.upper
+        return False
 
 
 def candidate_of(

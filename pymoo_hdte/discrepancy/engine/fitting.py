@@ -187,17 +187,7 @@ class Residuals(Protocol):
 
 
 class Evidence(Protocol):
-    """Measurements with which a model of few unknowns and effects can be compared.
-
-    Attributes
-    ----------
-    base : tuple of Parameter
-        Unknowns of the model without effects.
-    rules : Rules
-        Thresholds of the verdict.
-    remainder : float
-        Share of the base's excess that is attributed to no effect, since no model is exact.
-    """
+    """Measurements with which a model of few unknowns and effects can be compared."""
 
     @property
     def base(self) -> tuple[Parameter, ...]:
@@ -220,6 +210,10 @@ class Evidence(Protocol):
 
     def response(self, fitted: Fit) -> Response:
         """Return how the residuals of a fit respond to further effects."""
+        ...
+
+    def corrections(self, candidate: Candidate) -> Sequence[Any] | None:
+        """Return effects by which the form of a law may err; None where no forms are known."""
         ...
 
     def rows_of_parts(self) -> list[NDArray[np.int_]]:

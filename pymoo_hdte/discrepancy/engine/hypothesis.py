@@ -158,6 +158,12 @@ def alike(one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: R
     return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
 
 
+def leave_the_same(one: Hypothesis, other: Hypothesis, rules: Rules) -> bool:
+    """Tell whether two sets explain the data so nearly alike that the same must be missing."""
+    difference = abs(one.fit.chi_square - other.fit.chi_square)
+    return difference <= rules.trial_gain * other.fit.chi_square
+
+
 def contains(one: Hypothesis, other: Hypothesis) -> bool:
     """Tell whether a set is nested: it differs from another only by laws that contain the other's.
 
@@ -201,9 +207,3 @@ def fit_all(
         fitted = fit(data, (*base.candidates, one.candidate), np.append(base.values, one.start))
         found.append(hypothesis_of(fitted, excess))
     return sorted(found, key=lambda one: one.bic)
-
-
-def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
-    """Return at most the ``most`` best candidates of each name."""
-    names = [one.candidate.name for one in screened]
-    return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < most]

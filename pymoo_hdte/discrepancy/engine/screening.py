@@ -10,13 +10,14 @@ without linearisation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
 
@@ -32,12 +33,15 @@ class Screened:
     start : tuple of float
     by_part : tuple of float
         The same for each part of the data alone; empty for a parameter out of tolerance.
+    signatures : ndarray, shape (n_starts, n_residuals)
+        Change of the residuals by each of its starts; empty for a parameter out of tolerance.
     """
 
     candidate: Candidate
     reduction: float
     start: tuple[float, ...]
     by_part: tuple[float, ...] = ()
+    signatures: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
 
 
 def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
@@ -50,25 +54,124 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
         The present model, perhaps with effects, whose misfit is to be explained.
     candidates : sequence of Candidate
     """
-    # A parameter at its bound cannot move beyond it.
-    orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
-    residual = fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
+    orthonormal, residual = _beyond_parameters(fitted)
     response, parts = data.response(fitted), data.rows_of_parts()
     found = []
     for candidate in candidates:
         if candidate.frees is not None:
             found.append(_freed(candidate, fitted, orthonormal, residual))
             continue
-        signatures = []
-        for start in candidate.starts:
-            signature = response(candidate.build(start))
-            signatures.append(signature - orthonormal @ (orthonormal.T @ signature))
-        every = np.array(signatures)
-        by_part = tuple(
-            _best_start(candidate, every[:, rows], residual[rows]).reduction for rows in parts
-        )
-        found.append(replace(_best_start(candidate, every, residual), by_part=by_part))
+        signatures = np.array([response(candidate.build(start)) for start in candidate.starts])
+        found.append(_screened(candidate, signatures, orthonormal, residual, parts))
     return sorted(found, key=lambda one: -one.reduction)
+
+
+def most_hopeful(
+    data: Evidence,
+    fitted: Fit,
+    others: Sequence[Candidate],
+    known: Sequence[Screened],
+    left: float,
+    ill: Sequence[tuple[int, float]],
+) -> list[Screened]:
+    """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
+
+    Parameters
+    ----------
+    data : Evidence
+    fitted : Fit
+    others : sequence of Candidate
+        Effects.
+    known : sequence of Screened
+        The same, as screened beside another model of these data; or nothing.
+    left : float
+        Excess chi-square of the fit.
+    ill : sequence of (int, float)
+        Parts of the data that it explains ill, and their excess.
+    """
+    if known:
+        others = _not_far_behind(data, fitted, known, left, ill)
+    screened = screen(data, fitted, others) if others else []
+    chosen = _hopeful(screened, [one.reduction for one in screened], left, data.rules)
+    for part, of_part in ill:
+        reductions = [one.by_part[part] for one in screened]
+        more = _hopeful(screened, reductions, of_part, data.rules)
+        chosen += [one for one in more if one not in chosen]
+    return chosen
+
+
+def _not_far_behind(
+    data: Evidence,
+    fitted: Fit,
+    known: Sequence[Screened],
+    left: float,
+    ill: Sequence[tuple[int, float]],
+) -> list[Candidate]:
+    """Return the effects that are worth a screening, which takes a prediction for each start.
+
+    Their signatures beside another fit tell without any prediction. Effects that move a resonance
+    or take contact away change them, so that only candidates that stay far behind are left out.
+    """
+    share = data.rules.promising_share * data.rules.second_hope_share
+    orthonormal, residual = _beyond_parameters(fitted)
+    parts = data.rows_of_parts()
+    found = (
+        _screened(one.candidate, one.signatures, orthonormal, residual, parts) for one in known
+    )
+    return [
+        one.candidate
+        for one in found
+        if one.reduction >= share * left
+        or any(one.by_part[part] >= share * of_part for part, of_part in ill)
+    ]
+
+
+def _hopeful(
+    screened: Sequence[Screened], reductions: Sequence[float], left: float, rules: Rules
+) -> list[Screened]:
+    """Return the best candidates, to first order, if they remove enough of what is left."""
+    order = np.argsort([-reduction for reduction in reductions], kind="stable")
+    enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
+    return varied(enough, 1)[: rules.most_seconds]
+
+
+def varied(screened: Sequence[Screened], most: int) -> list[Screened]:
+    """Return at most the ``most`` best candidates of each name."""
+    names = [one.candidate.name for one in screened]
+    return [one for k, one in enumerate(screened) if names[:k].count(names[k]) < most]
+
+
+def reduced(
+    one: Screened, orthonormal: NDArray[np.float64], residual: NDArray[np.float64]
+) -> Screened:
+    """Return a known candidate with what it could remove of another residual (n,).
+
+    What is done by other directions, orthonormal (n, k), is projected out of its signatures.
+    """
+    return _screened(one.candidate, one.signatures, orthonormal, residual, ())
+
+
+def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return what parameters can do, shape (n, k), orthonormal, and what they leave, (n,)."""
+    # A parameter at its bound cannot move beyond it.
+    orthonormal, _ = np.linalg.qr(fitted.jacobian[:, fitted.bound_sides == 0.0])
+    return orthonormal, fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
+
+
+def _screened(
+    candidate: Candidate,
+    signatures: NDArray[np.float64],
+    orthonormal: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    parts: Sequence[NDArray[np.int_]],
+) -> Screened:
+    """Return what a candidate could remove, as a whole and in each part."""
+    beyond = signatures - (signatures @ orthonormal) @ orthonormal.T
+    by_part = tuple(
+        _best_start(candidate, beyond[:, rows], residual[rows]).reduction for rows in parts
+    )
+    best = _best_start(candidate, beyond, residual)
+    return replace(best, by_part=by_part, signatures=signatures)
 
 
 def _freed(

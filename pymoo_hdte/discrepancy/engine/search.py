@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
@@ -19,11 +20,11 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     down_to_noise,
     hypothesis_of,
     label_of,
-    varied,
+    leave_the_same,
 )
 from pymoo_hdte.discrepancy.engine.membership import ill_explained, is_earned
-from pymoo_hdte.discrepancy.engine.screening import Screened, screen
-from pymoo_hdte.discrepancy.engine.starts import best_fit
+from pymoo_hdte.discrepancy.engine.screening import Screened, most_hopeful, varied
+from pymoo_hdte.discrepancy.engine.starts import best_fit, other_starts
 
 Vector = NDArray[np.float64]
 Effects = tuple[Candidate, ...]
@@ -44,16 +45,20 @@ class Search:
     ----------
     found : list of Hypothesis
         All sets fitted so far.
+    forms : AnyForm
+        What sets leave in any form of their laws.
     """
 
     def __init__(self, data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> None:
         self.data, self.base, self.candidates = data, base, candidates
+        self.forms = AnyForm(data, base)
         self.degrees_of_freedom = len(base.residuals) - len(base.values)
         self.excess = base.chi_square - self.degrees_of_freedom
         self._by_label: dict[frozenset[str], Hypothesis] = {}
         self._finished: set[frozenset[str]] = set()
         self._extended: set[frozenset[str]] = set()
         self._resumed = False
+        self._beside_base: dict[str, Screened] = {}
 
     @property
     def found(self) -> list[Hypothesis]:
@@ -63,6 +68,7 @@ class Search:
     def singles(self, screened: Sequence[Screened]) -> None:
         """Fit the most promising single effects, and the base parameters out of tolerance."""
         rules = self.data.rules
+        self._beside_base = {one.candidate.label: one for one in screened}
         least = rules.promising_share * screened[0].reduction
         promising = [one for one in screened if one.reduction >= least]
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
@@ -70,19 +76,22 @@ class Search:
         self._parameters()
         self._finish_near(1)
         if not self.enough(self.found[0]):
-            self._from_other_starts(self.found[0])
+            self._finish(self.found[0], *other_starts(self.found[0], self.base.values))
         self._special_cases(self.found[0])
         self._finish_near(1)
 
     def grow(self) -> None:
         """Fit sets of more effects as long as what is left could be that of a further one."""
-        rules = self.data.rules
+        rules, first = self.data.rules, self.found[0]
+        if self.enough(first):
+            self._extend_beyond_forms(first)
+            return
         for size in range(1, rules.most_effects):
             grown = self._of_size(size)[: rules.most_firsts if size == 1 else 1]
             for one in grown:
                 if not self._could_count(one):
                     return
-                if one is not grown[0] and self._leaves_the_same(one, grown[0]):
+                if one is not grown[0] and leave_the_same(one, grown[0], rules):
                     self._extend_like(one, grown[0])
                 else:
                     self._extend(one)
@@ -113,10 +122,12 @@ class Search:
         members = one.members
         if len(members) == 1:
             return True
-        return all(
-            is_earned(self.data, self.base, one, self.without(one, member), member)
-            for member in members
-        )
+        return all(self._earns(one, member, self.without(one, member)) for member in members)
+
+    def _earns(self, one: Hypothesis, member: Effects, rest: Hypothesis) -> bool:
+        """Tell whether a member is earned, as the listed laws go or in any form of the others."""
+        earned = is_earned(self.data, self.base, one, rest, member)
+        return earned or self.forms.earns(one, rest)
 
     def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
         """Return a set without one of its members, fitted to the end."""
@@ -161,16 +172,6 @@ class Search:
             if place < rules.most_firsts or one.bic - best.bic < near * misfit:
                 self._finish(one)
 
-    def _from_other_starts(self, one: Hypothesis) -> None:
-        """Fit a single effect again from all its starts.
-
-        An inertia that is larger by half moves a resonance past lines, so that chi-square does not
-        decrease steadily on the way there; and values of the base that hide an effect lie far off.
-        """
-        (*others, last) = one.candidates
-        if not others and len(last.starts) > 1 and not last.linear:
-            self._finish(one, *(np.append(self.base.values, start) for start in last.starts))
-
     def _parameters(self) -> None:
         """Fit all base parameters that want to leave their tolerances together.
 
@@ -190,7 +191,7 @@ class Search:
             bounds, values = found.at_bounds, found.values
         if not freed:
             return
-        needed = tuple(one for one in freed if self._outside(one, values))
+        needed = tuple(one for one in freed if one.outside(self.data.base, values))
         best = self.found[0].bic if self._by_label else np.inf
         if not needed or found.chi_square > best:
             return
@@ -204,13 +205,6 @@ class Search:
             if one.frees not in alone:
                 # An effect covers it under another name.
                 self._by_label.pop(label_of((one,)), None)
-
-    def _outside(self, one: Candidate, values: Vector) -> bool:
-        """Tell whether a base parameter lies outside its tolerance."""
-        for parameter, value in zip(self.data.base, values, strict=False):
-            if parameter.name == one.frees:
-                return not parameter.lower <= value <= parameter.upper
-        return False
 
     def _pruned(self, one: Hypothesis) -> Effects:
         """Return the parameters of a set whose removal would cost more than they do."""
@@ -234,30 +228,38 @@ class Search:
         if label in self._extended:
             return
         self._extended.add(label)
-        others = [
+        others = self._further(one)
+        if not others:
+            return
+        rules, left = self.data.rules, one.fit.chi_square - self.degrees_of_freedom
+        before, after = (self.data.excess(each) for each in (self.base, one.fit))
+        ill = ill_explained(before, after, rules) if by_part and not one.exact else []
+        of_ill = [(part, float(after.of_parts[part])) for part in ill]
+        chosen = most_hopeful(self.data, one.fit, others, self._known(others), left, of_ill)
+        for more in chosen:
+            self._fit((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
+        self._extend_beyond_forms(one)
+
+    def _further(self, one: Hypothesis) -> list[Candidate]:
+        """Return the effects that may stand beside a set."""
+        return [
             other
             for other in self.candidates
             if other.frees is None and all(other.goes_with(each) for each in one.candidates)
         ]
-        if not others:
-            return
-        before, after = (self.data.excess(each) for each in (self.base, one.fit))
-        by_part = by_part and not one.exact
-        ill = ill_explained(before, after, self.data.rules) if by_part else []
-        screened = screen(self.data, one.fit, others)
-        left = one.fit.chi_square - self.degrees_of_freedom
-        chosen = self._hopeful(screened, [each.reduction for each in screened], left)
-        for part in ill:
-            reductions = [each.by_part[part] for each in screened]
-            of_part = self._hopeful(screened, reductions, float(after.of_parts[part]))
-            chosen += [each for each in of_part if each not in chosen]
-        for more in chosen:
-            self._fit((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
 
-    def _leaves_the_same(self, one: Hypothesis, other: Hypothesis) -> bool:
-        """Tell whether two sets explain the data so nearly alike that the same must be missing."""
-        difference = abs(one.fit.chi_square - other.fit.chi_square)
-        return difference <= self.data.rules.trial_gain * other.fit.chi_square
+    def _extend_beyond_forms(self, one: Hypothesis) -> None:
+        """Fit a set with effects that remove what its laws do not explain in any form."""
+        small = len(one.members) < self.data.rules.most_effects
+        found = self.forms.beside(one, self._known(self._further(one))) if small else []
+        for more in found:
+            self._fit((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
+        if found:
+            self._finish_near(len(one.members) + 1)
+
+    def _known(self, others: Sequence[Candidate]) -> list[Screened]:
+        """Return effects as screened beside the base; none where none was."""
+        return [self._beside_base[one.label] for one in others] if self._beside_base else []
 
     def _extend_like(self, one: Hypothesis, other: Hypothesis) -> None:
         """Fit a set with each of the effects by which another one was extended.
@@ -271,15 +273,6 @@ class Search:
             if fits and all(more[0].goes_with(each) for each in one.candidates):
                 start = longer.values_of(more)[len(self.base.values) :]
                 self._fit((*one.candidates, *more), np.append(one.fit.values, start))
-
-    def _hopeful(
-        self, screened: Sequence[Screened], reductions: Sequence[float], left: float
-    ) -> list[Screened]:
-        """Return the best candidates, to first order, if they remove enough of what is left."""
-        rules = self.data.rules
-        order = np.argsort([-reduction for reduction in reductions], kind="stable")
-        enough = [screened[k] for k in order if reductions[k] >= rules.second_hope_share * left]
-        return varied(enough, 1)[: rules.most_seconds]
 
     def _exchange(self, one: Hypothesis) -> None:
         """Fit sets in which one member is replaced by what would do as much beside the others."""

@@ -43,6 +43,18 @@ def best_fit(
     return fit_from(_other_shapes(best, one, found, data.rules))
 
 
+def other_starts(one: Hypothesis, base: Vector) -> list[Vector]:
+    """Return starts of a single effect from all its own ones, beside fitted values of the base.
+
+    An inertia that is larger by half moves a resonance past lines, so that chi-square does not
+    decrease steadily on the way there; and values of the base that hide an effect lie far off.
+    """
+    (*others, last) = one.candidates
+    if others or len(last.starts) == 1 or last.linear:
+        return []
+    return [np.append(base, start) for start in last.starts]
+
+
 def _from_believed(base: Sequence[Parameter], one: Hypothesis) -> Vector:
     """Return the believed values of the base with the fitted ones of a set's effects."""
     believed = np.array([parameter.start for parameter in base])

@@ -127,8 +127,7 @@ def judge(
         search.resume(known)
     else:
         search.singles(screened)
-        if not search.enough(search.found[0]):
-            search.grow()
+        search.grow()
     chosen = _special_case(search, _best(search))
     certain = _explains(search, chosen)
     if not certain:
@@ -140,7 +139,7 @@ def judge(
         chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
     vote = data.held_out_vote(base, chosen.fit)
     shown = vote is None or vote.counts(rules)
-    doubts = doubts_of(search, chosen, vote if shown else None)
+    doubts = doubts_of(search, chosen, vote if shown else None) + _other_forms(search, chosen)
     if not certain and _stands_out(search, chosen):
         certain, left = True, left_by(chosen.fit.chi_square / degrees_of_freedom)
         doubts += [left] if left not in doubts else []
@@ -191,7 +190,9 @@ def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
 
 
 def _explains(search: Search, one: Hypothesis) -> bool:
-    return explains(search.data, one, search.base, search.degrees_of_freedom)
+    if explains(search.data, one, search.base, search.degrees_of_freedom):
+        return True
+    return search.forms.explains(one)
 
 
 def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
@@ -206,6 +207,16 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
         and _explains(search, one)
         and search.earned(one)
     )
+
+
+def _other_forms(search: Search, chosen: Hypothesis) -> list[str]:
+    """Return in words which members stand for what their listed forms do not explain."""
+    members = chosen.members if len(chosen.members) > 1 else []
+    return [
+        f"{'+'.join(one.label for one in member)} has to have another form to explain what is left"
+        for member in members
+        if search.forms.only_in_another(chosen, search.without(chosen, member))
+    ]
 
 
 def _stands_out(search: Search, chosen: Hypothesis) -> bool:

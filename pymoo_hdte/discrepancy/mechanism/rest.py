@@ -19,9 +19,8 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     down_to_noise,
     fit_all,
     hypothesis_of,
-    varied,
 )
-from pymoo_hdte.discrepancy.engine.screening import screen
+from pymoo_hdte.discrepancy.engine.screening import screen, varied
 from pymoo_hdte.discrepancy.mechanism.evidence import MeasuredData
 from pymoo_hdte.mechanism import Mechanism
 

@@ -1,0 +1,85 @@
+"""Small changes of a drive that are no effect of their own: a law of any function of the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.drive import Coefficients, DriveEffect
+from pymoo_hdte.effects.law import Behaviour, Law, PortState, Response
+
+Force = Callable[[PortState], Response]
+
+
+@dataclass(frozen=True, eq=False)
+class AnyForce(Behaviour):
+    """A law of any function of the motion.
+
+    Attributes
+    ----------
+    force : callable
+    orders : tuple of float
+        Cycles per turn of the port with which it varies.
+    """
+
+    force: Force
+    orders: tuple[float, ...] = ()
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents."""
+        return self.force(state)
+
+    def with_input_locked(self) -> Law | None:
+        """Return none: what varies with an angle has a mean of zero, and nothing else moves."""
+        return None
+
+
+class AnyForceOfLoad(AnyForce):
+    """One that depends on the load too."""
+
+    loaded: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, eq=False)
+class Correction(DriveEffect):
+    """A law at a port beside those of effects.
+
+    Attributes
+    ----------
+    port : str
+    law : Law
+    """
+
+    name = "correction"
+    port: str
+    law: Law
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the law."""
+        return replace(coefficients, laws=(*coefficients.laws, (self.port, self.law)))
+
+
+@dataclass(frozen=True, eq=False)
+class DampingByRecord(DriveEffect):
+    """A damping of the torsion that differs between records, whose number r divides the rows'.
+
+    Attributes
+    ----------
+    shares : ndarray, shape (r,)
+        Of the believed damping, added.
+    """
+
+    name = "damping_by_record"
+    shares: NDArray[np.float64]
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients; those of a sweep at rest, of one row, as they are."""
+        damping = np.asarray(coefficients.damping)
+        if len(damping) % len(self.shares):
+            return coefficients
+        factors = 1.0 + np.tile(self.shares, len(damping) // len(self.shares))
+        return replace(coefficients, damping=damping * factors)

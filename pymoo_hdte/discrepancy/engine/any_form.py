@@ -1,0 +1,187 @@
+"""What a set of effects leaves if each of its laws may have any form.
+
+A real law has no form that a library holds exactly. The corrections of its form span what other
+forms of it can do, to first order around the fitted set. What is left beyond them, and beyond all
+parameters, is no error of form: if it is significant, something else is missing, and an effect
+that takes it away is earned however little it is beside the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, adequate, gains_enough
+from pymoo_hdte.discrepancy.engine.screening import Screened, reduced, varied
+
+_RANK = 1e-5
+"""Share of the largest singular value from which a direction counts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """What a fit leaves beyond its parameters and the forms of its laws.
+
+    Attributes
+    ----------
+    directions : ndarray, shape (n, k)
+        What these can do, orthonormal.
+    residual : ndarray, shape (n,)
+        Beyond them.
+    excess : float
+        Its chi-square beyond the degrees of freedom that it has.
+    """
+
+    directions: NDArray[np.float64]
+    residual: NDArray[np.float64]
+    excess: float
+
+
+class AnyForm:
+    """Sets of effects whose laws may have any form.
+
+    Parameters
+    ----------
+    data : Evidence
+    base : Fit
+        Without effects.
+    """
+
+    def __init__(self, data: Evidence, base: Fit) -> None:
+        self.data, self.base = data, base
+        self._degrees_of_freedom = len(base.residuals) - len(base.values)
+        self._rests: dict[Fit, Rest | None] = {}
+        self._by_place: dict[tuple[str, str, float | None], NDArray[np.float64]] = {}
+
+    @property
+    def noise(self) -> float:
+        """Excess up to which a model is adequate."""
+        degrees_of_freedom = self._degrees_of_freedom
+        return (adequate(degrees_of_freedom, self.data.rules) - 1.0) * degrees_of_freedom
+
+    def rest(self, fitted: Fit) -> Rest | None:
+        """Return what a fit leaves; None for machines whose laws have no known corrections."""
+        if fitted not in self._rests:
+            self._rests[fitted] = self._rest(fitted)
+        return self._rests[fitted]
+
+    def explains(self, one: Hypothesis) -> bool:
+        """Tell whether a set removes most of the misfit and leaves nothing but errors of form."""
+        rules = self.data.rules
+        if one.explained < rules.explained_share or not gains_enough(one, self.base, rules):
+            return False
+        rest = self.rest(one.fit)
+        return rest is not None and rest.excess <= self.noise
+
+    def earns(self, one: Hypothesis, without: Hypothesis) -> bool:
+        """Tell whether a member is earned: what is left without it is no error of form.
+
+        The set leaves nothing but noise beyond its forms, and most of what it leaves ``without``
+        the member is gone, more than noise and the model's own error can be.
+        """
+        both = self.rest(one.fit)
+        if both is None or both.excess > self.noise:
+            return False
+        left = self.rest(without.fit)
+        assert left is not None
+        kept = {each.label for each in without.candidates}
+        member = [each for each in one.candidates if each.label not in kept]
+        return left.excess - both.excess >= self._least(without, member, left)
+
+    def only_in_another(self, one: Hypothesis, without: Hypothesis) -> bool:
+        """Tell whether a member takes less in its listed form than in any, of what others leave."""
+        both, left = self.rest(one.fit), self.rest(without.fit)
+        if both is None or left is None:
+            return False
+        in_any = left.excess - both.excess
+        listed = without.fit.chi_square - one.fit.chi_square
+        return listed < self.data.rules.explained_part_share * in_any
+
+    def beside(self, one: Hypothesis, known: Sequence[Screened]) -> list[Screened]:
+        """Return the effects that may remove most of what a set leaves beyond its forms.
+
+        Where none does in its listed form, and little is left, those that do in any form.
+
+        Parameters
+        ----------
+        one : Hypothesis
+        known : sequence of Screened
+            Effects that may be added, with their signatures beside the base.
+        """
+        rest = self.rest(one.fit)
+        if rest is None or not known:
+            return []
+        rules = self.data.rules
+        found = [reduced(each, rest.directions, rest.residual) for each in known]
+        ranked = [
+            each
+            for each in sorted(found, key=lambda each: -each.reduction)
+            if rest.excess >= self._least(one, (each.candidate,), rest)
+        ]
+        hopeful = [
+            each for each in ranked if each.reduction >= self._least(one, (each.candidate,), rest)
+        ]
+        little = one.explained >= rules.explained_share
+        if not hopeful and little and rest.excess > self.noise:
+            gains = [self._in_any_form(each, rest) for each in ranked]
+            places = [k for k in np.argsort(gains)[::-1] if rest.excess - gains[k] <= self.noise]
+            hopeful = [ranked[k] for k in places]
+        return varied(hopeful, 1)[: rules.most_seconds]
+
+    def _least(self, one: Hypothesis, member: Sequence[Candidate], rest: Rest) -> float:
+        """Return what a further member has to remove beyond the forms of a set."""
+        rules = self.data.rules
+        error = rules.exact_model_accuracy**2
+        if not one.exact:
+            # At one port the corrections of a form need not hold all that a real law does.
+            ports = {each.port for each in one.candidates}
+            same_port = any(each.port in ports for each in member)
+            error = rules.second_form_share if same_port else self.data.remainder
+        of_base = self.base.chi_square - self._degrees_of_freedom
+        share = rules.explained_part_share * rest.excess
+        return max(rules.single_effect_gain, error * of_base, share)
+
+    def _rest(self, fitted: Fit) -> Rest | None:
+        forms = [self.data.corrections(one) for one in fitted.candidates]
+        if any(form is None for form in forms):
+            return None
+        response = self.data.response(fitted)
+        columns = [response((one,)) for form in forms for one in form or ()]
+        free = fitted.bound_sides == 0.0
+        # A bound of an effect's own unknowns limits the listed form only.
+        free[fitted.n_base :] = True
+        parameters = fitted.jacobian[:, free]
+        rank = _orthonormal(parameters).shape[1]
+        directions = _orthonormal(np.column_stack([parameters, *columns]))
+        residual = fitted.residuals - directions @ (directions.T @ fitted.residuals)
+        freedom = self._degrees_of_freedom - (directions.shape[1] - rank)
+        return Rest(directions, residual, float(residual @ residual) - freedom)
+
+    def _in_any_form(self, one: Screened, rest: Rest) -> float:
+        """Return what an effect removes in any form, less what noise gives so many unknowns."""
+        directions = np.concatenate([one.signatures, self._forms_of(one.candidate)])
+        beyond = directions - (directions @ rest.directions) @ rest.directions.T
+        free = _orthonormal(beyond.T)
+        return float(np.sum((free.T @ rest.residual) ** 2)) - free.shape[1]
+
+    def _forms_of(self, candidate: Candidate) -> NDArray[np.float64]:
+        """Return the corrections of a candidate's form beside the base, shape (k, n)."""
+        place = (candidate.name, candidate.port, candidate.order)
+        if place not in self._by_place:
+            response = self.data.response(self.base)
+            found = [response((one,)) for one in self.data.corrections(candidate) or ()]
+            self._by_place[place] = np.array(found).reshape(-1, len(self.base.residuals))
+        return self._by_place[place]
+
+
+def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an orthonormal basis of columns (n, m) that need not be independent, (n, k)."""
+    sizes = np.linalg.norm(columns, axis=0)
+    kept = sizes > 0.0
+    left, values, _ = np.linalg.svd(columns[:, kept] / sizes[kept], full_matrices=False)
+    return np.asarray(left[:, values > _RANK * values.max(initial=0.0)])

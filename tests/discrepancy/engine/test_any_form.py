@@ -1,0 +1,99 @@
+"""Laws of other forms than the library's: what they leave, and what shows beside them."""
+
+import numpy as np
+import pytest
+from planted_features import known_data, library, measured
+
+from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.drive.forms.corrections import (
+    AnyForce,
+    AnyForceOfLoad,
+    Correction,
+)
+from pymoo_hdte.discrepancy.engine.any_form import AnyForm
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.hypothesis import down_to_noise, hypothesis_of
+from pymoo_hdte.discrepancy.engine.verdict import judge
+from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.law import Response
+
+FRICTION, SPRING, DRIFT = (
+    "stribeck_friction:input",
+    "hardening_stiffness:mesh",
+    "thermal_drift:sensor",
+)
+OF_LOAD = "load_dependent_friction:input"
+SPEEDS = (10.0, 40.0, 150.0, 500.0, 1200.0, 2000.0)
+LOADS = (5.0, 40.0, 20.0, 10.0, 30.0)
+DATA = known_data(
+    [(speed, LOADS[(2 * k + j) % 5]) for k, speed in enumerate(SPEEDS) for j in (0, 1)],
+    [1.0, 2.0, 2.02, 3.0],
+)
+
+
+def exponential(state):
+    """Friction that falls exponentially, not as a Gaussian curve."""
+    sign, steep = smoothed_sign(state.speed)
+    fallen = 0.02 * np.exp(-np.abs(state.speed) / 20.0)
+    return Response((0.02 + fallen) * sign, damping=(0.02 + fallen) * steep - fallen / 20.0)
+
+
+def overload(state):
+    """A spring that stiffens with the fifth power, not the third."""
+    return Response(2e15 * state.position**5, 1e16 * state.position**4)
+
+
+def rounded(state):
+    """Friction of the load that begins slowly."""
+    sign, steep = smoothed_sign(state.speed)
+    size = 0.2 * (np.hypot(state.load, 0.1) - 0.1)
+    return Response(size * sign, damping=size * steep)
+
+
+FOREIGN = {
+    FRICTION: Correction("input", AnyForce(exponential)),
+    SPRING: Correction("mesh", AnyForce(overload)),
+    OF_LOAD: Correction("input", AnyForceOfLoad(rounded)),
+}
+
+
+def of_labels(*labels):
+    return [one for one in library(DATA) if one.label in labels]
+
+
+def planted(*effects, seed=1):
+    return measured(effects, np.random.default_rng(seed), DATA)[0]
+
+
+def small_drift():
+    (drift,) = of_labels(DRIFT)
+    return drift.build((4e-8, 500.0))
+
+
+@pytest.mark.parametrize("label", FOREIGN)
+def test_what_another_form_of_a_law_leaves_is_none_of_a_second_effect(label):
+    data = planted(FOREIGN[label])
+    base = fit(data)
+    found = fit(data, of_labels(label))
+    degrees_of_freedom = len(base.residuals) - len(base.values)
+    forms = AnyForm(data, base)
+    assert not down_to_noise(found, degrees_of_freedom, data.rules)
+    assert forms.rest(found).excess <= forms.noise
+    left = hypothesis_of(found, base.chi_square - degrees_of_freedom)
+    assert forms.explains(left)
+
+
+def test_a_small_effect_shows_beside_a_law_of_another_form(monkeypatch):
+    data = planted(FOREIGN[SPRING], *small_drift())
+    laws = of_labels(SPRING, DRIFT)
+    found = judge(data, fit(data), laws)
+    assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
+    monkeypatch.setattr(Data, "corrections", lambda self, candidate: None)
+    found = judge(data, fit(data), laws)
+    assert {one.label for one in found.chosen.candidates} == {SPRING}
+
+
+def test_another_form_alone_is_one_effect():
+    data = planted(FOREIGN[SPRING], seed=2)
+    found = judge(data, fit(data), of_labels(SPRING, DRIFT))
+    assert (found.status, found.chosen.label) == ("named", SPRING)
