@@ -15,9 +15,9 @@ from pymoo_hdte.algorithms.crowding import crowding_tournaments
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, SparseMutation
 from pymoo_hdte.algorithms.points import Points
-from pymoo_hdte.algorithms.spread import most_spread
+from pymoo_hdte.algorithms.quality import Quality, truncation_of
 from pymoo_hdte.algorithms.success_shares import SuccessShares
-from pymoo_hdte.algorithms.survival import Truncation, survivors
+from pymoo_hdte.algorithms.survival import survivors
 from pymoo_hdte.checks import InvalidInput
 
 
@@ -48,16 +48,19 @@ class ElitistSwarm(Swarm):
         1 to 19 of them; by default `Attraction`, `Exchange` and `Difference`.
     mutation : SparseMutation, optional
         What is added to every step; by default a `SparseMutation`.
-    truncation : callable, optional
-        Takes objectives (n, m) and a size, and returns the rows that stay; by default
-        `most_spread`.
+    quality : "spread", "hypervolume" or callable
+        What decides which solutions of a front stay. An even spread serves IGD and IGD+ on fronts
+        without a knee; the dominated hypervolume serves itself, and IGD+ on most fronts, and
+        crowds solutions at knees. It counts with two and three objectives; with more, "hypervolume"
+        means "spread". A callable takes objectives (n, m) and a size, and returns the rows that
+        stay.
     **kwargs
         Any other argument of `pymoo.core.algorithm.Algorithm`.
 
     Raises
     ------
     InvalidInput
-        As `ParticleSwarm`, but for G_max, which is not needed; for no or too many moves.
+        As `ParticleSwarm`, but for G_max, which is not needed; for no or too many moves, or a quality that is not known.
     TypeError
         For an argument that does not exist.
 
@@ -78,7 +81,7 @@ class ElitistSwarm(Swarm):
         sampling: Sampling | NDArray | Population | None = None,
         moves: Sequence[Move] | None = None,
         mutation: SparseMutation | None = None,
-        truncation: Truncation = most_spread,
+        quality: Quality = "spread",
         **kwargs: Any,
     ) -> None:
         super().__init__(pop_size, sampling, **kwargs)
@@ -86,7 +89,7 @@ class ElitistSwarm(Swarm):
         if not 0 < len(self.moves) < 1.0 / SuccessShares.SMALLEST:
             raise InvalidInput("number of moves", len(self.moves), "1 to 19, as each gets a share")
         self.mutation = SparseMutation() if mutation is None else mutation
-        self.truncation = truncation
+        self.truncation = truncation_of(quality)
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         self._evaluated(infills)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.algorithms.dominance import constrained_ranks
 from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.quality import Truncation
 from pymoo_hdte.algorithms.spread import most_spread
-
-Truncation = Callable[[NDArray[np.float64], int], NDArray[np.int_]]
-"""Takes objectives (n, m) and a size, and returns which rows stay."""
 
 
 def survivors(points: Points, size: int, truncation: Truncation = most_spread) -> NDArray[np.int_]:
