@@ -60,7 +60,8 @@ class ElitistSwarm(Swarm):
     Raises
     ------
     InvalidInput
-        As `ParticleSwarm`, but for G_max, which is not needed; for no or too many moves, or a quality that is not known.
+        As `ParticleSwarm`, but for G_max, which is not needed; for no or too many moves; for a
+        quality that is not known.
     TypeError
         For an argument that does not exist.
 
