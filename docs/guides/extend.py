@@ -243,8 +243,8 @@ swarms = {
     "bare bones as a fourth": lambda: ElitistSwarm(
         moves=[Attraction(), Exchange(), Difference(), BareBones()]
     ),
-    "crowding distance": lambda: ElitistSwarm(truncation=least_crowded),
-    "random truncation": lambda: ElitistSwarm(truncation=random_rows),
+    "crowding distance": lambda: ElitistSwarm(quality=least_crowded),
+    "random truncation": lambda: ElitistSwarm(quality=random_rows),
 }
 for name, make in swarms.items():
     found = [igd(minimize(problem, make(), ("n_gen", 40), seed=seed).F) for seed in range(1, 12)]

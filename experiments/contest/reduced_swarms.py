@@ -103,7 +103,7 @@ REDUCED: dict[str, Callable[[Problem], ElitistSwarm]] = {
     "equal shares of moves": lambda _: EqualSwarm(),
     "without mutation": lambda _: ElitistSwarm(mutation=NoMutation()),
     "mutation of one size": lambda _: ElitistSwarm(mutation=OneSizeMutation()),
-    "crowding truncation": lambda _: ElitistSwarm(truncation=least_crowded),
+    "crowding truncation": lambda _: ElitistSwarm(quality=least_crowded),
     "leaders at random": lambda _: AnyLeaderSwarm(),
     "attraction in all variables": lambda _: ElitistSwarm(
         moves=(WholeAttraction(), Exchange(), Difference())

@@ -1,6 +1,7 @@
 """The swarm family, as pymoo algorithms."""
 
 from pymoo_hdte.algorithms.archive import LeaderArchive
+from pymoo_hdte.algorithms.compact import CompactSwarm
 from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.inertia import EntropyWeight, LinearDecrease
 from pymoo_hdte.algorithms.interpolated_front import FoundFront, interpolated_front
@@ -13,6 +14,7 @@ __all__ = [
     "AMPMOPSO",
     "MOPSO",
     "MPMOPSO",
+    "CompactSwarm",
     "ElitistSwarm",
     "EntropyWeight",
     "Flat",

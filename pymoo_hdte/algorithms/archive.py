@@ -1,14 +1,18 @@
-"""The external archive: the best points found so far, from which the swarm takes its leaders."""
+"""Archives of the best points found so far: the leaders of a swarm, and fronts to be offered."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
+from moocore import is_nondominated
 from numpy.typing import NDArray
 from pymoo.core.population import Population
 
 from pymoo_hdte.algorithms.crowding import crowding_tournaments, least_crowded
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.survival import Truncation
 
 
 class LeaderArchive:
@@ -74,3 +78,48 @@ class LeaderArchive:
             Positions in the units of the problem's variables.
         """
         return self.points.X[crowding_tournaments(self.points.F, n, random_state)]
+
+
+class FrontArchive:
+    """Feasible, mutually non-dominated solutions of different objectives, in order of arrival.
+
+    It keeps individuals, some kilobytes each, and judges them again at every update, since
+    callbacks may evaluate them again and constraint handling may grow stricter. An update reads N
+    individuals, half a microsecond each, and compares them in O(N log N) for two and three
+    objectives, N being the members and the newcomers together.
+
+    Parameters
+    ----------
+    capacity : int
+        Largest number of members.
+    truncation : Truncation
+        Chooses who stays above the capacity.
+    left : int, optional
+        How many it leaves, the capacity by default; fewer, and it is seldom needed.
+
+    Attributes
+    ----------
+    members : Population
+        The archived individuals.
+    """
+
+    def __init__(self, capacity: int, truncation: Truncation, left: int | None = None) -> None:
+        self._capacity, self._truncation = capacity, truncation
+        self._left = capacity if left is None else left
+        self.members = Population.empty()
+
+    def __len__(self) -> int:
+        return len(self.members)
+
+    def update(self, population: Population, points_of: Callable[[Population], Points]) -> None:
+        """Add an evaluated population, whose points and those of members are read by a function."""
+        everyone = Population.merge(self.members, population)
+        if not len(everyone):
+            return
+        points = points_of(everyone)
+        kept = np.flatnonzero(points.violation == 0.0)
+        if len(kept):
+            kept = kept[is_nondominated(points.F[kept])]
+        if len(kept) > self._capacity:
+            kept = kept[self._truncation(points.F[kept], self._left)]
+        self.members = everyone[kept]

@@ -63,13 +63,21 @@ class Swarm(Algorithm):
         InvalidInput
             If the problem does not fit.
         """
-        _check_problem(problem)
+        self._check(problem)
         super().setup(problem, **kwargs)
         self._plan()
         return self
 
+    def _check(self, problem: Problem) -> None:
+        """Refuse a problem that does not fit."""
+        check_problem(problem)
+
     def _plan(self) -> None:
         """Fix what depends on how long the run will be."""
+
+    def _n_asked(self) -> int:
+        """Return the number of particles in a generation."""
+        return self.pop_size
 
     def _initialize_infill(self) -> Population:
         particles = self.initialization.do(
@@ -97,11 +105,11 @@ class Swarm(Algorithm):
     def _evaluated(self, infills: Population | None) -> Points:
         """Return the points of a swarm that comes back from evaluation, in the order of ``ask``."""
         n = 0 if infills is None else len(infills)
-        if infills is None or n != self.pop_size:
-            allowed = f"the {self.pop_size} particles of ask(), in their order"
+        if infills is None or n != self._n_asked():
+            allowed = f"the {self._n_asked()} particles of ask(), in their order"
             raise InvalidInput("number of infills", n, allowed)
         points = self._points(infills)
-        expected = (self.pop_size, self.problem.n_obj)
+        expected = (n, self.problem.n_obj)
         if points.F.shape != expected:
             raise InvalidInput("shape of F of infills", points.F.shape, f"{expected}, evaluated")
         return points
@@ -116,9 +124,12 @@ def particles_at(X: NDArray[np.float64]) -> Population:
     return Population(particles)
 
 
-def _check_problem(problem: Problem) -> None:
-    if getattr(problem, "vars", None) is not None or problem.vtype not in (None, float):
-        raise InvalidInput("vtype of problem", problem.vtype, "real variables")
+def check_problem(problem: Problem, integers: bool = False) -> None:
+    """Refuse a problem that no swarm can take; one with ``integers`` where a repair makes them."""
+    mixed = getattr(problem, "vars", None) is not None
+    if mixed or problem.vtype not in ((None, float, int) if integers else (None, float)):
+        with_repair = "real variables, or integers with repair=RoundingRepair() in an elitist swarm"
+        raise InvalidInput("vtype of problem", "mixed" if mixed else problem.vtype, with_repair)
     if problem.n_obj < 2:
         raise InvalidInput("n_obj of problem", problem.n_obj, "at least 2")
     bounds = problem.bounds()

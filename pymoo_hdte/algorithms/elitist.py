@@ -8,17 +8,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+from pymoo.core.repair import NoRepair, Repair
 from pymoo.core.sampling import Sampling
 
-from pymoo_hdte.algorithms.base import Swarm, particles_at
+from pymoo_hdte.algorithms.base import Swarm, check_problem, particles_at
 from pymoo_hdte.algorithms.crowding import crowding_tournaments
 from pymoo_hdte.algorithms.dominance import best_front
-from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, SparseMutation
+from pymoo_hdte.algorithms.moves import (
+    Attraction,
+    Difference,
+    Exchange,
+    Move,
+    SparseMutation,
+    nearest_in_objectives,
+)
 from pymoo_hdte.algorithms.points import Points
-from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.algorithms.success_shares import SuccessShares
-from pymoo_hdte.algorithms.survival import Truncation, survivors
-from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.algorithms.survival import Quality, survivors, truncation_of
+from pymoo_hdte.checks import InvalidInput, whole_number
 
 
 class ElitistSwarm(Swarm):
@@ -48,16 +56,24 @@ class ElitistSwarm(Swarm):
         1 to 19 of them; by default `Attraction`, `Exchange` and `Difference`.
     mutation : SparseMutation, optional
         What is added to every step; by default a `SparseMutation`.
-    truncation : callable, optional
-        Takes objectives (n, m) and a size, and returns the rows that stay; by default
-        `most_spread`.
+    quality : "spread", "hypervolume" or callable
+        What decides which solutions of a front stay. An even spread serves IGD and IGD+ on fronts
+        without a knee; the dominated hypervolume serves itself, and IGD+ on most fronts, and
+        crowds solutions at knees. It counts with two and three objectives; with more, "hypervolume"
+        means "spread". A callable takes objectives (n, m) and a size, and returns the rows that
+        stay.
+    n_offsprings : int, optional
+        New positions in a generation, ``pop_size`` by default.
+    repair : Repair, optional
+        Of pymoo, for all positions before they are evaluated; `RoundingRepair` makes integers.
     **kwargs
         Any other argument of `pymoo.core.algorithm.Algorithm`.
 
     Raises
     ------
     InvalidInput
-        As `ParticleSwarm`, but for G_max, which is not needed; for no or too many moves.
+        As `ParticleSwarm`, but for G_max, which is not needed; for no or too many moves; for a
+        quality that is not known.
     TypeError
         For an argument that does not exist.
 
@@ -78,7 +94,9 @@ class ElitistSwarm(Swarm):
         sampling: Sampling | NDArray | Population | None = None,
         moves: Sequence[Move] | None = None,
         mutation: SparseMutation | None = None,
-        truncation: Truncation = most_spread,
+        quality: Quality = "spread",
+        n_offsprings: int | None = None,
+        repair: Repair | None = None,
         **kwargs: Any,
     ) -> None:
         super().__init__(pop_size, sampling, **kwargs)
@@ -86,39 +104,75 @@ class ElitistSwarm(Swarm):
         if not 0 < len(self.moves) < 1.0 / SuccessShares.SMALLEST:
             raise InvalidInput("number of moves", len(self.moves), "1 to 19, as each gets a share")
         self.mutation = SparseMutation() if mutation is None else mutation
-        self.truncation = truncation
+        self._truncation = truncation_of(quality)
+        self.n_offsprings = n_offsprings
+        if n_offsprings is not None:
+            self.n_offsprings = whole_number("n_offsprings", n_offsprings, at_least=1)
+        self.repair = NoRepair() if repair is None else repair
+        self.initialization.repair = self.repair
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         self._evaluated(infills)
         self.success = SuccessShares(len(self.moves))
         self.pop = infills
 
+    def _check(self, problem: Problem) -> None:
+        check_problem(problem, integers=type(self.repair) is not NoRepair)
+
+    def _n_asked(self) -> int:
+        started = self.is_initialized and self.n_offsprings is not None
+        return self.n_offsprings if started else self.pop_size  # type: ignore[return-value]
+
     # Callbacks may change the population, so it is read again wherever it is used.
     def _infill(self) -> Population:
         swarm, random_state = self._points(self.pop), self.random_state
         lowest, highest = self.problem.bounds()
         # If a callback changed the length of the population, particles move in turn.
-        X = np.resize(swarm.X, (self.pop_size, swarm.X.shape[1]))
-        front = swarm[best_front(swarm)]
+        movers = self._movers(len(swarm))
+        X = swarm.X[movers]
+        front = self._front(swarm)
         leaders = self._leaders(front) if len(front) else X
-        self.chosen = self.success.draw(self.pop_size, random_state)
+        self.chosen = self.success.draw(len(movers), random_state)
         steps = np.empty_like(X)
         for number, move in enumerate(self.moves):
             rows = self.chosen == number
-            steps[rows] = move(X[rows], leaders[rows], swarm.X, random_state)
+            around = self._around(move, swarm, movers[rows])
+            steps[rows] = move(X[rows], leaders[rows], around, random_state)
         steps += self.mutation(steps, highest - lowest, random_state)
-        return particles_at(np.clip(X + steps, lowest, highest))
+        moved = particles_at(np.clip(X + steps, lowest, highest))
+        if type(self.repair) is NoRepair:
+            return moved
+        return self.repair.do(self.problem, moved, random_state=random_state)
+
+    def _movers(self, n: int) -> NDArray[np.int_]:
+        """Return which of ``n`` particles move."""
+        if self._n_asked() < min(n, self.pop_size):
+            return self.random_state.permutation(n)[: self._n_asked()]
+        return np.resize(np.arange(n), self._n_asked())
+
+    def _front(self, swarm: Points) -> Points:
+        """Return the points that lead."""
+        return swarm[best_front(swarm)]
 
     def _leaders(self, front: Points) -> NDArray[np.float64]:
-        """Draw a leader's position for every particle, shape (n, d)."""
-        return front.X[crowding_tournaments(front.F, self.pop_size, self.random_state)]
+        """Draw a leader's position for every particle that moves, shape (n, d)."""
+        return front.X[crowding_tournaments(front.F, self._n_asked(), self.random_state)]
+
+    def _around(self, move: Move, swarm: Points, rows: NDArray[np.int_]) -> NDArray[np.float64]:
+        """Return the positions a move draws from: all, or the neighbours of every row."""
+        k = getattr(move, "NEIGHBOURS", None)
+        return swarm.X if k is None else swarm.X[nearest_in_objectives(swarm.F, k)[rows]]
+
+    def _survivors(self, points: Points) -> NDArray[np.int_]:
+        """Return which of the old and the new points make up the next swarm."""
+        return survivors(points, self.pop_size, self._truncation)
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         points = self._points(self.pop).followed_by(self._evaluated(infills))
-        kept = survivors(points, self.pop_size, self.truncation)
+        kept = self._survivors(points)
         survived = np.zeros(len(points), dtype=bool)
         survived[kept] = True
-        self.success.learn(self.chosen, survived[-self.pop_size :])
+        self.success.learn(self.chosen, survived[-len(self.chosen) :])
         self.pop = Population.merge(self.pop, infills)[kept]
 
     def _set_optimum(self) -> None:

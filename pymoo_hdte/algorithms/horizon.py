@@ -38,13 +38,21 @@ def generation_limit(termination: Termination, pop_size: int, n_max_gen: int | N
     return max(1, math.ceil(limit))
 
 
-def _limit(termination: Termination, pop_size: int) -> float:
-    """Return the largest number of generations that a termination allows, inf if unlimited."""
+def evaluation_limit(termination: Termination) -> float:
+    """Return the largest number of evaluations a termination allows, inf if it names none."""
+    return _limit(termination, None)
+
+
+def _limit(termination: Termination, pop_size: int | None) -> float:
+    """Return the largest number of generations that a termination allows, inf if unlimited.
+
+    Without ``pop_size`` the number of evaluations, for which a limit on generations is none.
+    """
     match termination:
         case MaximumGenerationTermination(n_max_gen=limit) if limit is not None:
-            return limit
+            return math.inf if pop_size is None else limit
         case MaximumFunctionCallTermination(n_max_evals=limit) if limit is not None:
-            return limit / pop_size
+            return limit / (pop_size or 1)
         case DefaultTermination(criteria=parts) | TerminateIfAny(criteria=parts):
             return min((_limit(part, pop_size) for part in parts), default=math.inf)
         case TerminationCollection(terminations=parts):

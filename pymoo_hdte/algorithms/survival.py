@@ -3,16 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.algorithms.dominance import constrained_ranks
+from pymoo_hdte.algorithms.hypervolume import most_hypervolume
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.spread import most_spread
+from pymoo_hdte.checks import InvalidInput
 
 Truncation = Callable[[NDArray[np.float64], int], NDArray[np.int_]]
-"""Takes objectives (n, m) and a size, and returns which rows stay."""
+"""Takes mutually non-dominated objectives (n, m) and a size, and returns which rows stay."""
+
+Quality = Literal["spread", "hypervolume"] | Truncation
+
+_NAMED: dict[str, Truncation] = {"spread": most_spread, "hypervolume": most_hypervolume}
+
+
+def truncation_of(quality: Quality) -> Truncation:
+    """Return the truncation of a quality's name, or a truncation as it is.
+
+    Raises
+    ------
+    InvalidInput
+        If the name is not known.
+    """
+    if callable(quality):
+        return quality
+    if quality not in _NAMED:
+        raise InvalidInput("quality", quality, f"{', '.join(_NAMED)} or a callable")
+    return _NAMED[quality]
 
 
 def survivors(points: Points, size: int, truncation: Truncation = most_spread) -> NDArray[np.int_]:
@@ -21,6 +44,7 @@ def survivors(points: Points, size: int, truncation: Truncation = most_spread) -
     Feasible points come before infeasible ones, these by violation. A point whose objectives and
     violation equal an earlier one's comes after all others, so that no front fills with copies.
     """
+    size = min(size, len(points))
     ranks = constrained_ranks(points)
     copies = _copies(points)
     ranks[copies] += ranks.max()
@@ -33,6 +57,27 @@ def survivors(points: Points, size: int, truncation: Truncation = most_spread) -
     spread = last <= ranks[~copies].max() and points.violation[front[0]] == 0.0
     chosen = truncation(points.F[front], room) if spread else np.arange(room)
     return np.sort(np.concatenate([safe, front[chosen]]))
+
+
+def guests(points: Points, size: int) -> NDArray[np.int_]:
+    """Return at most ``size`` infeasible rows, ascending: the best in objectives and violation.
+
+    Violation counts as a further objective, so that points stay that cross an infeasible region, or
+    that come from different sides as long as nothing is feasible (H. K. Singh, A. Isaacs, T. Ray,
+    W. Smith, "Infeasibility driven evolutionary algorithm (IDEA) for engineering design
+    optimization", AI 2008: Advances in Artificial Intelligence, 104-115).
+    """
+    rows = np.flatnonzero((points.violation > 0.0) & np.isfinite(points.violation))
+    if not len(rows) or size < 1:
+        return rows[:0]
+    keys = np.column_stack([points.F[rows], points.violation[rows]])
+    free = Points(points.X[rows], keys, np.zeros(len(rows)))
+    return rows[survivors(free, min(size, len(rows)))]
+
+
+def tolerant(points: Points, level: float) -> Points:
+    """Return the points with violations up to a level counted as none."""
+    return replace(points, violation=np.where(points.violation <= level, 0.0, points.violation))
 
 
 def _copies(points: Points) -> NDArray[np.bool_]:

@@ -10,12 +10,13 @@ from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from swarm_problems import Parabolas, assert_clean_front, digest, run
 
-from pymoo_hdte.algorithms import AMPMOPSO, MOPSO, ElitistSwarm
+from pymoo_hdte.algorithms import AMPMOPSO, MOPSO, CompactSwarm, ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
 
 ELITIST = {"pop_size": 20}
 SMALL = {"pop_size": 20, "archive_size": 10}
 SWARMS = {
+    "CompactSwarm": lambda: CompactSwarm(20, n_result=20),
     "ElitistSwarm": lambda: ElitistSwarm(**ELITIST),
     "AMPMOPSO": lambda: AMPMOPSO(**SMALL),
     "MOPSO": lambda: MOPSO(**SMALL),

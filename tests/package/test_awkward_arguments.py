@@ -8,7 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from virtual_rig_cases import BELIEVED, RIG
 
-from pymoo_hdte.algorithms import AMOPSO, AMPMOPSO, MOPSO, MPMOPSO, ElitistSwarm
+from pymoo_hdte.algorithms import (
+    AMOPSO,
+    AMPMOPSO,
+    MOPSO,
+    MPMOPSO,
+    CompactSwarm,
+    ElitistSwarm,
+)
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.decision import WeightedUtopia
 from pymoo_hdte.discrepancy import BelievedDrive, Rig, RunningRecord, TorsionRecord
@@ -78,7 +85,8 @@ VALID = {
         kind.__name__: (kind, {"pop_size": 10, "archive_size": 10})
         for kind in (MOPSO, AMOPSO, MPMOPSO, AMPMOPSO)
     },
-    "ElitistSwarm": (ElitistSwarm, {"pop_size": 10}),
+    "CompactSwarm": (CompactSwarm, {"pop_size": 10, "n_result": 20, "n_archive": 30}),
+    "ElitistSwarm": (ElitistSwarm, {"pop_size": 10, "n_offsprings": 5}),
     "RobustDTE": (
         RobustDTE,
         {"order": 1, "moments": "exact", "n_samples": 10, "sample_seed": 1, "tolerance": 0.05}

@@ -1,0 +1,182 @@
+"""The swarm for few evaluations: small, beside an archive of all that it has found."""
+
+from __future__ import annotations
+
+import warnings
+from copy import copy
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.population import Population
+from pymoo.core.result import Result
+from pymoo.core.sampling import Sampling
+
+from pymoo_hdte.algorithms.archive import FrontArchive
+from pymoo_hdte.algorithms.elitist import ElitistSwarm
+from pymoo_hdte.algorithms.horizon import evaluation_limit
+from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
+from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.spread import most_spread
+from pymoo_hdte.algorithms.survival import Quality, guests, survivors, tolerant
+from pymoo_hdte.checks import whole_number
+
+SMALLEST, LARGEST = 10, 100
+"""Particles of a swarm whose size follows from the budget."""
+_AT_ONCE = 10
+"""Generations after which what they found enters the archive of all."""
+
+
+def size_for(evaluations: float) -> int:
+    """Return half the square root of a number of evaluations, within 10 and 100 particles.
+
+    Particles and generations then grow alike: 11 particles for 500 evaluations, 22 for 2,000, 50
+    for 10,000 and 79 for 25,000.
+    """
+    return int(np.clip(np.sqrt(min(evaluations, 1e9)) / 2.0, SMALLEST, LARGEST).round())
+
+
+class CompactSwarm(ElitistSwarm):
+    """An `ElitistSwarm` whose size follows from the budget, and whose result does not.
+
+    A small swarm comes further in few evaluations than a large one. What it finds is kept in an
+    archive, from which the result is chosen. Moves, survival and mutation are those of
+    `ElitistSwarm`; added are a move among neighbours, `NeighbourDifference`, for variables that
+    depend on each other, and infeasible particles that stay beside the feasible ones.
+
+    Parameters
+    ----------
+    pop_size : int, optional
+        Number of particles, at least 2. By default half the square root of the number of
+        evaluations that the termination allows, within 10 and 100; 100 if it names none, and as
+        many as ``sampling`` has where that is an array or a Population.
+    n_result : int
+        Largest number of solutions in the result, at least 1.
+    n_archive : int
+        Largest number of solutions that `archive_all` remembers, at least ``n_result``; a thousand
+        cost some tenths of a millisecond a generation.
+    quality : "spread", "hypervolume" or callable
+        As of `ElitistSwarm`, for the swarm and for the result.
+    sampling, moves, **kwargs
+        As of `ElitistSwarm`; by default the three moves there and `NeighbourDifference`.
+
+    Raises
+    ------
+    InvalidInput
+        As `ElitistSwarm`, and for sizes that are not allowed.
+    TypeError
+        For an argument that does not exist.
+
+    Warns
+    -----
+    RuntimeWarning
+        If no solution could be judged because no objective was finite; the result is empty then.
+
+    Notes
+    -----
+    - a fifth of the places of a swarm goes to infeasible particles, as long as there are any: the
+      best in objectives and violation together (Singh, Isaacs, Ray, Smith 2008), who may cross a
+      gap between feasible regions;
+    - as long as nothing is feasible, the less infeasible half of the swarm leads;
+    - for the others, violations up to 0.9 of the swarm's median count as none, which shrinks to
+      nothing as the swarm follows: an epsilon level (Takahama, Sakai 2006) without a schedule, for
+      regions as thin as equality constraints make them. The result is feasible as pymoo defines it,
+      with equalities met to 1e-4;
+    - the archive knows what was evaluated: a callback that changes the problem has to evaluate the
+      individuals of `archive_all` again.
+    """
+
+    GUESTS = 0.2
+    """Share of the swarm's places for infeasible particles."""
+    TOLERATED = 0.9
+    """Share of the swarm's median violation that counts as none: it shrinks along with it."""
+
+    def __init__(
+        self,
+        pop_size: int | None = None,
+        *,
+        n_result: int = 100,
+        n_archive: int = 1000,
+        quality: Quality = "hypervolume",
+        sampling: Sampling | NDArray | Population | None = None,
+        moves: tuple[Move, ...] | None = None,
+        **kwargs: Any,
+    ) -> None:
+        if pop_size is None and isinstance(sampling, np.ndarray):
+            pop_size = len(sampling)
+        if moves is None:
+            moves = (Attraction(), Exchange(), Difference(), NeighbourDifference())
+        size = LARGEST if pop_size is None else pop_size
+        super().__init__(size, sampling=sampling, moves=moves, quality=quality, **kwargs)
+        self._by_budget = pop_size is None
+        self.n_result = whole_number("n_result", n_result, at_least=1)
+        self.n_archive = whole_number("n_archive", n_archive, at_least=self.n_result)
+
+    def _plan(self) -> None:
+        # A running swarm goes on as it is when it is given more evaluations.
+        if self.is_initialized:
+            return
+        if self._by_budget:
+            self.pop_size = size_for(evaluation_limit(self.termination))
+        # Thinning out a thousand takes longer than a generation: a quarter at once makes it rare.
+        self._found = FrontArchive(self.n_archive, most_spread, left=1 + 3 * self.n_archive // 4)
+        self._offered = FrontArchive(self.n_result, self._truncation)
+        self._waiting: list[Population] = []
+
+    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
+        super()._initialize_advance(infills, **kwargs)
+        self._remember(self.pop)
+
+    def _remember(self, population: Population) -> None:
+        self._offered.update(population, self._points)
+        self._waiting.append(population)
+        if len(self._waiting) == _AT_ONCE:
+            self._found.update(self._not_yet_found(), self._points)
+            self._waiting = []
+
+    def _not_yet_found(self) -> Population:
+        return Population.merge(Population.empty(), Population.empty(), *self._waiting)
+
+    def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
+        former = self.pop
+        super()._advance(infills, **kwargs)
+        # Callbacks may have put in individuals that nobody asked for.
+        self._remember(Population.merge(former, infills))
+
+    def _front(self, swarm: Points) -> Points:
+        if np.any(swarm.violation == 0.0):
+            return super()._front(tolerant(swarm, self._level(swarm)))
+        judged = swarm[np.flatnonzero(np.isfinite(swarm.violation))]
+        return judged[np.argsort(judged.violation, kind="stable")[: max(1, len(judged) // 2)]]
+
+    def _survivors(self, points: Points) -> NDArray[np.int_]:
+        points = tolerant(points, self._level(points[np.arange(len(points) - len(self.chosen))]))
+        invited = guests(points, int(self.GUESTS * self.pop_size))
+        others = np.setdiff1d(np.arange(len(points)), invited)
+        kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
+        return np.sort(np.concatenate([invited, others[kept]]))
+
+    def _level(self, swarm: Points) -> float:
+        """Return the violation that is tolerated: none once half of the swarm is feasible."""
+        level = self.TOLERATED * float(np.median(swarm.violation))
+        return level if np.isfinite(level) else 0.0
+
+    def archive_all(self) -> Population:
+        """Return all non-dominated feasible solutions found, at most ``n_archive``, thinned out."""
+        found = copy(self._found)
+        found.update(self._not_yet_found(), self._points)
+        return found.members.copy()
+
+    def _set_optimum(self) -> None:
+        if len(self._offered):
+            self.opt = self._offered.members.copy()
+        else:
+            super()._set_optimum()
+
+    def result(self) -> Result:
+        """Return the result, empty if nothing could be judged."""
+        result = super().result()
+        if self.opt is not None and not np.isfinite(self._points(self.opt).violation).any():
+            warnings.warn("no objective was finite: the result is empty", RuntimeWarning, 2)
+            result.opt = result.X = result.F = result.CV = result.G = result.H = None
+        return result

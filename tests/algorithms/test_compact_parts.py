@@ -1,0 +1,167 @@
+"""Parts of the compact swarm: neighbours, guests, archive, size."""
+
+import numpy as np
+import pytest
+from moocore import is_nondominated
+from pymoo.core.population import Population
+from pymoo.core.termination import NoTermination
+from pymoo.termination import get_termination
+from pymoo.termination.default import DefaultMultiObjectiveTermination
+from scipy.stats import kstest, ortho_group
+
+from pymoo_hdte.algorithms.archive import FrontArchive
+from pymoo_hdte.algorithms.base import particles_at
+from pymoo_hdte.algorithms.compact import size_for
+from pymoo_hdte.algorithms.horizon import evaluation_limit
+from pymoo_hdte.algorithms.moves import NeighbourDifference, nearest_in_objectives
+from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.spread import most_spread
+from pymoo_hdte.algorithms.survival import guests, tolerant
+
+D = 5
+
+
+# --- move among neighbours ------------------------------------------------------------------------
+
+
+def test_the_move_among_neighbours_turns_with_the_coordinates(rng):
+    X, around = rng.random((40, D)), rng.random((40, 12, D))
+    rotation = ortho_group.rvs(D, random_state=np.random.default_rng(3))
+    move = NeighbourDifference()
+    plain = move(X, X, around, np.random.default_rng(7)) @ rotation
+    turned = move(X @ rotation, X @ rotation, around @ rotation, np.random.default_rng(7))
+    np.testing.assert_allclose(plain, turned, atol=1e-12)
+
+
+def test_the_move_among_neighbours_stays_in_the_flat_they_span(rng):
+    """Particles and neighbours on a plane through space: so do the steps."""
+    plane = rng.standard_normal((2, D))
+    X, around = rng.random((50, 2)) @ plane, rng.random((50, 12, 2)) @ plane
+    steps = NeighbourDifference()(X, X, around, rng)
+    assert np.linalg.matrix_rank(np.vstack([plane, steps])) == 2
+    # Neighbours in one place: only the pull is left, up to a whole step.
+    there = np.ones((2000, 12, D))
+    share = NeighbourDifference()(np.zeros((2000, D)), X, there, rng)
+    np.testing.assert_array_equal(share, np.broadcast_to(share[:, :1], share.shape))
+    assert kstest(share[:, 0], "uniform").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("n_obj", [2, 3, 5])
+def test_neighbours_are_the_nearest_in_scaled_objectives(rng, n_obj):
+    F = rng.random((30, n_obj)) * 10.0 ** np.arange(n_obj)
+    near = nearest_in_objectives(F, 12)
+    scaled = (F - F.min(axis=0)) / np.ptp(F, axis=0)
+    distance = np.linalg.norm(scaled[:, np.newaxis] - scaled, axis=2)
+    expected = np.argsort(distance, axis=1)[:, 1:13]
+    np.testing.assert_array_equal(np.sort(near), np.sort(expected))
+    assert nearest_in_objectives(F[:4], 12).shape == (4, 3)
+
+
+@pytest.mark.parametrize("lost", [np.nan, np.inf])
+def test_objectives_that_are_not_finite_have_neighbours_like_themselves(rng, lost):
+    F = rng.random((20, 2))
+    F[:5, 1] = lost
+    near = nearest_in_objectives(F, 4)
+    assert np.all(np.sort(near[:5]) < 5)
+    assert np.all(near[5:] >= 5)
+    assert nearest_in_objectives(np.full((6, 2), lost), 3).shape == (6, 3)
+
+
+# --- guests ---------------------------------------------------------------------------------------
+
+
+def points(F, violation):
+    F = np.asarray(F, dtype=float)
+    return Points(np.zeros((len(F), 1)), F, np.asarray(violation, dtype=float))
+
+
+def test_guests_are_infeasible_and_best_in_objectives_and_violation():
+    swarm = points([[0, 0], [1, 1], [2, 2], [0, 3], [3, 3], [9, 9]], [5.0, 2.0, 1.0, 2.0, 2.0, 0.0])
+    # The fifth is worse than the third in everything; the last one is feasible.
+    np.testing.assert_array_equal(guests(swarm, 4), [0, 1, 2, 3])
+    np.testing.assert_array_equal(guests(swarm, 9), [0, 1, 2, 3, 4])
+    assert len(guests(swarm, 0)) == 0
+
+
+def test_whoever_cannot_be_judged_is_no_guest():
+    swarm = points([[0, 0], [1, 1], [np.nan, 0]], [np.inf, 1.0, np.inf])
+    np.testing.assert_array_equal(guests(swarm, 3), [1])
+    assert len(guests(points([[0, 0]], [np.inf]), 1)) == 0
+
+
+def test_small_violations_may_be_tolerated():
+    swarm = points(np.zeros((4, 2)), [0.0, 1.0, 2.0, np.inf])
+    np.testing.assert_array_equal(tolerant(swarm, 1.0).violation, [0.0, 0.0, 2.0, np.inf])
+    np.testing.assert_array_equal(swarm.violation, [0.0, 1.0, 2.0, np.inf])
+
+
+# --- archive --------------------------------------------------------------------------------------
+
+
+def evaluated(F):
+    population = particles_at(np.zeros((len(F), 1)))
+    population.set("F", F)
+    return population
+
+
+def read(population):
+    return Points.of(population, False)
+
+
+def test_the_archive_has_the_front_of_all_it_was_given(rng):
+    archive, everything = FrontArchive(1000, most_spread), []
+    for _ in range(12):
+        F = rng.random((30, 2))
+        F[3] = F[4]
+        everything.append(F)
+        archive.update(evaluated(F), read)
+    everything = np.concatenate(everything)
+    np.testing.assert_array_equal(archive.members.get("F"), everything[is_nondominated(everything)])
+
+
+def test_the_archive_is_bounded_and_thinned_out_evenly():
+    archive = FrontArchive(40, most_spread, left=30)
+    line = np.random.default_rng(2).random(2000)
+    for some in line.reshape(100, 20):
+        archive.update(evaluated(np.column_stack([some, 1.0 - some])), read)
+        assert len(archive) <= 40
+    kept = np.sort(archive.members.get("F")[:, 0])
+    assert kept[0] == line.min()
+    assert kept[-1] == line.max()
+    assert np.diff(kept).max() < 0.1
+
+
+def test_the_archive_forgets_what_is_no_longer_feasible():
+    """As constraint handling that grows stricter needs."""
+    archive = FrontArchive(10, most_spread)
+    archive.update(evaluated(np.array([[0.0, 1.0], [1.0, 0.0]])), read)
+    allowed = {"least": 0.0}
+
+    def stricter(population):
+        F = population.get("F")
+        return points(F, np.where(F[:, 0] < allowed["least"], 1.0, 0.0))
+
+    allowed["least"] = 0.5
+    archive.update(Population.empty(), stricter)
+    np.testing.assert_array_equal(archive.members.get("F"), [[1.0, 0.0]])
+
+
+# --- size -----------------------------------------------------------------------------------------
+
+
+def test_the_swarm_grows_with_the_square_root_of_the_budget():
+    assert [size_for(n) for n in (100, 500, 2_000, 10_000, 25_000)] == [10, 11, 22, 50, 79]
+    assert size_for(1e6) == size_for(np.inf) == 100
+
+
+@pytest.mark.parametrize(
+    ("termination", "limit"),
+    [
+        (get_termination("n_eval", 700), 700),
+        (get_termination("n_gen", 50), np.inf),
+        (DefaultMultiObjectiveTermination(n_max_evals=900), 900),
+        (NoTermination(), np.inf),
+    ],
+)
+def test_the_budget_is_what_the_termination_tells_in_evaluations(termination, limit):
+    assert evaluation_limit(termination) == limit

@@ -1,0 +1,233 @@
+"""The compact swarm as a pymoo algorithm: result, archive, constraints, habits of pymoo."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from moocore import is_nondominated
+from pymoo.core.problem import Problem
+from pymoo.core.variable import Integer, Real
+from pymoo.indicators.hv import HV
+from pymoo.indicators.igd_plus import IGDPlus
+from pymoo.operators.repair.rounding import RoundingRepair
+from pymoo.optimize import minimize
+from pymoo.problems import get_problem
+from swarm_problems import Cliff, Parabolas, Unreachable, assert_clean_front, digest
+
+from experiments.contest.moved_zdt import MovedZDT
+from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
+from pymoo_hdte.checks import InvalidInput
+
+
+def run(problem, n_eval, seed=1, make=CompactSwarm, **kwargs):
+    problem = get_problem(problem) if isinstance(problem, str) else problem
+    return minimize(problem, make(**kwargs), ("n_eval", n_eval), seed=seed)
+
+
+# --- result and archive ---------------------------------------------------------------------------
+
+
+def test_few_evaluations_are_spent_better_than_by_a_large_swarm():
+    problem = MovedZDT("zdt1", rotated=True, seed=1)
+    distance = IGDPlus(problem.pareto_front(1000))
+    ours, theirs = (
+        [distance(run(problem, 2000, seed, make).F) for seed in range(3)]
+        for make in (CompactSwarm, ElitistSwarm)
+    )
+    assert np.mean(ours) < 0.9 * np.mean(theirs)
+
+
+@pytest.mark.parametrize("name", ["zdt1", "dtlz2", "tnk"])
+def test_the_result_comes_from_all_that_was_found(name):
+    result = run(name, 3000)
+    swarm, everything = result.algorithm, result.algorithm.archive_all()
+    assert len(swarm.pop) == swarm.pop_size == 27
+    assert len(result.F) == min(100, len(everything))
+    assert_clean_front(result)
+    F = everything.get("F")
+    assert is_nondominated(F).all()
+    # What is left of the volume of all: a hundred of several hundred lose little.
+    scale = np.ptp(F, axis=0)
+    volume = HV(np.full(F.shape[1], 1.1))
+    of_all = volume((F - F.min(axis=0)) / scale)
+    assert volume((result.F - F.min(axis=0)) / scale) > (0.95 if F.shape[1] == 3 else 0.99) * of_all
+
+
+def test_the_archive_has_every_front_solution_that_was_evaluated():
+    problem, seen = Parabolas(), []
+    swarm = CompactSwarm().setup(problem, termination=("n_eval", 600), seed=2)
+    while swarm.has_next():
+        infills = swarm.ask()
+        swarm.evaluator.eval(problem, infills)
+        seen.append(infills.get("F"))
+        swarm.tell(infills=infills)
+        front = np.concatenate(seen)
+        front = front[is_nondominated(front)]
+        found = swarm.archive_all().get("F")
+        assert sorted(map(tuple, found)) == sorted(map(tuple, front))
+    assert swarm.archive is None
+
+
+@pytest.mark.parametrize("n_result", [1, 15, 300])
+def test_the_size_of_the_result_is_the_user_s(n_result):
+    assert len(run(Parabolas(), 1500, n_result=n_result).F) == n_result
+
+
+def test_quality_decides_what_is_offered():
+    problem = get_problem("zdt1")
+    volume = HV(np.array([1.1, 1.1]))
+    found = {
+        quality: run(problem, 3000, quality=quality, n_result=20).F
+        for quality in ("spread", "hypervolume")
+    }
+    assert volume(found["hypervolume"]) > volume(found["spread"])
+
+
+@pytest.mark.parametrize(
+    ("termination", "kwargs", "size"),
+    [
+        (("n_eval", 2000), {}, 22),
+        (("n_eval", 2000), {"pop_size": 40}, 40),
+        (("n_gen", 4), {}, 100),
+        (("n_gen", 4), {"sampling": np.zeros((7, 3))}, 7),
+    ],
+)
+def test_the_size_of_the_swarm_follows_from_the_budget(termination, kwargs, size):
+    swarm = CompactSwarm(**kwargs).setup(Parabolas(), termination=termination, seed=1)
+    swarm.next()
+    assert len(swarm.pop) == swarm.pop_size == size
+
+
+# --- constraints ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["mw9", "mw12", pytest.param("mw1", marks=pytest.mark.nightly)])
+def test_gaps_between_feasible_regions_are_crossed(name):
+    """Where one leader and nobody infeasible left a part of the front, or all of it, unfound."""
+    problem = get_problem(name)
+    volume = HV(np.array([1.2, 1.2]))
+    n_eval = 10_000 if name == "mw1" else 6000
+    ours, theirs = (
+        [run(problem, n_eval, seed, make) for seed in (0, 1)]
+        for make in (CompactSwarm, ElitistSwarm)
+    )
+    reached = [
+        np.mean([0.0 if one.F is None else volume(one.F) for one in results])
+        for results in (ours, theirs)
+    ]
+    assert reached[0] > 1.2 * reached[1]
+
+
+class OnASphere(Parabolas):
+    """One equality constraint, which pymoo counts as met on a shell 1e-4 thin."""
+
+    def __init__(self):
+        super().__init__(n_var=10, n_eq_constr=1)
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        out["F"] = np.column_stack([1.0 + X[:, 0], ((X - 1.0) ** 2).sum(axis=1) - 4.0])
+        out["H"] = (X**2).sum(axis=1, keepdims=True) - 1.0
+
+
+def test_an_equality_constraint_is_met_and_followed():
+    volume = HV(np.array([1.5, 12.0]))
+    reached = {}
+    for make in (CompactSwarm, ElitistSwarm):
+        results = [run(OnASphere(), 4000, seed, make) for seed in range(3)]
+        assert all(np.abs(result.H).max() <= 1e-4 for result in results)
+        reached[make] = np.mean([volume(result.F) for result in results])
+    assert reached[CompactSwarm] > reached[ElitistSwarm]
+
+
+def test_an_infeasible_problem_reports_like_pymoo():
+    result = run(Unreachable(), 2000)
+    assert result.F is None
+    assert len(result.algorithm.archive_all()) == 0
+    np.testing.assert_allclose(result.algorithm.opt[0].X, -1.0, atol=0.05)
+
+
+# --- habits of pymoo ------------------------------------------------------------------------------
+
+
+class Lattice(Problem):
+    """Integers; the best compromises lie between (3, 7) and (6, 2)."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**{"n_var": 2, "n_obj": 2, "xl": 0, "xu": 20, "vtype": int, **kwargs})
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        assert np.issubdtype(X.dtype, np.integer)
+        distances = [((X - corner) ** 2).sum(axis=1) for corner in ([3, 7], [6, 2])]
+        out["F"] = np.column_stack(distances)
+
+
+@pytest.mark.parametrize("make", [CompactSwarm, ElitistSwarm])
+def test_integers_by_a_repair(make):
+    problem = Lattice()
+    grid = np.array(np.meshgrid(np.arange(21), np.arange(21))).reshape(2, -1).T
+    F = problem.evaluate(grid)
+    front = F[is_nondominated(F)]
+    result = run(problem, 1000, make=make, repair=RoundingRepair())
+    np.testing.assert_array_equal(np.unique(result.F, axis=0), np.unique(front, axis=0))
+    with pytest.raises(InvalidInput, match="RoundingRepair"):
+        run(problem, 100, make=make)
+
+
+def test_mixed_variables_are_refused_with_a_word_on_what_is_possible():
+    class Mixed(Problem):
+        def __init__(self):
+            super().__init__(vars={"a": Integer(bounds=(0, 3)), "b": Real(bounds=(0, 1))}, n_obj=2)
+
+    with pytest.raises(InvalidInput, match="mixed"):
+        run(Mixed(), 100, repair=RoundingRepair())
+
+
+@pytest.mark.parametrize("make", [CompactSwarm, ElitistSwarm])
+@pytest.mark.parametrize("n_offsprings", [1, 7, 45])
+def test_any_number_of_offspring(make, n_offsprings):
+    problem = Parabolas()
+    swarm = make(20, n_offsprings=n_offsprings)
+    result = minimize(problem, swarm, ("n_eval", 400), seed=1)
+    assert problem.n_rows == result.algorithm.evaluator.n_eval
+    assert 400 <= problem.n_rows < 400 + n_offsprings
+    assert len(result.pop) == 20
+
+
+def test_a_problem_without_any_number_ends_empty_and_with_a_warning():
+    with pytest.warns(RuntimeWarning, match="no objective was finite"):
+        result = run(Cliff(3.0), 200)
+    assert result.F is result.X is None
+
+
+def test_pymoo_s_default_termination_ends_a_small_swarm():
+    result = minimize(Parabolas(), CompactSwarm(15), seed=1)
+    assert 50 < result.algorithm.n_iter < 500
+
+
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing))])
+@pytest.mark.parametrize("problem", ["zdt1", "tnk"])
+def test_a_copy_taken_anywhere_goes_on_alike(problem, clone):
+    uninterrupted = run(problem, 600, seed=3)
+    swarm = CompactSwarm().setup(get_problem(problem), termination=("n_eval", 600), seed=3)
+    while swarm.has_next():
+        swarm = clone(swarm)
+        swarm.archive_all()
+        swarm.next()
+    assert digest(swarm.result()) == digest(uninterrupted)
+
+
+def test_more_evaluations_go_on_with_the_swarm_as_it_is():
+    first = run("zdt1", 500).algorithm
+    first.setup(first.problem, termination=("n_eval", 2000), seed=1)
+    first.run()
+    assert first.pop_size == 11
+    assert first.evaluator.n_eval >= 2000
+
+
+@pytest.mark.parametrize("argument", ["n_result", "n_archive", "n_offsprings"])
+def test_sizes_are_checked(argument):
+    with pytest.raises(InvalidInput, match=argument):
+        CompactSwarm(**{argument: 0})
+    with pytest.raises(InvalidInput, match="n_archive"):
+        CompactSwarm(n_result=100, n_archive=99)

@@ -1,0 +1,91 @@
+"""Truncation by hypervolume against its definition, and the choice of a quality."""
+
+import numpy as np
+import pytest
+from moocore import hypervolume, is_nondominated
+from pymoo.indicators.hv import HV
+from pymoo.indicators.igd import IGD
+from pymoo.problems import get_problem
+from swarm_problems import run
+
+from pymoo_hdte.algorithms import ElitistSwarm
+from pymoo_hdte.algorithms.hypervolume import most_hypervolume
+from pymoo_hdte.algorithms.spread import most_spread
+from pymoo_hdte.checks import InvalidInput
+
+
+def front(n, n_obj, seed, power=2.0):
+    F = np.random.default_rng(seed).dirichlet(np.ones(n_obj), size=n) ** (1.0 / power)
+    return F / np.linalg.norm(F, axis=1, keepdims=True)
+
+
+def by_definition(F, size, reference):
+    """Take out, one at a time, the row without which most hypervolume is left."""
+    scaled = (F - F.min(axis=0)) / np.ptp(F, axis=0)
+    rows = list(range(len(F)))
+    while len(rows) > size:
+        others = [rows[:i] + rows[i + 1 :] for i in range(len(rows))]
+        rows.pop(int(np.argmax([hypervolume(scaled[some], ref=reference) for some in others])))
+    return rows
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_row_that_adds_least_leaves(seed):
+    # So far a reference point never loses an end of two objectives.
+    F = front(30, 2, seed)
+    np.testing.assert_array_equal(most_hypervolume(F, 9), by_definition(F, 9, [1e3, 1e3]))
+    F = front(25, 3, seed)
+    np.testing.assert_array_equal(most_hypervolume(F, 9), by_definition(F, 9, [1.1, 1.1, 1.1]))
+
+
+@pytest.mark.parametrize("n_obj", [2, 3])
+def test_units_and_order_of_rows_do_not_matter_and_the_input_stays(n_obj):
+    F = front(60, n_obj, 5)
+    before = F.copy()
+    kept = most_hypervolume(F, 20)
+    np.testing.assert_array_equal(F, before)
+    # Powers of two, so that scaling back is exact.
+    np.testing.assert_array_equal(kept, most_hypervolume(F * 2.0 ** np.arange(9, 9 + n_obj), 20))
+    turned = most_hypervolume(F[::-1], 20)
+    np.testing.assert_array_equal(kept, np.sort(59 - turned))
+
+
+def test_of_equal_contributions_the_first_row_leaves():
+    line = np.array([0.5, 0.0, 1.0, 0.25, 0.75])
+    F = np.column_stack([line, 1.0 - line])
+    np.testing.assert_array_equal(most_hypervolume(F, 4), [1, 2, 3, 4])
+    np.testing.assert_array_equal(most_hypervolume(F, 2), [1, 2])
+
+
+@pytest.mark.parametrize("n_obj", [2, 3])
+def test_sets_without_a_range_and_small_sets_are_cut_too(n_obj):
+    assert len(most_hypervolume(np.ones((4, n_obj)), 1)) == 1
+    np.testing.assert_array_equal(most_hypervolume(front(5, n_obj, 0), 5), np.arange(5))
+
+
+def test_with_four_objectives_spread_decides():
+    F = front(40, 4, 1)
+    np.testing.assert_array_equal(most_hypervolume(F, 15), most_spread(F, 15))
+
+
+@pytest.mark.parametrize("n_obj", [2, 3])
+def test_each_quality_serves_its_indicator(n_obj):
+    """On a front with a knee, where the two differ."""
+    F = front(300, n_obj, 2, power=0.5)
+    F = F[is_nondominated(F)]
+    F = (F - F.min(axis=0)) / np.ptp(F, axis=0)
+    volume, distance = HV(np.full(n_obj, 1.1)), IGD(F)
+    spread, greedy = F[most_spread(F, 25)], F[most_hypervolume(F, 25)]
+    assert volume(greedy) > volume(spread)
+    assert distance(spread) < distance(greedy)
+
+
+def test_a_swarm_takes_a_quality_by_name_or_as_a_function():
+    problem = get_problem("zdt1")
+    volume = HV(np.array([1.1, 1.1]))
+    named = run(ElitistSwarm(20, quality="hypervolume"), problem, n_gen=150)
+    given = run(ElitistSwarm(20, quality=most_hypervolume), problem, n_gen=150)
+    np.testing.assert_array_equal(named.F, given.F)
+    assert volume(named.F) > volume(run(ElitistSwarm(20), problem, n_gen=150).F)
+    with pytest.raises(InvalidInput, match="quality"):
+        ElitistSwarm(quality="crowding")
