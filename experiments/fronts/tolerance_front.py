@@ -34,7 +34,7 @@ def find_tolerance_front(problem: RobustDTETolerance, rng: np.random.Generator) 
     designs = []
     for tolerance in tqdm(_even_tolerances(problem), desc="tolerances", leave=False):
         at_tolerance = problem.at_tolerance(float(tolerance))
-        chosen = _front_designs(at_tolerance, rng)
+        chosen = front_designs(at_tolerance, POINTS, rng)
         designs.append(np.column_stack([chosen, np.full(len(chosen), tolerance)]))
     together = np.vstack(designs)
     front = problem.evaluate(together)
@@ -82,8 +82,11 @@ def _even_tolerances(problem: RobustDTETolerance) -> NDArray[np.float64]:
     return np.round(even, _DECIMALS)
 
 
-def _front_designs(problem: Problem, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Return the designs of a front of two objectives, about even in arc length."""
+def front_designs(problem: Problem, n_points: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return the designs of a front of two objectives, about even in arc length.
+
+    Gaps are part of that length, so that their ends are known to one step.
+    """
     search = LevelSearch(problem, rng)
     first, last = search.lowest(0), search.lowest(1)
     coarse = [first]
@@ -93,7 +96,7 @@ def _front_designs(problem: Problem, rng: np.random.Generator) -> NDArray[np.flo
     values = np.array([solution.objectives for solution in coarse])
     steps = np.diff(values, axis=0) / np.ptp(values, axis=0)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.T))])
-    levels = np.interp(np.linspace(0.0, arc[-1], POINTS), arc, values[:, 0])
+    levels = np.interp(np.linspace(0.0, arc[-1], n_points), arc, values[:, 0])
     solutions = [first]
     for level in levels[1:-1]:
         right = int(np.searchsorted(values[:, 0], level))

@@ -36,6 +36,8 @@ _FLAT = 1e-4
 SLSQP no slope to follow; its ends are tried."""
 _GAP_END = 1e-7
 """To this share of the front's width the ends of a gap are located."""
+_INSIDE = 1e-8
+"""Constraints (allowed up to 0) are kept below 0 by this, since SLSQP ends a little beside them."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,8 @@ class FrontSearch:
     Parameters
     ----------
     problem : Problem
-        Two smooth objectives with ``dF``, box bounds, no constraints.
+        Two smooth objectives with ``dF``, box bounds; smooth inequality constraints of the size of
+        1 with ``dG``, if any.
     rng : numpy.random.Generator
         Scrambles the Sobol points that the starts come from.
     """
@@ -61,10 +64,20 @@ class FrontSearch:
         self._problem = problem
         self._width = problem.xu - problem.xl
         self._bounds = Bounds(np.zeros(problem.n_var), np.ones(problem.n_var))
-        self._cubes = qmc.Sobol(problem.n_var, rng=rng).random(_SAMPLES)
-        self._sample = problem.evaluate(self.designs(self._cubes))
+        cubes = qmc.Sobol(problem.n_var, rng=rng).random(_SAMPLES)
+        sample, limits = problem.evaluate(self.designs(cubes), return_values_of=["F", "G"])
+        allowed = np.all(limits <= 0.0, axis=1)
+        self._cubes, self._sample = cubes[allowed], sample[allowed]
         self._scale = np.ptp(self._sample, axis=0)
         self._last: tuple[bytes, tuple[NDArray[np.float64], ...]] = (b"", ())
+        self._limits = [
+            NonlinearConstraint(
+                lambda cube: self._evaluate(cube)[2],
+                -np.inf,
+                -_INSIDE,
+                jac=lambda cube: self._evaluate(cube)[3],
+            )
+        ][: problem.n_ieq_constr]
 
     def designs(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map points of the unit cube to designs."""
@@ -74,12 +87,19 @@ class FrontSearch:
         # SLSQP asks for value and slope of objective and constraint at the same point in turn.
         key = cube.tobytes()
         if key != self._last[0]:
-            values, slopes = self._problem.evaluate(
-                self.designs(cube), return_values_of=["F", "dF"]
+            asked = ["F", "dF", "G", "dG"] if self._limits else ["F", "dF"]
+            values, slopes, *limits = self._problem.evaluate(
+                self.designs(cube), return_values_of=asked
             )
-            scaled = values / self._scale, slopes * self._width / self._scale[:, None]
-            self._last = key, scaled
+            scaled = [values / self._scale, slopes * self._width / self._scale[:, None]]
+            if limits:
+                scaled += [limits[0], limits[1] * self._width]
+            self._last = key, tuple(scaled)
         return self._last[1]
+
+    def _excess(self, cube: NDArray[np.float64]) -> float:
+        """Return by how much the worst constraint is violated, 0 if none is."""
+        return max(0.0, float(np.max(self._evaluate(cube)[2]))) if self._limits else 0.0
 
     def lowest(self, objective: int) -> Solution:
         """Return the global minimum of one objective, ties broken by the other."""
@@ -88,10 +108,12 @@ class FrontSearch:
         order = np.argsort(self._sample[:, objective])[: 4 * _STARTS]
 
         def weighted(cube: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-            values, slopes = self._evaluate(cube)
+            values, slopes = self._evaluate(cube)[:2]
             return float(weights @ values), weights @ slopes
 
-        ends = [self._minimise(weighted, self._cubes[index], _FINE) for index in order]
+        starts = self._cubes[order]
+        ends = [self._minimise(weighted, start, _FINE, *self._limits) for start in starts]
+        ends = [end for end in ends if not self._excess(end)]
         return self._solution(min(ends, key=lambda cube: weighted(cube)[0]))
 
     def below(self, level: float, starts: list[NDArray[np.float64]]) -> Solution | None:
@@ -99,29 +121,31 @@ class FrontSearch:
 
         All starts are followed roughly, the better half of what they reach to the end.
         """
-        constraint = NonlinearConstraint(
+        on_f1 = NonlinearConstraint(
             lambda cube: self._evaluate(cube)[0][0],
             -np.inf,
             level / self._scale[0],
             jac=lambda cube: self._evaluate(cube)[1][0][None, :],
         )
+        limits = [on_f1, *self._limits]
 
         def second(cube: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-            values, slopes = self._evaluate(cube)
+            values, slopes = self._evaluate(cube)[:2]
             return float(values[1]), slopes[1]
 
         def merit(cube: NDArray[np.float64]) -> float:
             first, last = self._evaluate(cube)[0]
-            return float(last + 1e3 * max(first - level / self._scale[0], 0.0))
+            above = max(first - level / self._scale[0], 0.0)
+            return float(last + 1e3 * (above + self._excess(cube)))
 
-        rough = [self._minimise(second, start, _ROUGH, constraint) for start in starts]
+        rough = [self._minimise(second, start, _ROUGH, *limits) for start in starts]
         rough.sort(key=merit)
         kept = rough[: max(1, len(rough) // 2)]
-        ended = [self._minimise(second, x, _FINE, constraint) for x in kept]
+        ended = [self._minimise(second, x, _FINE, *limits) for x in kept]
         best = min(ended, key=merit)
         flat = [end for end in _ends(best) if abs(merit(end) - merit(best)) < _FLAT]
-        ended += [self._minimise(second, x, _FINE, constraint) for x in flat]
-        fine = [self._solution(x) for x in ended]
+        ended += [self._minimise(second, x, _FINE, *limits) for x in flat]
+        fine = [self._solution(x) for x in ended if not self._excess(x)]
         slack = level + _SLACK * self._scale[0]
         feasible = [solution for solution in fine if solution.objectives[0] <= slack]
         return min(feasible, key=lambda solution: solution.objectives[1], default=None)
@@ -157,7 +181,7 @@ class FrontSearch:
         return chosen
 
     def _solution(self, cube: NDArray[np.float64]) -> Solution:
-        return Solution(cube, self._problem.evaluate(self.designs(cube)))
+        return Solution(cube, self._problem.evaluate(self.designs(cube), return_values_of=["F"]))
 
 
 def _ends(cube: NDArray[np.float64]) -> list[NDArray[np.float64]]:

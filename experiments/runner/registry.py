@@ -244,6 +244,13 @@ EXPERIMENTS = (
         has_small_version=True,
     ),
     Experiment(
+        "cards",
+        "cards.experiment",
+        "Problem cards: what makes each robust problem hard, and which separate algorithms",
+        reads_outcome=True,
+        has_small_version=True,
+    ),
+    Experiment(
         "swarm_parts",
         "contest.swarm_parts",
         "What each part of the elitist swarm is worth",
