@@ -27,7 +27,7 @@ from experiments.cards.tables import (
 from experiments.comparison.figures import BLUE, GREY, grid
 from experiments.contest.peers_data import MEASURES
 from experiments.contest.problems import CARDS, problem_of
-from experiments.runner.result import Table
+from experiments.runner.result import Table, significant
 from pymoo_hdte.io.text_table import csv_text
 from pymoo_hdte.problems import RobustDTEGrades, RobustDTETolerance
 from pymoo_hdte.surrogate import TruncatedNormal
@@ -170,9 +170,10 @@ def _of(table: Table, name: str) -> Table:
 def _verdicts(numbers: Numbers, name: str) -> str:
     found = [one for one in separations(numbers.scores, numbers.hardness) if one.problem == name]
     sentences = [
-        f"At {one.evaluations:,} evaluations {one.reached} of {one.algorithms} reach the front, "
-        f"medians of IGD differ by up to {one.spread:.3g} times: it "
-        f"{'separates' if one.separates else 'does not separate'} algorithms."
+        f"At {one.evaluations:,} evaluations it "
+        f"{'separates' if one.separates else 'does not separate'} algorithms: the quartiles of "
+        f"their median IGD differ {significant(one.spread, 2)} times, one algorithm's seeds "
+        f"{significant(one.scatter, 2)} times; {one.reached} of {one.algorithms} reach the front."
         for one in found
     ]
     return " ".join(sentences)

@@ -8,16 +8,16 @@ import numpy as np
 from scipy.stats import kruskal
 
 from experiments.cards.hardness import Hardness
+from experiments.comparison.paired import SIGNIFICANT
 from experiments.comparison.ranks import costs_of
 from experiments.contest.peers_data import MEASURES, Scores
 
 RANDOM = "random search"
-SURE = 0.01
-"""Largest p-value of Kruskal and Wallis's test at which the algorithms differ."""
 REACHES = 2.0
 """A median IGD of at most so many times the floor reaches the front."""
-LEAST_SHARE = 0.25
-"""Of the algorithms, on either side: that reach the front, and that do not."""
+LEAST_SPREAD = 2.0
+"""Factor between the upper and the lower quartile of the algorithms' medians that matters to a
+user; the extremes do not count, as one algorithm fails everywhere."""
 
 
 class Separation(NamedTuple):
@@ -32,9 +32,9 @@ class Separation(NamedTuple):
     p : float
         Of Kruskal and Wallis's test that all runs are alike.
     spread : float
-        Factor between the medians of the worst and the best.
+        Factor between the upper and the lower quartile of the algorithms' medians.
     scatter : float
-        Factor between the worst and the best seed, of the median algorithm.
+        Factor between the worst and the best seed, of the median algorithm that has all finite.
     reached : int
         Algorithms whose median IGD is at most `REACHES` times the floor.
     """
@@ -49,9 +49,8 @@ class Separation(NamedTuple):
 
     @property
     def separates(self) -> bool:
-        """Whether they differ for sure, and a good share reaches the front while another fails."""
-        fewer = min(self.reached, self.algorithms - self.reached)
-        return self.p <= SURE and fewer >= LEAST_SHARE * self.algorithms
+        """Whether they differ for sure, and by as much as matters."""
+        return self.p <= SIGNIFICANT and self.spread >= LEAST_SPREAD
 
 
 def separations(scores: Scores, hardness: dict[str, Hardness]) -> list[Separation]:
@@ -72,14 +71,16 @@ def separations(scores: Scores, hardness: dict[str, Hardness]) -> list[Separatio
 def _separation(problem: str, budget: int, values: np.ndarray, floor: float) -> Separation:
     costs = costs_of(values, True, ("problems", "algorithms", "seeds"))[0]
     medians = np.median(costs, axis=1)
-    with np.errstate(invalid="ignore"):
-        scatter = float(np.median(costs.max(axis=1) / costs.min(axis=1)))
+    finite = costs[np.isfinite(costs).all(axis=1)]
+    scatter = float(np.median(finite.max(axis=1) / finite.min(axis=1))) if len(finite) else np.nan
+    # A quartile is one of the medians: between a finite one and an infinite one there is none.
+    low, high = np.quantile(medians, (0.25, 0.75), method="nearest")
     return Separation(
         problem,
         budget,
         len(costs),
         float(kruskal(*costs).pvalue),
-        float(medians.max() / medians.min()),
+        float(high / low) if np.isfinite(low) else np.nan,
         scatter,
         int(np.sum(medians <= REACHES * floor)),
     )

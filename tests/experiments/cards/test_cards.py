@@ -99,14 +99,16 @@ def test_merged_campaigns_keep_every_run_and_leave_the_rest_empty():
         ([FLOOR] * 8, False),
         ([FLOOR] * 4 + [10 * FLOOR] * 4, True),
         ([FLOOR] * 7 + [10 * FLOOR], False),
-        ([10 * FLOOR] * 4 + [100 * FLOOR] * 4, False),
+        ([FLOOR] * 4 + [1.5 * FLOOR] * 4, False),
+        ([FLOOR] * 4 + [np.inf] * 4, True),
     ],
 )
-def test_a_problem_separates_where_some_reach_the_front_and_others_do_not(medians, separates):
+def test_a_problem_separates_where_the_quartiles_of_the_algorithms_lie_apart(medians, separates):
     (found,) = separations(planted(medians), {"RobustToy": PLAIN})
     assert found.separates == separates
-    assert found.spread == pytest.approx(max(medians) / min(medians))
+    assert found.spread == pytest.approx(medians[5] / medians[2])
     assert found.scatter == pytest.approx(1.1 / 0.9)
+    assert found.reached == sum(median <= 2.0 * FLOOR for median in medians)
 
 
 @pytest.fixture(scope="module")
