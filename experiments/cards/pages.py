@@ -203,6 +203,8 @@ def _description(problem: Problem) -> str:
 def _scatter(problem: Problem) -> str:
     uncertainty = getattr(problem.moments, "uncertainty", None)
     inputs = getattr(problem, "inputs", getattr(uncertainty, "inputs", ()))
+    if not inputs:
+        return "As in `RobustDTE`, with the tolerance of the design in place of 5 %."
     names = _input_names(problem, len(inputs))
     rows = []
     for name, entry in zip(names, inputs, strict=True):
@@ -211,8 +213,6 @@ def _scatter(problem: Problem) -> str:
         else:
             law = f"uniform within ±{100 * entry.tolerance:g} % of the design"
         rows.append([name, law])
-    if not rows:
-        return "As in `RobustDTE`, with the tolerance of the design in place of 5 %."
     return _markdown(["input", "law (SI)"], rows)
 
 

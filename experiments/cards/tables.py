@@ -28,11 +28,11 @@ HARDNESS_NOTE = (
     f"floor is the IGD of {POINTS} points of the true front itself, spread evenly."
 )
 SEPARATION_NOTE = (
-    f"By IGD, {RANDOM} aside. Quartiles are those of the algorithms' medians; the seeds' scatter is "
-    "the worst by the best seed of the median algorithm. A problem separates algorithms at a "
+    f"By IGD, {RANDOM} aside. Quartiles are those of the algorithms' medians; the seeds' scatter "
+    "is the worst by the best seed of the median algorithm. A problem separates algorithms at a "
     f"budget if Kruskal and Wallis's test gives p of at most {SIGNIFICANT:g} and the upper "
-    f"quartile is at least {LEAST_SPREAD:g} times the lower. An algorithm reaches the front if its median IGD is "
-    f"at most {REACHES:g} times the floor."
+    f"quartile is at least {LEAST_SPREAD:g} times the lower. An algorithm reaches the front if its "
+    f"median IGD is at most {REACHES:g} times the floor."
 )
 
 
