@@ -31,6 +31,7 @@ from experiments.runner.result import Table, significant
 from pymoo_hdte.io.text_table import csv_text
 from pymoo_hdte.problems import RobustDTEGrades, RobustDTETolerance
 from pymoo_hdte.surrogate import TruncatedNormal
+from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 FORMULA = (
     r"f_1(u) = \mathrm{E}\,[y(\xi)], \qquad f_2(u) = \sqrt{\mathrm{Var}\,[y(\xi)]}, \qquad "
@@ -109,6 +110,7 @@ def page(numbers: Numbers, name: str) -> str:
             for kind, text in FURTHER.items()
             if isinstance(problem, kind)
         ),
+        *_limits(problem),
         _description(problem),
         "## What scatters",
         _scatter(problem),
@@ -200,6 +202,18 @@ def _description(problem: Problem) -> str:
     return f"```{{eval-rst}}\n{body}\n```"
 
 
+def _limits(problem: Problem) -> list[str]:
+    if not isinstance(problem, RobustDTEGrades):
+        return []
+    speed = problem.process_speed / REVOLUTION_PER_MINUTE
+    shares = ", ".join(f"{share:.3f}" for share in problem.cost_shares)
+    return [
+        f"The shares of the grades in the cost are w = {shares}; c = {problem.cost_limit:g} is its "
+        f"limit, Ω_p = {speed:.0f} r/min the process speed, m = {problem.margin:g} the margin, and "
+        "N the ratio."
+    ]
+
+
 def _scatter(problem: Problem) -> str:
     uncertainty = getattr(problem.moments, "uncertainty", None)
     inputs = getattr(problem, "inputs", getattr(uncertainty, "inputs", ()))
@@ -263,5 +277,5 @@ def _around(axis: Axes, front: NDArray[np.float64]) -> None:
 def _label(problem: Problem, place: int) -> str:
     name = problem.obj_names[place]
     unit = problem.units[name]
-    words = name.removesuffix(f"_{unit}").replace("_", " ")
+    words = name.removesuffix(f"_{unit}").replace("_", " ").replace("dte", "DTE")
     return words if unit == "1" else f"{words} [{unit}]"

@@ -69,7 +69,7 @@ def test_two_wells_are_two_optima_and_half_of_the_starts_reach_the_better():
 def test_the_toy_has_one_optimum_and_one_piece():
     found = hardness(RobustToy(), np.random.default_rng(1), starts=3)
     assert (found.optima, found.best_reached, found.pieces, found.feasible) == (1, 1.0, 1, 1.0)
-    # Means reach from 2 to 4, those of the front to 3: no design lies farther behind than its width.
+    # Means reach from 2 to 4, those of the front to 3: none lies farther behind than its width.
     assert 0.0 < found.near < found.wide == 1.0
     # Fifty points evenly along a straight front of length sqrt(2) would give sqrt(2) / 196.
     assert found.floor == pytest.approx(np.sqrt(2.0) / 196.0, rel=0.2)
