@@ -59,13 +59,13 @@ class RobustDTEGrades(StoredFront, RobustProblem):
     model, tolerance, box, conditions
         As in `RobustDTE`; the band holds for the grades too.
     grades : tuple of float, length 2
-        Smallest and largest grade, above 0.
+        Smallest and largest grade, dimensionless, above 0.
     cost_limit : float
-        Largest cost, between those of the coarsest and the finest grades.
+        Largest cost, dimensionless, between those of the coarsest and the finest grades.
     process_speed : float
         rad/s at the input, above 0.
     margin : float
-        Share of the excitation's frequency, above 0 and below 1.
+        Share of the excitation's frequency, dimensionless, above 0 and below 1.
 
     Attributes
     ----------
@@ -73,7 +73,13 @@ class RobustDTEGrades(StoredFront, RobustProblem):
         As in `RobustDTE`; grades are pure numbers, and ``nominal`` has none. The surrogate is of
         order 3 in K and J_in, 1 in B_in, and 2 in all others.
     cost_shares : ndarray, shape (n_grades,)
-        Share of the error sources that each grade stands for; they add up to 1.
+        Share of the error sources that each grade stands for, dimensionless; they add up to 1.
+    cost_limit, margin : float
+        As given, dimensionless.
+    process_speed : float
+        As given, rad/s.
+    n_ieq_constr : int
+        Number of constraints, 2: the cost, then the resonance.
 
     Raises
     ------
@@ -188,6 +194,7 @@ class RobustDTEGrades(StoredFront, RobustProblem):
         Parameters
         ----------
         designs : ndarray, shape (n, n_var)
+            SI.
 
         Returns
         -------
