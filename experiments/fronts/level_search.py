@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.fronts.true_front import FrontSearch, Solution
+from experiments.fronts.front_search import FrontSearch, Solution
 from pymoo_hdte.problems.reference import ReferenceFront
 
 _BESIDE = 1e-6

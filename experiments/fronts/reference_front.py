@@ -20,6 +20,7 @@ from tqdm import tqdm
 from experiments.comparison.figures import BLUE, grid
 from experiments.comparison.quality import GAP, TrueFront
 from experiments.fronts.agreement import disagreement
+from experiments.fronts.front_search import Solution
 from experiments.fronts.level_search import LevelSearch, without_local_optima
 from experiments.fronts.tolerance_front import (
     POINTS,
@@ -28,7 +29,7 @@ from experiments.fronts.tolerance_front import (
     front_designs,
     tolerance_disagreement,
 )
-from experiments.fronts.true_front import Solution, falling, find_true_front
+from experiments.fronts.true_front import falling, find_true_front
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Picture, Result, Table
 from experiments.runner.store import write_atomically

@@ -14,8 +14,9 @@ from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from tqdm import tqdm
 
 from experiments.fronts.agreement import disagreement
+from experiments.fronts.front_search import FrontSearch
 from experiments.fronts.level_search import LevelSearch, hand_over
-from experiments.fronts.true_front import FrontSearch, falling
+from experiments.fronts.true_front import falling
 from pymoo_hdte.problems import RobustDTETolerance
 from pymoo_hdte.problems.reference import ReferenceFront
 from pymoo_hdte.problems.robust_dte_tolerance import PAPERS_TOLERANCE
