@@ -16,6 +16,7 @@ version = release = pymoo_hdte.__version__
 
 extensions = [
     "mathml",
+    "problem_cards",
     "myst_parser",
     "sphinx.ext.autodoc",
     "numpydoc",

@@ -144,8 +144,10 @@ print(f"end of the front {front[:, 0].min():.4f} arcsec")
 #
 # ``robust_dte_family()`` names all members with a stored front. They differ in what makes a problem
 # hard: ``resonant`` has a front of two pieces at order 3, a duty cycle averages over speeds and
-# loads, and with a free tolerance there are three objectives. Their fronts are those of their
-# surrogates, but for that of the last: `RobustDTEDirect` has none and asks the drive model itself.
+# loads, with a free tolerance there are three objectives, and with grades of the error classes two
+# constraints. Their fronts are those of their surrogates, but for that of the last:
+# `RobustDTEDirect` has none and asks the drive model itself. Each has a card, which says what makes
+# it hard and how twelve algorithms do on it (``docs/cards``, made with the pages).
 
 for name, build in robust_dte_family().items():
     if "_order" not in name:

@@ -19,7 +19,7 @@ from pymoo.util.ref_dirs import get_reference_directions
 from scipy.optimize import minimize
 
 from experiments.comparison.quality import N_POINTS, even_curve
-from experiments.contest.problems import BENCHMARKS, problem_of
+from experiments.contest.problems import EVERY, problem_of
 from experiments.runner.committed import DATA
 
 _PARTITIONS = 99
@@ -161,7 +161,7 @@ def front_of(name: str) -> NDArray[np.float64]:
 
 
 def _front(name: str, problem: Problem) -> NDArray[np.float64]:
-    match BENCHMARKS[name].family, name:
+    match EVERY[name].family, name:
         case "DTLZ", _:
             return dtlz_front(int(name[-1]))
         case "WFG", _:
@@ -174,6 +174,6 @@ def _front(name: str, problem: Problem) -> NDArray[np.float64]:
             return osy_front(problem)
         case _, "WeldedBeam":
             return welded_beam_front()
-        case "RobustDTE" | "toy twin", _:
+        case "RobustDTE" | "constrained RobustDTE" | "toy twin", _:
             return problem.pareto_front()
     return even_curve(problem.pareto_front(10 * N_POINTS))

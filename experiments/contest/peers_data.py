@@ -19,7 +19,7 @@ from experiments.comparison.indicators import Indicators, IndicatorsAgainst
 from experiments.contest.benchmark_fronts import front_of
 from experiments.contest.contestants import EVERYONE
 from experiments.contest.job import EVALUATIONS, SPENT, ContestRun
-from experiments.contest.problems import BENCHMARKS
+from experiments.contest.problems import BENCHMARKS, EVERY
 from experiments.runner.campaign import Campaign, Run
 from experiments.runner.committed import committed_file, read_rows, table_with_origin
 from experiments.runner.registry import Context
@@ -74,7 +74,7 @@ class Scores:
 
     def rows(self, tuning: bool | None) -> NDArray[np.int_]:
         """Return the rows of the problems that may, or may not, be tuned on; all for None."""
-        kinds = [BENCHMARKS[name].tuning for name in self.problems]
+        kinds = [EVERY[name].tuning for name in self.problems]
         return np.array([i for i, kind in enumerate(kinds) if tuning is None or kind == tuning])
 
 
@@ -155,7 +155,7 @@ def contest_scores(
 
 def takes_part(algorithm: str, problem: str) -> bool:
     """Say whether an algorithm takes the problem at all."""
-    unconstrained = BENCHMARKS[problem].family != "constrained"
+    unconstrained = not EVERY[problem].family.startswith("constrained")
     return unconstrained or EVERYONE[algorithm].takes_constraints
 
 

@@ -42,8 +42,8 @@ class Benchmark:
 
 @cache
 def problem_of(name: str) -> Problem:
-    """Return the problem of that name, built once per process."""
-    return BENCHMARKS[name].make()
+    """Return the problem of that name, one of `EVERY`, built once per process."""
+    return EVERY[name].make()
 
 
 def _zdt() -> list[Benchmark]:
@@ -83,7 +83,8 @@ def _constrained(name: str) -> Benchmark:
 
 
 def _robust(member: str) -> Benchmark:
-    return Benchmark(f"RobustDTE-{member}", "RobustDTE", False, robust_dte_family()[member])
+    family = "constrained RobustDTE" if member.endswith("_grades") else "RobustDTE"
+    return Benchmark(f"RobustDTE-{member}", family, False, robust_dte_family()[member])
 
 
 BENCHMARKS = {
@@ -97,4 +98,12 @@ BENCHMARKS = {
         *map(_robust, ROBUST_MEMBERS),
     )
 }
-"""All problems by name."""
+"""All problems of the comparison by name."""
+
+CARDS = {
+    benchmark.name: benchmark
+    for benchmark in (BENCHMARKS["RobustToy"], *map(_robust, robust_dte_family()))
+}
+"""The problems of this package that have a card, by name."""
+
+EVERY = BENCHMARKS | CARDS

@@ -38,7 +38,7 @@ def _second_objective_at(
 ) -> NDArray[np.float64]:
     """Return the least f2 at these levels of f1, shape (n,), found from the designs of a front."""
     search = LevelSearch(problem, np.random.default_rng(0))
-    firsts = problem.evaluate(designs)[:, 0]
+    firsts = problem.evaluate(designs, return_values_of=["F"])[:, 0]
     cubes = (designs - problem.xl) / (problem.xu - problem.xl)
     values = np.full(len(levels), np.inf)
     for row, level in enumerate(levels):

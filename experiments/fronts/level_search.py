@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.fronts.true_front import FrontSearch, Solution
+from experiments.fronts.front_search import FrontSearch, Solution
 from pymoo_hdte.problems.reference import ReferenceFront
 
 _BESIDE = 1e-6
@@ -18,6 +18,8 @@ _BESIDE = 1e-6
 _FAR = 0.1
 """Distance of neighbours, as a share of the search space in some variable."""
 _IMPROVEMENT = 1e-10
+_ACTIVE = 1e-6
+"""A constraint closer than this to 0 holds a design."""
 
 
 class LevelSearch(FrontSearch):
@@ -72,17 +74,29 @@ def hand_over(search: LevelSearch, levels: NDArray[np.float64], solutions: list[
 def on_level(problem: Problem, design: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     """Move a design on to a level of f1, by one Newton step along its slope in the free part.
 
+    Active constraints keep their value to first order.
+
     SLSQP leaves it beside the level by some 1e-7 of the range of f1 over all designs. That is more
     than it seems: the front is far narrower than that range, and may be steep. A design well below
     its level, as in a gap of the front, stays where it is.
     """
-    values, slopes = problem.evaluate(design, return_values_of=["F", "dF"])
+    asked = ["F", "dF", "G", "dG"] if problem.n_ieq_constr else ["F", "dF"]
+    values, slopes, *limits = problem.evaluate(design, return_values_of=asked)
     width = problem.xu - problem.xl
     free = (design > problem.xl) & (design < problem.xu)
     slope = np.where(free, slopes[0] * width, 0.0)
+    rounding = 1e-20 * (slope @ slope)
+    if limits:
+        slope = _along(slope, np.where(free, limits[1] * width, 0.0)[limits[0] > -_ACTIVE])
     length = slope @ slope
     missing = level - values[0]
-    if length == 0.0 or missing > _BESIDE * abs(level):
+    if length <= rounding or missing > _BESIDE * abs(level):
         return design
     step = missing / length * slope
     return np.clip(design + step * width, problem.xl, problem.xu)
+
+
+def _along(slope: NDArray[np.float64], of_limits: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the part of a slope (n_var,) that leaves constraints of slopes (m, n_var) alone."""
+    weights, *_ = np.linalg.lstsq(of_limits.T, slope, rcond=None)
+    return slope - weights @ of_limits

@@ -14,8 +14,9 @@ from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 from tqdm import tqdm
 
 from experiments.fronts.agreement import disagreement
+from experiments.fronts.front_search import FrontSearch
 from experiments.fronts.level_search import LevelSearch, hand_over
-from experiments.fronts.true_front import FrontSearch, falling
+from experiments.fronts.true_front import falling
 from pymoo_hdte.problems import RobustDTETolerance
 from pymoo_hdte.problems.reference import ReferenceFront
 from pymoo_hdte.problems.robust_dte_tolerance import PAPERS_TOLERANCE
@@ -34,7 +35,7 @@ def find_tolerance_front(problem: RobustDTETolerance, rng: np.random.Generator) 
     designs = []
     for tolerance in tqdm(_even_tolerances(problem), desc="tolerances", leave=False):
         at_tolerance = problem.at_tolerance(float(tolerance))
-        chosen = _front_designs(at_tolerance, rng)
+        chosen = front_designs(at_tolerance, POINTS, rng)
         designs.append(np.column_stack([chosen, np.full(len(chosen), tolerance)]))
     together = np.vstack(designs)
     front = problem.evaluate(together)
@@ -82,8 +83,11 @@ def _even_tolerances(problem: RobustDTETolerance) -> NDArray[np.float64]:
     return np.round(even, _DECIMALS)
 
 
-def _front_designs(problem: Problem, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Return the designs of a front of two objectives, about even in arc length."""
+def front_designs(problem: Problem, n_points: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return the designs of a front of two objectives, about even in arc length.
+
+    Gaps are part of that length, so that their ends are known to one step.
+    """
     search = LevelSearch(problem, rng)
     first, last = search.lowest(0), search.lowest(1)
     coarse = [first]
@@ -93,7 +97,7 @@ def _front_designs(problem: Problem, rng: np.random.Generator) -> NDArray[np.flo
     values = np.array([solution.objectives for solution in coarse])
     steps = np.diff(values, axis=0) / np.ptp(values, axis=0)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*steps.T))])
-    levels = np.interp(np.linspace(0.0, arc[-1], POINTS), arc, values[:, 0])
+    levels = np.interp(np.linspace(0.0, arc[-1], n_points), arc, values[:, 0])
     solutions = [first]
     for level in levels[1:-1]:
         right = int(np.searchsorted(values[:, 0], level))

@@ -9,166 +9,22 @@ the pieces are filled evenly in arc length.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
-from scipy.optimize import Bounds, NonlinearConstraint, minimize
-from scipy.stats import qmc
 
-_SAMPLES = 2**16
-_STARTS = 8
+from experiments.fronts.front_search import FrontSearch, Solution
+
 _LEVELS = 100
-_ROUGH = {"ftol": 1e-6, "maxiter": 40}
-_FINE = {"ftol": 1e-12, "maxiter": 100}
 _IMPROVEMENT = 1e-9
 _GAP = 0.02
 """Neighbours farther apart than this, in normalised objectives, belong to different pieces."""
-_SLACK = 1e-7
-"""SLSQP may end this far above a level, in units of the sampled range of f1."""
 _SPACING = 0.005
 """Neighbours closer than this need no solution between them before the pieces are filled."""
-_FLAT = 1e-4
-"""A variable that moves the objectives less than this, end to end, in units of their range, leaves
-SLSQP no slope to follow; its ends are tried."""
 _GAP_END = 1e-7
 """To this share of the front's width the ends of a gap are located."""
-
-
-@dataclass(frozen=True)
-class Solution:
-    """A design in the unit cube and its objectives."""
-
-    cube: NDArray[np.float64]
-    objectives: NDArray[np.float64]
-
-
-class FrontSearch:
-    """Solves for g(e) and keeps what it needs to do so well.
-
-    Parameters
-    ----------
-    problem : Problem
-        Two smooth objectives with ``dF``, box bounds, no constraints.
-    rng : numpy.random.Generator
-        Scrambles the Sobol points that the starts come from.
-    """
-
-    def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
-        self._problem = problem
-        self._width = problem.xu - problem.xl
-        self._bounds = Bounds(np.zeros(problem.n_var), np.ones(problem.n_var))
-        self._cubes = qmc.Sobol(problem.n_var, rng=rng).random(_SAMPLES)
-        self._sample = problem.evaluate(self.designs(self._cubes))
-        self._scale = np.ptp(self._sample, axis=0)
-        self._last: tuple[bytes, tuple[NDArray[np.float64], ...]] = (b"", ())
-
-    def designs(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Map points of the unit cube to designs."""
-        return self._problem.xl + np.clip(cube, 0.0, 1.0) * self._width
-
-    def _evaluate(self, cube: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        # SLSQP asks for value and slope of objective and constraint at the same point in turn.
-        key = cube.tobytes()
-        if key != self._last[0]:
-            values, slopes = self._problem.evaluate(
-                self.designs(cube), return_values_of=["F", "dF"]
-            )
-            scaled = values / self._scale, slopes * self._width / self._scale[:, None]
-            self._last = key, scaled
-        return self._last[1]
-
-    def lowest(self, objective: int) -> Solution:
-        """Return the global minimum of one objective, ties broken by the other."""
-        weights = np.full(2, 1e-7)
-        weights[objective] = 1.0
-        order = np.argsort(self._sample[:, objective])[: 4 * _STARTS]
-
-        def weighted(cube: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-            values, slopes = self._evaluate(cube)
-            return float(weights @ values), weights @ slopes
-
-        ends = [self._minimise(weighted, self._cubes[index], _FINE) for index in order]
-        return self._solution(min(ends, key=lambda cube: weighted(cube)[0]))
-
-    def below(self, level: float, starts: list[NDArray[np.float64]]) -> Solution | None:
-        """Return the best solution with f1 <= level from these starts, or None if none got there.
-
-        All starts are followed roughly, the better half of what they reach to the end.
-        """
-        constraint = NonlinearConstraint(
-            lambda cube: self._evaluate(cube)[0][0],
-            -np.inf,
-            level / self._scale[0],
-            jac=lambda cube: self._evaluate(cube)[1][0][None, :],
-        )
-
-        def second(cube: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-            values, slopes = self._evaluate(cube)
-            return float(values[1]), slopes[1]
-
-        def merit(cube: NDArray[np.float64]) -> float:
-            first, last = self._evaluate(cube)[0]
-            return float(last + 1e3 * max(first - level / self._scale[0], 0.0))
-
-        rough = [self._minimise(second, start, _ROUGH, constraint) for start in starts]
-        rough.sort(key=merit)
-        kept = rough[: max(1, len(rough) // 2)]
-        ended = [self._minimise(second, x, _FINE, constraint) for x in kept]
-        best = min(ended, key=merit)
-        flat = [end for end in _ends(best) if abs(merit(end) - merit(best)) < _FLAT]
-        ended += [self._minimise(second, x, _FINE, constraint) for x in flat]
-        fine = [self._solution(x) for x in ended]
-        slack = level + _SLACK * self._scale[0]
-        feasible = [solution for solution in fine if solution.objectives[0] <= slack]
-        return min(feasible, key=lambda solution: solution.objectives[1], default=None)
-
-    def _minimise(
-        self,
-        function: Callable[[NDArray[np.float64]], tuple[float, NDArray[np.float64]]],
-        start: NDArray[np.float64],
-        options: dict[str, float],
-        *constraints: NonlinearConstraint,
-    ) -> NDArray[np.float64]:
-        result = minimize(
-            function,
-            start,
-            jac=True,
-            bounds=self._bounds,
-            constraints=constraints,
-            method="SLSQP",
-            options=options,
-        )
-        return np.clip(result.x, 0.0, 1.0)
-
-    def starts(self, level: float) -> list[NDArray[np.float64]]:
-        """Return sampled designs below the level with small f2, far apart from each other."""
-        order = np.argsort(np.where(self._sample[:, 0] <= level, self._sample[:, 1], np.inf))
-        chosen: list[NDArray[np.float64]] = []
-        for index in order[: 60 * _STARTS]:
-            cube = self._cubes[index]
-            if all(np.max(np.abs(cube - other)) > 0.15 for other in chosen):
-                chosen.append(cube)
-            if len(chosen) == _STARTS:
-                break
-        return chosen
-
-    def _solution(self, cube: NDArray[np.float64]) -> Solution:
-        return Solution(cube, self._problem.evaluate(self.designs(cube)))
-
-
-def _ends(cube: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Return copies of a design with one variable at either end of its range."""
-    copies = []
-    for variable in range(len(cube)):
-        for end in (0.0, 1.0):
-            moved = cube.copy()
-            moved[variable] = end
-            copies.append(moved)
-    return copies
 
 
 def find_true_front(

@@ -144,6 +144,14 @@ EXPERIMENTS = (
         has_small_version=True,
     ),
     Experiment(
+        "cards",
+        "cards.experiment",
+        "Problem cards: what makes each robust problem hard, and which separate algorithms",
+        "Which of our robust problems tell algorithms apart, and at which budget?",
+        reads_outcome=True,
+        has_small_version=True,
+    ),
+    Experiment(
         "swarm_parts",
         "contest.swarm_parts",
         "What each part of the elitist swarm is worth",

@@ -10,6 +10,7 @@ from pymoo_hdte.problems.operating_conditions import (
 from pymoo_hdte.problems.robust import RobustProblem
 from pymoo_hdte.problems.robust_dte import RobustDTE
 from pymoo_hdte.problems.robust_dte_direct import RobustDTEDirect
+from pymoo_hdte.problems.robust_dte_grades import RobustDTEGrades
 from pymoo_hdte.problems.robust_dte_tolerance import RobustDTETolerance
 from pymoo_hdte.problems.simulator.existing import Robust
 from pymoo_hdte.problems.simulator.inputs import Design
@@ -39,6 +40,7 @@ __all__ = [
     "RobustConstraint",
     "RobustDTE",
     "RobustDTEDirect",
+    "RobustDTEGrades",
     "RobustDTETolerance",
     "RobustProblem",
     "RobustToy",

@@ -30,9 +30,8 @@ def test_a_point_beside_the_front_is_noticed(row, objective):
 
 
 def test_a_search_at_fixed_tolerance_finds_the_front(monkeypatch):
-    monkeypatch.setattr(tolerance_front, "POINTS", 12)
     monkeypatch.setattr(tolerance_front, "_COARSE_POINTS", 6)
-    designs = tolerance_front._front_designs(TOY, np.random.default_rng(1))
+    designs = tolerance_front.front_designs(TOY, 12, np.random.default_rng(1))
     front = TOY.evaluate(designs)
     # The closed form at the u_1 that has this mean: u_2 = 1, so the mean is u_1 + 1.
     best = TOY.pareto_set()[0] * [0.0, 1.0, 1.0] + np.outer(front[:, 0] - 1.0, [1.0, 0.0, 0.0])
@@ -73,3 +72,40 @@ def test_solutions_lie_on_their_level():
     for level in (2.1, 2.5, 2.9):
         found = search.best(level, search.starts(level))
         assert found.objectives[0] == pytest.approx(level, rel=1e-14)
+
+
+class LimitedToy(RobustToy):
+    """The toy where x_1^2 + x_2^2 is at least 13/4: x_1 is from 3/2 on where x_2 is 1."""
+
+    def __init__(self):
+        super().__init__()
+        self.n_ieq_constr = 1
+
+    def _evaluate(self, x, out, *args, **kwargs):
+        super()._evaluate(x, out, *args, **kwargs)
+        out["G"] = 1.0 - np.sum(x[:, :2] ** 2, axis=1, keepdims=True) / 3.25
+        if "dG" in out:
+            out["dG"] = np.column_stack([-2.0 * x[:, :2] / 3.25, np.zeros(len(x))])[:, None]
+
+
+def test_a_search_keeps_to_the_constraints():
+    toy = LimitedToy()
+    search = LevelSearch(toy, np.random.default_rng(1))
+    for found in (search.lowest(0), search.best(2.5 + 1e-7, search.starts(2.6))):
+        # Both ends of the arc have this mean; a large x_1 lowers the scatter.
+        assert search.designs(found.cube)[:2] == pytest.approx([1.5, 1.0], abs=1e-6)
+    # Above it the constraint is free, and the front is that of the toy.
+    free = LevelSearch(TOY, np.random.default_rng(1))
+    found, plain = (one.best(2.8, one.starts(2.8)) for one in (search, free))
+    assert found.objectives == pytest.approx(plain.objectives, rel=1e-9)
+
+
+def test_a_design_is_moved_to_its_level_along_an_active_constraint():
+    toy = LimitedToy()
+    design = np.array([np.sqrt(3.25) * np.cos(0.7), np.sqrt(3.25) * np.sin(0.7), 1.4])
+    level = toy.evaluate(design)[0][0] * (1.0 + 5e-7)
+    moved = on_level(toy, design, level)
+    mean, limit = (values[0] for values in toy.evaluate(moved))
+    assert mean == pytest.approx(level, rel=1e-11)
+    # Steps of 1e-6 leave what is of second order.
+    assert limit == pytest.approx(0.0, abs=1e-10)

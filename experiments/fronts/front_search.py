@@ -1,0 +1,179 @@
+"""The search behind true fronts: least f2 below a level of f1, by SLSQP from many starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.problem import Problem
+from scipy.optimize import Bounds, NonlinearConstraint, minimize
+from scipy.stats import qmc
+
+_SAMPLES = 2**16
+_STARTS = 8
+_ROUGH = {"ftol": 1e-6, "maxiter": 40}
+_FINE = {"ftol": 1e-12, "maxiter": 100}
+_SLACK = 1e-7
+"""SLSQP may end this far above a level, in units of the sampled range of f1."""
+_FLAT = 1e-4
+"""A variable that moves the objectives less than this, end to end, in units of their range, leaves
+SLSQP no slope to follow; its ends are tried."""
+_INSIDE = 1e-8
+"""Constraints (allowed up to 0) are kept below 0 by this, since SLSQP ends a little beside them."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """A design in the unit cube and its objectives."""
+
+    cube: NDArray[np.float64]
+    objectives: NDArray[np.float64]
+
+
+class FrontSearch:
+    """Solves for g(e) and keeps what it needs to do so well.
+
+    Parameters
+    ----------
+    problem : Problem
+        Two smooth objectives with ``dF``, box bounds; smooth inequality constraints of the size of
+        1 with ``dG``, if any.
+    rng : numpy.random.Generator
+        Scrambles the Sobol points that the starts come from.
+    """
+
+    def __init__(self, problem: Problem, rng: np.random.Generator) -> None:
+        self._problem = problem
+        self._width = problem.xu - problem.xl
+        self._bounds = Bounds(np.zeros(problem.n_var), np.ones(problem.n_var))
+        cubes = qmc.Sobol(problem.n_var, rng=rng).random(_SAMPLES)
+        sample, limits = problem.evaluate(self.designs(cubes), return_values_of=["F", "G"])
+        allowed = np.all(limits <= 0.0, axis=1)
+        self._cubes, self._sample = cubes[allowed], sample[allowed]
+        self._scale = np.ptp(self._sample, axis=0)
+        self._last: tuple[bytes, tuple[NDArray[np.float64], ...]] = (b"", ())
+        self._limits = [
+            NonlinearConstraint(
+                lambda cube: self._evaluate(cube)[2],
+                -np.inf,
+                -_INSIDE,
+                jac=lambda cube: self._evaluate(cube)[3],
+            )
+        ][: problem.n_ieq_constr]
+
+    def designs(self, cube: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Map points of the unit cube to designs."""
+        return self._problem.xl + np.clip(cube, 0.0, 1.0) * self._width
+
+    def _evaluate(self, cube: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        # SLSQP asks for value and slope of objective and constraint at the same point in turn.
+        key = cube.tobytes()
+        if key != self._last[0]:
+            asked = ["F", "dF", "G", "dG"] if self._limits else ["F", "dF"]
+            values, slopes, *limits = self._problem.evaluate(
+                self.designs(cube), return_values_of=asked
+            )
+            scaled = [values / self._scale, slopes * self._width / self._scale[:, None]]
+            if limits:
+                scaled += [limits[0], limits[1] * self._width]
+            self._last = key, tuple(scaled)
+        return self._last[1]
+
+    def _excess(self, cube: NDArray[np.float64]) -> float:
+        """Return by how much the worst constraint is violated, 0 if none is."""
+        return max(0.0, float(np.max(self._evaluate(cube)[2]))) if self._limits else 0.0
+
+    def lowest(self, objective: int) -> Solution:
+        """Return the global minimum of one objective, ties broken by the other."""
+        weights = np.full(2, 1e-7)
+        weights[objective] = 1.0
+        order = np.argsort(self._sample[:, objective])[: 4 * _STARTS]
+
+        def weighted(cube: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+            values, slopes = self._evaluate(cube)[:2]
+            return float(weights @ values), weights @ slopes
+
+        starts = self._cubes[order]
+        ends = [self._minimise(weighted, start, _FINE, *self._limits) for start in starts]
+        ends = [end for end in ends if not self._excess(end)]
+        return self._solution(min(ends, key=lambda cube: weighted(cube)[0]))
+
+    def below(self, level: float, starts: list[NDArray[np.float64]]) -> Solution | None:
+        """Return the best solution with f1 <= level from these starts, or None if none got there.
+
+        All starts are followed roughly, the better half of what they reach to the end.
+        """
+        on_f1 = NonlinearConstraint(
+            lambda cube: self._evaluate(cube)[0][0],
+            -np.inf,
+            level / self._scale[0],
+            jac=lambda cube: self._evaluate(cube)[1][0][None, :],
+        )
+        limits = [on_f1, *self._limits]
+
+        def second(cube: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+            values, slopes = self._evaluate(cube)[:2]
+            return float(values[1]), slopes[1]
+
+        def merit(cube: NDArray[np.float64]) -> float:
+            first, last = self._evaluate(cube)[0]
+            above = max(first - level / self._scale[0], 0.0)
+            return float(last + 1e3 * (above + self._excess(cube)))
+
+        rough = [self._minimise(second, start, _ROUGH, *limits) for start in starts]
+        rough.sort(key=merit)
+        kept = rough[: max(1, len(rough) // 2)]
+        ended = [self._minimise(second, x, _FINE, *limits) for x in kept]
+        best = min(ended, key=merit)
+        flat = [end for end in _ends(best) if abs(merit(end) - merit(best)) < _FLAT]
+        ended += [self._minimise(second, x, _FINE, *limits) for x in flat]
+        fine = [self._solution(x) for x in ended if not self._excess(x)]
+        slack = level + _SLACK * self._scale[0]
+        feasible = [solution for solution in fine if solution.objectives[0] <= slack]
+        return min(feasible, key=lambda solution: solution.objectives[1], default=None)
+
+    def _minimise(
+        self,
+        function: Callable[[NDArray[np.float64]], tuple[float, NDArray[np.float64]]],
+        start: NDArray[np.float64],
+        options: dict[str, float],
+        *constraints: NonlinearConstraint,
+    ) -> NDArray[np.float64]:
+        result = minimize(
+            function,
+            start,
+            jac=True,
+            bounds=self._bounds,
+            constraints=constraints,
+            method="SLSQP",
+            options=options,
+        )
+        return np.clip(result.x, 0.0, 1.0)
+
+    def starts(self, level: float) -> list[NDArray[np.float64]]:
+        """Return sampled designs below the level with small f2, far apart from each other."""
+        order = np.argsort(np.where(self._sample[:, 0] <= level, self._sample[:, 1], np.inf))
+        chosen: list[NDArray[np.float64]] = []
+        for index in order[: 60 * _STARTS]:
+            cube = self._cubes[index]
+            if all(np.max(np.abs(cube - other)) > 0.15 for other in chosen):
+                chosen.append(cube)
+            if len(chosen) == _STARTS:
+                break
+        return chosen
+
+    def _solution(self, cube: NDArray[np.float64]) -> Solution:
+        return Solution(cube, self._problem.evaluate(self.designs(cube), return_values_of=["F"]))
+
+
+def _ends(cube: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Return copies of a design with one variable at either end of its range."""
+    copies = []
+    for variable in range(len(cube)):
+        for end in (0.0, 1.0):
+            moved = cube.copy()
+            moved[variable] = end
+            copies.append(moved)
+    return copies
