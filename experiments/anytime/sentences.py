@@ -151,7 +151,7 @@ def first_page(scores: Scores, found: Contests) -> dict[str, str]:
     word = standing(at_stated)
     if word != "ahead of both":
         parts[FAILS] = f"at the stated 100 x 100 evaluations {OURS} is {_level(word)}"
-        parts[FAILS] += f", where {_at_stated(scores, word).partition(': ')[2][:-1]}"
+        parts[FAILS] += f", where {_near_each_other(scores)}"
     return parts
 
 
@@ -162,12 +162,13 @@ def _level(word: str) -> str:
 def _at_stated(scores: Scores, word: str) -> str:
     if word == "ahead of both":
         return "it holds in IGD as well."
+    return f"it does not hold: {_near_each_other(scores)}."
+
+
+def _near_each_other(scores: Scores) -> str:
     means = [
         scores.of(Case(MODEL, EXACT, RETURNED, *STATED, name), COMPARED["igd"]).mean()
         for name in (OURS, *RIVALS)
     ]
     percent = 100.0 * (max(means) / min(means) - 1.0)
-    return (
-        f"it does not hold: the mean IGDs of the three lie within {significant(percent, 2)} % of "
-        "each other."
-    )
+    return f"the mean IGDs of the three lie within {significant(percent, 2)} % of each other"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from experiments.blind.outcome import Outcome
+from experiments.blind.scoring import MOST_IN_CLASS
 from experiments.blind.targets import select
 
 
@@ -39,4 +40,5 @@ def _found(outcomes: Sequence[Outcome]) -> str:
     for kind, what in (("single", "single effects"), ("pair", "pairs")):
         of_kind = select(outcomes, kind)
         shares.append(f"{sum(one.right_answer for one in of_kind)} of {len(of_kind)} {what}")
-    return f"{shares[0]} and both of {shares[1]} were found"
+    how = f"alone, in part or in a class of at most {MOST_IN_CLASS}"
+    return f"{shares[0]} and both of {shares[1]} were named, {how}"

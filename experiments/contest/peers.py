@@ -68,12 +68,15 @@ PEERS_NOTE = (
 
 
 def _new(scores: Scores) -> str:
-    """Say for the first page how our swarm ranks at the smallest budget."""
-    ranks = median_ranks(scores, "igd", scores.budgets[0], tuning=False)
-    place = 1 + int(np.sum(ranks < ranks[scores.algorithms.index(OURS)]))
+    """Say for the first page how our swarm ranks at the largest budget, where it ranks worst."""
+    ours, evaluations, places = scores.algorithms.index(OURS), scores.budgets[-1], []
+    for indicator in ("igd", "hypervolume"):
+        ranks = median_ranks(scores, indicator, evaluations, tuning=False)
+        places.append(f"{1 + int(np.sum(ranks < ranks[ours]))} by {NAMES[indicator]}")
     return (
-        f"a swarm without settings that takes place {place} of {len(scores.algorithms)} by IGD on "
-        f"{len(scores.rows(False))} held-out problems"
+        f"a swarm without settings whose average rank on {len(scores.rows(False))} held-out "
+        f"problems takes place {' and '.join(places)} among {len(scores.algorithms)} algorithms "
+        f"after {evaluations:,} evaluations"
     )
 
 

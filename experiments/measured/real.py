@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from experiments.measured.cpu_time import SECONDS, TOOL, cpu_table, timed_study
 from experiments.measured.known_answers import (
+    CONFIDENT,
     FALLS_SHORT,
     KNOWN_RIGS,
     RIGHT,
@@ -188,7 +189,8 @@ def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
     """Count the judgements, those that fall short first."""
     counts = [(one, sum(row[1] == one for row in rows)) for one in FALLS_SHORT]
     told = ", ".join(f"{count} {word}" for word, count in counts if count)
-    return f"Of {len(rows)} machines: {told}; confidently wrong: {counts[0][1]}."
+    none = "" if counts[0][1] else f", none {CONFIDENT}"
+    return f"Of {len(rows)} machines: {told}{none}."
 
 
 def _said(rig: KnownRig, one: Study) -> tuple[str, str]:

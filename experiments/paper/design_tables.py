@@ -148,8 +148,9 @@ def dominated(model: str) -> str:
     """Say which share of random designs dominates the paper's optima, for the first page."""
     shares = [significant(100.0 * share, 2) for share in sorted(dominating_shares(model).values())]
     return (
-        f"{shares[0]} to {shares[-1]} % of random designs are better than its optima in mean and "
-        f"scatter at once on the model {model}, so that it optimised another one"
+        f"{shares[0]} to {shares[-1]} % of random designs are better than each of the paper's "
+        f"optima in mean and deviation at once on the model {model}, so that the paper optimised "
+        "another one"
     )
 
 

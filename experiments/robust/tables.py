@@ -47,8 +47,9 @@ def of_the_first_page(outcome: Outcome) -> str:
     """Say what a robust problem is and how few runs it takes, as part of a longer sentence."""
     names, won = _tried_and_won(outcome)
     return (
-        "a robust problem made of any simulator in ten lines, with exact moments of a surrogate "
-        f"that takes fewer runs than chaospy and OpenTURNS on {len(won)} of {len(names)} functions"
+        "a robust problem made of a deterministic simulator in a dozen lines, with exact moments "
+        "of a surrogate that takes fewer runs than chaospy and OpenTURNS on "
+        f"{len(won)} of {len(names)} functions"
     )
 
 

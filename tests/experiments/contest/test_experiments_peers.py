@@ -53,6 +53,11 @@ def demands(scores):
     return {row[0]: (row[-1], row) for row in must_reach_table(scores).rows}
 
 
+def test_the_first_page_tells_where_our_swarm_is_not_the_best():
+    said = peers._new(committed_scores("peers"))
+    assert "takes place 1 by IGD and 2 by hypervolume among 12 algorithms after 25,000" in said
+
+
 # --- indicators ---------------------------------------------------------------------------------
 
 

@@ -88,6 +88,9 @@ def test_shortfalls_are_told_and_what_is_right_is_counted():
     assert "one (confidently wrong): backlash, where gravity is known. Right: 1 of 2" in told
     assert "two" not in told
     assert real.shortfalls(rows[1:]) == ("Right: 1 of 1 whose answer is known.",)
+    counted = "1 no answer known, 1 right"
+    assert real._in_one_sentence(rows) == f"Of 3 machines: 1 confidently wrong, {counted}."
+    assert real._in_one_sentence(rows[1:]) == f"Of 2 machines: {counted}, none confidently wrong."
 
 
 def examined(name, **options):
