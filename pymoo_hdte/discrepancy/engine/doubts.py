@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import permutations
+
 import numpy as np
 from scipy.stats import chi2, norm
 
@@ -30,12 +33,29 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
     freed = any(one.frees is not None for one in chosen.candidates)
     if curves and freed and not search.enough(chosen):
         found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
+    if not search.enough(chosen):
+        found += _harmonics_of_another(chosen.candidates)
     if vote is not None and vote.after >= vote.before:
         found.append(NOT_PROVEN)
     per_degree = fitted.chi_square / search.degrees_of_freedom
     if per_degree > search.data.rules.contradicting_chi_square:
         found.append(left_by(per_degree))
     return found
+
+
+def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[str]:
+    """Return in words which effects may be no more than harmonics of the form of another.
+
+    A clearance that varies once in some angle need not do so as a cosine; its harmonics look like
+    an error of their order. Effects that fit down to the noise as listed leave no such choice.
+    """
+    return [
+        f"{higher.label} may be a harmonic of {lower.label}"
+        for lower, higher in permutations(candidates, 2)
+        if not lower.exact and lower.port == higher.port and lower.name != higher.name
+        if lower.order is not None and higher.order is not None
+        if higher.order > lower.order and np.isclose(higher.order % lower.order, 0.0)
+    ]
 
 
 def left_by(per_degree: float) -> str:

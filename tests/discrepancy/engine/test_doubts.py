@@ -17,7 +17,10 @@ FREEDOM = 1000
 
 def one(label, *, exact, frees=None):
     """A candidate without unknowns of its own."""
-    return SimpleNamespace(label=label, exact=exact, frees=frees, parameters=())
+    name, _, place = label.partition(":")
+    port, _, order = place.partition("@")
+    of_place = {"name": name, "port": port, "order": float(order) if order else None}
+    return SimpleNamespace(label=label, exact=exact, frees=frees, parameters=(), **of_place)
 
 
 def doubts(chi_square_per_degree, *candidates):
@@ -52,6 +55,29 @@ FREED = one("parameter:damping", exact=True, frees="damping")
 def test_values_beside_a_curve_that_does_not_quite_fit_are_not_certain(left, candidates, doubtful):
     """A rational fall of a friction was named Stribeck's with a damping that had not changed."""
     assert bool(doubts(left, *candidates)) == doubtful
+
+
+CLEARANCE = one("clearance_variation:mesh@2", exact=False)
+
+
+@pytest.mark.parametrize(
+    ("left", "label", "doubtful"),
+    [
+        (2.1, "kinematic_error:mesh@4", True),
+        (2.1, "kinematic_error:mesh@6", True),
+        (2.1, "kinematic_error:mesh@3", False),
+        (2.1, "kinematic_error:mesh@2", False),
+        (2.1, "kinematic_error:mesh@1", False),
+        (2.1, "torque_ripple:input@4", False),
+        (2.1, "clearance_variation:mesh@4", False),
+        (1.0, "kinematic_error:mesh@4", False),
+    ],
+)
+def test_a_harmonic_of_another_effect_is_not_certain(left, label, doubtful):
+    """A clearance with a harmonic was named with a kinematic error of order 4."""
+    line = one(label, exact=True)
+    assert bool(doubts(left, CLEARANCE, line)) == doubtful
+    assert bool(doubts(left, line, CLEARANCE)) == doubtful
 
 
 def test_what_is_left_in_multiples_of_the_noise_is_a_doubt():

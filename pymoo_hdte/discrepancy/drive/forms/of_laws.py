@@ -164,22 +164,14 @@ def _stiffness(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     found.append(Correction("mesh", cubic))
     for order in ranges.multiples(candidate.order) if candidate.order else ():
         for phase in _PARTS:
-            for law in bends[::2]:
-
-                def force(
-                    state: PortState,
-                    law: SoftWindup = law,
-                    order: float = order,
-                    phase: float = phase,
-                ) -> Response:
-                    one, wave = law.respond(state), np.cos(state.phase(order) + phase)
-                    return Response(one.torque * wave, one.slope * wave)
-
-                found.append(Correction("mesh", AnyForce(force, (order,))))
+            waving = [_waving(law, order, phase) for law in bends[::2]]
+            found += [Correction("mesh", AnyForce(force, (order,))) for force in waving]
     return found
 
 
 def _waving(law: SoftWindup, order: float, phase: float) -> Force:
+    """Return a bend that comes and goes with the angle."""
+
     def force(state: PortState) -> Response:
         one, wave = law.respond(state), np.cos(state.phase(order) + phase)
         return Response(one.torque * wave, one.slope * wave)
