@@ -52,7 +52,7 @@ def run(context: Context) -> Result:
         title=f"Fig. 17: ablation of AMP-MOPSO{'' if stated else ', open'}, "
         f"{context.seeds_in_words}",
         command=context.comparison_command("ablation"),
-        answer="" if stated else least_igd(comparisons),
+        answer="" if any(found) else least_igd(comparisons),
         paragraphs=(SETTING, FLOWCHART) if stated else open_paragraphs(context, comparisons),
         models=models_compared(comparisons),
         tables=(

@@ -59,7 +59,7 @@ def run(context: Context) -> Result:
     return Result(
         title=f"Table 7: {'three algorithms' if stated else 'open'}, {context.seeds_in_words}",
         command=context.comparison_command("table7"),
-        answer="" if stated else least_igd(comparisons),
+        answer="" if quality.findings else least_igd(comparisons),
         paragraphs=(SETTING,) if stated else open_paragraphs(context, comparisons),
         models=models_compared(comparisons),
         tables=(

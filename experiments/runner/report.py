@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -87,6 +88,12 @@ def write_report(out: Path, notice: str = "") -> Path:
 
 def _page(template: str, common: Mapping[str, object], **values: object) -> bytes:
     """Return a page; ``up`` leads from it to the folder of the first one."""
+    return _environment().get_template(template).render({**common, **values}).encode()
+
+
+@cache
+def _environment() -> Environment:
+    """Return what compiles each template once."""
     environment = Environment(
         loader=FileSystemLoader(Path(__file__).parents[1] / "templates"),
         autoescape=True,
@@ -95,7 +102,7 @@ def _page(template: str, common: Mapping[str, object], **values: object) -> byte
         lstrip_blocks=True,
     )
     environment.globals["zip"] = zip
-    return environment.get_template(template).render({**common, **values}).encode()
+    return environment
 
 
 def _parts(results: Sequence[StoredResult], about: str) -> list[tuple[StoredResult, str]]:

@@ -93,7 +93,10 @@ class Statistic:
         ndarray, shape (n,), or None
             In the response's unit.
         """
-        return None
+        if self._weights is None:
+            return None
+        of_mean, of_std = self._weights
+        return of_mean * mean + of_std * std
 
     def half_width(self, mean_error: Array, std_error: Array, around: Around) -> Array:
         """Return the half-width of its error band, shape (n,), in its unit; NaN if it has none.
@@ -106,6 +109,11 @@ class Statistic:
             The response around n designs.
         """
         return self._error(mean_error, std_error, around)
+
+    @property
+    def _weights(self) -> tuple[float, float] | None:
+        """Of mean and standard deviation, where these are enough."""
+        return None
 
     def _of(self, around: Around) -> tuple[Array, Array]:
         raise NotImplementedError
@@ -149,9 +157,9 @@ class Mean(Statistic):
         slope[:, 0] = 1.0
         return around.mean, slope
 
-    def of_moments(self, mean: Array, std: Array) -> Array:
-        """Return the mean."""
-        return mean
+    @property
+    def _weights(self) -> tuple[float, float]:
+        return 1.0, 0.0
 
 
 @dataclass(frozen=True)
@@ -171,9 +179,9 @@ class Std(Statistic):
         slope[:, 0] = 0.0
         return around.std, slope
 
-    def of_moments(self, mean: Array, std: Array) -> Array:
-        """Return the standard deviation."""
-        return std
+    @property
+    def _weights(self) -> tuple[float, float]:
+        return 0.0, 1.0
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
         return std_error
@@ -207,9 +215,9 @@ class MeanPlusStd(Statistic):
         parts = [one.value(around) for one in (Mean(), Std())]
         return parts[0][0] + self.k * parts[1][0], parts[0][1] + self.k * parts[1][1]
 
-    def of_moments(self, mean: Array, std: Array) -> Array:
-        """Return mean plus k standard deviations."""
-        return mean + self.k * std
+    @property
+    def _weights(self) -> tuple[float, float]:
+        return 1.0, self.k
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
         return mean_error + abs(self.k) * std_error

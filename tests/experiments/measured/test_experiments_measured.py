@@ -77,7 +77,7 @@ def test_a_raw_log_needs_25_lines_and_no_script(name, folder):
 def test_without_the_measurements_the_report_says_so(experiment, tmp_path, monkeypatch):
     monkeypatch.setattr("experiments.measured.rigs.MEASURED", tmp_path / "nowhere")
     result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
-    assert "Skipped" in result.paragraphs[0]
+    assert "Skipped" in result.answer
     assert str(tmp_path / "nowhere") in result.paragraphs[0]
 
 

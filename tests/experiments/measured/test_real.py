@@ -121,7 +121,7 @@ def test_the_stored_verdict_is_what_comes_out(name):
 def test_without_the_measurements_a_full_run_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(real, "MEASURED", tmp_path / "nowhere")
     result = real.run(Context(1, tmp_path, Campaign(tmp_path), full=True))
-    assert str(tmp_path / "nowhere") in result.paragraphs[0]
+    assert str(tmp_path / "nowhere") in result.answer
     monkeypatch.setattr("experiments.measured.rigs.MEASURED", tmp_path / "nowhere")
     assert real.examined(KNOWN_RIGS[0]) is None
 

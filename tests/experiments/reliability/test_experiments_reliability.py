@@ -45,6 +45,7 @@ from experiments.reliability.text import BYTES, TEXTS
 from experiments.runner import committed
 from experiments.runner.campaign import Campaign, Run
 from experiments.runner.registry import Context
+from experiments.runner.result import Result
 
 LOADERS = [name for name in KINDS if name not in THROUGH_COMMANDS]
 
@@ -250,7 +251,7 @@ def test_a_full_disk_is_one_sentence_and_code_1(tmp_path, monkeypatch, capsys):
         raise OSError(28, "No space left on device", str(tmp_path))
 
     monkeypatch.setattr("experiments.__main__.save", full)
-    monkeypatch.setattr("experiments.measured.emps.run", lambda context: None)
+    monkeypatch.setattr("experiments.measured.emps.run", lambda context: Result("", "", "done"))
     assert main(["emps", "--workers", "1", "--out", str(tmp_path)]) == 1
     assert "emps: [Errno 28] No space left on device" in capsys.readouterr().err
 
