@@ -14,6 +14,9 @@ from matplotlib.figure import Figure
 NO_VALUE = "\N{EM DASH}"
 MINUS = "\N{MINUS SIGN}"
 
+LONG = 40
+"""Characters from which a cell is given room."""
+
 Cell = float | int | str | None
 """What a table holds; None where there is nothing to say."""
 
@@ -111,6 +114,11 @@ class Table:
     def holds_text(self, index: int) -> bool:
         """Whether the column at ``index`` holds words, which read better aligned to the left."""
         return any(isinstance(row[index], str) for row in self.rows)
+
+
+    def holds_prose(self, index: int) -> bool:
+        """Whether the words of the column at ``index`` need room."""
+        return any(len(str(row[index])) > LONG for row in self.rows)
 
 
 @dataclass(frozen=True)
