@@ -129,7 +129,8 @@ def test_laws_of_exact_form_may_have_no_other():
     )
     law = listed(DATA, "torque_ripple", (1.0,))
     forms, found = left_by(planted(ripple, harmonic), [law])
-    assert found.exact and found.explained > 0.9
+    assert found.exact
+    assert found.explained > 0.9
     assert forms.rest(found.fit).is_noise
     assert not forms.explains(found)
 
