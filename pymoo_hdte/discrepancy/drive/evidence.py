@@ -181,6 +181,7 @@ def _ranges_of(data: Observations) -> Ranges:
         believed.damping,
         tuple(order for order, amplitude in lines if amplitude > 0.0),
         tuple(data.features.orders.tolist()),
+        data.rules.form_terms,
     )
 
 

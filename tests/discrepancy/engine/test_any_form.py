@@ -1,5 +1,7 @@
 """Laws of other forms than the library's: what they leave, and what shows beside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planted_features import known_data, library, listed, measured
@@ -143,3 +145,9 @@ def test_a_law_whose_listed_form_contradicts_a_part_is_not_named_plainly(monkeyp
     assert AnyForm(data, found.base).explains(found.chosen)
     assert (found.status, found.chosen.label) == ("partial", SPRING)
     assert any("another form" in one for one in found.doubts)
+
+
+def test_a_law_of_fewer_terms_has_fewer_forms():
+    law = listed(DATA, "torque_ripple", (1.0,))
+    few = replace(DATA, rules=replace(DATA.rules, form_terms=2))
+    assert [len(data.corrections(law)) for data in (DATA, few)] == [6, 4]
