@@ -14,9 +14,11 @@ from experiments.paper.inference.likelihood import (
     DEPTH_TOLERANCE,
     FITTED,
     OBSERVED,
+    READING,
     Evaluation,
 )
 from experiments.paper.inference.rungs import Rung
+from experiments.paper.inference.search import BASIN
 
 STEPS = (
     ("accuracy_first", "balanced"),
@@ -63,10 +65,17 @@ def steps_of(predicted: NDArray[np.float64]) -> NDArray[np.float64]:
     return _difference() @ predicted
 
 
-def step_errors(found: Evaluation) -> NDArray[np.float64]:
-    """Return by how many standard errors each step misses the printed one, shape (4,)."""
+def step_errors(found: Evaluation, sampling_alone: bool = False) -> NDArray[np.float64]:
+    """Return by how many standard errors each step misses the printed one, shape (4,).
+
+    With ``sampling_alone`` without `READING`, what the text leaves open.
+    """
     contrast = _difference()
-    error = np.sqrt(np.diag(contrast @ found.covariance @ contrast.T))
+    error = np.sqrt(
+        np.diag(contrast @ found.covariance @ contrast.T)
+        # Each step is the difference of two numbers.
+        - (2.0 * READING**2 if sampling_alone else 0.0)
+    )
     return np.asarray((steps_of(found.predicted) - steps_of(OBSERVED)) / error)
 
 
@@ -80,6 +89,29 @@ def gives_trade_off(fit: Fit) -> bool:
 def undominated(fit: Fit) -> bool:
     """Whether no design of the box dominates a published optimum."""
     return bool(fit.evaluation.depths.max() <= DEPTH_TOLERANCE)
+
+
+def above_a_special_case(fits: Sequence[Fit]) -> list[Fit]:
+    """Return the fits whose search ended above a model that theirs contains: it fell short."""
+    return [
+        one
+        for one in fits
+        if any(
+            other.target == one.target
+            and _contains(one.rung, other.rung)
+            and other.deviance + BASIN < one.deviance
+            for other in fits
+        )
+    ]
+
+
+def _contains(one: Rung, other: Rung) -> bool:
+    wide, special = one.candidate, other.candidate
+    return (
+        (wide.reading, wide.bands) == (special.reading, special.bands)
+        and set(wide.effects) >= set(special.effects)
+        and set(one.closures) >= set(other.closures)
+    )
 
 
 def describe(rung: Rung) -> str:

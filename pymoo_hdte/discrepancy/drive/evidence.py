@@ -166,7 +166,7 @@ class Data(Observations):
         return replace(self, features=self.features.rows(np.flatnonzero(held)))
 
 
-def _ranges_of(data: Observations) -> Ranges:
+def _ranges_of(data: Data) -> Ranges:
     """Return what the records of some data run through."""
     when, believed = data.features.conditions, data.campaign.believed
     torques = [np.abs(when.output_torque).max(), *(np.abs(one.path).max() for one in data.torsion)]
@@ -181,6 +181,7 @@ def _ranges_of(data: Observations) -> Ranges:
         believed.damping,
         tuple(order for order, amplitude in lines if amplitude > 0.0),
         tuple(data.features.orders.tolist()),
+        data.rules.form_terms,
     )
 
 

@@ -35,11 +35,19 @@ class Rest:
         Beyond them.
     excess : float
         Its chi-square beyond the degrees of freedom that it has.
+    noise : float
+        Excess up to which it is noise, by these degrees of freedom.
     """
 
     directions: NDArray[np.float64]
     residual: NDArray[np.float64]
     excess: float
+    noise: float
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether nothing but noise is left."""
+        return self.excess <= self.noise
 
 
 class AnyForm:
@@ -58,25 +66,27 @@ class AnyForm:
         self._rests: dict[Fit, Rest | None] = {}
         self._by_place: dict[tuple[str, str, float | None], NDArray[np.float64]] = {}
 
-    @property
-    def noise(self) -> float:
-        """Excess up to which a model is adequate."""
-        degrees_of_freedom = self._degrees_of_freedom
-        return (adequate(degrees_of_freedom, self.data.rules) - 1.0) * degrees_of_freedom
-
     def rest(self, fitted: Fit) -> Rest | None:
-        """Return what a fit leaves; None for machines whose laws have no known corrections."""
+        """Return what a fit leaves; None where that says nothing.
+
+        For machines whose laws have no known corrections, and where parameters and forms together
+        could follow any data.
+        """
         if fitted not in self._rests:
             self._rests[fitted] = self._rest(fitted)
         return self._rests[fitted]
 
     def explains(self, one: Hypothesis) -> bool:
-        """Tell whether a set removes most of the misfit and leaves nothing but errors of form."""
+        """Tell whether a set removes most of the misfit and leaves nothing but errors of form.
+
+        Laws whose forms are known exactly leave no more than their model's own error.
+        """
         rules = self.data.rules
-        if one.explained < rules.explained_share or not gains_enough(one, self.base, rules):
+        share = rules.exact_share if one.exact else rules.explained_share
+        if one.explained < share or not gains_enough(one, self.base, rules):
             return False
         rest = self.rest(one.fit)
-        return rest is not None and rest.excess <= self.noise
+        return rest is not None and rest.is_noise
 
     def earns(self, one: Hypothesis, without: Hypothesis) -> bool:
         """Tell whether a member is earned: what is left without it is no error of form.
@@ -85,10 +95,9 @@ class AnyForm:
         the member is gone, more than noise and the model's own error can be.
         """
         both = self.rest(one.fit)
-        if both is None or both.excess > self.noise:
-            return False
         left = self.rest(without.fit)
-        assert left is not None
+        if both is None or left is None or not both.is_noise:
+            return False
         kept = {each.label for each in without.candidates}
         member = [each for each in one.candidates if each.label not in kept]
         return left.excess - both.excess >= self._least(without, member, left)
@@ -127,9 +136,9 @@ class AnyForm:
             each for each in ranked if each.reduction >= self._least(one, (each.candidate,), rest)
         ]
         little = one.explained >= rules.explained_share
-        if not hopeful and little and rest.excess > self.noise:
+        if not hopeful and little and not rest.is_noise:
             gains = [self._in_any_form(each, rest) for each in ranked]
-            places = [k for k in np.argsort(gains)[::-1] if rest.excess - gains[k] <= self.noise]
+            places = [k for k in np.argsort(gains)[::-1] if rest.excess - gains[k] <= rest.noise]
             hopeful = [ranked[k] for k in places]
         return varied(hopeful, 1)[: rules.most_seconds]
 
@@ -156,11 +165,13 @@ class AnyForm:
         # A bound of an effect's own unknowns limits the listed form only.
         free[fitted.n_base :] = True
         parameters = fitted.jacobian[:, free]
-        rank = _orthonormal(parameters).shape[1]
         directions = _orthonormal(np.column_stack([parameters, *columns]))
         residual = fitted.residuals - directions @ (directions.T @ fitted.residuals)
-        freedom = self._degrees_of_freedom - (directions.shape[1] - rank)
-        return Rest(directions, residual, float(residual @ residual) - freedom)
+        freedom = len(residual) - directions.shape[1]
+        if freedom < 1:
+            return None
+        noise = (adequate(freedom, self.data.rules) - 1.0) * freedom
+        return Rest(directions, residual, float(residual @ residual) - freedom, noise)
 
     def _in_any_form(self, one: Screened, rest: Rest) -> float:
         """Return what an effect removes in any form, less what noise gives so many unknowns."""

@@ -209,6 +209,14 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules):
         "says it.",
         at_least=1.0,
     )
+    form_terms: int = rule(
+        6,
+        "1",
+        "Curves of the speed, or harmonics of an angle, that another form of a law may hold; what "
+        "is left beyond them is no error of its form.",
+        f"{BY_HAND}: records of six speeds show no more of a friction, and more would also follow "
+        "another effect.",
+    )
 
     # Is there a second effect?
     second_share: float = rule(

@@ -190,9 +190,11 @@ def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
 
 
 def _explains(search: Search, one: Hypothesis) -> bool:
-    if explains(search.data, one, search.base, search.degrees_of_freedom):
-        return True
-    return search.forms.explains(one)
+    return _as_listed(search, one) or search.forms.explains(one)
+
+
+def _as_listed(search: Search, one: Hypothesis) -> bool:
+    return explains(search.data, one, search.base, search.degrees_of_freedom)
 
 
 def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
@@ -210,13 +212,19 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
 
 
 def _other_forms(search: Search, chosen: Hypothesis) -> list[str]:
-    """Return in words which members stand for what their listed forms do not explain."""
+    """Return in words which members stand for what their listed forms do not explain.
+
+    All together where the listed forms contradict a part of the data and only others do not.
+    """
     members = chosen.members if len(chosen.members) > 1 else []
-    return [
-        f"{'+'.join(one.label for one in member)} has to have another form to explain what is left"
+    found = [
+        "+".join(one.label for one in member)
         for member in members
         if search.forms.only_in_another(chosen, search.without(chosen, member))
     ]
+    if not found and not _as_listed(search, chosen) and search.forms.explains(chosen):
+        found = [chosen.label]
+    return [f"{one} has to have another form to explain what is left" for one in found]
 
 
 def _stands_out(search: Search, chosen: Hypothesis) -> bool:

@@ -1,8 +1,10 @@
 """Laws of other forms than the library's: what they leave, and what shows beside them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from planted_features import known_data, library, measured
+from planted_features import known_data, library, listed, measured
 
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.forms.corrections import (
@@ -10,11 +12,12 @@ from pymoo_hdte.discrepancy.drive.forms.corrections import (
     AnyForceOfLoad,
     Correction,
 )
+from pymoo_hdte.discrepancy.engine import verdict
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import down_to_noise, hypothesis_of
 from pymoo_hdte.discrepancy.engine.verdict import judge
-from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.friction import PeriodicTorque, smoothed_sign
 from pymoo_hdte.effects.law import Response
 
 FRICTION, SPRING, DRIFT = (
@@ -78,7 +81,7 @@ def test_what_another_form_of_a_law_leaves_is_none_of_a_second_effect(label):
     degrees_of_freedom = len(base.residuals) - len(base.values)
     forms = AnyForm(data, base)
     assert not down_to_noise(found, degrees_of_freedom, data.rules)
-    assert forms.rest(found).excess <= forms.noise
+    assert forms.rest(found).is_noise
     left = hypothesis_of(found, base.chi_square - degrees_of_freedom)
     assert forms.explains(left)
 
@@ -97,3 +100,54 @@ def test_another_form_alone_is_one_effect():
     data = planted(FOREIGN[SPRING], seed=2)
     found = judge(data, fit(data), of_labels(SPRING, DRIFT))
     assert (found.status, found.chosen.label) == ("named", SPRING)
+
+
+def left_by(data, laws):
+    base = fit(data)
+    found = fit(data, laws)
+    excess = base.chi_square - (len(base.residuals) - len(base.values))
+    return AnyForm(data, base), hypothesis_of(found, excess)
+
+
+@pytest.mark.parametrize("spared", [0, 2])
+def test_forms_that_follow_almost_any_data_explain_none(monkeypatch, spared):
+    """A second effect is left; forms of all directions but a few would swallow it."""
+    data = planted(FOREIGN[SPRING], *small_drift())
+    forms, found = left_by(data, of_labels(SPRING))
+    assert not forms.explains(found)
+    n = len(found.fit.residuals)
+    # The spared directions hold some five times as much as noise.
+    spare = np.argsort(np.abs(found.fit.residuals))[n - spared :]
+    axes = np.delete(np.eye(n), spare, axis=0)
+    monkeypatch.setattr(Data, "corrections", lambda self, candidate: range(len(axes)))
+    monkeypatch.setattr(Data, "response", lambda self, fitted: lambda one: axes[one[0]])
+    assert not AnyForm(data, forms.base).explains(found)
+
+
+def test_laws_of_exact_form_may_have_no_other():
+    ripple, harmonic = (
+        Correction("input", PeriodicTorque(order, 0.3, size))
+        for order, size in ((1.0, 5e-3), (3.0, 1e-3))
+    )
+    law = listed(DATA, "torque_ripple", (1.0,))
+    forms, found = left_by(planted(ripple, harmonic), [law])
+    assert found.exact
+    assert found.explained > 0.9
+    assert forms.rest(found.fit).is_noise
+    assert not forms.explains(found)
+
+
+def test_a_law_whose_listed_form_contradicts_a_part_is_not_named_plainly(monkeypatch):
+    """As where it explains the whole but for one channel, which only another form follows."""
+    monkeypatch.setattr(verdict, "explains", lambda *arguments: False)
+    data = planted(FOREIGN[SPRING], seed=2)
+    found = judge(data, fit(data), of_labels(SPRING))
+    assert AnyForm(data, found.base).explains(found.chosen)
+    assert (found.status, found.chosen.label) == ("partial", SPRING)
+    assert any("another form" in one for one in found.doubts)
+
+
+def test_a_law_of_fewer_terms_has_fewer_forms():
+    law = listed(DATA, "torque_ripple", (1.0,))
+    few = replace(DATA, rules=replace(DATA.rules, form_terms=2))
+    assert [len(data.corrections(law)) for data in (DATA, few)] == [6, 4]

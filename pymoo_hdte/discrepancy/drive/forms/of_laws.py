@@ -37,12 +37,10 @@ _LARGER_SHARE = 5e-3
 """For what changes means."""
 _ANGLE = 1e-7
 """rad, of an error of the output angle."""
-_CURVES = 6
-"""Polynomials of the logarithm of the speed for a friction of any form."""
 _SHARPNESS = 3.0
+"""Of the bends, as of a play with a soft skin."""
 _BENDS = tuple(np.geomspace(0.01, 1.0, 8).tolist())
 """Torsions, as shares of the largest, at which a stiffness may bend and springs may slip."""
-_HARMONICS = 6
 _PARTS = (0.0, np.pi / 2.0)
 """Phases of the two parts of a line."""
 _DRIFTS = (0.1, 0.3, 1.0, 3.0)
@@ -67,6 +65,8 @@ class Ranges:
         Orders of the believed static error.
     shown : tuple of float
         Orders that are analysed.
+    terms : int
+        Curves of the speed, or harmonics of an angle, that another form may hold.
     """
 
     speed: NDArray[np.float64]
@@ -78,10 +78,11 @@ class Ranges:
     damping: float
     lines: tuple[float, ...]
     shown: tuple[float, ...]
+    terms: int
 
     def multiples(self, order: float) -> list[float]:
         """Return an order and those of its harmonics that are analysed."""
-        multiples = [k * order for k in range(1, _HARMONICS + 1)]
+        multiples = [k * order for k in range(1, self.terms + 1)]
         return [one for one in multiples if np.min(np.abs(np.subtract(self.shown, one))) < 1e-6]
 
     def slower(self, port: str) -> float:
@@ -99,7 +100,7 @@ def _friction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     """Friction of any curve; at the output bristles show in the sweep, which turns there."""
     found: list[DriveEffect] = [
         Correction(candidate.port, AnyForce(_of_speed(power, candidate.port, ranges)))
-        for power in range(_CURVES)
+        for power in range(ranges.terms)
     ]
     return found + (_springs(candidate, ranges)[:4] if candidate.port == "output" else [])
 
