@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
 
-from experiments.cards.data import DIRECT, Numbers, committed_numbers
+from experiments.cards.data import Numbers, committed_numbers
 from experiments.cards.experiment import LEFT_OUT, SETTING
-from experiments.cards.separation import separations
+from experiments.cards.separation import Separation, separations
 from experiments.cards.tables import (
     HARDNESS_NOTE,
     SEPARATION_NOTE,
@@ -78,8 +78,8 @@ def index_page(numbers: Numbers) -> str:
         [
             "# Problem cards",
             "One page for each robust problem with a stored front: what it is, what makes it hard, "
-            "and how twelve algorithms do on it. The numbers are those of `python -m experiments "
-            "cards`, which `--full` computes anew.",
+            "and how up to twelve algorithms do on it. The numbers are those of `python -m "
+            "experiments cards`, which `--full` computes anew.",
             f"```{{toctree}}\n:maxdepth: 1\n\n{stems}\n```",
             "## Which problems separate algorithms",
             *(finding.sentence for finding in separating.findings),
@@ -122,7 +122,7 @@ def page(numbers: Numbers, name: str) -> str:
         "## What makes it hard",
         table_text(_of(hardness_table(numbers), name)),
         "How these numbers are defined stands with [all cards](index).",
-        "## Twelve algorithms" if name != DIRECT else "## Algorithms",
+        "## Algorithms",
         _verdicts(numbers, name),
         f"{medians.title.partition(': ')[2].capitalize()}, best IGD at the largest budget first; "
         f"{{download}}`every run <{stem}.csv>`.",
@@ -171,14 +171,19 @@ def _of(table: Table, name: str) -> Table:
 
 def _verdicts(numbers: Numbers, name: str) -> str:
     found = [one for one in separations(numbers.scores, numbers.hardness) if one.problem == name]
-    sentences = [
-        f"At {one.evaluations:,} evaluations it "
-        f"{'separates' if one.separates else 'does not separate'} algorithms: the quartiles of "
-        f"their median IGD differ {significant(one.spread, 2)} times, one algorithm's seeds "
-        f"{significant(one.scatter, 2)} times; {one.reached} of {one.algorithms} reach the front."
-        for one in found
-    ]
-    return " ".join(sentences)
+    return " ".join(map(_verdict, found))
+
+
+def _verdict(one: Separation) -> str:
+    at = f"At {one.evaluations:,} evaluations"
+    reach = f"{one.reached} of {one.algorithms} reach the front."
+    if one.separates is None:
+        return f"{at} too few algorithms ran to say whether it separates them; {reach}"
+    return (
+        f"{at} it {'separates' if one.separates else 'does not separate'} algorithms: quartiles "
+        f"of their median IGD differ {significant(one.spread, 2)} times, one algorithm's seeds "
+        f"{significant(one.scatter, 2)} times; {reach}"
+    )
 
 
 def _constructor(name: str) -> str:

@@ -18,6 +18,8 @@ REACHES = 2.0
 LEAST_SPREAD = 2.0
 """Factor between the upper and the lower quartile of the algorithms' medians that matters to a
 user; the extremes do not count, as one algorithm fails everywhere."""
+FEWEST = 4
+"""Algorithms below which the quartiles of the medians are their extremes, and nothing is said."""
 
 
 class Separation(NamedTuple):
@@ -48,8 +50,10 @@ class Separation(NamedTuple):
     reached: int
 
     @property
-    def separates(self) -> bool:
-        """Whether they differ for sure, and by as much as matters."""
+    def separates(self) -> bool | None:
+        """Whether they differ for sure, and by as much as matters; None if too few ran to say."""
+        if self.algorithms < FEWEST:
+            return None
         return self.p <= SIGNIFICANT and self.spread >= LEAST_SPREAD
 
 

@@ -39,10 +39,11 @@ def size_for(evaluations: float) -> int:
 class CompactSwarm(ElitistSwarm):
     """An `ElitistSwarm` whose size follows from the budget, and whose result does not.
 
-    A small swarm comes further in few evaluations than a large one. What it finds is kept in an
-    archive, from which the result is chosen. Moves, survival and mutation are those of
-    `ElitistSwarm`; added are a move among neighbours, `NeighbourDifference`, for variables that
-    depend on each other, and infeasible particles that stay beside the feasible ones.
+    With few evaluations a small swarm has more generations than a large one. All that it finds is
+    offered to two archives: the result, which `quality` thins out in every generation, and
+    `archive_all`. Moves and mutation are those of `ElitistSwarm`; added are a move among
+    neighbours, `NeighbourDifference`, for variables that depend on each other, and infeasible
+    particles that stay beside the feasible ones.
 
     Parameters
     ----------
@@ -70,7 +71,8 @@ class CompactSwarm(ElitistSwarm):
     Warns
     -----
     RuntimeWarning
-        If no solution could be judged because no objective was finite; the result is empty then.
+        If no solution could be judged, for want of finite objectives and constraints; the result
+        is empty then.
 
     Notes
     -----
@@ -82,8 +84,8 @@ class CompactSwarm(ElitistSwarm):
       nothing as the swarm follows: an epsilon level (Takahama, Sakai 2006) without a schedule, for
       regions as thin as equality constraints make them. The result is feasible as pymoo defines it,
       with equalities met to 1e-4;
-    - the archive knows what was evaluated: a callback that changes the problem has to evaluate the
-      individuals of `archive_all` again.
+    - archives know what was evaluated: a callback that changes the problem has to evaluate the
+      individuals of `archive_all` and of ``opt`` again.
     """
 
     GUESTS = 0.2
@@ -111,17 +113,15 @@ class CompactSwarm(ElitistSwarm):
         self._by_budget = pop_size is None
         self.n_result = whole_number("n_result", n_result, at_least=1)
         self.n_archive = whole_number("n_archive", n_archive, at_least=self.n_result)
-
-    def _plan(self) -> None:
-        # A running swarm goes on as it is when it is given more evaluations.
-        if self.is_initialized:
-            return
-        if self._by_budget:
-            self.pop_size = size_for(evaluation_limit(self.termination))
         # Thinning out a thousand takes longer than a generation: a quarter at once makes it rare.
         self._found = FrontArchive(self.n_archive, most_spread, left=1 + 3 * self.n_archive // 4)
         self._offered = FrontArchive(self.n_result, self._truncation)
         self._waiting: list[Population] = []
+
+    def _plan(self) -> None:
+        # A running swarm goes on as it is when it is given more evaluations.
+        if self._by_budget and not self.is_initialized:
+            self.pop_size = size_for(evaluation_limit(self.termination))
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         super()._initialize_advance(infills, **kwargs)
@@ -151,7 +151,8 @@ class CompactSwarm(ElitistSwarm):
 
     def _survivors(self, points: Points) -> NDArray[np.int_]:
         points = tolerant(points, self._level(points[np.arange(len(points) - len(self.chosen))]))
-        invited = guests(points, int(self.GUESTS * self.pop_size))
+        # A callback may have left few particles: not all of them are guests.
+        invited = guests(points, min(int(self.GUESTS * self.pop_size), len(points) - 1))
         others = np.setdiff1d(np.arange(len(points)), invited)
         kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
         return np.sort(np.concatenate([invited, others[kept]]))
@@ -177,6 +178,7 @@ class CompactSwarm(ElitistSwarm):
         """Return the result, empty if nothing could be judged."""
         result = super().result()
         if self.opt is not None and not np.isfinite(self._points(self.opt).violation).any():
-            warnings.warn("no objective was finite: the result is empty", RuntimeWarning, 2)
+            reason = "no objective was finite, or no constraint: the result is empty"
+            warnings.warn(reason, RuntimeWarning, 2)
             result.opt = result.X = result.F = result.CV = result.G = result.H = None
         return result

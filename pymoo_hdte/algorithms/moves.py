@@ -175,6 +175,8 @@ class SparseMutation:
 def nearest_in_objectives(F: NDArray[np.float64], k: int) -> NDArray[np.int_]:
     """Return for each row of objectives ``F`` (n, m) the ``k`` nearest others, all if fewer.
 
+    A single row is its own neighbour.
+
     Distances are Euclidean, in objectives scaled by their ranges; rows that are not finite lie
     together, one range beyond the largest values.
     """
@@ -185,5 +187,5 @@ def nearest_in_objectives(F: NDArray[np.float64], k: int) -> NDArray[np.int_]:
         scaled[good] = (F[good] - lowest) / np.where(span > 0.0, span, 1.0)
     distance = ((scaled[:, np.newaxis] - scaled) ** 2).sum(axis=2)
     np.fill_diagonal(distance, np.inf)
-    k = min(k, len(F) - 1)
+    k = max(1, min(k, len(F) - 1))
     return np.argpartition(distance, k - 1, axis=1)[:, :k]

@@ -33,7 +33,7 @@ def truncation_of(quality: Quality) -> Truncation:
     """
     if callable(quality):
         return quality
-    if quality not in _NAMED:
+    if not isinstance(quality, str) or quality not in _NAMED:
         raise InvalidInput("quality", quality, f"{', '.join(_NAMED)} or a callable")
     return _NAMED[quality]
 

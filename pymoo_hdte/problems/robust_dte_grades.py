@@ -47,12 +47,12 @@ class RobustDTEGrades(StoredFront, RobustProblem):
 
     Two constraints hold for the nominal design. The grades cost no more than ``cost_limit``, by
     the reciprocal model of Chase and Greenwood as in `RobustDTETolerance`: the mean of 1 / grade
-    over the error sources of the data sheet, 1 for the drive as it is. That halving any one error
-    costs the same is our simplification. And the drive also runs for long at ``process_speed``: its
-    torsional resonance, that of K between both inertias, stays off the speed of the wave
-    generator's two lobes there, by the share ``margin`` of it at least. Designs that are softer and
-    stiffer than that are two separate regions. (The torsion under load is load / K, and a limit of
-    it would only move the bound of K.)
+    over the error sources of the data sheet that stand behind a line, 1 for the drive as it is.
+    That halving any one error costs the same is our simplification. And the drive also runs for
+    long at ``process_speed``: its torsional resonance, that of K between both inertias, stays off
+    the speed of the wave generator's two lobes there, by the share ``margin`` of it at least.
+    Designs that are softer and stiffer than that are two separate regions. (The torsion under load
+    is load / K, and a limit of it would only move the bound of K.)
 
     Parameters
     ----------

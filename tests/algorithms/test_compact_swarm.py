@@ -200,6 +200,38 @@ def test_a_problem_without_any_number_ends_empty_and_with_a_warning():
     assert result.F is result.X is None
 
 
+class NoConstraint(Parabolas):
+    """Whose constraint is never a number."""
+
+    def __init__(self):
+        super().__init__(n_ieq_constr=1)
+
+    def _evaluate(self, X, out, *args, **kwargs):
+        super()._evaluate(X, out)
+        out["G"] = np.full((len(X), 1), np.nan)
+
+
+def test_the_warning_does_not_blame_objectives_alone():
+    with pytest.warns(RuntimeWarning, match="or no constraint"):
+        result = run(NoConstraint(), 200)
+    assert result.F is None
+
+
+@pytest.mark.parametrize("problem", [Parabolas(), Unreachable()])
+@pytest.mark.parametrize("n_offsprings", [None, 1])
+def test_a_callback_may_leave_a_single_particle(problem, n_offsprings):
+    def leave_one(algorithm):
+        algorithm.pop = algorithm.pop[:1]
+
+    swarm = CompactSwarm(20, n_offsprings=n_offsprings, callback=leave_one)
+    result = minimize(problem, swarm, ("n_eval", 100), seed=1)
+    assert result.algorithm.evaluator.n_eval >= 100
+
+
+def test_an_archive_is_empty_before_a_run():
+    assert len(CompactSwarm().archive_all()) == 0
+
+
 def test_pymoo_s_default_termination_ends_a_small_swarm():
     result = minimize(Parabolas(), CompactSwarm(15), seed=1)
     assert 50 < result.algorithm.n_iter < 500

@@ -87,5 +87,6 @@ def test_a_swarm_takes_a_quality_by_name_or_as_a_function():
     given = run(ElitistSwarm(20, quality=most_hypervolume), problem, n_gen=150)
     np.testing.assert_array_equal(named.F, given.F)
     assert volume(named.F) > volume(run(ElitistSwarm(20), problem, n_gen=150).F)
-    with pytest.raises(InvalidInput, match="quality"):
-        ElitistSwarm(quality="crowding")
+    for unknown in ("crowding", ["spread"]):
+        with pytest.raises(InvalidInput, match="quality"):
+            ElitistSwarm(quality=unknown)

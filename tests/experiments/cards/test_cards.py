@@ -112,6 +112,15 @@ def test_a_problem_separates_where_the_quartiles_of_the_algorithms_lie_apart(med
     assert found.reached == sum(median <= 2.0 * FLOOR for median in medians)
 
 
+def test_two_algorithms_are_too_few_for_quartiles():
+    (found,) = separations(planted([FLOOR, 10 * FLOOR]), {"RobustToy": PLAIN})
+    assert found.separates is None
+    assert (
+        "too few"
+        in separation_table(Numbers(planted([1.0, 9.0]), {"RobustToy": PLAIN})).rows[0][-1]
+    )
+
+
 @pytest.fixture(scope="module")
 def numbers():
     return committed_numbers()
@@ -130,6 +139,14 @@ def test_every_problem_has_numbers_at_every_budget_it_was_given(numbers):
 def test_a_problem_separates_algorithms_at_the_largest_budget(numbers):
     (finding,) = separation_table(numbers).findings
     assert finding.agrees
+    assert "direct" not in finding.sentence
+
+
+def test_by_the_earlier_rule_none_does(numbers):
+    """As the note says: a quarter reaches the front, and a quarter does not."""
+    for one in separations(*numbers):
+        if one.evaluations == max(BUDGETS):
+            assert min(one.reached, one.algorithms - one.reached) < 0.25 * one.algorithms
 
 
 def test_a_card_says_what_the_problem_is(numbers):
