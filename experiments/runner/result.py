@@ -115,7 +115,6 @@ class Table:
         """Whether the column at ``index`` holds words, which read better aligned to the left."""
         return any(isinstance(row[index], str) for row in self.rows)
 
-
     def holds_prose(self, index: int) -> bool:
         """Whether the words of the column at ``index`` need room."""
         return any(len(str(row[index])) > LONG for row in self.rows)
