@@ -44,7 +44,7 @@ def steady_files(out: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(out)): path.read_bytes()
         for path in out.rglob("*")
-        if path.is_file() and "times" not in path.parts and path.name != "index.html"
+        if path.is_file() and "times" not in path.parts and path.suffix != ".html"
     }
 
 
