@@ -31,7 +31,7 @@ MODEL = "calibrated"
 def advantage_findings(found: Contests) -> Iterator[Finding]:
     """Say where AMP-MOPSO is ahead of both rivals, and how it stands at the stated setting."""
     for contest, entries in found.items():
-        at_stated = [duel for duel in entries if (duel.population, duel.evaluations) == STATED]
+        at_stated = _of_stated(entries)
         if contest.indicator == "hypervolume" or not at_stated:
             continue
         word = standing(at_stated)
@@ -41,6 +41,11 @@ def advantage_findings(found: Contests) -> Iterator[Finding]:
             f"beyond chance {settings_ahead(entries) or 'nowhere'}; at the stated 100 x 100 it is "
             f"{_level(word)}.",
         )
+
+
+def _of_stated(entries: Sequence[Duel]) -> list[Duel]:
+    """Return the duels at the setting that the paper states."""
+    return [duel for duel in entries if (duel.population, duel.evaluations) == STATED]
 
 
 def settings_ahead(entries: Sequence[Duel]) -> str:
@@ -121,7 +126,7 @@ def _setting(one: Reading) -> str:
 def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
     """Return the first sentences of the report; empty where the stated setting was not run."""
     entries, place = found.get(Contest(MODEL, "igd"), []), stated_place(ranked)
-    at_stated = [duel for duel in entries if (duel.population, duel.evaluations) == STATED]
+    at_stated = _of_stated(entries)
     if not at_stated or place is None:
         return ""
     igd, spacing = (
@@ -141,7 +146,7 @@ def opening(scores: Scores, found: Contests, ranked: Sequence[Reading]) -> str:
 def first_page(scores: Scores, found: Contests) -> dict[str, str]:
     """Return what holds of Table 7, and what does not, as parts of longer sentences."""
     entries = found.get(Contest(MODEL, "igd"), [])
-    at_stated = [duel for duel in entries if (duel.population, duel.evaluations) == STATED]
+    at_stated = _of_stated(entries)
     if not at_stated:
         return {}
     ahead = settings_ahead(entries)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +71,7 @@ def paper_choices(model: str = MODEL) -> list[Choice]:
     ]
 
 
+@cache
 def dominating_shares(model: str) -> dict[str, float]:
     """Return the share of random designs in the box that dominate each of the paper's optima."""
     problem = robust_problem(model)

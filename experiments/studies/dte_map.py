@@ -67,26 +67,27 @@ def run(context: Context) -> Result:
 def _resonances(entry: SpeedLoadMap) -> str:
     """Say where a drive model resonates."""
     mode = torsional_mode(entry.model)
-    met = [
-        f"order {order:g} at {significant(speed, 4)} r/min"
-        for order, speed in critical_speeds(entry.model)
-    ]
+    met = [f"{one} r/min" for one in _met(entry)]
     return f"{entry.model.name} has its torsional mode at {significant(mode.frequency, 4)} Hz, " + (
         f"met by {', '.join(met)}." if met else "met by no excited order in the range."
     )
+
+
+def _met(entry: SpeedLoadMap) -> list[str]:
+    """Return the orders that meet the torsional mode, each with its input speed in r/min."""
+    return [
+        f"order {order:g} at {significant(speed, 4)}"
+        for order, speed in critical_speeds(entry.model)
+    ]
 
 
 def _modes_table(maps: Sequence[SpeedLoadMap]) -> Table:
     rows = []
     for entry in maps:
         mode = torsional_mode(entry.model)
-        resonances = ", ".join(
-            f"order {order:g} at {significant(speed, 4)}"
-            for order, speed in critical_speeds(entry.model)
-        )
         ends = np.nanmin(entry.dte), np.nanmax(entry.dte)
         total = entry.dte.size
-        cells = (mode.frequency, mode.damping_ratio, resonances or "none")
+        cells = (mode.frequency, mode.damping_ratio, ", ".join(_met(entry)) or "none")
         rows.append((entry.model.name, *cells, *ends, f"{entry.unstable} of {total}"))
     columns = (
         Column("model"),

@@ -72,7 +72,7 @@ def guests(points: Points, size: int) -> NDArray[np.int_]:
         return rows[:0]
     keys = np.column_stack([points.F[rows], points.violation[rows]])
     free = Points(points.X[rows], keys, np.zeros(len(rows)))
-    return rows[survivors(free, min(size, len(rows)))]
+    return rows[survivors(free, size)]
 
 
 def tolerant(points: Points, level: float) -> Points:

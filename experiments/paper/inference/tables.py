@@ -23,17 +23,17 @@ from experiments.paper.inference.verdicts import (
     above_a_special_case,
     chosen_fits,
     describe,
+    gives_both,
     gives_trade_off,
     step_errors,
     steps_of,
-    undominated,
 )
 from experiments.runner.result import Cell, Column, Finding, Table, significant
 
 
 def of_the_first_page(fits: Sequence[Fit]) -> str:
     """Say whether its trade-off and its optima go together, as part of a longer sentence."""
-    both = sum(gives_trade_off(one) and undominated(one) for one in fits)
+    both = len(gives_both(fits))
     return (
         f"{both} of {len(fits)} fitted models give its trade-off between mean and scatter and "
         "leave its optima optimal"
@@ -45,7 +45,7 @@ def opening(fits: Sequence[Fit]) -> str:
     common = [one for one in fits if one.target == "common"]
     searched = len(common)
     meeting = [one for one in common if gives_trade_off(one)]
-    both = [one for one in fits if gives_trade_off(one) and undominated(one)]
+    both = gives_both(fits)
     if both:
         return (
             f"Of {searched} drive models searched, {len(both)} give the published numbers with the "
@@ -132,7 +132,7 @@ def _findings(fits: Sequence[Fit]) -> list[Finding]:
     (independent,) = (one for one in fits if one.target == "independent")
     common = [one for one in fits if one.target == "common"]
     meeting = [one for one in common if gives_trade_off(one)]
-    both = [one for one in fits if gives_trade_off(one) and undominated(one)]
+    both = gives_both(fits)
     found = independent.evaluation
     ours, paper = steps_of(found.predicted), steps_of(OBSERVED)
     return [

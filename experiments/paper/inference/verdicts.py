@@ -114,6 +114,11 @@ def _contains(one: Rung, other: Rung) -> bool:
     )
 
 
+def gives_both(fits: Sequence[Fit]) -> list[Fit]:
+    """Return the fits that give the trade-off and leave the optima undominated."""
+    return [one for one in fits if gives_trade_off(one) and undominated(one)]
+
+
 def describe(rung: Rung) -> str:
     """Return a rung in words."""
     effects = ", ".join(name.replace("_", " ") for name in rung.candidate.effects) or "no effect"

@@ -127,14 +127,10 @@ class AnyForm:
             return []
         rules = self.data.rules
         found = [reduced(each, rest.directions, rest.residual) for each in known]
-        ranked = [
-            each
-            for each in sorted(found, key=lambda each: -each.reduction)
-            if rest.excess >= self._least(one, (each.candidate,), rest)
-        ]
-        hopeful = [
-            each for each in ranked if each.reduction >= self._least(one, (each.candidate,), rest)
-        ]
+        found.sort(key=lambda each: -each.reduction)
+        asked = [(each, self._least(one, (each.candidate,), rest)) for each in found]
+        ranked = [each for each, least in asked if rest.excess >= least]
+        hopeful = [each for each, least in asked if min(rest.excess, each.reduction) >= least]
         little = one.explained >= rules.explained_share
         if not hopeful and little and not rest.is_noise:
             gains = [self._in_any_form(each, rest) for each in ranked]

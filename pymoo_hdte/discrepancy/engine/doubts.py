@@ -31,9 +31,9 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
         found.append("a base parameter ended at ten times or a tenth of what is believed")
     curves = [one.label for one in chosen.candidates if not one.exact]
     freed = any(one.frees is not None for one in chosen.candidates)
-    if curves and freed and not search.enough(chosen):
-        found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
     if not search.enough(chosen):
+        if curves and freed:
+            found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
         found += _harmonics_of_another(chosen.candidates)
     if vote is not None and vote.after >= vote.before:
         found.append(NOT_PROVEN)

@@ -80,24 +80,6 @@ class Statistic:
         """
         return self._of(around)
 
-    def of_moments(self, mean: Array, std: Array) -> Array | None:
-        """Return its values, without the sign, where mean and deviation are enough, else None.
-
-        Parameters
-        ----------
-        mean, std : ndarray, shape (n,)
-            Of the response, in its unit.
-
-        Returns
-        -------
-        ndarray, shape (n,), or None
-            In the response's unit.
-        """
-        if self._weights is None:
-            return None
-        of_mean, of_std = self._weights
-        return of_mean * mean + of_std * std
-
     def half_width(self, mean_error: Array, std_error: Array, around: Around) -> Array:
         """Return the half-width of its error band, shape (n,), in its unit; NaN if it has none.
 
@@ -111,8 +93,8 @@ class Statistic:
         return self._error(mean_error, std_error, around)
 
     @property
-    def _weights(self) -> tuple[float, float] | None:
-        """Of mean and standard deviation, where these are enough."""
+    def weights(self) -> tuple[float, float] | None:
+        """Of mean and standard deviation, dimensionless; None if it is no such sum."""
         return None
 
     def _of(self, around: Around) -> tuple[Array, Array]:
@@ -158,7 +140,8 @@ class Mean(Statistic):
         return around.mean, slope
 
     @property
-    def _weights(self) -> tuple[float, float]:
+    def weights(self) -> tuple[float, float]:
+        """Of mean and standard deviation, dimensionless."""
         return 1.0, 0.0
 
 
@@ -180,7 +163,8 @@ class Std(Statistic):
         return around.std, slope
 
     @property
-    def _weights(self) -> tuple[float, float]:
+    def weights(self) -> tuple[float, float]:
+        """Of mean and standard deviation, dimensionless."""
         return 0.0, 1.0
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
@@ -216,7 +200,8 @@ class MeanPlusStd(Statistic):
         return parts[0][0] + self.k * parts[1][0], parts[0][1] + self.k * parts[1][1]
 
     @property
-    def _weights(self) -> tuple[float, float]:
+    def weights(self) -> tuple[float, float]:
+        """Of mean and standard deviation, dimensionless."""
         return 1.0, self.k
 
     def _error(self, mean_error: Array, std_error: Array, around: Around) -> Array:
