@@ -31,6 +31,7 @@ from pymoo_hdte.drive.solve.steady_motion import SpeedLoop
 from pymoo_hdte.drive.solve.torus import (
     Torus,
     fundamental_orders,
+    multiples_of,
     multiplication,
     stacked,
     unstacked,
@@ -390,6 +391,16 @@ def test_orders_need_the_fewest_angles():
     assert fundamental_orders([2.02, 4.04, 1 / 101]) == pytest.approx((1.0, 1 / 101, 0.02))
     # Three times 0.02 is 0.06, and 1.98 is 2 - 0.02.
     assert fundamental_orders([2.02, 4.06, 1.98]) == pytest.approx((1.0, 0.02))
+
+
+@given(st.lists(st.floats(0.05, 6.0), min_size=1, max_size=3), st.integers(1, 3))
+def test_all_orders_are_sums_of_their_fundamentals(orders, harmonics):
+    multiples = [k * order for order in orders for k in range(1, harmonics + 1)]
+    fundamentals = fundamental_orders([1.0, 2.02, *multiples])
+    # The harmonics of an order need no angle besides that of the order.
+    assert len(fundamentals) <= 2 + len(orders)
+    for order in (1.0, 2.02, *multiples):
+        assert multiples_of(fundamentals, order) @ fundamentals == pytest.approx(order, abs=1e-7)
 
 
 TORUS = Torus((1.0, 0.02), (4, 2))

@@ -28,14 +28,26 @@ _LARGEST_MULTIPLE = 4
 
 
 def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
-    """Return 1 and the fractions from which all ``orders`` are whole multiples and sums."""
-    fractions = sorted({round(abs(order - np.rint(order)), 9) for order in orders} - {0.0})
+    """Return 1 and the fractions from which all ``orders`` are whole multiples and sums.
+
+    Those from which most of the others follow are taken, for each needs an angle of its own. The
+    harmonics of 0.5644, for instance, lie at the fractions 0.4356, 0.1287 and 0.3069 of a turn,
+    of which the second and third are multiples of the first, up to whole turns.
+    """
+    left = sorted({round(abs(order - np.rint(order)), 9) for order in orders} - {0.0})
     found: list[float] = []
-    for fraction in fractions:
-        multiples = [fraction / known for known in found]
-        if not any(abs(m - round(m)) < 1e-6 and round(m) <= _LARGEST_MULTIPLE for m in multiples):
-            found.append(fraction)
-    return (1.0, *found)
+    while left:
+        # Of equally good ones the smallest.
+        best = max(left, key=lambda one: (sum(_follows(other, one) for other in left), -one))
+        found.append(best)
+        left = [other for other in left if not _follows(other, best)]
+    return (1.0, *sorted(found))
+
+
+def _follows(fraction: float, known: float) -> bool:
+    """Tell whether a fraction is a small multiple of a known one, up to whole turns and sign."""
+    multiples = known * np.arange(1, _LARGEST_MULTIPLE + 1)
+    return bool(np.any(np.abs(np.abs(multiples - np.rint(multiples)) - fraction) < _TOLERANCE))
 
 
 @lru_cache(maxsize=1024)
@@ -103,7 +115,13 @@ class Torus:
         lines = self._multiples
         self._differences = self._flat(lines[:, None] - lines)
         self._sums = self._flat(lines[:, None] + lines)
-        self._kept, self._conjugates = self._flat(lines), self._flat(-lines)
+        # The real transform has the lines whose last multiple is not negative, the others by their
+        # conjugates; of a line at 0 in that multiple both halves have a place.
+        self._half_shape = (*self._shape[:-1], self._shape[-1] // 2 + 1)
+        self._reversed = lines[:, -1] < 0
+        self._kept = self._half(np.where(self._reversed[:, None], -lines, lines))
+        self._twice = np.flatnonzero(lines[:, -1] == 0)
+        self._conjugates = self._half(-lines[self._twice])
         self._axes = tuple(range(1, 1 + len(self._shape)))
         self._places: dict[float, tuple[int, bool] | None] = {}
 
@@ -136,6 +154,11 @@ class Torus:
         """Return the indices of multiples (..., n_angles) in a flattened transform of the grid."""
         wrapped = np.moveaxis(multiples % np.array(self._shape), -1, 0)
         return np.asarray(np.ravel_multi_index(tuple(wrapped), self._shape))
+
+    def _half(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
+        """Return the indices of multiples in a flattened real transform of the grid."""
+        wrapped = np.moveaxis(multiples % np.array(self._shape), -1, 0)
+        return np.asarray(np.ravel_multi_index(tuple(wrapped), self._half_shape))
 
     def phase(self, order: float) -> NDArray[np.float64]:
         """Return ``order`` times the input angle on the grid, shape (G,), up to whole turns."""
@@ -185,21 +208,22 @@ class Torus:
         """Return values on the grid, shape (n, G), of Re sum phasor exp(i order alpha)."""
         if len(self.orders) <= _DENSE:
             return np.ascontiguousarray(phasors).view(float) @ self._synthesis
-        spectrum = np.zeros((len(phasors), self.size), dtype=complex)
-        spectrum[:, self._kept] = 0.5 * phasors
-        spectrum[:, self._conjugates] += 0.5 * phasors.conj()
-        grid = spectrum.reshape(-1, *self._shape)
-        values = fft.ifftn(grid, axes=self._axes, norm="forward", overwrite_x=True).real
-        return np.ascontiguousarray(values).reshape(len(phasors), self.size)
+        spectrum = np.zeros((len(phasors), *self._half_shape), dtype=complex)
+        flat = spectrum.reshape(len(phasors), -1)
+        half = 0.5 * phasors
+        flat[:, self._kept] = np.where(self._reversed, half.conj(), half)
+        flat[:, self._conjugates] += half[:, self._twice].conj()
+        values = fft.irfftn(spectrum, s=self._shape, axes=self._axes, norm="forward")
+        return np.asarray(values).reshape(len(phasors), self.size)
 
     def phasors(self, values: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the kept harmonics, shape (n, n_harmonics), of values on the grid."""
         if len(self.orders) <= _DENSE:
             return (values @ self._analysis).view(complex)
-        spectrum = fft.fftn(values.reshape(-1, *self._shape), axes=self._axes, norm="forward")
-        found = 2.0 * spectrum.reshape(len(values), self.size)[:, self._kept]
+        spectrum = fft.rfftn(values.reshape(-1, *self._shape), axes=self._axes, norm="forward")
+        found = 2.0 * spectrum.reshape(len(values), -1)[:, self._kept]
         found[:, 0] *= 0.5
-        return np.asarray(found)
+        return np.where(self._reversed, found.conj(), found)
 
     def derivative(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the harmonics of the derivative by the input angle."""
