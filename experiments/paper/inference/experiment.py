@@ -1,7 +1,7 @@
 """Whether any model gives the published trade-off, and what the numbers say of its parameters.
 
 Without ``--full`` the report is made from ``experiments/data/inference*.csv``, the committed
-outcome of the last full campaign; with it the campaign runs (some forty minutes of one core, with
+outcome of the last full campaign; with it the campaign runs (some seventy minutes of one core, with
 the extra ``posterior``), goes on where it was interrupted, and leaves the files in the results
 folder.
 """
@@ -48,7 +48,7 @@ LARGE, FRONT, MIDDLE, SMALL = Effort(64), Effort(32), Effort(24), Effort(9)
 """Of the models with all effects: theta_s as semi-amplitude, the same with the front as a target,
 and theta_s as peak-to-peak; of all other models, which are special cases of these or one closure
 more."""
-STEPS = 500
+STEPS = 2000
 """Of each walker of a posterior."""
 FULL = {bands: Rung(Candidate(EFFECTS, "semi_amplitude", bands)) for bands in (NARROW, WIDE)}
 """The rung of ``calibrated``, under either reading of the bands."""
