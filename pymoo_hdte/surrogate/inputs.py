@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+
+# Its special functions load when they are first used.
+import scipy
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ndtr, ndtri
 
 from pymoo_hdte.checks import InvalidInput, real_number
 from pymoo_hdte.surrogate.box import Box, ExtrapolationError
@@ -77,7 +79,8 @@ class TruncatedNormal:
         It has the shape of ``x``, which may be any shape, e.g. (n,), in the variable's unit.
         """
         z = (np.asarray(x, dtype=float) - self.mean) / self.std
-        inside = np.sqrt(2.0 * np.pi) * self.std * (ndtr(self.cut) - ndtr(-self.cut))
+        low, high = scipy.special.ndtr([-self.cut, self.cut])
+        inside = np.sqrt(2.0 * np.pi) * self.std * (high - low)
         return np.where(np.abs(z) <= self.cut, np.exp(-0.5 * z**2) / inside, 0.0)
 
     def quadrature(self, degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -112,8 +115,8 @@ class TruncatedNormal:
         ndarray, shape (size,)
             In the variable's unit.
         """
-        low, high = ndtr(-self.cut), ndtr(self.cut)
-        z = ndtri(low + (high - low) * random_state.random(size))
+        low, high = scipy.special.ndtr([-self.cut, self.cut])
+        z = scipy.special.ndtri(low + (high - low) * random_state.random(size))
         return self.mean + self.std * np.clip(z, -self.cut, self.cut)
 
 

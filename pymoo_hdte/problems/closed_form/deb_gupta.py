@@ -7,9 +7,9 @@ keep so far from the bounds that the box stays inside.
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.polynomial.legendre import leggauss
 from numpy.typing import NDArray
-from scipy.special import erf
 
 from pymoo_hdte.checks import real_number, whole_number
 from pymoo_hdte.problems.closed_form.pieces import falling_points, least_between
@@ -257,6 +257,8 @@ def _mean_valleys(x: Array, delta: float) -> Array:
     """Return the mean of the valleys' depth over x +- delta, same shape."""
     total = np.zeros_like(x)
     for depth, centre, width in ((0.8, 0.35, _WIDE), (1.0, _CENTRE, _NARROW)):
-        upper, lower = (erf((x + side * delta - centre) / width) for side in (1.0, -1.0))
+        upper, lower = (
+            scipy.special.erf((x + side * delta - centre) / width) for side in (1.0, -1.0)
+        )
         total += depth * width * np.sqrt(np.pi) / 2.0 * (upper - lower) / (2.0 * delta)
     return total

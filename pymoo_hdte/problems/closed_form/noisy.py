@@ -12,8 +12,6 @@ import numpy as np
 # Its statistics load when they are first used.
 import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri
 
 from pymoo_hdte.checks import real_number, whole_number
 from pymoo_hdte.problems.closed_form.pieces import falling_points
@@ -185,7 +183,9 @@ class BeamReliability(ClosedFormProblem):
         b, h = designs.T
         section = b * h**2 / 6.0
         mean = self._strength[0] * section - self._force[0]
-        probability = ndtr(-mean / np.hypot(self._strength[1] * section, self._force[1]))
+        probability = scipy.special.ndtr(
+            -mean / np.hypot(self._strength[1] * section, self._force[1])
+        )
         objectives = np.column_stack([self._density * b * h, probability])
         return objectives, np.column_stack([probability - self._limit, h / b - 4.0])
 
@@ -199,7 +199,7 @@ class BeamReliability(ClosedFormProblem):
             return float(self.closed_form(np.array([[h / 4.0, h]]))[1][0, 0])
 
         top = float(self.xu[1])
-        first = float(brentq(excess, float(self.xl[1]), top, xtol=1e-16, rtol=1e-15))
+        first = float(scipy.optimize.brentq(excess, float(self.xl[1]), top, xtol=1e-16, rtol=1e-15))
         heights = np.linspace(first, top, FRONT_POINTS // 2)
         widths = np.linspace(top / 4.0, float(self.xu[0]), FRONT_POINTS // 2)
         slender = np.column_stack([heights / 4.0, heights])
@@ -224,7 +224,7 @@ class Portfolio(ClosedFormProblem):
         super().__init__(designs, objectives, [Mean(response="invested") <= 1.0])
         correlation = np.full((4, 4), self._correlation) + (1.0 - self._correlation) * np.eye(4)
         self.covariance = correlation * np.outer(self._deviations, self._deviations)
-        z = ndtri(self._level)
+        z = scipy.special.ndtri(self._level)
         self._tail = float(np.exp(-0.5 * z**2) / np.sqrt(2.0 * np.pi) / (1.0 - self._level))
 
     def noise(self) -> dict[Any, Any]:
@@ -262,7 +262,7 @@ class Portfolio(ClosedFormProblem):
             shares = self._efficient(t)
             return float(np.sqrt(shares @ self.covariance @ shares) - self._tail * t)
 
-        first = float(brentq(slope, 0.0, 1.0, xtol=1e-16, rtol=1e-15))
+        first = float(scipy.optimize.brentq(slope, 0.0, 1.0, xtol=1e-16, rtol=1e-15))
         richest = np.eye(4)[np.argmax(self._returns)]
         gaps = self.covariance @ richest
         rest = np.flatnonzero(richest == 0.0)

@@ -7,8 +7,8 @@ by sin(w d) / (w d).
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from pymoo_hdte.checks import real_number, whole_number
 from pymoo_hdte.problems.closed_form.problem import (
@@ -188,7 +188,7 @@ class RobustSrinivas(ClosedFormProblem):
         def excess(x2: float) -> float:
             return float(self.closed_form(np.array([[x1, x2]]))[1][0, 0])
 
-        return float(brentq(excess, 1.0, 20.0, xtol=1e-14, rtol=1e-15))
+        return float(scipy.optimize.brentq(excess, 1.0, 20.0, xtol=1e-14, rtol=1e-15))
 
     def _least_on_circle(self) -> float:
         """Return the x1 where f2 is least on g1 = 0: there its slope along the circle is 0."""
@@ -198,4 +198,4 @@ class RobustSrinivas(ClosedFormProblem):
             # Mean and deviation of g1 depend on x1^2 + x2^2 alone, so that it is a circle.
             return 9.0 + 2.0 * (x2 - 1.0) * x1 / x2
 
-        return float(brentq(slope, -8.0, -2.5, xtol=1e-14, rtol=1e-15))
+        return float(scipy.optimize.brentq(slope, -8.0, -2.5, xtol=1e-14, rtol=1e-15))

@@ -11,7 +11,6 @@ import numpy as np
 # Its statistics load when they are first used.
 import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
 from pymoo_hdte.problems.simulator.distributions import joint_distribution
@@ -187,7 +186,9 @@ class Inputs:
         columns = [axis.physical(z) for axis, z in zip(self.axes, cube.T, strict=True)]
         for first, joint in self._joint:
             place = slice(first, first + len(joint))
-            columns[place] = list(np.asarray(joint.inv(ndtr(np.array(columns[place])))))
+            columns[place] = list(
+                np.asarray(joint.inv(scipy.special.ndtr(np.array(columns[place]))))
+            )
         return np.column_stack(columns)
 
     def reach(self) -> dict[str, tuple[float, float]]:
