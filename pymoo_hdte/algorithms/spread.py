@@ -40,7 +40,7 @@ def _kept(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
     for _ in range(n - size):
         leaving = -1
         for row in range(n):
-            if stays[row] and (leaving < 0 or _closer(gaps[row], gaps[leaving])):
+            if stays[row] and (leaving < 0 or _closer(gaps, row, leaving)):
                 leaving = row
         stays[leaving] = False
         for row in range(n):
@@ -50,8 +50,9 @@ def _kept(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
 
 
 @compiled
-def _closer(gaps: NDArray[np.float64], others: NDArray[np.float64]) -> bool:
-    return gaps[0] < others[0] or (gaps[0] == others[0] and gaps[1] < others[1])
+def _closer(gaps: NDArray[np.float64], row: int, other: int) -> bool:
+    gap, least = gaps[row, 0], gaps[other, 0]
+    return bool(gap < least or (gap == least and gaps[row, 1] < gaps[other, 1]))
 
 
 @compiled
@@ -73,5 +74,6 @@ def _find_neighbours(
             first, second, gap, second_gap = other, first, distance, gap
         elif distance < second_gap:
             second, second_gap = other, distance
-    neighbours[row] = first, second
-    gaps[row] = gap, second_gap
+    # One by one: assigning a tuple to a row takes three seconds more to compile.
+    neighbours[row, 0], neighbours[row, 1] = first, second
+    gaps[row, 0], gaps[row, 1] = gap, second_gap

@@ -207,11 +207,15 @@ def _correct(
 def _exponentials(matrix: Values) -> tuple[Values, Values]:
     """Return the exponentials of half a matrix and the whole one, by a series and squaring."""
     norm, halvings, n = 0.0, 1, len(matrix)
+    result = np.zeros((n, n))
     for i in range(n):
-        norm = max(norm, np.sum(np.abs(matrix[i])))
+        row = 0.0
+        for j in range(n):
+            row += abs(matrix[i, j])
+        norm = max(norm, row)
+        result[i, i] = 1.0
     while norm > 2.0**halvings and halvings < 200:
         halvings += 1
-    result = np.eye(n)
     for order in range(18, 0, -1):
         result = _product(matrix, result)
         for i in range(n):
@@ -240,17 +244,20 @@ def _judge(
     after: Values, error: Values, origin: Values, watched: Values, reach: Values, rtol: float
 ) -> tuple[Values, float]:
     """Return the largest positions and speeds so far, (2, rows), and the relative error."""
-    farthest, missed, size = reach.copy(), np.zeros(reach.shape), 0.0
+    farthest, missed, size, finite = np.empty(reach.shape), np.zeros(reach.shape), 0.0, True
     for kind in range(2):
-        largest = np.max(np.abs(after[kind]))
+        largest = 0.0
+        for place in range(watched.shape[1]):
+            largest = max(largest, abs(after[kind, place]))
+            finite = finite and math.isfinite(error[kind, place])
         for row in range(len(watched)):
             moved = 0.0
             for place in range(watched.shape[1]):
                 moved += watched[row, place] * (after[kind, place] - origin[kind, place])
                 missed[kind, row] += watched[row, place] * error[kind, place]
-            farthest[kind, row] = max(farthest[kind, row], abs(moved))
+            farthest[kind, row] = max(reach[kind, row], abs(moved))
             largest = max(largest, farthest[kind, row])
         for row in range(len(watched)):
             allowed = rtol * farthest[kind, row] + _ROUNDING * largest + 1e-300
             size = max(size, abs(missed[kind, row]) / allowed)
-    return farthest, size if np.isfinite(error).all() else np.inf
+    return farthest, size if finite else math.inf

@@ -138,6 +138,10 @@ class AngleEquations:
         self, port: str, position: Values, speed: Values, load: Values | None = None
     ) -> Response:
         """Return the sum of the laws at a port, which passes on ``load`` besides them."""
+        laws = [law for place, law in self.coefficients.laws if place == port]
+        total = Response(np.zeros_like(speed))
+        if not laws:
+            return total
         # The angle of periodic laws at the output omits the small fluctuation of the output.
         slower = self.coefficients.ratio if port == "output" else 1.0
 
@@ -147,15 +151,13 @@ class AngleEquations:
         stiffness = self.coefficients.stiffness[:, None]
         warmth = np.reshape(self.coefficients.temperature, (-1, 1))
         state = PortState(position, speed, phase, stiffness, self._path, self._back, load, warmth)
-        total = Response(np.zeros_like(speed))
-        for place, law in self.coefficients.laws:
-            if place == port:
-                one = law.respond(state)
-                total = Response(
-                    total.torque + one.torque,
-                    total.slope + one.slope,
-                    total.damping + one.damping,
-                )
+        for law in laws:
+            one = law.respond(state)
+            total = Response(
+                total.torque + one.torque,
+                total.slope + one.slope,
+                total.damping + one.damping,
+            )
         return total
 
     def _path(self, values: Values) -> Values:
@@ -201,7 +203,7 @@ class AngleEquations:
         """Return the torque, N.m, that the output passes on to load, bearings and laws there."""
         return self.output_damping * motion.output_speed + motion.output_friction + self.load
 
-    def input_residual(self, motion: TorsionMotion) -> Phasors:
+    def input_residual(self, motion: TorsionMotion, loop_torque: Values) -> Phasors:
         """Return the residual of the first equation, N.m; its mean is the motor's constant."""
         coefficients = self.coefficients
         reaction = coefficients.reaction * self._static_slope
@@ -214,19 +216,19 @@ class AngleEquations:
             + friction.torque
             + motion.mesh_torque * (1.0 / coefficients.ratio - reaction)
         )
-        return self.torus.phasors(resisting - self.loop_torque(motion))
+        return self.torus.phasors(resisting - loop_torque)
 
     def lead(self, motion: TorsionMotion) -> Phasors:
         """Return alpha - Omega t."""
         return -self.torus.integral(self.torus.phasors(self.speed / motion.angular_speed))
 
-    def loop_torque(self, motion: TorsionMotion) -> Values:
-        """Return the motor's torque without its constant."""
+    def loop_torque(self, motion: TorsionMotion, lead: Phasors | None = None) -> Values:
+        """Return the motor's torque without its constant; ``lead`` is that of the motion."""
         motor = self.motor
         if motor == CONSTANT_TORQUE:
             return np.zeros_like(motion.angular_speed)
         # The integral of w_set - w is Omega t - alpha.
-        late = -self.torus.signal(self.lead(motion))
+        late = -self.torus.signal(self.lead(motion) if lead is None else lead)
         return motor.proportional * (self.speed - motion.angular_speed) + motor.integral * late
 
     def input_operator(self) -> Phasors:
@@ -261,4 +263,4 @@ class AngleEquations:
 
 def mean(values: Values | float) -> Values:
     """Return the mean over the grid, shape (n, 1)."""
-    return np.atleast_2d(np.mean(np.atleast_2d(values), axis=1)).T
+    return np.asarray(np.atleast_2d(values).mean(axis=1, keepdims=True))

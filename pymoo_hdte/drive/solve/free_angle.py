@@ -212,14 +212,16 @@ class _Solver:
         motion = equations.motion(self.torsion, self.energy)
         torus, coefficients = equations.torus, equations.coefficients
         inertia = np.reshape(coefficients.load_inertia, (-1, 1))
-        constant = equations.input_residual(motion)[:, :1].real
+        lead = equations.lead(motion)
+        loop_torque = equations.loop_torque(motion, lead)
+        constant = equations.input_residual(motion, loop_torque)[:, :1].real
         return SteadyMotion(
             torus=torus,
             transmission_error=equations.static + self.torsion,
             torsion=self.torsion,
-            motor_torque=torus.phasors(equations.loop_torque(motion) + constant),
+            motor_torque=torus.phasors(loop_torque + constant),
             coupling_torque=torus.phasors(equations.load + inertia * motion.output_acceleration),
-            lead=equations.lead(motion),
+            lead=lead,
             energy=self.energy,
             converged=self.converged,
         )
@@ -247,7 +249,8 @@ def _newton_step(
     motion = equations.motion(torsion, energy)
     operator = equations.coefficients.ratio * equations.input_operator()
     impedance, coupling, share = equations.impedance(mean(motion.output_loss), operator)
-    energy_change = -equations.coefficients.ratio * equations.input_residual(motion) / operator
+    missing = equations.input_residual(motion, equations.loop_torque(motion))
+    energy_change = -equations.coefficients.ratio * missing / operator
     energy_change[:, 0] = 0.0
     right = (equations.output_residual(motion) + coupling * energy_change) / share
     change = _torsion_change(equations, motion, impedance, recall, right)

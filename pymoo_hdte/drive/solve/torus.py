@@ -124,6 +124,9 @@ class Torus:
         self._conjugates = self._half(-lines[self._twice])
         self._axes = tuple(range(1, 1 + len(self._shape)))
         self._places: dict[float, tuple[int, bool] | None] = {}
+        self._rate = 1j * self.orders
+        self._moving = self.orders != 0.0
+        self._divisor = np.where(self._moving, self._rate, 1.0)
 
     @cached_property
     def _synthesis(self) -> NDArray[np.float64]:
@@ -227,13 +230,11 @@ class Torus:
 
     def derivative(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the harmonics of the derivative by the input angle."""
-        return 1j * self.orders * phasors
+        return self._rate * phasors
 
     def integral(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the harmonics of the zero-mean integral over the input angle."""
-        moving = self.orders != 0.0
-        divisor = np.where(moving, 1j * self.orders, 1.0)
-        return np.where(moving, phasors / divisor, 0.0)
+        return np.where(self._moving, phasors / self._divisor, 0.0)
 
     def product_matrix(self, factor: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the real matrices that multiply a signal by ``factor``, given on the grid (n, G).

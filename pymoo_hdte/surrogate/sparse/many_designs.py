@@ -55,11 +55,20 @@ class ManyDesigns:
     def __call__(self, offsets: Array, factors: Array) -> tuple[Array, Array]:
         """Return mean and deviation, shape (n, r) each, from A and B of every axis, (m, n)."""
         found = np.empty((2, offsets.shape[1], len(self._coefficients)))
+        # Room for a block, made here: what makes it in machine code takes a second to compile.
+        columns, terms = self._columns.max(), self._sizes.max()
+        work = (
+            np.empty((len(self._rows), self._rows.max(), columns, _BLOCK)),
+            np.empty((columns + 1, _BLOCK)),
+            np.empty((terms, _BLOCK)),
+            np.empty((terms, _BLOCK)),
+        )
         _moments(
             (np.ascontiguousarray(offsets), np.ascontiguousarray(factors)),
             (self._nodes, self._rules, self._rows, self._columns),
             (self._pairs, self._ends, self._sizes, self._mean_place),
             self._coefficients,
+            work,
             found,
         )
         return found[0], found[1]
@@ -71,7 +80,10 @@ def _matrices(places, families, start, count, matrix, basis):  # type: ignore[no
     offsets, factors = places
     nodes, rules, rows, columns = families
     for j in range(len(rows)):
-        matrix[j, : rows[j], : columns[j]] = 0.0
+        for row in range(rows[j]):
+            for k in range(columns[j]):
+                for b in range(count):
+                    matrix[j, row, k, b] = 0.0
         for q in range(rows[j]):
             for b in range(count):
                 basis[0, b] = 1.0
@@ -87,21 +99,18 @@ def _matrices(places, families, start, count, matrix, basis):  # type: ignore[no
 
 
 @compiled
-def _moments(places, families, steps, coefficients, found):  # type: ignore[no-untyped-def]
+def _moments(places, families, steps, coefficients, work, found):  # type: ignore[no-untyped-def]
     pairs, ends, sizes, mean_place = steps
-    rows, columns = families[2], families[3]
-    n, block = places[0].shape[1], _BLOCK
-    matrix = np.empty((len(rows), rows.max(), columns.max(), block))
-    basis = np.empty((columns.max() + 1, block))
-    old, new = np.empty((sizes.max(), block)), np.empty((sizes.max(), block))
-    for start in range(0, n, block):
-        count = min(block, n - start)
+    matrix, basis, old, new = work
+    n = places[0].shape[1]
+    for start in range(0, n, _BLOCK):
+        count = min(_BLOCK, n - start)
         _matrices(places, families, start, count, matrix, basis)
         for response in range(len(coefficients)):
             for p in range(sizes[0]):
                 for b in range(count):
                     old[p, b] = coefficients[response, p]
-            for j in range(len(rows)):
+            for j in range(len(matrix)):
                 for p in range(sizes[j + 1]):
                     for b in range(count):
                         new[p, b] = 0.0

@@ -38,7 +38,14 @@ PRECISE = {"accuracy": 1e-6}
 """Takes more than 40 runs."""
 
 
-def test_a_run_that_fails_once_is_made_again():
+@pytest.fixture(scope="module")
+def steady():
+    """What a simulator that never fails gives, and its number of calls."""
+    calm = Flaky()
+    return quiet(calm, *PLAIN, **PRECISE).evaluate(np.array([[0.7]])), len(calm.calls)
+
+
+def test_a_run_that_fails_once_is_made_again(steady):
     met = set()
 
     def every_seventh_point_once(call, x):
@@ -46,11 +53,10 @@ def test_a_run_that_fails_once_is_made_again():
         met.add(x)
         return first and len(met) % 7 == 3
 
-    calm, flaky = Flaky(), Flaky(every_seventh_point_once)
-    X = np.array([[0.7]])
-    steady = quiet(calm, *PLAIN, **PRECISE)
-    assert np.array_equal(quiet(flaky, *PLAIN, **PRECISE).evaluate(X), steady.evaluate(X))
-    assert len(flaky.calls) == len(calm.calls) + (len(met) + 4) // 7
+    flaky, (expected, calls) = Flaky(every_seventh_point_once), steady
+    found = quiet(flaky, *PLAIN, **PRECISE).evaluate(np.array([[0.7]]))
+    assert np.array_equal(found, expected)
+    assert len(flaky.calls) == calls + (len(met) + 4) // 7
 
 
 def test_runs_that_always_fail_are_left_out_and_told():
@@ -143,11 +149,10 @@ def fails_once_everywhere(x, a):
     return np.exp(x * a)
 
 
-def test_workers_give_the_same_and_make_failed_runs_again(workers):
+def test_workers_give_the_same_and_make_failed_runs_again(workers, steady):
     FAILED_ONCE.clear()
     problem = quiet(fails_once_everywhere, *PLAIN, **PRECISE, executor=workers)
-    X = np.array([[0.7]])
-    assert np.array_equal(problem.evaluate(X), quiet(Flaky(), *PLAIN, **PRECISE).evaluate(X))
+    assert np.array_equal(problem.evaluate(np.array([[0.7]])), steady[0])
     assert FAILED_ONCE
     assert not len(problem.failed)
 
