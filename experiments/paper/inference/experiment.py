@@ -1,7 +1,7 @@
 """Whether any model gives the published trade-off, and what the numbers say of its parameters.
 
 Without ``--full`` the report is made from ``experiments/data/inference*.csv``, the committed
-outcome of the last full campaign; with it the campaign runs (some seventy minutes of one core, with
+outcome of the last full campaign; with it the campaign runs (some twenty minutes of one core, with
 the extra ``posterior``), goes on where it was interrupted, and leaves the files in the results
 folder.
 """
