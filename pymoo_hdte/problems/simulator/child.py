@@ -9,6 +9,7 @@ import os
 import pickle
 import signal
 import sys
+from contextlib import suppress
 from queue import SimpleQueue
 from threading import Thread
 from typing import IO
@@ -38,8 +39,10 @@ def serve() -> None:
     calls: SimpleQueue[bytes] = SimpleQueue()
     Thread(target=_read, args=(asked, calls), daemon=True).start()
     sys.path[:] = pickle.loads(calls.get())
-    while True:
-        _answer(calls.get(), answers)
+    # Whoever asked may be gone before the answer.
+    with suppress(BrokenPipeError):
+        while True:
+            _answer(calls.get(), answers)
 
 
 def _read(asked: IO[bytes], calls: SimpleQueue[bytes]) -> None:

@@ -54,9 +54,9 @@ class Workers:
         self.time_limit = time_limit
         if time_limit is not None:
             self.time_limit = real_number("time_limit", time_limit, above=0.0)
-        own = isinstance(executor, numbers.Integral) or (
-            executor is None and time_limit is not None
-        )
+        if executor is None and time_limit is not None:
+            executor = 1
+        own = isinstance(executor, numbers.Integral)
         if not (own or executor is None or hasattr(executor, "submit")):
             allowed = "a number of processes, an executor of concurrent.futures or a Dask client"
             raise InvalidInput("executor", executor, allowed)
