@@ -87,7 +87,7 @@ def minimize_asynchronously(
     try:
         run.to_the_end()
     finally:
-        runner.cancel()
+        runner.evaluations.cancel()
     result = swarm.result()
     result.algorithm = swarm
     return result
@@ -98,6 +98,7 @@ class _SteadyState:
 
     def __init__(self, swarm: ElitistSwarm, runner: ExecutorParallelization, at_once: int) -> None:
         self._swarm, self._runner, self._at_once = swarm, runner, at_once
+        self._evaluations = runner.evaluations
         self._f = swarm.problem.elementwise_func(swarm.problem, (), {})
         self._limit = evaluation_limit(swarm.termination)
         self._first = list(swarm.ask().tolist())
@@ -113,7 +114,7 @@ class _SteadyState:
                 self._start()
             if not self._under_way:
                 break
-            number, output = self._runner.next()
+            number, output = self._evaluations.next()
             self._tell(*self._under_way.pop(number), output)
 
     def _start(self) -> None:
@@ -126,7 +127,7 @@ class _SteadyState:
             particle = self._swarm.ask()[0]
             move = self._swarm.chosen
         self._under_way[self._started] = particle, move
-        self._runner.start(self._started, self._f, particle.X)
+        self._evaluations.start(self._started, self._f, particle.X)
         self._started += 1
 
     def _random(self) -> Individual:
@@ -136,7 +137,7 @@ class _SteadyState:
 
     def _tell(self, particle: Individual, move: NDArray[np.int_] | None, output: Any) -> None:
         swarm = self._swarm
-        self._runner.deliver(self._f, output)
+        self._runner.deliver(self._evaluations.filled(self._f, output))
         told = Population([particle])
         swarm.evaluator.eval(swarm.problem, told, algorithm=swarm)
         if move is not None:
@@ -148,5 +149,5 @@ class _SteadyState:
         else:
             self._arrived.append(particle)
             if len(self._arrived) == swarm.pop_size:
-                self._runner.refuse_failures()
+                self._evaluations.refuse_failures()
                 swarm.tell(infills=Population(self._arrived))

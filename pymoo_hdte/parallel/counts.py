@@ -32,7 +32,15 @@ class Counts:
     first_loss: str = ""
 
     def lose(self, kind: str, text: str) -> None:
-        """Count a design without a result."""
+        """Count a design without a result.
+
+        Parameters
+        ----------
+        kind : str
+            One of the four.
+        text : str
+            What was said.
+        """
         self.first_loss = self.first_loss or text
         self.lost[kind] += 1
 

@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-import copy
-import heapq
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from pymoo_hdte.checks import InvalidInput, whole_number
 from pymoo_hdte.parallel.counts import Counts
-from pymoo_hdte.parallel.kept_designs import KeptDesigns, Output, Row
+from pymoo_hdte.parallel.evaluations import Evaluations
+from pymoo_hdte.parallel.kept_designs import Output
 from pymoo_hdte.parallel.virtual import VirtualWorkers
-from pymoo_hdte.problems.simulator.children import NOT_A_NUMBER, TOO_LONG, Failure
-from pymoo_hdte.problems.simulator.runs import SimulatorFailed
 from pymoo_hdte.problems.simulator.workers import Workers
-
-
-@dataclass
-class _Task:
-    """An evaluation under way: f(x), tried so often."""
-
-    f: Callable[[Any], Output]
-    x: Any
-    row: Row | None
-    tries: int = 1
 
 
 class ExecutorParallelization:
@@ -86,156 +70,81 @@ class ExecutorParallelization:
         virtual = isinstance(executor, VirtualWorkers)
         if virtual and time_limit is not None:
             raise InvalidInput("time_limit", time_limit, "that of the VirtualWorkers")
+        tries = whole_number("tries", tries, 1)
         self._workers: Any = executor if virtual else Workers(executor, time_limit)
-        self._tries = whole_number("tries", tries, 1)
-        self._cache = cache
         self.counts = Counts()
-        self._forget()
-
-    def _forget(self) -> None:
-        self._kept: KeptDesigns | None = None
-        self._known: list[tuple[int, int, Row]] = []
-        self._same: dict[Row, list[int]] = {}
-        self._tasks: dict[int, _Task] = {}
-        self._shapes: dict[str, tuple[int, ...]] = {}
+        self._under_way: Evaluations | None = Evaluations(self._workers, tries, cache, self.counts)
         self._delivered: Output | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        # Workers cannot be stored, and what a problem is does not depend on them.
-        return {"_tries": self._tries, "_cache": self._cache}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__ |= state | {"_workers": None, "counts": Counts()}
-        self._forget()
+        # Workers cannot be stored.
+        return self.__dict__ | {"_workers": None, "_under_way": None, "_delivered": None}
 
     @property
     def number(self) -> int | None:
         """How many evaluations run at once; None if the executor does not tell."""
         return None if self._workers is None else self._workers.number
 
-    def __call__(self, f: Callable[[Any], Output], X: Sequence[Any]) -> list[Output]:
-        """Return f(x) of every x, in their order; NaN where it failed."""
-        if self._delivered is not None:
-            delivered, self._delivered = self._delivered, None
-            return [delivered]
-        outputs: dict[int, Output | None] = {}
-        try:
-            for number, x in enumerate(X):
-                self.start(number, f, x)
-            while len(outputs) < len(X):
-                number, output = self.next()
-                outputs[number] = output
-        except BaseException:
-            self.cancel()
-            raise
-        self.refuse_failures()
-        return [self._filled(f, outputs[number]) for number in range(len(X))]
+    @property
+    def evaluations(self) -> Evaluations:
+        """What is under way.
 
-    def start(self, number: int, f: Callable[[Any], Output], x: Any) -> None:
-        """Have f(x) evaluated, which `next` returns with the number.
+        Raises
+        ------
+        InvalidInput
+            If the runner comes back from a file, without workers.
+        """
+        if self._under_way is None:
+            allowed = "a new one: workers are not stored with a problem"
+            raise InvalidInput("elementwise_runner of the problem", self, allowed)
+        return self._under_way
+
+    def __call__(self, f: Callable[[Any], Output], X: Sequence[Any]) -> list[Output]:
+        """Return f(x) of every x, in their order; NaN where it failed.
 
         Parameters
         ----------
-        number : int
-            Tells the design from others under way.
         f : callable
             Of pymoo: from a design to its outputs by name.
-        x : object
-            The design; with a file n_var real numbers.
+        X : sequence
+            Designs.
+
+        Returns
+        -------
+        list of dict
+            Outputs by name.
+
+        Raises
+        ------
+        InvalidInput, SimulatorFailed
+            As the class says.
         """
-        if self._workers is None:
-            allowed = "a new one: workers are not stored with a problem"
-            raise InvalidInput("elementwise_runner of the problem", self, allowed)
-        row = None if self._cache is None else _row(x)
-        if row is not None:
-            self._kept = self._kept or self._opened(f, len(row))
-            if row in self._kept.order:
-                heapq.heappush(self._known, (self._kept.order[row], number, row))
-                return
-            if row in self._same:
-                self._same[row].append(number)
-                return
-            self._same[row] = []
-        self._tasks[number] = task = _Task(_without_runner(f), x, row)
-        self._workers.start(number, task.f, x)
+        if self._delivered is not None:
+            delivered, self._delivered = self._delivered, None
+            return [delivered]
+        under_way = self.evaluations
+        outputs: dict[int, Output | None] = {}
+        try:
+            for number, x in enumerate(X):
+                under_way.start(number, f, x)
+            while len(outputs) < len(X):
+                number, output = under_way.next()
+                outputs[number] = output
+        except BaseException:
+            under_way.cancel()
+            raise
+        under_way.refuse_failures()
+        return [under_way.filled(f, outputs[number]) for number in range(len(X))]
 
-    def _opened(self, f: Callable[[Any], Output], n_var: int) -> KeptDesigns:
-        bare = _without_runner(f)
+    def deliver(self, output: Output) -> None:
+        """Hand out the outputs of one design in the next call by pymoo.
 
-        def again(row: Row) -> Output | Failure:
-            for _ in range(self._tries):
-                self._workers.start(None, bare, np.array(row))
-                gave: Output | Failure = _judged(self._workers.next()[1])
-                if not isinstance(gave, Failure):
-                    break
-            return gave
-
-        assert self._cache is not None
-        return KeptDesigns(self._cache, getattr(bare, "problem", f), n_var, again)
-
-    def next(self) -> tuple[int, Output | None]:
-        """Return number and outputs of the next design that is finished, None if it is lost.
-
-        What is in the file comes first, in the order in which it once ended.
+        Parameters
+        ----------
+        output : dict
+            By name, from `evaluations`.
         """
-        if self._known:
-            return self._from_file()
-        while True:
-            number, answer = self._workers.next()
-            task, gave = self._tasks[number], _judged(answer)
-            # Another try of what lasts too long would last as long again.
-            final = gave.kind == TOO_LONG if isinstance(gave, Failure) else True
-            if final or task.tries == self._tries:
-                break
-            task.tries += 1
-            self.counts.repeated += 1
-            self._workers.start(number, task.f, task.x)
-        del self._tasks[number]
-        if task.row is not None and self._kept is not None:
-            gave = self._kept.keep(task.row, gave)
-            for other in self._same.pop(task.row):
-                heapq.heappush(self._known, (self._kept.order[task.row], other, task.row))
-        self.counts.made += not isinstance(gave, Failure)
-        return number, self._counted(gave)
-
-    def _from_file(self) -> tuple[int, Output | None]:
-        _, number, row = heapq.heappop(self._known)
-        assert self._kept is not None
-        gave = self._kept[row]
-        self.counts.from_file += not isinstance(gave, Failure)
-        return number, self._counted(gave)
-
-    def _counted(self, gave: Output | Failure) -> Output | None:
-        if isinstance(gave, Failure):
-            self.counts.lose(gave.kind, gave.text)
-            return None
-        self._shapes = {key: np.shape(value) for key, value in gave.items()}
-        return gave
-
-    def _filled(self, f: Any, output: Output | None) -> Output:
-        """Return the outputs of a design, NaN for one that is lost."""
-        if output is not None:
-            return output
-        shapes = dict(self._shapes)
-        if (problem := getattr(f, "problem", None)) is not None:
-            sizes = {"F": problem.n_obj, "G": problem.n_ieq_constr, "H": problem.n_eq_constr}
-            shapes = {key: (size,) for key, size in sizes.items() if size} | shapes
-        return {key: np.full(shape, np.nan) for key, shape in shapes.items()}
-
-    def deliver(self, f: Any, output: Output | None) -> None:
-        """Hand out the outputs of a design, NaN for a lost one, in the next call by pymoo."""
-        self._delivered = self._filled(f, output)
-
-    def refuse_failures(self) -> None:
-        """Raise `SimulatorFailed` if nothing but failures came so far."""
-        if self.counts.n_lost and not self.counts.made + self.counts.from_file:
-            raise SimulatorFailed(f"no evaluation gave a result: {self.counts}")
-
-    def cancel(self) -> None:
-        """Forget what is under way, and end it where the processes are our own."""
-        if self._workers is not None:
-            self._workers.cancel()
-        self._known, self._same, self._tasks = [], {}, {}
+        self._delivered = output
 
     def close(self) -> None:
         """End the processes that are our own; executors of the caller stay."""
@@ -247,31 +156,3 @@ class ExecutorParallelization:
 
     def __exit__(self, *error: object) -> None:
         self.close()
-
-
-def _without_runner(f: Any) -> Any:
-    """Return f for a worker, which would import this package for the runner of its problem."""
-    if getattr(f, "problem", None) is None:
-        return f
-    f = copy.copy(f)
-    f.problem = copy.copy(f.problem)
-    f.problem.elementwise_runner = None
-    return f
-
-
-def _row(x: Any) -> Row:
-    try:
-        return tuple(np.asarray(x, dtype=float).tolist())
-    except (TypeError, ValueError):
-        raise InvalidInput("design", x, "real numbers, to be kept in a file") from None
-
-
-def _judged(gave: Any) -> Output | Failure:
-    """Return the outputs of a design, or why they are none."""
-    if isinstance(gave, Failure):
-        return gave
-    for key in ("F", "G", "H"):
-        value = gave.get(key)
-        if value is not None and np.isnan(np.asarray(value, dtype=float)).any():
-            return Failure(NOT_A_NUMBER, f"{key} is {np.asarray(value)}")
-    return gave

@@ -60,7 +60,22 @@ class VirtualWorkers:
         return self.busy / (self.number * self.now) if self.now else 1.0
 
     def start(self, key: Hashable, function: Callable[..., Any], *arguments: Any) -> None:
-        """Put a call in the queue, whose result `next` returns with its key."""
+        """Put a call in the queue, whose result `next` returns with its key.
+
+        Parameters
+        ----------
+        key : hashable
+            Tells the call from others.
+        function : callable
+            What is called, at the virtual end of the call.
+        *arguments
+            Its arguments.
+
+        Raises
+        ------
+        InvalidInput
+            If the call would never end.
+        """
         wanted = float(self._seconds())
         lasts = min(wanted, self._limit)
         if not 0.0 <= lasts < float("inf"):

@@ -1,6 +1,9 @@
 """Runs of a simulator: failures, resumed studies, workers, and what it may return."""
 
 import concurrent.futures
+import math
+import time
+from functools import partial
 
 import chaospy
 import numpy as np
@@ -150,6 +153,40 @@ def test_workers_give_the_same_and_make_failed_runs_again(workers):
     assert np.array_equal(problem.evaluate(X), quiet(Flaky(), *PLAIN, **PRECISE).evaluate(X))
     assert FAILED_ONCE
     assert not len(problem.failed)
+
+
+def hangs_or_fails_somewhere(log, x, a):
+    with open(log, "a") as file:
+        file.write(f"{x.hex()}\n")
+    if int(1e6 * x) % 16 == 3:
+        time.sleep(1000.0)
+    if int(1e6 * x) % 16 == 5:
+        raise RuntimeError("no convergence")
+    return math.exp(x * a)
+
+
+def test_a_run_that_hangs_is_left_out_and_no_failed_one_comes_again_after_a_kill(tmp_path):
+    log, file = tmp_path / "log", tmp_path / "runs.jsonl"
+    simulator = partial(hangs_or_fails_somewhere, str(log))
+    options = {"time_limit": 0.3, "executor": 2, "at_once": 4, "cache": file, "tries": 1}
+    with pytest.warns(RuntimeWarning, match="runs failed and are left out"):
+        problem = quiet(simulator, *PLAIN, accuracy=0.05, **options)
+    lost = {x for x, _ in problem.failed}
+    assert {int(1e6 * x) % 16 for x in lost} == {3, 5}
+    # As a kill before the last run leaves it.
+    lines = file.read_text().splitlines(keepends=True)
+    file.write_text("".join(lines[:-2]))
+    log.unlink()
+    with pytest.warns(RuntimeWarning, match="runs failed and are left out"):
+        again = quiet(simulator, *PLAIN, accuracy=0.05, **options)
+    assert len(log.read_text().splitlines()) == 1
+    X = np.array([[0.7]])
+    assert np.array_equal(again.evaluate(X), problem.evaluate(X))
+
+
+def test_a_vectorised_simulator_has_no_time_limit():
+    with pytest.raises(InvalidInput, match="time_limit"):
+        quiet(Flaky(), *PLAIN, vectorised=True, time_limit=1.0)
 
 
 def test_runs_and_memory_are_told_before_the_first_run(capsys):
