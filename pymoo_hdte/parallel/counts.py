@@ -15,7 +15,8 @@ class Counts:
     made : int
         Designs evaluated in this process's run, with a result.
     from_file : int
-        Designs whose result was in the file of an earlier run; failed ones count as lost.
+        Designs whose result was in the file, from an earlier run or from the same design earlier in
+        this one; lost ones count as lost.
     lost : Counter
         Designs without a result, which are NaN, by kind: "raised", "not a number", "over the time
         limit", "worker lost".

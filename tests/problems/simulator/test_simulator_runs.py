@@ -1,13 +1,13 @@
 """Runs of a simulator: failures, resumed studies, workers, and what it may return."""
 
 import concurrent.futures
-import math
 import time
-from functools import partial
+from contextlib import closing
 
 import chaospy
 import numpy as np
 import pytest
+from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import (
@@ -17,6 +17,9 @@ from pymoo_hdte.problems import (
     UntrustedSurrogate,
     robust_problem,
 )
+from pymoo_hdte.problems.simulator.run_file import RunFile
+from pymoo_hdte.problems.simulator.runs import Simulator
+from pymoo_hdte.problems.simulator.workers import Workers
 
 
 def quiet(simulator, designs, noise=None, **options):
@@ -155,33 +158,40 @@ def test_workers_give_the_same_and_make_failed_runs_again(workers):
     assert not len(problem.failed)
 
 
-def hangs_or_fails_somewhere(log, x, a):
-    with open(log, "a") as file:
-        file.write(f"{x.hex()}\n")
-    if int(1e6 * x) % 16 == 3:
-        time.sleep(1000.0)
-    if int(1e6 * x) % 16 == 5:
-        raise RuntimeError("no convergence")
-    return math.exp(x * a)
-
-
 def test_a_run_that_hangs_is_left_out_and_no_failed_one_comes_again_after_a_kill(tmp_path):
-    log, file = tmp_path / "log", tmp_path / "runs.jsonl"
-    simulator = partial(hangs_or_fails_somewhere, str(log))
-    options = {"time_limit": 0.3, "executor": 2, "at_once": 4, "cache": file, "tries": 1}
-    with pytest.warns(RuntimeWarning, match="runs failed and are left out"):
-        problem = quiet(simulator, *PLAIN, accuracy=0.05, **options)
-    lost = {x for x, _ in problem.failed}
-    assert {int(1e6 * x) % 16 for x in lost} == {3, 5}
+    """As `robust_problem` makes runs; the values of the problem follow from them."""
+    log, path = tmp_path / "log", tmp_path / "runs.jsonl"
+
+    # Within the test, so that the processes need not import this file.
+    def function(x):
+        with open(log, "a") as file:
+            file.write(f"{x:g}\n")
+        if x == 3.0:
+            time.sleep(1000.0)
+        if x == 5.0:
+            raise RuntimeError("no convergence")
+        return 2.0 * x
+
+    def responses():
+        file = RunFile(path, ("x",), "the same")
+        with closing(Workers(2, 0.3)) as workers:
+            runs = Simulator(function, ("x",), False, workers, 2, file, tqdm(disable=True))
+            return [runs(values)[:, 0] for values in np.arange(8.0).reshape(2, 4, 1)]
+
+    expected = [0.0, 2.0, 4.0, np.nan, 8.0, np.nan, 12.0, 14.0]
+    np.testing.assert_array_equal(np.concatenate(responses()), expected)
+    # What fails is tried again, what lasts too long is not.
+    assert sorted(log.read_text().split()) == sorted("012345567")
+    lines = path.read_text().splitlines(keepends=True)
+    lost = [line for line in lines if "failed" in line]
+    assert len(lost) == 2
     # As a kill before the last run leaves it.
-    lines = file.read_text().splitlines(keepends=True)
-    file.write_text("".join(lines[:-2]))
+    last = next(line for line in reversed(lines) if "gave" in line)
+    lines.remove(last)
+    path.write_text("".join(lines))
     log.unlink()
-    with pytest.warns(RuntimeWarning, match="runs failed and are left out"):
-        again = quiet(simulator, *PLAIN, accuracy=0.05, **options)
-    assert len(log.read_text().splitlines()) == 1
-    X = np.array([[0.7]])
-    assert np.array_equal(again.evaluate(X), problem.evaluate(X))
+    np.testing.assert_array_equal(np.concatenate(responses()), expected)
+    assert len(log.read_text().split()) == 1
 
 
 def test_a_vectorised_simulator_has_no_time_limit():
