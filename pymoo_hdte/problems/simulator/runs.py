@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -159,7 +160,8 @@ class Simulator:
         """Yield runs as they end, so that a finished one is kept whatever happens to the others."""
         for row in rows:
             inputs = dict(zip(self.names, row, strict=True))
-            self.workers.start(row, call_by_name, self.function, inputs)
+            # Not by a function of ours: processes beside workers would import this package for it.
+            self.workers.start(row, partial(self.function, **inputs))
         try:
             for _ in rows:
                 row, gave = self.workers.next()  # type: ignore[assignment]
@@ -192,8 +194,3 @@ class Simulator:
             raise InvalidInput("names of the responses", names, str(self.responses))
         self.responses = names
         return np.column_stack(arrays)
-
-
-def call_by_name(function: Callable[..., Any], inputs: dict[str, float]) -> Any:
-    """Return what the function gives for inputs by name; workers call it."""
-    return function(**inputs)
