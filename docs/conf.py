@@ -46,6 +46,7 @@ numpydoc_xref_aliases = {
         "surrogate",
         "problems",
         "algorithms",
+        "parallel",
         "mechanism",
         "discrepancy",
     )

@@ -20,6 +20,7 @@ from experiments.runner.machine import machine_table
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
+from experiments.studies.benchmark_workers import ratios_of_workers, virtual_table
 from experiments.studies.timing import Ratio, best_time, ratio_table
 from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
 from pymoo_hdte.drive import (
@@ -50,7 +51,13 @@ RESONANT = ("calibrated", "resonant")
 def run(context: Context) -> Result:
     """Measure all ratios and the agreement; minutes, on one core."""
     agreement = tuple(_agreement())
-    ratios = [*_moments(), *_steady_state(), *_algorithms(), *ratios_of_parts()]
+    ratios = [
+        *_moments(),
+        *_steady_state(),
+        *_algorithms(),
+        *ratios_of_parts(),
+        *ratios_of_workers(),
+    ]
     return Result(
         title="Benchmark: speed ratios and agreement with integration",
         command="python -m experiments benchmark",
@@ -63,6 +70,7 @@ def run(context: Context) -> Result:
         models=models_of("calibrated", "resonant"),
         tables=(
             ratio_table(ratios),
+            virtual_table(),
             *measured_cpu(),
             machine_table(),
             _agreement_table(agreement),

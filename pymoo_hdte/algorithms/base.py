@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import warnings
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from pymoo.core.individual import Individual
 from pymoo.core.initialization import Initialization
 from pymoo.core.population import Population
 from pymoo.core.problem import Problem
+from pymoo.core.result import Result
 from pymoo.core.sampling import Sampling
 from pymoo.operators.sampling.rnd import FloatRandomSampling
 from pymoo.util.display.multi import MultiObjectiveOutput
@@ -98,6 +100,20 @@ class Swarm(Algorithm):
         for number in np.flatnonzero(np.any(beyond > 0.0, axis=1)):
             particles[number] = Individual(X=np.clip(X[number], lowest, highest))
         return particles
+
+    def result(self) -> Result:
+        """Return the result so far, with what became of evaluations if the runner counts them."""
+        result = super().result()
+        result.evaluations = self._counts()
+        return result
+
+    def _counts(self) -> Any:
+        return getattr(getattr(self.problem, "elementwise_runner", None), "counts", None)
+
+    def _finalize(self) -> None:
+        counts = self._counts()
+        if counts is not None and counts.n_lost:
+            warnings.warn(f"designs were lost: {counts}", RuntimeWarning, stacklevel=4)
 
     def _points(self, population: Population) -> Points:
         return Points.of(population, self.problem.has_constraints())

@@ -9,7 +9,7 @@ import sys
 
 PACKAGES = (
     "drive", "surrogate", "identification", "problems", "algorithms", "decision", "discrepancy",
-    "mechanism", "validation",
+    "mechanism", "validation", "parallel",
 )  # fmt: skip
 
 HERE = ("pymoo_hdte", "test_public_docstrings")

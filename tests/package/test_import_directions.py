@@ -30,7 +30,7 @@ LOWEST_FIRST = (
     ),
     *("discrepancy.report", "virtual"),
     *("problems.simulator", "problems.closed_form", "problems"),
-    *("algorithms", "decision", "discrepancy", "cli"),
+    *("algorithms", "parallel", "decision", "discrepancy", "cli"),
 )
 """Rooms of the package; a folder stands for the modules in it, not for the folders below it.
 

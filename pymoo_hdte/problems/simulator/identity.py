@@ -73,13 +73,13 @@ def _surroundings(simulator: Any) -> tuple[list[Any], list[ModuleType]]:
 
 
 def _functions(simulator: Any) -> list[FunctionType]:
-    """Return the simulator as a function, or the methods of its class."""
+    """Return the simulator as a function, or the methods of its class, pymoo's base excepted."""
     if isinstance(simulator, FunctionType):
         return [simulator]
     kind = type(simulator.__self__ if isinstance(simulator, MethodType) else simulator)
-    return [
-        one for base in kind.__mro__ for one in vars(base).values() if isinstance(one, FunctionType)
-    ]
+    # What pymoo's own classes read cannot be pickled, and they do not compute the responses.
+    bases = [base for base in kind.__mro__ if not base.__module__.startswith("pymoo.core.")]
+    return [one for base in bases for one in vars(base).values() if isinstance(one, FunctionType)]
 
 
 def _read(function: FunctionType) -> Iterator[tuple[str, Any]]:

@@ -6,6 +6,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from pymoo_hdte.problems.simulator.trust import (
     negative_somewhere,
     positive_places,
 )
+from pymoo_hdte.problems.simulator.workers import Workers
 from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, fit_adaptively, least_runs
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
@@ -53,6 +55,7 @@ def robust_problem(
     executor: Any = None,
     at_once: int = 1,
     tries: int = 2,
+    time_limit: float | None = None,
     cache: str | os.PathLike[str] | None = None,
     seed: int = 1,
     progress: bool = True,
@@ -96,15 +99,19 @@ def robust_problem(
         Responses that cannot be negative; True for all. A surrogate that is so is refused.
     vectorised : bool
         Whether the simulator takes and returns arrays of shape (n,) in the place of numbers.
-    executor : object, optional
-        Of `concurrent.futures`, or a client of Dask, that makes the runs.
+    executor : int or object, optional
+        Makes the runs: of `concurrent.futures`, a client of Dask, or a number of processes.
     at_once : int
         Least number of runs that are chosen together; the number of workers of the executor.
     tries : int
         How often a run is made that raises or gives NaN, before it is left out. What a vectorised
         simulator raises is passed on.
+    time_limit : float, optional
+        Seconds after which a run is ended and left out, imports not counted; it then has a process
+        of its own beside the worker, and may crash there.
     cache : path, optional
-        File of finished runs: with it, no run is made twice, though the process be killed. The
+        File of finished and of failed runs: with it, none is made twice, though the process be
+        killed. The
         first that does not fail is made again, to see whether the file is this simulator's, where
         the study that wrote it came to its end, or the simulator's source, state, globals, closure
         or the modules that it names are others or cannot be told. What else it reads or calls, as
@@ -142,9 +149,11 @@ def robust_problem(
     file = None if cache is None else RunFile(cache, inputs.names, identity(simulator))
     count, batch = whole_number("tries", tries, 1), whole_number("at_once", at_once, 1)
     random_state = np.random.default_rng(whole_number("seed", seed, 0))
+    if vectorised and time_limit is not None:
+        raise InvalidInput("time_limit", time_limit, "None for a vectorised simulator")
     bar = _announce(inputs, least, budget) if progress else tqdm(disable=True)
-    with bar:
-        simulate = Simulator(simulator, inputs.names, vectorised, executor, count, file, bar)
+    with bar, closing(Workers(executor, time_limit)) as workers:
+        simulate = Simulator(simulator, inputs.names, vectorised, workers, count, file, bar)
         fit = fit_adaptively(
             inputs.axes,
             lambda cube: simulate(inputs.values(cube)),

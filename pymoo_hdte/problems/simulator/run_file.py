@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pymoo_hdte.checks import InvalidInput
+
+_SAME = 1e-6
+"""Relative difference of two runs of one simulator, on two machines say; set by hand."""
+_ASKED = 5
+"""Runs of a file that are made again, one after the other, until one does not fail; by hand."""
 
 
 class RunFile:
@@ -29,6 +38,10 @@ class RunFile:
     ----------
     runs : dict
         What the simulator gave, by inputs.
+    failures : dict
+        Why a run gave nothing, by inputs.
+    order : dict
+        Which run ended when, from 0 on, by inputs.
     responses : tuple of str
         Names of what it gives; empty before the first run.
     goes_on : bool
@@ -48,6 +61,8 @@ class RunFile:
         self.path = Path(path)
         self._names, self._simulator = names, simulator
         self.runs: dict[tuple[float, ...], Any] = {}
+        self.failures: dict[tuple[float, ...], str] = {}
+        self.order: dict[tuple[float, ...], int] = {}
         self.responses: tuple[str, ...] = ()
         self.goes_on = self._finished = False
         contents = self.path.read_bytes() if self.path.exists() else b""
@@ -87,7 +102,12 @@ class RunFile:
         if "responses" in run:
             self.responses = tuple(run["responses"])
         elif "at" in run:
-            self.runs[tuple(map(float.fromhex, run["at"]))] = run["gave"]
+            at = tuple(map(float.fromhex, run["at"]))
+            self.order.setdefault(at, len(self.order))
+            if "failed" in run:
+                self.failures[at] = str(run["failed"])
+            else:
+                self.runs[at] = run["gave"]
 
     def keep(self, at: tuple[float, ...], gave: Any, responses: tuple[str, ...]) -> None:
         """Write a run to the disk, before the first the names of the responses."""
@@ -95,8 +115,41 @@ class RunFile:
             self.responses = responses
             self._append({"responses": list(responses)})
         self.runs[at] = gave
+        self.order.setdefault(at, len(self.order))
         self._append({"at": [value.hex() for value in at], "gave": gave})
         self._finished = False
+
+    def keep_failure(self, at: tuple[float, ...], why: str) -> None:
+        """Write to the disk that a run gave nothing, so that it is not tried again."""
+        self.failures[at] = why
+        self.order.setdefault(at, len(self.order))
+        self._append({"at": [value.hex() for value in at], "failed": why})
+        self._finished = False
+
+    def check(self, again: Callable[[tuple[float, ...]], Any]) -> None:
+        """Make a run of the file again: names and inputs of simulators may be the same.
+
+        Parameters
+        ----------
+        again : callable
+            Returns what the simulator gives for inputs, or None where it fails.
+
+        Raises
+        ------
+        InvalidInput
+            If it gives something else, or the first five of the file fail.
+        """
+        allowed = "runs of this simulator; delete the file"
+        for row, kept in islice(self.runs.items(), _ASKED):
+            gave = again(row)
+            if gave is not None:
+                same = len(gave) == len(kept) and np.allclose(gave, kept, rtol=_SAME, atol=0.0)
+                if not same:
+                    raise InvalidInput("cache", str(self.path), allowed)
+                return
+        if self.runs:
+            allowed += f", if it fails now at the first {_ASKED} of them by right"
+            raise InvalidInput("cache", str(self.path), allowed)
 
     def finish(self) -> None:
         """Note that the study came to its end."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import islice
-from queue import SimpleQueue
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,15 +11,13 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems.simulator.children import TOO_LONG, Failure
 from pymoo_hdte.problems.simulator.run_file import RunFile
+from pymoo_hdte.problems.simulator.workers import Workers
 
 Array = NDArray[np.float64]
 
 
-_SAME = 1e-6
-"""Relative difference of two runs of one simulator, on two machines say; set by hand."""
-_ASKED = 5
-"""Runs of a file that are made again, one after the other, until one does not fail; by hand."""
 SMALLEST, LARGEST = 1e-100, 1e100
 """Sizes of responses, in any unit, the squares of which keep their digits."""
 
@@ -41,8 +38,8 @@ class Simulator:
         Of the inputs.
     vectorised : bool
         Whether it takes and returns arrays of shape (n,).
-    executor : object or None
-        With ``submit``: of `concurrent.futures`, or a client of Dask.
+    workers : Workers
+        That make the runs, unless it is vectorised.
     tries : int
         How often a run is made before it counts as failed.
     file : RunFile or None
@@ -66,32 +63,29 @@ class Simulator:
         function: Callable[..., Any],
         names: tuple[str, ...],
         vectorised: bool,
-        executor: Any,
+        workers: Workers,
         tries: int,
         file: RunFile | None,
         progress: tqdm,
     ) -> None:
         self.function, self.names, self.vectorised = function, names, vectorised
-        self.executor, self.tries = executor, tries
+        self.workers, self.tries = workers, tries
         self.file, self.progress = file, progress
         self.responses = file.responses if file else ()
         self._ran = self._sized = False
-        self._last_error: BaseException | None = None
-        if file and file.runs and not file.goes_on:
-            self._check_kept(file)
+        self._last: Failure | None = None
+        self._given_up: set[tuple[float, ...]] = set()
+        if file and file.goes_on:
+            self._given_up |= set(file.failures)
+        elif file:
+            file.check(self._again)
 
-    def _check_kept(self, file: RunFile) -> None:
-        """Make a run of the file again: names and inputs of simulators may be the same."""
-        allowed = "runs of this simulator; delete the file"
-        for row, kept in islice(file.runs.items(), _ASKED):
-            for _ in range(self.tries):
-                ((_, gave),) = self._run([row])
-                if self._good(gave):
-                    if not np.allclose(gave, kept, rtol=_SAME, atol=0.0):
-                        raise InvalidInput("cache", str(file.path), allowed)
-                    return
-        allowed += f", if it fails now at the first {_ASKED} of them by right"
-        raise InvalidInput("cache", str(file.path), allowed) from self._last_error
+    def _again(self, row: tuple[float, ...]) -> Any:
+        for _ in range(self.tries):
+            ((_, gave),) = self._run([row])
+            if self._good(gave):
+                return gave
+        return None
 
     def __call__(self, values: Array) -> Array:
         """Return the responses at inputs in their units, shape (n, r), NaN where a run failed.
@@ -105,27 +99,39 @@ class Simulator:
         """
         rows = [tuple(row) for row in values.tolist()]
         kept = self.file.runs if self.file else {}
-        found: dict[tuple[float, ...], Any] = {row: kept[row] for row in rows if row in kept}
+        found: dict[tuple[float, ...], Any] = {row: kept.get(row) for row in rows}
         for _ in range(self.tries):
-            missing = [row for row in dict.fromkeys(rows) if not self._good(found.get(row))]
-            if not missing:
-                break
-            for row, gave in self._run(missing):
+            missing = [
+                row for row in found if row not in self._given_up and not self._good(found[row])
+            ]
+            for row, gave in self._run(missing) if missing else ():
                 found[row] = gave
                 if self.file and self._good(gave):
                     self.file.keep(row, gave, self.responses)
         self.progress.update(len(rows))
         self._ran = self._ran or any(self._good(found[row]) for row in rows)
+        self._give_up([row for row in found if not self._good(found[row])])
         if not self._ran:
             where = ", ".join(f"{n} = {v:g}" for n, v in zip(self.names, rows[0], strict=True))
             message = f"the simulator failed in all of {len(rows)} runs, the first at {where}"
-            message += f": {self._last_error!r}" if self._last_error else ""
-            raise SimulatorFailed(message) from self._last_error
+            message += f": {self._last.text}" if self._last else ""
+            raise SimulatorFailed(message) from (self._last.error if self._last else None)
         bad = [np.nan] * len(self.responses)
         table = np.array([found[row] if self._good(found[row]) else bad for row in rows])
         if not self._sized:
             self._check_sizes(table)
         return table
+
+    def _give_up(self, rows: Sequence[tuple[float, ...]]) -> None:
+        """Note runs that have failed as often as they are tried: a killed study goes on without.
+
+        Not where nothing has run so far: what is amiss there will be mended.
+        """
+        for row in rows:
+            if self.file and self._ran and row not in self.file.failures:
+                why = self._last.text if self._last else "not a number"
+                self.file.keep_failure(row, why)
+            self._given_up.add(row)
 
     def _check_sizes(self, table: Array) -> None:
         """Refuse the first runs if squares of their responses would lose digits."""
@@ -145,9 +151,6 @@ class Simulator:
             columns = dict(zip(self.names, np.array(rows).T, strict=True))
             table = self._table(self.function(**columns), len(rows))
             yield from zip(rows, table.tolist(), strict=True)
-        elif self.executor is None:
-            for row in rows:
-                yield row, self._one(lambda row=row: self._call(row))  # type: ignore[misc]
         else:
             yield from self._on_workers(rows)
 
@@ -155,29 +158,23 @@ class Simulator:
         self, rows: Sequence[tuple[float, ...]]
     ) -> Iterable[tuple[tuple[float, ...], Any]]:
         """Yield runs as they end, so that a finished one is kept whatever happens to the others."""
-        # Dask would return the stored failure of a run that is made again.
-        options = {"pure": False} if hasattr(self.executor, "scheduler_info") else {}
-        done: SimpleQueue[Any] = SimpleQueue()
-        waiting = {}
         for row in rows:
             inputs = dict(zip(self.names, row, strict=True))
-            future = self.executor.submit(call_by_name, self.function, inputs, **options)
-            waiting[future] = row
-            future.add_done_callback(done.put)
-        for _ in rows:
-            future = done.get()
-            yield waiting.pop(future), self._one(future.result)
-
-    def _call(self, row: tuple[float, ...]) -> Any:
-        return call_by_name(self.function, dict(zip(self.names, row, strict=True)))
-
-    def _one(self, result: Callable[[], Any]) -> list[float] | None:
+            # Not by a function of ours: processes beside workers would import this package for it.
+            self.workers.start(row, partial(self.function, **inputs))
         try:
-            gave = result()
-        except Exception as error:  # A user's simulator may raise anything.
-            self._last_error = error
-            return None
-        return self._table(gave, None)[0].tolist()
+            for _ in rows:
+                row, gave = self.workers.next()  # type: ignore[assignment]
+                if isinstance(gave, Failure):
+                    self._last = gave
+                    # Another try would last as long again.
+                    if gave.kind == TOO_LONG:
+                        self._give_up([row])
+                    yield row, None
+                else:
+                    yield row, self._table(gave, None)[0].tolist()
+        finally:
+            self.workers.cancel()
 
     def _table(self, gave: Any, count: int | None) -> Array:
         """Return what the simulator gave as (n, r), and learn the names of its responses."""
@@ -197,8 +194,3 @@ class Simulator:
             raise InvalidInput("names of the responses", names, str(self.responses))
         self.responses = names
         return np.column_stack(arrays)
-
-
-def call_by_name(function: Callable[..., Any], inputs: dict[str, float]) -> Any:
-    """Return what the function gives for inputs by name; workers call it."""
-    return function(**inputs)

@@ -1,10 +1,13 @@
 """Runs of a simulator: failures, resumed studies, workers, and what it may return."""
 
 import concurrent.futures
+import time
+from contextlib import closing
 
 import chaospy
 import numpy as np
 import pytest
+from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems import (
@@ -14,6 +17,9 @@ from pymoo_hdte.problems import (
     UntrustedSurrogate,
     robust_problem,
 )
+from pymoo_hdte.problems.simulator.run_file import RunFile
+from pymoo_hdte.problems.simulator.runs import Simulator
+from pymoo_hdte.problems.simulator.workers import Workers
 
 
 def quiet(simulator, designs, noise=None, **options):
@@ -155,6 +161,47 @@ def test_workers_give_the_same_and_make_failed_runs_again(workers, steady):
     assert np.array_equal(problem.evaluate(np.array([[0.7]])), steady[0])
     assert FAILED_ONCE
     assert not len(problem.failed)
+
+
+def test_a_run_that_hangs_is_left_out_and_no_failed_one_comes_again_after_a_kill(tmp_path):
+    """As `robust_problem` makes runs; the values of the problem follow from them."""
+    log, path = tmp_path / "log", tmp_path / "runs.jsonl"
+
+    # Within the test, so that the processes need not import this file.
+    def function(x):
+        with open(log, "a") as file:
+            file.write(f"{x:g}\n")
+        if x == 3.0:
+            time.sleep(1000.0)
+        if x == 5.0:
+            raise RuntimeError("no convergence")
+        return 2.0 * x
+
+    def responses():
+        file = RunFile(path, ("x",), "the same")
+        with closing(Workers(2, 0.3)) as workers:
+            runs = Simulator(function, ("x",), False, workers, 2, file, tqdm(disable=True))
+            return [runs(values)[:, 0] for values in np.arange(8.0).reshape(2, 4, 1)]
+
+    expected = [0.0, 2.0, 4.0, np.nan, 8.0, np.nan, 12.0, 14.0]
+    np.testing.assert_array_equal(np.concatenate(responses()), expected)
+    # What fails is tried again, what lasts too long is not.
+    assert sorted(log.read_text().split()) == sorted("012345567")
+    lines = path.read_text().splitlines(keepends=True)
+    lost = [line for line in lines if "failed" in line]
+    assert len(lost) == 2
+    # As a kill before the last run leaves it.
+    last = next(line for line in reversed(lines) if "gave" in line)
+    lines.remove(last)
+    path.write_text("".join(lines))
+    log.unlink()
+    np.testing.assert_array_equal(np.concatenate(responses()), expected)
+    assert len(log.read_text().split()) == 1
+
+
+def test_a_vectorised_simulator_has_no_time_limit():
+    with pytest.raises(InvalidInput, match="time_limit"):
+        quiet(Flaky(), *PLAIN, vectorised=True, time_limit=1.0)
 
 
 def test_runs_and_memory_are_told_before_the_first_run(capsys):
