@@ -207,6 +207,9 @@ def test_directions_that_do_not_matter_are_no_shift():
     # B_in hardly moves the DTE, so that nothing holds it where it is on either front.
     assert max(choice.distance for choice in shift.choices) > 0.05
     assert all(choice.stays for choice in shift.choices)
+    for choice in shift.choices:
+        for free in (choice.free_before, choice.free_after):
+            assert free.tolist() == [False, False, True, False]
     assert "stays where it was" in shift.sentence
 
 
