@@ -157,7 +157,7 @@ class DesignStudy:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """Names of the variables that move neither objective (`without_influence`) over their whole box."""
+        """Names of the variables that move neither objective (`without_influence`)."""
         problem = self.problem
         free = without_influence(problem.moments, problem.xl, problem.xu, self.design)
         return tuple(name for name, one in zip(problem.var_names, free, strict=True) if one)
