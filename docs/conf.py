@@ -17,6 +17,7 @@ version = release = pymoo_hdte.__version__
 extensions = [
     "mathml",
     "problem_cards",
+    "glossary",
     "myst_parser",
     "sphinx.ext.autodoc",
     "numpydoc",
