@@ -166,6 +166,12 @@ class DataSheet:
     ------
     InvalidInput
         For a value that is not finite or out of range, or a symbol that two error sources share.
+
+    Examples
+    --------
+    >>> sheet = hs_20_100()
+    >>> sheet.name, sheet.ratio, sheet.error_orders
+    ('HS-20-100', 101.0, {'e_m': 2.0, 'e_g': 2.02, 'e_w': 1.0, 'e_p': 2.0, 'e_h': 404.0})
     """
 
     name: str

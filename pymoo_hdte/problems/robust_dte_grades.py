@@ -90,6 +90,11 @@ class RobustDTEGrades(StoredFront, RobustProblem):
     -----
     Ask for ``dG``, shape (n, 2, n_var), in ``return_values_of`` to get the slopes of the
     constraints, as ``dF`` gives those of the objectives.
+
+    Examples
+    --------
+    >>> problem = RobustDTEGrades()  # doctest: +SKIP
+    >>> problem.n_var, problem.n_ieq_constr  # doctest: +SKIP
     """
 
     def __init__(

@@ -39,6 +39,13 @@ class ChebyshevSurrogate:
     InvalidInput
         If the coefficients are not finite or beyond +-1e150, have another number of axes than the
         box has variables, or an axis is empty; or if the provenance is no JSON.
+
+    Examples
+    --------
+    >>> box = Box(("x", "y"), np.array([0.0, 0.0]), np.array([1.0, 2.0]))
+    >>> surrogate = ChebyshevSurrogate.fit(lambda X: X[:, 0] ** 2 + X[:, 1], box, 3)
+    >>> np.round(surrogate(np.array([[0.5, 1.0]])), 12)
+    array([1.25])
     """
 
     def __init__(

@@ -57,6 +57,12 @@ class BelievedDrive:
     InvalidInput
         For a value that is not finite or out of range, orders that do not match, or an effect that
         is given twice at one place or is a value.
+
+    Examples
+    --------
+    >>> believed = read_campaign("campaign").believed
+    >>> believed.ratio, believed.tolerance_of("stiffness")
+    (50, 0.1)
     """
 
     ratio: float
@@ -156,6 +162,11 @@ class Rig:
     ------
     InvalidInput
         For a value that is negative or not finite, or for noise of zero.
+
+    Examples
+    --------
+    >>> read_campaign("campaign").rig.output_torque_noise
+    0.2
     """
 
     proportional: float

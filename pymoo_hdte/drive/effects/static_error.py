@@ -38,6 +38,15 @@ class KinematicErrorLine(DriveEffect):
     ------
     InvalidInput
         For a number that is not finite, or an order that is not above 0.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> model = preset("calibrated")
+    >>> wrong = replace(model, effects=(*model.effects, KinematicErrorLine(3.0, 2e-5, 0.0)))
+    >>> rows = model.nominal[np.newaxis]
+    >>> print(f"{(wrong.dte_arcsec(rows) - model.dte_arcsec(rows))[0]:.1f} arcsec more")
+    1.0 arcsec more
     """
 
     name: ClassVar[str] = "kinematic_error"
@@ -169,6 +178,11 @@ class KinematicReaction(DriveEffect):
     ------
     InvalidInput
         If the share is not finite.
+
+    Examples
+    --------
+    >>> KinematicReaction(share=0.5)
+    KinematicReaction(share=0.5)
     """
 
     name: ClassVar[str] = "kinematic_reaction"

@@ -62,6 +62,13 @@ class Coefficients:
         Eq. (9), 1 by the principle of virtual work; dimensionless.
     temperature : float or ndarray, shape (n,)
         Of the drive in kelvin; NaN where it is not known.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> coefficients = model.coefficients(model.nominal[np.newaxis])
+    >>> coefficients.ratio, coefficients.stiffness.shape
+    (101.0, (1,))
     """
 
     ratio: float
