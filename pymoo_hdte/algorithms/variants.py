@@ -74,6 +74,13 @@ class AMPMOPSO(ParticleSwarm):
 
     Parameters and errors: see `ParticleSwarm`.
 
+    Measured (3 seeds, 100 particles, 100 generations each): the adaptive weight hardly adapts. With
+    32 ** m cells nearly every solution of the archive has one of its own, so that the entropy is
+    nearly the largest possible. The weight stayed within .400 to .468 on ZDT1, DTLZ2, UF1 and RE21,
+    with medians of .421, .400, .414 and .425, and below .433 in 84 to 100 % of the generations; on
+    `RobustDTE` within .400 to .476, median .414. The pyramid has two layers only, and so is a split
+    in two by rank: 1 and 2 against all others.
+
     Notes
     -----
     Choices where the paper is silent, besides those that `ParticleSwarm` lists for the family:

@@ -62,7 +62,7 @@ LARGEST_STATIC_ERROR = 0.1
 
 @dataclass(frozen=True)
 class DriveModel:
-    """Eq. (9) for one drive under rated conditions, with the effects it has beside Eq. (9).
+    """The equations of motion, Eq. (9), of one drive under rated conditions, and its effects.
 
     Attributes
     ----------
@@ -348,8 +348,8 @@ def preset(name: str) -> DriveModel:
     Parameters
     ----------
     name : {"published", "calibrated", "resonant"}
-        ``"published"`` is Eq. (9) with the printed values of Table 4; ``"calibrated"`` adds named
-        effects whose values were fitted to published statistics; ``"resonant"`` is an earlier fit,
+        ``"published"`` is the equations of motion, Eq. (9), with the printed values of
+        Table 4; ``"calibrated"`` adds named effects whose values were fitted to published statistics; ``"resonant"`` is an earlier fit,
         a harder benchmark, whose front is disconnected on a surrogate of order 3.
 
     Returns

@@ -79,7 +79,7 @@ def simulate_drive(
     settle: float = 1.5,
     rtol: float = 1e-8,
 ) -> Run:
-    """Integrate Eq. (9) for one design from rest to steady state and through one output turn.
+    """Integrate the motion, Eq. (9), of one design from rest and through one steady output turn.
 
     Torque-driven as in Section 2.2, from the rest of Eq. (11). The input torque rises smoothly from
     zero to the level that holds the rated speed, plus the torque that accelerates the inertias

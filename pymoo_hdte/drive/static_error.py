@@ -52,7 +52,7 @@ class StaticErrorSample:
         Parameters
         ----------
         error_class : {"e_m", "e_g", "e_w", "e_p", "e_h"}
-            Class of Eq. (1).
+            Class of the static error, Eq. (1).
 
         Returns
         -------
@@ -143,17 +143,17 @@ def class_amplitudes(sheet: DataSheet) -> dict[str, float]:
     """Return each class's amplitude at the output, rad: root sum of squares of its mean errors.
 
     The square is the expected squared resultant of sources with independent uniform phases, but for
-    the variances of the magnitudes. The angle at the output is that of Eq. (2).
+    the variances of the magnitudes. The angle at the output is that of Eq. (2), mesh to output.
 
     Parameters
     ----------
     sheet : DataSheet
-        Mean errors (Table 2) and the constants of Eq. (2).
+        Mean errors (Table 2) and the constants of Eq. (2), from mesh to output.
 
     Returns
     -------
     dict of str to float
-        rad, by class of Eq. (1).
+        rad, by class of the static error, Eq. (1).
 
     Examples
     --------

@@ -25,7 +25,7 @@ class ChebyshevSurrogate:
         The d variables and their intervals.
     coefficients : array_like, shape (p_1, ..., p_d)
         Entry ``i`` multiplies T_i1 ... T_id of the variables mapped to [-1, 1]. The factor
-        (1/2)^h of Eq. (23) is already in them. In the output's unit.
+        (1/2)^h of Eq. (23), the coefficients, is already in them. In the output's unit.
     provenance : mapping, optional
         What made the surrogate, e.g. the model and its parameters; must be writable as JSON.
 
@@ -70,7 +70,7 @@ class ChebyshevSurrogate:
         order: int,
         provenance: Mapping[str, Any] | None = None,
     ) -> ChebyshevSurrogate:
-        """Interpolate ``function`` at the tensor grid of Chebyshev nodes (Eqs. 20, 23 and 24).
+        """Interpolate ``function`` at Chebyshev nodes (Eq. 20) by the sum of Eq. (23) and the rule of (24).
 
         Parameters
         ----------

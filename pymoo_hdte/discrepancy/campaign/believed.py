@@ -24,7 +24,7 @@ MECHANICAL = (
 
 @dataclass(frozen=True)
 class BelievedDrive:
-    """Believed parameters of the drive and its load in Eq. (9), with their tolerances.
+    """Believed parameters of the drive and its load in the motion, Eq. (9), with their tolerances.
 
     Attributes
     ----------
@@ -45,8 +45,8 @@ class BelievedDrive:
     error_tolerance : float
         Relative half-width of the amplitudes.
     effects : tuple of Effect
-        Effects that the drive is believed to have beside Eq. (9); their numbers are fixed but for
-        those in ``tolerances``. The inertia of the load and the damping of the torsion are given as
+        Effects that the drive is believed to have beside the motion, Eq. (9); their numbers are
+        fixed but for those in ``tolerances``. The inertia of the load and the damping of the torsion are given as
         values instead.
     tolerances : dict of str to float
         Relative half-widths of single values: of `MECHANICAL`, which replace ``tolerance``, and of

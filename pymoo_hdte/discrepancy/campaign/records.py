@@ -118,7 +118,7 @@ class RunningRecord:
         _check_record(self, ("input_angle", "output_angle", "input_torque", "output_torque"))
 
     def transmission_error(self, ratio: float) -> NDArray[np.float64]:
-        """Return ``input_angle / ratio - output_angle`` (Eq. 10), rad, shape (n,).
+        """Return the transmission error, Eq. (10), rad, shape (n,): input / ratio - output angle.
 
         The ratio is N, dimensionless.
         """

@@ -29,7 +29,8 @@ class Choice:
     free_before, free_after : ndarray of bool, shape (4,)
         Which of them move neither mean nor standard deviation, and so have no number worth saying.
     distance : float
-        Relative distance of the two designs, Eq. (42); also along directions that do not matter.
+        Relative distance of the two designs (deviation degree, Eq. 42); also along directions
+        that do not matter.
     promised : ndarray, shape (2,)
         Mean and standard deviation of the DTE, arcsec, of the old design by the old model.
     delivered : ndarray, shape (2,)

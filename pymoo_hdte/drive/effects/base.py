@@ -91,7 +91,7 @@ class Session:
 
 
 class DriveEffect:
-    """An effect that Eq. (9) does not contain: base of all effects of a drive model.
+    """An effect that the equations of motion, Eq. (9), lack: base of all effects of a drive model.
 
     A subclass is a frozen dataclass whose fields are the quantities of its effect; it overrides
     what it changes.

@@ -27,7 +27,7 @@ class LoadInertia(DriveEffect):
     name : str
         ``"load_inertia"``, in model files and verdicts.
     inertia : float
-        J_L, kg.m2, added to J_out of Eq. (9).
+        J_L, kg.m2, added to J_out of the equations of motion, Eq. (9).
 
     Raises
     ------

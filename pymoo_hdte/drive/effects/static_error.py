@@ -23,7 +23,7 @@ from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 class KinematicErrorLine(DriveEffect):
     """A further order of theta_s: amplitude sin(order theta_in + phase).
 
-    It does not scale with theta_s, which is a property of the orders of Eq. (1).
+    It does not scale with theta_s, which is a property of the orders of the static error, Eq. (1).
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ register(
 class KinematicReaction(DriveEffect):
     """The mesh torque acts back on the input through the slope of theta_s.
 
-    Eq. (9) leaves out this term of Lagrange's equation.
+    The equations of motion, Eq. (9), leave out this term of Lagrange's equation.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ from pymoo_hdte.effects.stiffness import PeriodicStiffness
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Coefficients of Eq. (9), with what effects add to it, of n designs under one condition.
+    """Coefficients of the motion, Eq. (9), and of effects, of n designs under one condition.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ _TAIL = 1e-9
 def transfer_function(
     coefficients: Coefficients, orders: NDArray[np.float64]
 ) -> NDArray[np.complex128]:
-    """Return H from theta_s to theta_d of Eq. (9) at constant stiffness.
+    """Return H from theta_s to theta_d of the motion, Eq. (9), at constant stiffness.
 
     H = Z G / (1 + Z G), Z = K + i w c and G = 1/P the compliance of the two free inertias.
 
