@@ -349,8 +349,9 @@ def preset(name: str) -> DriveModel:
     ----------
     name : {"published", "calibrated", "resonant"}
         ``"published"`` is the equations of motion, Eq. (9), with the printed values of
-        Table 4; ``"calibrated"`` adds named effects whose values were fitted to published statistics; ``"resonant"`` is an earlier fit,
-        a harder benchmark, whose front is disconnected on a surrogate of order 3.
+        Table 4; ``"calibrated"`` adds named effects whose values were fitted to published
+        statistics; ``"resonant"`` is an earlier fit, a harder benchmark, whose front is
+        disconnected on a surrogate of order 3.
 
     Returns
     -------

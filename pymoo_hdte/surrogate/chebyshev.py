@@ -70,7 +70,7 @@ class ChebyshevSurrogate:
         order: int,
         provenance: Mapping[str, Any] | None = None,
     ) -> ChebyshevSurrogate:
-        """Interpolate ``function`` at Chebyshev nodes (Eq. 20) by the sum of Eq. (23) and the rule of (24).
+        """Interpolate ``function`` at Chebyshev nodes (Eq. 20) by the sums of Eqs. (23) and (24).
 
         Parameters
         ----------

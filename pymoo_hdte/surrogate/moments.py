@@ -28,7 +28,7 @@ class ExactMoments:
     variable. Its mean over all scatter is therefore a tensor polynomial of degree k_j in each
     design variable u_j, and its variance one of degree 2 k_j. Both are found once, from their
     values on a Chebyshev grid of designs; evaluating a design sums two short series. They are the
-    objectives, mean and deviation (Eqs. 29 and 30), without the paper's sampling.
+    objectives, Eqs. (29) and (30), mean and deviation, without the paper's sampling.
 
     Parameters
     ----------

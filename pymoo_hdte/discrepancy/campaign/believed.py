@@ -46,8 +46,8 @@ class BelievedDrive:
         Relative half-width of the amplitudes.
     effects : tuple of Effect
         Effects that the drive is believed to have beside the motion, Eq. (9); their numbers are
-        fixed but for those in ``tolerances``. The inertia of the load and the damping of the torsion are given as
-        values instead.
+        fixed but for those in ``tolerances``. The inertia of the load and the damping of the
+        torsion are given as values instead.
     tolerances : dict of str to float
         Relative half-widths of single values: of `MECHANICAL`, which replace ``tolerance``, and of
         effects, by the names of `known_values`.
