@@ -20,7 +20,9 @@ _BLOCK = re.compile(r"^```(python|sh)\n(.*?)^```\n(?:\s*prints `(.*?)`)?", re.DO
 def block_with(word: str, text: str) -> tuple[str, str, str]:
     """Return language, code and output of the only block with a word; the output may be empty."""
     (found,) = (one for one in _BLOCK.findall(text) if word in one[1])
-    return found
+    language, code, printed = found
+    # Sphinx colours code only if its source is the very text.
+    return language, code.rstrip("\n"), printed
 
 
 class ReadmeCode(Directive):
@@ -33,7 +35,7 @@ class ReadmeCode(Directive):
         """Return the block, and what it prints."""
         self.state.document.settings.env.note_dependency(str(README))
         language, code, printed = block_with(self.arguments[0], README.read_text(encoding="utf-8"))
-        shown: list[nodes.Node] = [nodes.literal_block(code, code.rstrip(), language=language)]
+        shown: list[nodes.Node] = [nodes.literal_block(code, code, language=language)]
         if printed:
             shown.append(nodes.literal_block(printed, printed, language="text"))
         return shown

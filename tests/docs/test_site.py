@@ -76,7 +76,7 @@ def test_the_front_page_shows_the_tested_examples_of_the_readme(readme_code):
 
 def test_a_word_of_no_block_or_of_two_is_an_error(readme_code):
     text = "```sh\none\n```\n\n```sh\none two\n```\n"
-    assert readme_code.block_with("two", text) == ("sh", "one two\n", "")
+    assert readme_code.block_with("two", text) == ("sh", "one two", "")
     for word in ("one", "three"):
         with pytest.raises(ValueError, match="unpack"):
             readme_code.block_with(word, text)
