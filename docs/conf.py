@@ -5,6 +5,7 @@ from importlib import import_module
 from pathlib import Path
 
 from numpydoc.xref import DEFAULT_LINKS
+from sphinx.ext import autosummary
 
 import pymoo_hdte
 
@@ -37,6 +38,8 @@ html_context = {"author": author}
 
 # Docstrings put names in single backticks; one that is no public name stays plain code.
 default_role = "py:obj"
+# Summaries end with a sentence, and not with "Eq.".
+autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.")
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 # As written: the fields of `Rules` would fill a screen.

@@ -16,7 +16,7 @@ LISTED = Counter(
     name
     for page in PAGES.values()
     for block in re.findall(r"autosummary::\n   :toctree: names\n\n(.*?)```", page, re.DOTALL)
-    for name in block.split()
+    for name in block.replace("~", "").split()
 )
 PUBLIC = {
     f"{package}.{name}"
