@@ -52,7 +52,7 @@ def test_a_listed_name_is_imported_from_where_its_page_says(name):
 
 def test_every_group_has_its_task_on_the_front_page_of_the_reference():
     for page in {*PAGES} - {"index"}:
-        assert re.search(rf"^\| .+ \| \[.+\]\({page}\) \|$", PAGES["index"], re.MULTILINE)
+        assert re.search(rf"^\| .+ \| \[.+\]\({page}\.md\) \|$", PAGES["index"], re.MULTILINE)
         assert f"\n{page}\n" in PAGES["index"]
 
 
