@@ -5,6 +5,7 @@ from importlib import import_module
 from pathlib import Path
 
 from numpydoc.xref import DEFAULT_LINKS
+from sphinx.ext import autosummary
 
 import pymoo_hdte
 
@@ -17,23 +18,32 @@ version = release = pymoo_hdte.__version__
 extensions = [
     "mathml",
     "problem_cards",
+    "glossary",
+    "readme_code",
     "myst_parser",
     "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
     "numpydoc",
     "sphinx_gallery.gen_gallery",
 ]
 exclude_patterns = ["guides"]
+templates_path = ["_templates"]
 html_theme = "furo"
 html_title = f"pymoo_hdte {version}"
 html_math_renderer = "mathml"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
+html_context = {"author": author}
 
 # Docstrings put names in single backticks; one that is no public name stays plain code.
 default_role = "py:obj"
+# Summaries end with a sentence, and not with "Eq.".
+autosummary.WELL_KNOWN_ABBREVIATIONS += ("Eq.", "Eqs.", "Fig.")
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
+# As written: the fields of `Rules` would fill a screen.
+autodoc_preserve_defaults = True
 numpydoc_show_class_members = False
 # Types are links where they are ours; the manuals of Python and numpy would have to be fetched.
 DEFAULT_LINKS.clear()

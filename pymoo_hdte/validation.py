@@ -14,7 +14,13 @@ from pymoo_hdte.surrogate import Accuracy, accuracy
 __all__ = ["CONFIDENCE", "ValidationMetrics", "validation_metrics"]
 
 CONFIDENCE = 0.95
-"""Level of the interval of the mean error, dimensionless."""
+"""Level of the interval of the mean error, dimensionless.
+
+Examples
+--------
+>>> CONFIDENCE
+0.95
+"""
 
 
 @dataclass(frozen=True)
@@ -22,6 +28,11 @@ class ValidationMetrics(Accuracy):
     """Error measures of predictions held against measurements (Section 4, Table 6).
 
     Those of `pymoo_hdte.surrogate.Accuracy`, and the mean error with its interval.
+
+    Examples
+    --------
+    >>> validation_metrics([10.0, 11.0, 12.2], [10.0, 11.0, 12.0]).n
+    3
     """
 
     mean_error: float
@@ -55,6 +66,12 @@ def validation_metrics(predicted: ArrayLike, measured: ArrayLike) -> ValidationM
     ------
     InvalidInput
         If shapes differ or values are not as described.
+
+    Examples
+    --------
+    >>> found = validation_metrics([10.0, 11.0, 12.2], [10.0, 11.0, 12.0])
+    >>> print(f"{found.mean_error:.3f} {found.r2:.2f}")
+    0.067 0.98
     """
     truth = finite_array("measured", measured, (None,))
     measures = accuracy(predicted, truth)

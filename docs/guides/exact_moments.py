@@ -36,7 +36,8 @@ from pymoo_hdte.surrogate import (
 #
 #    f(x) = \sum_i c_i \prod_j T_{i_j}(z_j) , \quad i_j = 0, \ldots, k
 #
-# with the Chebyshev polynomials :math:`T_n(\cos \varphi) = \cos (n \varphi)` (paper, Eqs. 14-25).
+# with the Chebyshev polynomials :math:`T_n(\cos \varphi) = \cos (n \varphi)` (the paper's
+# surrogate, Eqs. 14-25).
 # Its coefficients are those of the interpolation at the :math:`(k + 1)^d` roots of :math:`T_{k+1}`
 # in every variable. Here is one of three variables: a noise variable, and two that scatter around a
 # design.

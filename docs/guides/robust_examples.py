@@ -220,7 +220,7 @@ joint = robust_problem(
 print(f"drive: {joint.n_runs} runs, degrees {joint.degrees}")
 nominal = dict(zip(paper.var_names, paper.nominal.tolist(), strict=True))
 nominal["theta_s"] = paper.inputs[0].mean
-axes_of_drive = {"K": "K [N m/rad]", "J_in": "J_in [kg m$^2$]"}
+axes_of_drive = {"K": "K [N.m/rad]", "J_in": "J_in [kg.m2]"}
 result = pictures(joint, drive, "dte", nominal, axes_of_drive)
 
 # %%

@@ -29,7 +29,8 @@ from pymoo_hdte.units import ARCSEC
 # The equations of motion
 # -----------------------
 #
-# The paper's Eq. (9), with a mesh stiffness that may vary with the input angle, is
+# The paper's equations of motion, Eq. (9), with a mesh stiffness that may vary with the input
+# angle, are
 #
 # .. math::
 #

@@ -36,6 +36,12 @@ class LeaderArchive:
         The archived individuals, in order of arrival.
     points : Points
         The same as arrays.
+
+    Examples
+    --------
+    >>> archive = LeaderArchive(capacity=10, n_var=1, n_obj=2)
+    >>> len(archive.members)
+    0
     """
 
     def __init__(self, capacity: int, n_var: int, n_obj: int) -> None:

@@ -86,6 +86,13 @@ class CompactSwarm(ElitistSwarm):
       with equalities met to 1e-4;
     - archives know what was evaluated: a callback that changes the problem has to evaluate the
       individuals of `archive_all` and of ``opt`` again.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from pymoo.problems import get_problem
+    >>> len(minimize(get_problem("zdt1"), CompactSwarm(), ("n_eval", 1000), seed=1).F)
+    32
     """
 
     GUESTS = 0.2

@@ -85,6 +85,13 @@ class ElitistSwarm(Swarm):
       solution that is not finite comes last, copies of another one after that;
     - the result of a run is the best front of the swarm, at most ``pop_size`` solutions;
     - callbacks may change the population, which is all that the swarm knows of positions.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from pymoo.problems import get_problem
+    >>> len(minimize(get_problem("zdt1"), ElitistSwarm(), ("n_gen", 40), seed=1).F)
+    83
     """
 
     def __init__(

@@ -43,6 +43,11 @@ class LinearDecrease:
     ------
     InvalidInput
         If the weights are not finite numbers in that order.
+
+    Examples
+    --------
+    >>> LinearDecrease(0.4, 0.9).w_max
+    0.9
     """
 
     def __init__(self, w_min: float = 0.4, w_max: float = 0.9) -> None:
@@ -86,6 +91,12 @@ class EntropyWeight:
     ------
     InvalidInput
         If a parameter is not allowed.
+
+    Examples
+    --------
+    >>> swarm = ParticleSwarm(EntropyWeight(w_min=0.3), Pyramid())
+    >>> swarm.pop_size
+    100
     """
 
     def __init__(self, w_min: float = 0.4, w_max: float = 0.9, divisions: int = 32) -> None:

@@ -70,6 +70,11 @@ class FoundFront:
         Number of designs evaluated.
     lost : ndarray, shape (k, n_var)
         Those of them without objectives, in their own units.
+
+    Examples
+    --------
+    >>> FoundFront(np.eye(2), np.eye(2), np.ones(2), 0.01, 60, np.zeros((0, 2))).evaluated
+    60
     """
 
     designs: Values
@@ -126,6 +131,15 @@ def interpolated_front(
     ------
     ArithmeticError
         If no design of the first round has objectives.
+
+    Examples
+    --------
+    >>> found = interpolated_front(
+    ...     lambda X: np.column_stack([X[:, 0] ** 2, (X[:, 0] - 1) ** 2]) + 1.0,
+    ...     np.zeros(1), np.ones(1), np.random.default_rng(1), accuracy=0.05, least_width=0.02,
+    ... )
+    >>> found.difference <= 0.05
+    True
     """
     known = _Known(evaluate, lower, upper, least_width, notify)
     first = _first_cubes(len(lower), min(_FIRST, most // 4), rng)

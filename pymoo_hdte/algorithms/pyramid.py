@@ -41,7 +41,13 @@ class Hierarchy(Protocol):
 
 
 class Flat:
-    """No division of labour: c1 = c2 = 2 for all, no mutation (Kennedy and Eberhart 1995)."""
+    """No division of labour: c1 = c2 = 2 for all, no mutation (Kennedy and Eberhart 1995).
+
+    Examples
+    --------
+    >>> Flat().acceleration(np.array([0, 1]))
+    (array([2., 2.]), array([2., 2.]))
+    """
 
     def acceleration(
         self, ranks: NDArray[np.int_]
@@ -88,6 +94,11 @@ class Pyramid:
         Last rank of the top layer.
     MUTATION_PROBABILITY : float
         Probability that a particle of the bottom layer mutates in a generation.
+
+    Examples
+    --------
+    >>> Pyramid.TOP_RANKS, Pyramid.MUTATION_PROBABILITY
+    (2, 0.4)
     """
 
     TOP_RANKS = 2

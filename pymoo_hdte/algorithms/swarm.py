@@ -86,6 +86,14 @@ class ParticleSwarm(Swarm):
     `AdaptiveEpsilonConstraintHandling` the swarm runs, but hardly returns from violations that were
     allowed at first: on TNK, AMP-MOPSO then finds nothing feasible, while it finds a front without
     that wrapper.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from pymoo.problems import get_problem
+    >>> swarm = ParticleSwarm(LinearDecrease(), Pyramid(), pop_size=50)
+    >>> minimize(get_problem("zdt1"), swarm, ("n_gen", 20), seed=1).F.shape[1]
+    2
     """
 
     def __init__(

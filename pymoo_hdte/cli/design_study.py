@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.algorithms import FoundFront, interpolated_front
 from pymoo_hdte.cli.design_check import Check, check_designs, standard_error
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
+from pymoo_hdte.decision.influence import without_influence
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.problems import OperatingCondition, RobustDTEDirect
 from pymoo_hdte.problems.model_moments import FIRST_NODES
@@ -24,8 +25,6 @@ HARDLY_WORTH = 0.02
 
 A front that is narrower counts as that wide: nobody needs its designs apart.
 """
-LITTLE = 1e-3
-"""Share of mean and standard deviation that a variable must move, over its box, to matter."""
 CHECKED = 4
 """Designs along the front that are checked, beside those that preferences choose."""
 _SEARCHES = 3
@@ -158,17 +157,10 @@ class DesignStudy:
 
     @cached_property
     def free(self) -> tuple[str, ...]:
-        """Names of the variables that move neither objective by `LITTLE` over their whole box."""
+        """Names of the variables that move neither objective (`without_influence`)."""
         problem = self.problem
-        moved = np.repeat(self.design[None], 2 * problem.n_var, axis=0)
-        for row, bound in enumerate((problem.xl, problem.xu)):
-            np.fill_diagonal(moved[row * problem.n_var :], bound)
-        changes = np.abs(problem.moments(moved) / self.objectives - 1.0).max(axis=1)
-        # Without a steady state at a bound the variable matters.
-        largest = np.nan_to_num(changes, nan=np.inf).reshape(2, problem.n_var).max(axis=0)
-        return tuple(
-            name for name, one in zip(problem.var_names, largest, strict=True) if one < LITTLE
-        )
+        free = without_influence(problem.moments, problem.xl, problem.xu, self.design)
+        return tuple(name for name, one in zip(problem.var_names, free, strict=True) if one)
 
     @property
     def gains(self) -> dict[str, Gain]:

@@ -12,8 +12,9 @@ import numpy as np
 
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.design_check import DRIVES, SETS, Check
-from pymoo_hdte.cli.design_study import AGREEMENT, HARDLY_WORTH, LITTLE, DesignStudy, Gain
+from pymoo_hdte.cli.design_study import AGREEMENT, HARDLY_WORTH, DesignStudy, Gain
 from pymoo_hdte.decision import tolerance_band
+from pymoo_hdte.decision.influence import LITTLE
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.io.text_table import csv_text
@@ -147,18 +148,26 @@ def sentences(study: DesignStudy) -> list[str]:
             f"What is said of designs below is not to be built upon{_way_out(study)}.",
             _agreement(study),
         ]
+    return [
+        f"Take {_design_in_words(study)}.",
+        _worth(study),
+        f"Front and drive model agree to {100.0 * study.disagreement:.1f} % of the front's width "
+        f"({100.0 * AGREEMENT:g} % are allowed). {_agreement(study)}",
+    ]
+
+
+def _design_in_words(study: DesignStudy) -> str:
+    """Return the chosen values; a variable without influence has none worth a number."""
     problem = study.problem
     changes = 100.0 * (study.design / problem.nominal - 1.0)
     parts = [
         f"{name} {number(float(value), 4)} {problem.units[name]} ({change:+.1f} %)"
         for name, value, change in zip(problem.var_names, study.design, changes, strict=True)
+        if name not in study.free
     ]
-    return [
-        f"Take {', '.join(parts)}.",
-        _worth(study),
-        f"Front and drive model agree to {100.0 * study.disagreement:.1f} % of the front's width "
-        f"({100.0 * AGREEMENT:g} % are allowed). {_agreement(study)}",
-    ]
+    if study.free:
+        parts.append(f"any {' and '.join(study.free)} of the box")
+    return ", ".join(parts)
 
 
 def _worth(study: DesignStudy) -> str:

@@ -29,6 +29,12 @@ def tolerance_band(
     ------
     InvalidInput
         If the design or the tolerance is not allowed.
+
+    Examples
+    --------
+    >>> lower, upper = tolerance_band([10.0], 0.05)
+    >>> lower, upper
+    (array([9.5]), array([10.5]))
     """
     nominal = _positive("design", design)
     tolerance = real_number("tolerance", tolerance, at_least=0.0, below=1.0)
@@ -54,6 +60,11 @@ def deviation_degree(prototypes: ArrayLike, optimum: ArrayLike) -> NDArray[np.fl
     ------
     InvalidInput
         If the shapes do not fit or a value is not finite, or not positive in the optimum.
+
+    Examples
+    --------
+    >>> deviation_degree([[1.0, 2.2]], [1.0, 2.0]).round(3)
+    array([0.1])
     """
     target = _positive("optimum", optimum)
     actual = finite_array("prototypes", prototypes, (None, len(target)))

@@ -19,7 +19,13 @@ PREFERENCES: Mapping[str, tuple[float, float]] = MappingProxyType(
         "robustness_first": (0.1, 0.9),
     }
 )
-"""Weights of (mean, standard deviation) for the paper's three preferences (Section 5.3)."""
+"""Weights of (mean, standard deviation) for the paper's three preferences (Section 5.3).
+
+Examples
+--------
+>>> PREFERENCES["balanced"]
+(0.5, 0.5)
+"""
 
 
 class WeightedUtopia(DecisionMaking):
@@ -46,6 +52,12 @@ class WeightedUtopia(DecisionMaking):
     -----
     The paper prints the ideal point as [0, 1] but calls it the origin of the scaled objectives and
     measures from there, as this class does.
+
+    Examples
+    --------
+    >>> F = np.array([[0.0, 1.0], [0.4, 0.4], [1.0, 0.0]])
+    >>> int(WeightedUtopia(PREFERENCES["balanced"]).do(F))
+    1
     """
 
     def __init__(self, weights: Sequence[float]) -> None:

@@ -90,12 +90,12 @@ def analyse(
 
     Examples
     --------
-    >>> analysis = analyse(read_campaign("campaign"))
-    >>> analysis.verdict.status
+    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
+    >>> analysis.verdict.status  # doctest: +SKIP
     'named'
-    >>> [effect.label for effect in analysis.verdict.chosen.candidates]
+    >>> [effect.label for effect in analysis.verdict.chosen.candidates]  # doctest: +SKIP
     ['torque_ripple:input@2']
-    >>> problem = RobustDTE(model=analysis.revised_model())
+    >>> problem = RobustDTE(model=analysis.revised_model())  # doctest: +SKIP
     """
     if not isinstance(measured, Campaign | MeasuredMechanism):
         raise InvalidInput("measured", type(measured).__name__, "a Campaign or a MeasuredMechanism")
@@ -121,6 +121,12 @@ class DriveAnalysis:
     ----------
     finding : DriveFinding
         Campaign, features of its records and verdict.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_campaign("campaign"))  # doctest: +SKIP
+    >>> analysis.verdict.status, analysis.locate().sentence  # doctest: +SKIP
+    >>> analysis.report("report")  # doctest: +SKIP
     """
 
     def __init__(self, finding: DriveFinding) -> None:
@@ -214,6 +220,11 @@ class MechanismAnalysis:
         The mechanism as it is believed, and its records.
     finding : MechanismFinding
         Force balances of the records, verdict, and unexplained residual.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_rig("my_rig"))  # doctest: +SKIP
+    >>> analysis.verdict.status, analysis.report("report")  # doctest: +SKIP
     """
 
     def __init__(self, measured: MeasuredMechanism, finding: MechanismFinding) -> None:
@@ -297,6 +308,11 @@ class JointAnalysis(MechanismAnalysis):
         The joint as it is believed, and its records.
     joint : JointFinding
         With the verdict on the torsion beside that on the torques, and the ``status`` of both.
+
+    Examples
+    --------
+    >>> analysis = analyse(read_rig("my_two_encoder_joint"))  # doctest: +SKIP
+    >>> analysis.torsion.status  # doctest: +SKIP
     """
 
     def __init__(self, measured: MeasuredMechanism, joint: JointFinding) -> None:
@@ -331,6 +347,10 @@ def check_report_folder(out: str | Path) -> None:
         If the folder holds anything else.
     OSError
         If it cannot be written.
+
+    Examples
+    --------
+    >>> check_report_folder("a_new_folder")
     """
     from pymoo_hdte.discrepancy.report.write import FOLDER
 

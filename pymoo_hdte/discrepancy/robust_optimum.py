@@ -9,11 +9,13 @@ and actual performance.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 from pymoo.optimize import minimize
 
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia, deviation_degree
+from pymoo_hdte.decision.influence import without_influence
 from pymoo_hdte.discrepancy.report.optimum import Choice, OptimumShift, Values
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.problems import RobustDTE
@@ -60,8 +62,14 @@ def _choice(
         preference,
         before=before,
         after=after,
+        free_before=_free(old, old_designs[first]),
+        free_after=_free(new, new_designs[second]),
         distance=float(deviation_degree(after[None, :], before)[0]),
         promised=old_values[first],
         delivered=new.evaluate(same[None, :])[0],
         reached=new_values[second],
     )
+
+
+def _free(problem: RobustDTE, design: Values) -> NDArray[np.bool_]:
+    return without_influence(problem.evaluate, problem.xl, problem.xu, design)

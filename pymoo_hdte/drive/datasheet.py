@@ -155,10 +155,10 @@ class DataSheet:
     load_torque : float
         Rated, N.m at the output.
     nominal : Nominal
-        Parameters of Eq. (9) as in Table 4: ``static_error`` in rad, ``stiffness`` in N.m/rad,
-        inertias in kg.m2 and damping in N.m.s/rad.
+        Parameters of the motion, Eq. (9), as in Table 4: ``static_error`` in rad, ``stiffness``
+        in N.m/rad, inertias in kg.m2 and damping in N.m.s/rad.
     mesh : Mesh
-        Constants of Eq. (2).
+        Constants of Eq. (2), from the mesh to the angle of the output.
     error_sources : tuple of ErrorSource
         Tables 1 and 2, in metres.
 
@@ -166,6 +166,12 @@ class DataSheet:
     ------
     InvalidInput
         For a value that is not finite or out of range, or a symbol that two error sources share.
+
+    Examples
+    --------
+    >>> sheet = hs_20_100()
+    >>> sheet.name, sheet.ratio, sheet.error_orders
+    ('HS-20-100', 101.0, {'e_m': 2.0, 'e_g': 2.02, 'e_w': 1.0, 'e_p': 2.0, 'e_h': 404.0})
     """
 
     name: str
@@ -198,7 +204,7 @@ class DataSheet:
 
     @property
     def error_orders(self) -> dict[str, float]:
-        """Order of each error class of Eq. (1) by name, in cycles per input turn."""
+        """Order of each class of the static error, Eq. (1), by name, in cycles per input turn."""
         flexspline = 2.0 * self.circular_spline_teeth / self.flexspline_teeth
         tooth = 2.0 * self.circular_spline_teeth
         return {"e_m": 2.0, "e_g": flexspline, "e_w": 1.0, "e_p": 2.0, "e_h": tooth}

@@ -31,6 +31,11 @@ def load_datasheet(path: str | Path) -> DataSheet:
         For a wrong, missing, superfluous, negative, non-finite or unit-less field.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> load_datasheet("my_drive.toml").ratio
+    81.0
     """
     return datasheet_from_fields(read_toml(Path(path)))
 
@@ -62,7 +67,13 @@ def datasheet_from_fields(sheet: Fields) -> DataSheet:
 
 
 def hs_20_100() -> DataSheet:
-    """Return the data sheet of the drive in the paper, HS-20-100 (Tables 1, 2 and 4)."""
+    """Return the data sheet of the drive in the paper, HS-20-100 (Tables 1, 2 and 4).
+
+    Examples
+    --------
+    >>> hs_20_100().circular_spline_teeth
+    202
+    """
     with as_file(files("pymoo_hdte.drive") / "data" / "hs_20_100.toml") as path:
         return load_datasheet(path)
 

@@ -32,6 +32,12 @@ class KinematicError:
     InvalidInput
         For another reading, lists of different lengths, a number that is not finite or out of
         range, or amplitudes that are all 0.
+
+    Examples
+    --------
+    >>> error = preset("calibrated").kinematic_error
+    >>> error.orders, error.reading
+    ((1.0, 2.0, 2.02), 'semi_amplitude')
     """
 
     orders: tuple[float, ...]

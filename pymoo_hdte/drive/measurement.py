@@ -46,6 +46,14 @@ def low_pass(
     ------
     InvalidInput
         For a wrong rate or cutoff, or a signal that is not finite or too short to filter.
+
+    Examples
+    --------
+    >>> time = np.arange(2000) / 1000.0
+    >>> slow = np.sin(2 * np.pi * 5.0 * time)
+    >>> noisy = slow + 0.1 * np.sin(2 * np.pi * 300.0 * time)
+    >>> bool(abs(low_pass(noisy) - slow)[200:-200].max() < 0.01)
+    True
     """
     real_number("sampling_rate", sampling_rate, above=0.0)
     real_number("cutoff", cutoff, above=0.0, below=sampling_rate / 2.0)
@@ -82,6 +90,14 @@ def measured_dte(
     ------
     InvalidInput
         For wrong input, or a record shorter than one output turn.
+
+    Examples
+    --------
+    >>> time = np.arange(4000) / 1000.0
+    >>> angle = 2 * np.pi * 10.0 * time
+    >>> error = 1e-4 * np.sin(2 * angle)
+    >>> print(f"{np.degrees(measured_dte(angle, angle / 20.0 + error, 20.0)) * 3600:.0f} arcsec")
+    41 arcsec
     """
     real_number("ratio", ratio, above=0.0)
     driving = finite_array("input_angle", input_angle, (None,))

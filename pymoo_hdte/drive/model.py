@@ -28,15 +28,33 @@ from pymoo_hdte.io.toml import read_toml
 from pymoo_hdte.units import ARCSEC
 
 PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")
-"""The uncertain parameters xi of Section 2.3, in this order."""
+"""The uncertain parameters xi of Section 2.3, in this order.
+
+Examples
+--------
+>>> dict(zip(PARAMETERS, PARAMETER_UNITS))["K"]
+'N.m/rad'
+"""
 
 PARAMETER_UNITS = tuple(unit_of(name) for name in PARAMETERS)
-"""Units of `PARAMETERS`, one for each."""
+"""Units of `PARAMETERS`, one for each.
+
+Examples
+--------
+>>> PARAMETER_UNITS[PARAMETERS.index("J_in")]
+'kg.m2'
+"""
 
 FORMAT = FileFormat("pymoo_hdte drive model", version=1, fields=("data_sheet", "model"))
 
 PRESETS = ("published", "calibrated", "resonant")
-"""Names of the models that `preset` returns."""
+"""Names of the models that `preset` returns.
+
+Examples
+--------
+>>> [preset(name).name for name in PRESETS]
+['published', 'calibrated', 'resonant']
+"""
 
 LARGEST_STATIC_ERROR = 0.1
 """rad; any larger theta_s must be an angle in other units."""
@@ -44,7 +62,7 @@ LARGEST_STATIC_ERROR = 0.1
 
 @dataclass(frozen=True)
 class DriveModel:
-    """Eq. (9) for one drive under rated conditions, with the effects it has beside Eq. (9).
+    """The equations of motion, Eq. (9), of one drive under rated conditions, and its effects.
 
     Attributes
     ----------
@@ -62,6 +80,12 @@ class DriveModel:
     ------
     InvalidInput
         If an effect stands twice at one port and order.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> print(f"{model.dte_arcsec(model.nominal[np.newaxis])[0]:.1f} arcsec")
+    86.7 arcsec
     """
 
     name: str
@@ -286,6 +310,12 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
         For a wrong, missing, superfluous or unit-less field.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> sheet = load_datasheet("my_drive.toml")
+    >>> load_model("my_drive_model.toml", sheet).name
+    'my_drive'
     """
     return _from_fields(read_toml(Path(path)), sheet)
 
@@ -318,9 +348,10 @@ def preset(name: str) -> DriveModel:
     Parameters
     ----------
     name : {"published", "calibrated", "resonant"}
-        ``"published"`` is Eq. (9) with the printed values of Table 4; ``"calibrated"`` adds named
-        effects whose values were fitted to published statistics; ``"resonant"`` is an earlier fit,
-        a harder benchmark, whose front is disconnected on a surrogate of order 3.
+        ``"published"`` is the equations of motion, Eq. (9), with the printed values of
+        Table 4; ``"calibrated"`` adds named effects whose values were fitted to published
+        statistics; ``"resonant"`` is an earlier fit, a harder benchmark, whose front is
+        disconnected on a surrogate of order 3.
 
     Returns
     -------
@@ -330,6 +361,11 @@ def preset(name: str) -> DriveModel:
     ------
     InvalidInput
         For another name.
+
+    Examples
+    --------
+    >>> preset("resonant").sheet.name
+    'HS-20-100'
     """
     one_of("model", name, PRESETS)
     with as_file(files("pymoo_hdte.drive") / "data" / f"{name}.toml") as path:

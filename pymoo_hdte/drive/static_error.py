@@ -34,6 +34,12 @@ class StaticErrorSample:
         Size of each error source, m.
     phases : ndarray, shape (n, n_sources)
         Initial phase of each error source, rad.
+
+    Examples
+    --------
+    >>> sample = sample_static_error(hs_20_100(), 5, np.random.default_rng(1))
+    >>> sample.peak_to_peak().shape
+    (5,)
     """
 
     sheet: DataSheet
@@ -46,7 +52,7 @@ class StaticErrorSample:
         Parameters
         ----------
         error_class : {"e_m", "e_g", "e_w", "e_p", "e_h"}
-            Class of Eq. (1).
+            Class of the static error, Eq. (1).
 
         Returns
         -------
@@ -118,6 +124,12 @@ def sample_static_error(
     ------
     InvalidInput
         If ``n_samples`` is below 1.
+
+    Examples
+    --------
+    >>> sample = sample_static_error(hs_20_100(), 500, np.random.default_rng(1))
+    >>> sample.magnitudes.shape[0]
+    500
     """
     n_samples = whole_number("n_samples", n_samples, 1)
     means = np.array([source.mean for source in sheet.error_sources])
@@ -131,17 +143,23 @@ def class_amplitudes(sheet: DataSheet) -> dict[str, float]:
     """Return each class's amplitude at the output, rad: root sum of squares of its mean errors.
 
     The square is the expected squared resultant of sources with independent uniform phases, but for
-    the variances of the magnitudes. The angle at the output is that of Eq. (2).
+    the variances of the magnitudes. The angle at the output is that of Eq. (2), mesh to output.
 
     Parameters
     ----------
     sheet : DataSheet
-        Mean errors (Table 2) and the constants of Eq. (2).
+        Mean errors (Table 2) and the constants of Eq. (2), from mesh to output.
 
     Returns
     -------
     dict of str to float
-        rad, by class of Eq. (1).
+        rad, by class of the static error, Eq. (1).
+
+    Examples
+    --------
+    >>> amplitudes = class_amplitudes(hs_20_100())
+    >>> len(amplitudes), min(amplitudes.values()) > 0.0
+    (5, True)
     """
     squares = dict.fromkeys(ERROR_CLASSES, 0.0)
     for source in sheet.error_sources:

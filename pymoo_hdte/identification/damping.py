@@ -38,6 +38,12 @@ class NoLoadRun:
     ------
     InvalidInput
         For too few speeds, speeds that do not increase, or a value that is not finite.
+
+    Examples
+    --------
+    >>> run = NoLoadRun(np.array([10.0, 20.0, 30.0]), np.array([0.11, 0.12, 0.13]))
+    >>> print(f"{bearing_damping(run).slope:.4f} N.m.s/rad")
+    0.0010 N.m.s/rad
     """
 
     speed: NDArray[np.float64]
@@ -72,6 +78,12 @@ def bearing_damping(run: NoLoadRun) -> LinearFit:
     -------
     LinearFit
         Slope in N.m.s/rad, intercept in N.m.
+
+    Examples
+    --------
+    >>> run = NoLoadRun(np.array([10.0, 20.0, 30.0]), np.array([0.11, 0.12, 0.13]))
+    >>> print(f"{bearing_damping(run).slope:.4f} N.m.s/rad")
+    0.0010 N.m.s/rad
     """
     return fit_line(run.speed, run.torque)
 
@@ -98,6 +110,13 @@ def mesh_damping(bearing: NoLoadRun, complete: NoLoadRun) -> LinearFit:
     ------
     InvalidInput
         If the speeds differ.
+
+    Examples
+    --------
+    >>> speed = np.array([10.0, 20.0, 30.0])
+    >>> bearing, complete = NoLoadRun(speed, 0.001 * speed), NoLoadRun(speed, 0.003 * speed)
+    >>> print(f"{mesh_damping(bearing, complete).slope:.4f} N.m.s/rad")
+    0.0020 N.m.s/rad
     """
     if len(complete.speed) != len(bearing.speed):
         allowed = f"{len(bearing.speed)}, as in the run of the bearing alone"

@@ -50,6 +50,13 @@ class ErrorStatistics:
     -----
     Families of tests are adjusted by Holm's method (Scand. J. Statist. 6, 1979) to a probability of
     0.05 of any false alarm.
+
+    Examples
+    --------
+    >>> readings = np.random.default_rng(1).normal(10.0, 1.0, (12, 2, 5))
+    >>> found = error_statistics(readings, ("e_1", "e_2"))
+    >>> found.independent, found.correlated_pairs
+    (True, ())
     """
 
     symbols: tuple[str, ...]
@@ -137,6 +144,12 @@ def error_statistics(measurements: ArrayLike, symbols: Sequence[str]) -> ErrorSt
     InvalidInput
         For fewer than four prototypes, what `find_outliers` refuses, symbols that do not fit, or
         an error that does not vary over the prototypes.
+
+    Examples
+    --------
+    >>> readings = np.random.default_rng(1).normal(10.0, 1.0, (12, 2, 5))
+    >>> error_statistics(readings, ("e_1", "e_2")).values.shape
+    (12, 2)
     """
     readings = finite_array("measurements", measurements, (None, None, None))
     if len(readings) < FEWEST_PROTOTYPES:
@@ -181,6 +194,11 @@ def detectable_correlation(n_prototypes: int, n_errors: int) -> float:
     -------
     float
         Dimensionless, between 0 and 1.
+
+    Examples
+    --------
+    >>> print(f"{detectable_correlation(20, 4):.2f}")
+    0.57
     """
     pairs = n_errors * (n_errors - 1) / 2
     freedom = n_prototypes - 2

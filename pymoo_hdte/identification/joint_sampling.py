@@ -41,6 +41,13 @@ def draw_errors(
     ------
     InvalidInput
         If ``n_samples`` is below 1.
+
+    Examples
+    --------
+    >>> readings = np.random.default_rng(1).normal(10.0, 1.0, (12, 2, 5))
+    >>> found = error_statistics(readings, ("e_1", "e_2"))
+    >>> draw_errors(found, 1000, np.random.default_rng(2)).shape
+    (1000, 2)
     """
     n_samples = whole_number("n_samples", n_samples, 1)
     n_errors = len(statistics.symbols)

@@ -28,6 +28,13 @@ class LinearFit:
         Standard errors, in the same units.
     degrees_of_freedom : float
         Of the noise estimate behind the standard errors; a pure number.
+
+    Examples
+    --------
+    >>> fit = fit_line([0.0, 1.0, 2.0, 3.0], [0.1, 1.1, 2.0, 3.1])
+    >>> low, high = fit.slope_interval()
+    >>> bool(low < fit.slope < high)
+    True
     """
 
     slope: float
@@ -92,6 +99,12 @@ def fit_line(x: ArrayLike, y: ArrayLike, noise: Noise | None = None) -> LinearFi
     InvalidInput
         For too few points, unequal lengths, a value that is not finite, or an ``x`` that does not
         vary.
+
+    Examples
+    --------
+    >>> fit = fit_line([0.0, 1.0, 2.0, 3.0], [1.0, 3.0, 5.0, 7.0])
+    >>> print(f"{fit.slope:.1f} {fit.intercept:.1f}")
+    2.0 1.0
     """
     x = finite_array("x", x, (None,))
     y = finite_array("y", y, (len(x),))

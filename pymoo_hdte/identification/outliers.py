@@ -25,6 +25,11 @@ def largest_deviation(n_repeats: int) -> float:
     ----------
     n_repeats : int
         Number n of readings, at least 1.
+
+    Examples
+    --------
+    >>> print(f"{largest_deviation(5):.2f}")
+    1.79
     """
     return (n_repeats - 1) / n_repeats**0.5
 
@@ -51,6 +56,13 @@ def find_outliers(measurements: ArrayLike) -> NDArray[np.bool_]:
     InvalidInput
         For fewer than three repeats, a reading that is not finite, or readings so wild that fewer
         than half of one prototype's remain.
+
+    Examples
+    --------
+    >>> readings = np.random.default_rng(3).normal(10.0, 1.0, (12, 1, 5))
+    >>> readings[3, 0, 2] = 30.0
+    >>> bool(find_outliers(readings)[3, 0, 2])
+    True
     """
     readings = finite_array("measurements", measurements, (None, None, None))
     n_repeats = readings.shape[2]

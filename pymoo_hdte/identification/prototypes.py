@@ -29,6 +29,12 @@ class NormalSample:
         Size of the sample, at least 2.
     mean, std : float
         In the unit of the sample.
+
+    Examples
+    --------
+    >>> sample = NormalSample.of(np.array([1.0, 2.0, 3.0]))
+    >>> sample.mean, sample.std
+    (2.0, 1.0)
     """
 
     n: int
@@ -121,6 +127,12 @@ class Series:
     repeatability : float
         Standard deviation of repeats on one prototype, pooled, in the unit of the parameter; NaN
         without repeats.
+
+    Examples
+    --------
+    >>> found = series({(1, 1): 2.0, (1, 2): 2.2, (2, 1): 3.0, (2, 2): 3.2})
+    >>> print(f"{found.between.mean:.1f} {found.repeatability:.2f}")
+    2.6 0.14
     """
 
     prototypes: NDArray[np.float64]
@@ -144,6 +156,12 @@ def series(values: Mapping[RunKey, float]) -> Series:
     ------
     InvalidInput
         For fewer than two prototypes or a value that is not finite.
+
+    Examples
+    --------
+    >>> found = series({(1, 1): 2.0, (1, 2): 2.2, (2, 1): 3.0, (2, 2): 3.2})
+    >>> print(f"{found.between.mean:.1f} {found.repeatability:.2f}")
+    2.6 0.14
     """
     by_prototype: dict[int, list[float]] = {}
     for (prototype, repeat), value in values.items():

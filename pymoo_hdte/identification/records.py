@@ -62,6 +62,10 @@ def read_torsion_loops(path: str | Path) -> dict[RunKey, TorsionLoop]:
         rows, or a torque that does not run 0 -> +T -> 0 -> -T -> 0 once.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> loops = read_torsion_loops("bench/torsion.csv")  # doctest: +SKIP
     """
 
     def loop(run: _Run) -> TorsionLoop:
@@ -92,6 +96,10 @@ def read_no_load_runs(path: str | Path) -> dict[RunKey, NoLoadRun]:
         rise, or fewer than three of them.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> runs = read_no_load_runs("bench/no_load_bearing.csv")  # doctest: +SKIP
     """
 
     def no_load(run: _Run) -> NoLoadRun:
@@ -124,6 +132,10 @@ def read_error_measurements(path: str | Path) -> tuple[NDArray[np.float64], tupl
         with different numbers of repeats.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> values, symbols = read_error_measurements("bench/errors.csv")  # doctest: +SKIP
     """
     table = read_text_table(Path(path), by_hand=True)
     errors = [name for name in table.titles if name.endswith(MICROMETRES)]

@@ -40,6 +40,12 @@ class TorsionLoop:
     ------
     InvalidInput
         If the torque does not run 0 -> +T -> 0 -> -T -> 0 once.
+
+    Examples
+    --------
+    >>> torque = np.concatenate([np.linspace(a, b, 50) for a, b in ((0, 9), (9, -9), (-9, 0))])
+    >>> TorsionLoop(torque, torque / 3e4).branches.keys()
+    dict_keys(['a1', 'a2', 'a3', 'a4'])
     """
 
     torque: NDArray[np.float64]
@@ -79,6 +85,12 @@ def loop_branches(torque: NDArray[np.float64]) -> dict[str, slice]:
     InvalidInput
         Naming the sample, for a torque that never unloads, starts in reverse, does not start and
         end near zero, runs backwards within a branch, or leaves a branch fewer than three samples.
+
+    Examples
+    --------
+    >>> torque = np.concatenate([np.linspace(a, b, 50) for a, b in ((0, 9), (9, -9), (-9, 0))])
+    >>> list(loop_branches(torque))
+    ['a1', 'a2', 'a3', 'a4']
     """
     torque = finite_array("torque", torque, (None,))
     if len(torque) < 4 * FEWEST_SAMPLES:
@@ -118,6 +130,12 @@ def stiffness(loop: TorsionLoop) -> LinearFit:
     -------
     LinearFit
         Slope in N.m/rad, intercept in N.m.
+
+    Examples
+    --------
+    >>> torque = np.concatenate([np.linspace(a, b, 50) for a, b in ((0, 9), (9, -9), (-9, 0))])
+    >>> print(f"{stiffness(TorsionLoop(torque, torque / 3e4)).slope:.0f} N.m/rad")
+    30000 N.m/rad
     """
     loading = loop.branches["a1"]
     torque, torsion = loop.torque[loading], loop.torsion[loading]
@@ -129,6 +147,13 @@ def hysteresis_width(loop: TorsionLoop) -> float:
     """Return the torsion at zero torque after forward minus that after reverse loading, rad.
 
     Each is read off a straight line through the samples of the loop within 10 % of the peak torque.
+
+    Examples
+    --------
+    >>> torque = np.concatenate([np.linspace(a, b, 50) for a, b in ((0, 9), (9, -9), (-9, 0))])
+    >>> lag = 1e-5 * np.sign(np.gradient(torque))
+    >>> print(f"{hysteresis_width(TorsionLoop(torque, torque / 3e4 - lag)):.1e} rad")
+    2.0e-05 rad
     """
     branches = loop.branches
     falling = slice(branches["a2"].start, branches["a3"].stop)
@@ -136,7 +161,15 @@ def hysteresis_width(loop: TorsionLoop) -> float:
 
 
 def lost_energy(loop: TorsionLoop) -> float:
-    """Return the work that one loop turns into heat, J: the integral of torque over torsion."""
+    """Return the work that one loop turns into heat, J: the integral of torque over torsion.
+
+    Examples
+    --------
+    >>> torque = np.concatenate([np.linspace(a, b, 50) for a, b in ((0, 9), (9, -9), (-9, 0))])
+    >>> lag = 1e-5 * np.sign(np.gradient(torque))
+    >>> print(f"{lost_energy(TorsionLoop(torque, torque / 3e4 - lag)):.1e} J")
+    3.6e-04 J
+    """
     return float(np.trapezoid(loop.torque, loop.torsion))
 
 

@@ -28,6 +28,11 @@ class BelievedValue:
     ------
     InvalidInput
         For a number that is not finite or out of range, or a factor beside a tolerance.
+
+    Examples
+    --------
+    >>> BelievedValue(0.06, tolerance=0.5).limits
+    (0.03, 0.09)
     """
 
     value: float

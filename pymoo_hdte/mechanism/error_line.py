@@ -26,6 +26,11 @@ class ErrorLine:
     ------
     InvalidInput
         For a number that is not finite.
+
+    Examples
+    --------
+    >>> ErrorLine("motor", order=2.0, amplitude=1e-4, phase=0.0).order
+    2.0
     """
 
     coordinate: str

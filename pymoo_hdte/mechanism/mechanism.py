@@ -43,6 +43,11 @@ class Port:
     followed : mapping of str to float
         Share of measured angles that are no coordinates: they move the port, and it does not move
         them. The zero of d is then unknown, and periodic laws vary with the first coordinate.
+
+    Examples
+    --------
+    >>> Port("spring", {"motor": 1.0, "load": -1.0}, stiffness=BelievedValue(2e3)).stiffness.value
+    2000.0
     """
 
     name: str
@@ -72,6 +77,11 @@ class Input:
         False where the gain of the only input is not known at all. It is then 1, and inertias,
         stiffnesses, dampings and forces, those of known effects as well, are in units of the
         signal: their ratios are determined, their sizes not.
+
+    Examples
+    --------
+    >>> Input("torque", {"q": 101.0}).gain.value
+    1.0
     """
 
     name: str
@@ -96,6 +106,11 @@ class Loop:
         Units of the input per m or rad, and per m/s or rad/s.
     limit : float
         Largest size of the command, in units of the input; infinite without saturation.
+
+    Examples
+    --------
+    >>> Loop("torque", "target", "q", position_gain=5.0, speed_gain=2.0).limit
+    inf
     """
 
     input: str
@@ -134,6 +149,16 @@ class Mechanism:
         stiffness or damping that is negative, a port or input that touches no coordinate, a gear
         at a port whose motion is not the angle of a shaft, or a gain that is not stated beside a
         quantity that is known exactly, a force sensor or another input.
+
+    Examples
+    --------
+    >>> arm = Mechanism(
+    ...     inertias={"q": BelievedValue(0.06, tolerance=0.5)},
+    ...     ports=[Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, tolerance=0.5))],
+    ...     inputs=[Input("torque", {"q": 1.0})],
+    ... )
+    >>> arm.coordinates, arm.port_names
+    (('q',), ('bearing',))
     """
 
     inertias: Mapping[str, BelievedValue]
@@ -288,6 +313,12 @@ class LawAt:
         Name of the port.
     law : Law
         Force or torque over the port's motion; its numbers are in SI.
+
+    Examples
+    --------
+    >>> from pymoo_hdte.effects.friction import CoulombFriction
+    >>> LawAt("coulomb_friction", "bearing", CoulombFriction(0.3)).port
+    'bearing'
     """
 
     name: str

@@ -49,6 +49,13 @@ class Record:
         For another role, times that are not uniform, a channel of another length or with a value
         that is not finite, a noise that is not positive or of no channel, or a ``dropped`` that is
         no count.
+
+    Examples
+    --------
+    >>> time = np.arange(0.0, 2.0, 0.01)
+    >>> record = Record("one", "train", time, {"q": np.sin(time), "torque": np.cos(time)})
+    >>> record.step
+    0.01
     """
 
     name: str

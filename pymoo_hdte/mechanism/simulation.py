@@ -39,6 +39,15 @@ class SimulatedCourse:
         As applied: of the record, or commanded by a loop; in its unit.
     forces : dict of str to ndarray, shape (n,)
         By port that is ``read``, N or N.m.
+
+    Examples
+    --------
+    >>> arm = Mechanism({"q": BelievedValue(0.06)}, [], [Input("torque", {"q": 1.0})])
+    >>> time = np.arange(0.0, 1.0, 0.01)
+    >>> record = Record("one", "train", time, {"q": np.zeros(100), "torque": np.full(100, 0.06)})
+    >>> course = simulate_mechanism(arm, record)
+    >>> print(f"{course.speed['q'][-1]:.2f} rad/s")
+    0.99 rad/s
     """
 
     time: Values
@@ -87,6 +96,14 @@ def simulate_mechanism(
         For a missing channel, an effect at no port, or a wrong argument.
     ArithmeticError
         If the motion grows beyond all bounds, or a law jumps so that no step is short enough.
+
+    Examples
+    --------
+    >>> arm = Mechanism({"q": BelievedValue(0.06)}, [], [Input("torque", {"q": 1.0})])
+    >>> time = np.arange(0.0, 1.0, 0.01)
+    >>> record = Record("one", "train", time, {"q": np.zeros(100), "torque": np.full(100, 0.06)})
+    >>> print(f"{simulate_mechanism(arm, record).position['q'][-1]:.2f} rad")
+    0.49 rad
     """
     real_number("rtol", rtol, at_least=1e-12, at_most=1e-2)
     for effect in effects:

@@ -44,6 +44,12 @@ def robust_benchmarks() -> dict[str, Callable[[], ClosedFormProblem | RobustToy]
     portfolio           mean and CVaR, dependent noise; 3 variables, 1        convex
                         constraint
     =================== ===================================================== ================
+
+    Examples
+    --------
+    >>> problems = robust_benchmarks()
+    >>> len(problems), next(iter(problems.values()))().pareto_front().shape[1]
+    (12, 2)
     """
     return {
         "deb_gupta_1": DebGupta12,

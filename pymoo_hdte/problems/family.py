@@ -33,6 +33,11 @@ def robust_dte_family() -> dict[str, Member]:
                              pieces in two regions that no path joins
     calibrated_direct        the drive model itself, by quadrature
     ======================== ==============================================================
+
+    Examples
+    --------
+    >>> list(robust_dte_family())[:3]
+    ['calibrated', 'calibrated_order4', 'calibrated_order5']
     """
     orders = {"": 3, "_order4": 4, "_order5": 5}
     members: dict[str, Member] = {

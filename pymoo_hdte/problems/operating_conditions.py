@@ -38,6 +38,11 @@ class OperatingCondition:
     ------
     InvalidInput
         If a number is not finite or not in its range.
+
+    Examples
+    --------
+    >>> OperatingCondition(input_speed=209.4, load_torque=20.0, weight=0.3).weight
+    0.3
     """
 
     input_speed: float
@@ -79,6 +84,10 @@ def load_conditions(path: str | Path) -> tuple[OperatingCondition, ...]:
         no number or not in its range, or there is no row. The error names file and line.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> conditions = load_conditions("duty_cycle.csv")  # doctest: +SKIP
     """
     table = read_text_table(Path(path), by_hand=True)
     table.require(COLUMNS, no_others=True)
@@ -92,6 +101,11 @@ def hs_20_100_duty_cycle() -> tuple[OperatingCondition, ...]:
 
     Speeds and weights are our own choice, for want of a published one: the paper tests the drive
     under rated conditions only. All lie at or below the rated 2000 r/min and 40 N.m.
+
+    Examples
+    --------
+    >>> print(f"{sum(one.weight for one in hs_20_100_duty_cycle()):.1f}")
+    1.0
     """
     with as_file(files("pymoo_hdte.problems") / "data" / "duty_cycle.csv") as path:
         return load_conditions(path)

@@ -86,6 +86,11 @@ class RobustProblem(Problem):
     Notes
     -----
     Evaluating a design outside the box, or one that is NaN, raises `ExtrapolationError`.
+
+    Examples
+    --------
+    >>> isinstance(RobustDTE(), RobustProblem)
+    True
     """
 
     def __init__(

@@ -84,6 +84,13 @@ class RobustDTE(StoredFront, RobustProblem):
     `robust_dte_family`; with any other setting both return None.
 
     In a real drive K and B_fc cannot be chosen independently: wall thickness and preload move both.
+
+    Examples
+    --------
+    >>> problem = RobustDTE()
+    >>> mean, std = problem.evaluate(problem.nominal)
+    >>> print(f"{mean:.1f} {std:.1f} arcsec")
+    88.8 17.2 arcsec
     """
 
     def __init__(

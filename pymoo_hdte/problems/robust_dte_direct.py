@@ -61,6 +61,12 @@ class RobustDTEDirect(StoredFront, Problem):
     -----
     ``pareto_front()`` and ``pareto_set()`` are stored for ``calibrated`` under the defaults, found
     by ``python -m experiments direct_front``; with any other setting both return None.
+
+    Examples
+    --------
+    >>> problem = RobustDTEDirect(nodes=(2, 2, 2, 1, 1))
+    >>> problem.evaluate(problem.nominal[np.newaxis]).shape
+    (1, 2)
     """
 
     def __init__(

@@ -41,9 +41,9 @@ class RobustDTEGrades(StoredFront, RobustProblem):
     X = (K, J_in, B_in, B_fc, grades): the four design variables of `RobustDTE`, and one grade for
     each line of the model's static error theta_s. A grade multiplies the amplitude of its line: 1
     is the drive of the data sheet, 0.5 one whose errors behind this line are half as large, in
-    mean and scatter. Which error classes of Eq. (1) stand behind a line follows from its order
-    (Table 1): the wave generator errs at order 1, parts that stand still and the pitch at 2, the
-    flexspline at 2.02. Their letters make the name, as in ``grade_w``.
+    mean and scatter. Which classes of the static error, Eq. (1), stand behind a line follows
+    from its order (Table 1): the wave generator errs at order 1, parts that stand still and the
+    pitch at 2, the flexspline at 2.02. Their letters make the name, as in ``grade_w``.
 
     Two constraints hold for the nominal design. The grades cost no more than ``cost_limit``, by
     the reciprocal model of Chase and Greenwood as in `RobustDTETolerance`: the mean of 1 / grade
@@ -90,6 +90,11 @@ class RobustDTEGrades(StoredFront, RobustProblem):
     -----
     Ask for ``dG``, shape (n, 2, n_var), in ``return_values_of`` to get the slopes of the
     constraints, as ``dF`` gives those of the objectives.
+
+    Examples
+    --------
+    >>> problem = RobustDTEGrades()  # doctest: +SKIP
+    >>> problem.n_var, problem.n_ieq_constr  # doctest: +SKIP
     """
 
     def __init__(

@@ -66,6 +66,12 @@ class RobustDTETolerance(StoredFront, RobustProblem):
     .. [1] K. W. Chase and W. H. Greenwood, "Design issues in mechanical tolerance analysis",
        Manufacturing Review 1(1), 1988; named so and compared with other models by K. W. Chase and
        A. R. Parkinson, Research in Engineering Design 3, 1991, 23-37.
+
+    Examples
+    --------
+    >>> problem = RobustDTETolerance()
+    >>> problem.obj_names
+    ('mean_dte_arcsec', 'std_dte_arcsec', 'tolerance_cost')
     """
 
     def __init__(

@@ -41,6 +41,13 @@ class RobustToy(RobustProblem):
     ------
     InvalidInput
         For an argument that is not allowed.
+
+    Examples
+    --------
+    >>> toy = RobustToy()
+    >>> X = 0.5 * (toy.xl + toy.xu)[np.newaxis]
+    >>> np.allclose(toy.evaluate(X), np.column_stack(toy.closed_form(X)))
+    True
     """
 
     def __init__(

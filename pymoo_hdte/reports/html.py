@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
+from pymoo_hdte.reports.glossary import terms_of
+
 
 def page(package: str, template: str, **values: Any) -> str:
     """Return a page from a template of a package, which may include files of this one."""
@@ -18,7 +20,7 @@ def page(package: str, template: str, **values: Any) -> str:
         lstrip_blocks=True,
     )
     environment.filters["number"] = number
-    environment.globals["digits"] = digits
+    environment.globals |= {"digits": digits, "terms_of": terms_of}
     return environment.get_template(template).render(**values)
 
 
@@ -36,11 +38,11 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def digits(lower: float | None, upper: float | None) -> int:
-    """Return how many digits tell the ends of an interval apart, with two of its width; at least 4.
+    """Return how many digits of a value its interval leaves: two of the width, 2 to 12 in all.
 
-    More than 12 are not shown.
+    Without an interval there are 4.
     """
     if lower is None or upper is None or not lower < upper:
         return 4
     places = np.log10(max(abs(lower), abs(upper)) / (upper - lower))
-    return int(np.clip(np.ceil(places) + 2, 4, 12)) if np.isfinite(places) else 4
+    return int(np.clip(np.ceil(places) + 2, 2, 12)) if np.isfinite(places) else 4

@@ -22,6 +22,17 @@ class ExtrapolationError(InvalidInput):
     """A point lies outside the box on which a polynomial was built.
 
     Attributes as in `pymoo_hdte.checks.InvalidInput`: the variable, its value and its interval.
+
+    Examples
+    --------
+    >>> box = Box(("x",), np.array([0.0]), np.array([1.0]))
+    >>> surrogate = ChebyshevSurrogate.fit(lambda X: X[:, 0], box, 1)
+    >>> try:
+    ...     _ = surrogate(np.array([[2.0]]))
+    ... except ExtrapolationError as error:
+    ...     print(error.field)
+    ...
+    x
     """
 
 
@@ -46,6 +57,12 @@ class Box:
     ----------
     centre, half_width : ndarray, shape (d,)
         Midpoint and half the length of every interval, in the variables' own units.
+
+    Examples
+    --------
+    >>> box = Box(("K", "J"), np.array([1.0, 0.1]), np.array([3.0, 0.3]))
+    >>> box.from_cube(np.zeros((1, 2)))
+    array([[2. , 0.2]])
     """
 
     names: tuple[str, ...]

@@ -25,7 +25,7 @@ class ChebyshevSurrogate:
         The d variables and their intervals.
     coefficients : array_like, shape (p_1, ..., p_d)
         Entry ``i`` multiplies T_i1 ... T_id of the variables mapped to [-1, 1]. The factor
-        (1/2)^h of Eq. (23) is already in them. In the output's unit.
+        (1/2)^h of Eq. (23), the coefficients, is already in them. In the output's unit.
     provenance : mapping, optional
         What made the surrogate, e.g. the model and its parameters; must be writable as JSON.
 
@@ -39,6 +39,13 @@ class ChebyshevSurrogate:
     InvalidInput
         If the coefficients are not finite or beyond +-1e150, have another number of axes than the
         box has variables, or an axis is empty; or if the provenance is no JSON.
+
+    Examples
+    --------
+    >>> box = Box(("x", "y"), np.array([0.0, 0.0]), np.array([1.0, 2.0]))
+    >>> surrogate = ChebyshevSurrogate.fit(lambda X: X[:, 0] ** 2 + X[:, 1], box, 3)
+    >>> np.round(surrogate(np.array([[0.5, 1.0]])), 12)
+    array([1.25])
     """
 
     def __init__(
@@ -63,7 +70,7 @@ class ChebyshevSurrogate:
         order: int,
         provenance: Mapping[str, Any] | None = None,
     ) -> ChebyshevSurrogate:
-        """Interpolate ``function`` at the tensor grid of Chebyshev nodes (Eqs. 20, 23 and 24).
+        """Interpolate ``function`` at Chebyshev nodes (Eq. 20) by the sums of Eqs. (23) and (24).
 
         Parameters
         ----------

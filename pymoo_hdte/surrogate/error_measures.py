@@ -40,6 +40,12 @@ def latin_hypercube(
     ------
     InvalidInput
         If ``n`` is below 1 or the seed negative.
+
+    Examples
+    --------
+    >>> box = Box(("x",), np.array([0.0]), np.array([4.0]))
+    >>> np.sort(latin_hypercube(box, 4, 1)[:, 0]).astype(int)
+    array([0, 1, 2, 3])
     """
     if not isinstance(random_state, np.random.Generator):
         random_state = np.random.default_rng(whole_number("random_state", random_state, 0))
@@ -49,7 +55,13 @@ def latin_hypercube(
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Error measures of a prediction (Table 5)."""
+    """Error measures of a prediction (Table 5).
+
+    Examples
+    --------
+    >>> accuracy([1.0, 2.0, 3.5], [1.0, 2.0, 3.0]).max_error
+    0.5
+    """
 
     mae: float
     """Mean absolute error, in the output's unit."""
@@ -80,6 +92,11 @@ def accuracy(predicted: ArrayLike, actual: ArrayLike) -> Accuracy:
     ------
     InvalidInput
         If shapes differ or values are not as described.
+
+    Examples
+    --------
+    >>> print(f"{accuracy([1.0, 2.0, 3.0], [1.0, 2.0, 4.0]).rmse:.3f}")
+    0.577
     """
     truth = finite_array("actual", actual, (None,))
     error = finite_array("predicted", predicted, truth.shape) - truth

@@ -49,6 +49,13 @@ class TruncatedNormal:
     ------
     InvalidInput
         If a number is not finite or not in its range.
+
+    Examples
+    --------
+    >>> noise = TruncatedNormal(10.0, 1.0)
+    >>> nodes, weights = noise.quadrature(8)
+    >>> print(f"{weights @ nodes:.6f} {noise.truncated_std:.3f}")
+    10.000000 0.987
     """
 
     mean: float
@@ -140,6 +147,11 @@ class UniformBand:
     ------
     InvalidInput
         If the tolerance is not finite or not in its range.
+
+    Examples
+    --------
+    >>> UniformBand(0.05).scales_design
+    True
     """
 
     tolerance: float

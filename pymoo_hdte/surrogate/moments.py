@@ -28,7 +28,7 @@ class ExactMoments:
     variable. Its mean over all scatter is therefore a tensor polynomial of degree k_j in each
     design variable u_j, and its variance one of degree 2 k_j. Both are found once, from their
     values on a Chebyshev grid of designs; evaluating a design sums two short series. They are the
-    objectives of Eqs. (29) and (30) without the paper's sampling.
+    objectives, Eqs. (29) and (30), mean and deviation, without the paper's sampling.
 
     Parameters
     ----------
@@ -51,6 +51,15 @@ class ExactMoments:
     InvalidInput
         If inputs and names do not match, or if the scatter of some design leaves the box of the
         surrogate.
+
+    Examples
+    --------
+    >>> box = Box(("x",), np.array([0.5]), np.array([2.5]))
+    >>> surrogate = ChebyshevSurrogate.fit(lambda X: X[:, 0] ** 2, box, 2)
+    >>> design_box = Box(("x",), np.array([1.0]), np.array([2.0]))
+    >>> mean, std = ExactMoments(surrogate, [UniformBand(0.1)], design_box)(np.array([[1.0]]))
+    >>> print(f"{mean[0]:.4f} {std[0]:.4f}")
+    1.0033 0.1155
     """
 
     def __init__(

@@ -45,6 +45,16 @@ class SampledMoments:
     ------
     InvalidInput
         As for `ExactMoments`; also for a number of samples below 2 or a negative seed.
+
+    Examples
+    --------
+    >>> box = Box(("x",), np.array([0.5]), np.array([2.5]))
+    >>> surrogate = ChebyshevSurrogate.fit(lambda X: X[:, 0] ** 2, box, 2)
+    >>> design_box = Box(("x",), np.array([1.0]), np.array([2.0]))
+    >>> moments = SampledMoments(surrogate, [UniformBand(0.1)], design_box, 1000, seed=1)
+    >>> mean, std = moments(np.array([[1.0]]))
+    >>> print(f"{mean[0]:.2f}")
+    1.00
     """
 
     def __init__(

@@ -46,6 +46,13 @@ class SobolIndices:
     -----
     First-order indices sum to at most 1, total ones to at least 1. All are 0 where the output does
     not vary and there is nothing to share. Sobol, Mathematics and Computers in Simulation 55, 2001.
+
+    Examples
+    --------
+    >>> box = Box(("x", "y"), np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    >>> surrogate = ChebyshevSurrogate.fit(lambda X: 3 * X[:, 0] + X[:, 1], box, 1)
+    >>> np.round(sobol_indices_over_box(surrogate, box).first, 3)
+    array([0.9, 0.1])
     """
 
     names: tuple[str, ...]
@@ -83,6 +90,13 @@ def sobol_indices(
         If the inputs or the design do not match the surrogate.
     ExtrapolationError
         If the scatter leaves the box of the surrogate.
+
+    Examples
+    --------
+    >>> box = Box(("x",), np.array([0.5]), np.array([2.5]))
+    >>> surrogate = ChebyshevSurrogate.fit(lambda X: X[:, 0] ** 2, box, 2)
+    >>> np.round(sobol_indices(surrogate, [UniformBand(0.1)], np.array([1.0])).first, 3)
+    array([1.])
     """
     box = surrogate.box
     if len(inputs) != len(box):
@@ -124,6 +138,13 @@ def sobol_indices_over_box(surrogate: ChebyshevSurrogate, box: Box) -> SobolIndi
         If the box has other variables than the surrogate.
     ExtrapolationError
         If it leaves the surrogate's box.
+
+    Examples
+    --------
+    >>> box = Box(("x", "y"), np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    >>> surrogate = ChebyshevSurrogate.fit(lambda X: X[:, 0] * X[:, 1], box, 1)
+    >>> np.round(sobol_indices_over_box(surrogate, box).total, 3)
+    array([1., 1.])
     """
     if box.names != surrogate.box.names:
         raise InvalidInput("names of the box", box.names, str(surrogate.box.names))

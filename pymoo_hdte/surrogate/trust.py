@@ -26,6 +26,19 @@ class UntrustedSurrogate(InvalidInput):
         Size of what is wrong: an error as a share of the scatter, a mean in the response's unit.
     region : dict of str to tuple of float
         Interval of those variables, in their units, in which that is so; empty if all over the box.
+
+    Examples
+    --------
+    >>> def rough(x):
+    ...     return np.sin(1e4 * x)
+    ...
+    >>> try:
+    ...     design = {"x": Design(1.0, 2.0, tolerance=0.1)}
+    ...     _ = robust_problem(rough, design, budget=60, progress=False)
+    ... except UntrustedSurrogate as error:
+    ...     print(error.field)
+    ...
+    error of the mean of 'response' after 60 runs
     """
 
     def __init__(

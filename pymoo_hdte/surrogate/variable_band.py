@@ -47,6 +47,12 @@ class VariableBandMoments:
     InvalidInput
         If names do not match, the tolerance can leave 0 < t < 1, or the widest scatter of some
         design leaves the box of the surrogate.
+
+    Examples
+    --------
+    >>> problem = RobustDTETolerance()
+    >>> isinstance(problem.moments, VariableBandMoments)
+    True
     """
 
     def __init__(

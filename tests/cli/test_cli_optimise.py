@@ -233,6 +233,23 @@ class TestStudy:
         assert study.free == ("B_in",) == tuple(name for name, one in spans.items() if one < 1e-3)
         assert "No value of B_in within the box" in optimum_report.limits(study, ())[0]
 
+    @pytest.mark.parametrize("free", [("B_in",), ("B_in", "K"), ("K", "J_in", "B_in", "B_fc")])
+    def test_what_carries_no_information_is_not_headlined_with_a_number(self, study, free):
+        found = replace(study)
+        vars(found)["free"] = free
+        words, *_ = optimum_report.sentences(found)
+        stated = set(re.findall(r"(\w+) \d\S* \S+ \([-+]", words))
+        assert stated == {*study.problem.var_names} - {*free}
+        for name in free:
+            assert re.search(rf"\b{name}\b(?! \d)", words)
+
+    def test_the_report_puts_no_number_of_a_free_variable_among_limits(self, written, study):
+        page = (written / "report.html").read_text()
+        limits = page.split("<h2>Limits to order</h2>")[1].split("</table>")[0]
+        (row,) = (one for one in limits.split("<tr>") if "B_in" in one)
+        assert not re.search(r"\d", re.sub(r"<.*?>", "", row))
+        assert "any value of the box" in row
+
     def test_gains_are_known_better_than_either_value(self, study):
         before, after = study.initial_check, study.optimum_check
         mean, std = study.gains.values()

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 import docstring_parser
 from docstring_parser import DocstringParam, DocstringRaises, DocstringStyle
+from docstring_parser.common import DocstringExample
 from public_names import HERE, members, public_objects
 from raised_errors import ancestors, nodes, raised
 
@@ -113,7 +114,8 @@ def prose(target: object) -> str:
     parsed = _parsed(target)
     parts = [parsed.short_description, parsed.long_description]
     for one in parsed.meta:
-        if not isinstance(one, DocstringParam | DocstringRaises):
+        # Examples are code, not prose.
+        if not isinstance(one, DocstringParam | DocstringRaises | DocstringExample):
             parts += [getattr(one, "type_name", None), one.description]
     return re.sub(r"\s+", " ", " ".join(part for part in parts if part))
 

@@ -24,7 +24,7 @@ MECHANICAL = (
 
 @dataclass(frozen=True)
 class BelievedDrive:
-    """Believed parameters of the drive and its load in Eq. (9), with their tolerances.
+    """Believed parameters of the drive and its load in the motion, Eq. (9), with their tolerances.
 
     Attributes
     ----------
@@ -45,9 +45,9 @@ class BelievedDrive:
     error_tolerance : float
         Relative half-width of the amplitudes.
     effects : tuple of Effect
-        Effects that the drive is believed to have beside Eq. (9); their numbers are fixed but for
-        those in ``tolerances``. The inertia of the load and the damping of the torsion are given as
-        values instead.
+        Effects that the drive is believed to have beside the motion, Eq. (9); their numbers are
+        fixed but for those in ``tolerances``. The inertia of the load and the damping of the
+        torsion are given as values instead.
     tolerances : dict of str to float
         Relative half-widths of single values: of `MECHANICAL`, which replace ``tolerance``, and of
         effects, by the names of `known_values`.
@@ -57,6 +57,12 @@ class BelievedDrive:
     InvalidInput
         For a value that is not finite or out of range, orders that do not match, or an effect that
         is given twice at one place or is a value.
+
+    Examples
+    --------
+    >>> believed = read_campaign("campaign").believed
+    >>> believed.ratio, believed.tolerance_of("stiffness")
+    (50, 0.1)
     """
 
     ratio: float
@@ -156,6 +162,11 @@ class Rig:
     ------
     InvalidInput
         For a value that is negative or not finite, or for noise of zero.
+
+    Examples
+    --------
+    >>> read_campaign("campaign").rig.output_torque_noise
+    0.2
     """
 
     proportional: float

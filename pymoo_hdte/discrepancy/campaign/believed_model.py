@@ -55,6 +55,11 @@ def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> Drive
         effect that is out of range.
     OSError
         If a file cannot be read.
+
+    Examples
+    --------
+    >>> read_drive_model("my_drive_model.toml", "my_drive.toml").name
+    'my_drive'
     """
     path = Path(path)
     sheet = path.with_name(f"{path.stem}{SHEET_SUFFIX}{path.suffix}") if sheet is None else sheet

@@ -54,6 +54,12 @@ class Campaign:
         For no running record, a name used twice, the same measurement under two names, beliefs that
         no drive can have, or a record that contradicts them or the stated noise (see
         `plausibility`); for a size that is good enough and not above zero.
+
+    Examples
+    --------
+    >>> campaign = read_campaign("campaign")
+    >>> len(campaign.train), len(campaign.held_out)
+    (2, 1)
     """
 
     title: str

@@ -67,6 +67,11 @@ def read_campaign(
         missing, listed twice, incomplete or not finite, and whatever `Campaign` refuses.
     OSError
         If a file cannot be read.
+
+    Examples
+    --------
+    >>> read_campaign("campaign").believed.ratio
+    50
     """
     folder = Path(folder)
     with toml_with_lines(folder / CAMPAIGN_FILE) as top:
@@ -115,6 +120,13 @@ def write_campaign(campaign: Campaign, folder: str | Path) -> None:
         If the folder is a file or holds something.
     OSError
         If it cannot be written.
+
+    Examples
+    --------
+    >>> campaign = read_campaign("campaign")
+    >>> write_campaign(campaign, "copy_of_campaign")
+    >>> read_campaign("copy_of_campaign").title == campaign.title
+    True
     """
     folder = Path(folder)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):

@@ -57,6 +57,13 @@ class OrderLines:
         Mean and phasors, in s^k, that a fit assigns to the signals (t - t_mid)^k / k!, k = 2, 3, 4:
         a drift is curved in a record of ten minutes, and an order with one cycle per record absorbs
         the curvature.
+
+    Examples
+    --------
+    >>> campaign = read_campaign("campaign")
+    >>> lines = order_lines(campaign.running[0], campaign.rig, campaign.believed.ratio, [1.0, 2.0])
+    >>> lines.orders, lines.phasors.shape
+    (array([1., 2.]), (4, 2))
     """
 
     orders: NDArray[np.float64]
@@ -96,6 +103,13 @@ def order_lines(
     ------
     InvalidInput
         For orders out of range or closer together than the record can tell apart.
+
+    Examples
+    --------
+    >>> campaign = read_campaign("campaign")
+    >>> lines = order_lines(campaign.running[0], campaign.rig, campaign.believed.ratio, [1.0, 2.0])
+    >>> lines.mean.shape
+    (4,)
     """
     fit = LineFit.of(record, ratio, orders)
     gains, coefficients = averaging_gain(fit.orders, record), fit.coefficients

@@ -80,6 +80,12 @@ class RunningRecord:
     InvalidInput
         For a wrong condition, channels that are not finite, of unequal length or constant, time
         that does not increase, or time that disagrees with the sample rate.
+
+    Examples
+    --------
+    >>> record = read_campaign("campaign").running[0]
+    >>> record.role, len(record.time) == len(record.output_angle)
+    ('train', True)
     """
 
     name: str
@@ -112,7 +118,7 @@ class RunningRecord:
         _check_record(self, ("input_angle", "output_angle", "input_torque", "output_torque"))
 
     def transmission_error(self, ratio: float) -> NDArray[np.float64]:
-        """Return ``input_angle / ratio - output_angle`` (Eq. 10), rad, shape (n,).
+        """Return the transmission error, Eq. (10), rad, shape (n,): input / ratio - output angle.
 
         The ratio is N, dimensionless.
         """
@@ -142,6 +148,11 @@ class TorsionRecord:
     ------
     InvalidInput
         As in `RunningRecord`, and for a sweep that is held out.
+
+    Examples
+    --------
+    >>> [sweep.role for sweep in read_campaign("campaign").torsion]
+    ['train']
     """
 
     name: str

@@ -59,6 +59,14 @@ def residual_spectrum(
     ------
     InvalidInput
         As `order_lines`.
+
+    Examples
+    --------
+    >>> campaign = read_campaign("campaign")
+    >>> record, ratio = campaign.running[0], campaign.believed.ratio
+    >>> orders, sizes = residual_spectrum(record, campaign.rig, ratio, [1.0, 2.0])
+    >>> orders.shape[0] == sizes.shape[-1]
+    True
     """
     fit = LineFit.of(record, ratio, orders)
     highest = min(highest_order, nyquist_order(record))

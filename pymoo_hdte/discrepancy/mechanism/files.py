@@ -107,8 +107,10 @@ class MeasuredMechanism:
     ...     [Port("bearing", {"q": 1.0}, damping=BelievedValue(0.5, tolerance=0.5))],
     ...     [Input("torque", {"q": 1.0})],
     ... )
-    >>> record = Record("one", "train", time, {"q": angle, "torque": torque})
-    >>> analyse(MeasuredMechanism(joint, [record])).verdict.status
+    >>> time = np.arange(0.0, 6.0, 0.002)
+    >>> angle = np.sin(4.4 * time)
+    >>> record = Record("one", "train", time, {"q": angle, "torque": np.gradient(angle, time)})
+    >>> analyse(MeasuredMechanism(joint, [record])).verdict.status  # doctest: +SKIP
     'named'
     """
 
@@ -159,6 +161,11 @@ def read_rig(
         `read_table`, `check_sha256`, `Record` and `Mechanism` refuse.
     OSError
         If a file cannot be read.
+
+    Examples
+    --------
+    >>> rig = read_rig("my_rig")  # doctest: +SKIP
+    >>> rig.mechanism.coordinates, len(rig.records)  # doctest: +SKIP
     """
     path = Path(folder)
     path = path / RIG_FILE if path.is_dir() else path

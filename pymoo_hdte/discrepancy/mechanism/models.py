@@ -30,6 +30,11 @@ class MechanismModel:
         Known laws at its ports.
     cutoff : float or None
         Hz, up to which the motion is known; None to determine it from the records.
+
+    Examples
+    --------
+    >>> model = read_mechanism_model("report/revised_model.toml")  # doctest: +SKIP
+    >>> model.mechanism.coordinates, model.effects  # doctest: +SKIP
     """
 
     title: str
@@ -52,6 +57,10 @@ def read_mechanism_model(path: str | Path) -> MechanismModel:
         With file and line, as `read_rig`.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> model = read_mechanism_model("report/revised_model.toml")  # doctest: +SKIP
     """
     path = Path(path)
     with toml_with_lines(path) as top:

@@ -58,7 +58,7 @@ def misfit_map(location: Location) -> Figure:
         if place >= 2:
             _order_axis(axis, location.orders)
     labels = [
-        f"{location.speed_rpm[k]:.0f} r/min, {location.load_torque[k]:z.0f} N m" for k in rows
+        f"{location.speed_rpm[k]:.0f} r/min, {location.load_torque[k]:z.0f} N.m" for k in rows
     ]
     axis.set_yticks(range(len(rows)), labels, fontsize=7)
     return figure

@@ -26,8 +26,11 @@ class Choice:
         A key of `pymoo_hdte.decision.PREFERENCES`.
     before, after : ndarray, shape (4,)
         Factors on K, J_in, B_in, B_fc of the existing drive.
+    free_before, free_after : ndarray of bool, shape (4,)
+        Which of them move neither mean nor standard deviation, and so have no number worth saying.
     distance : float
-        Relative distance of the two designs, Eq. (42); also along directions that do not matter.
+        Relative distance of the two designs (deviation degree, Eq. 42); also along directions
+        that do not matter.
     promised : ndarray, shape (2,)
         Mean and standard deviation of the DTE, arcsec, of the old design by the old model.
     delivered : ndarray, shape (2,)
@@ -39,6 +42,8 @@ class Choice:
     preference: str
     before: Values
     after: Values
+    free_before: NDArray[np.bool_]
+    free_after: NDArray[np.bool_]
     distance: float
     promised: Values
     delivered: Values

@@ -112,7 +112,7 @@ def _noise_row(one: NoiseFinding) -> NoiseRow:
 
 
 def _shown(unit: str, size: float) -> tuple[str, float]:
-    return ("arcsec", size / ARCSEC) if unit == "rad" else (unit.replace(".", " "), size)
+    return ("arcsec", size / ARCSEC) if unit == "rad" else (unit, size)
 
 
 def _name(one: NoiseFinding) -> str:

@@ -151,7 +151,7 @@ def metric_rows(proof: Proof | None) -> list[tuple[str, float, float]]:
 def record_rows(
     campaign: Campaign, proof: Proof | None
 ) -> list[tuple[str, str, float, float, int, Gap | None]]:
-    """Return name, role, speed (r/min), load (N m), rows and, where held out, gap of records."""
+    """Return name, role, speed (r/min), load (N.m), rows and, where held out, gap of records."""
     gaps = {} if proof is None else dict(zip(proof.records, proof.by_record, strict=True))
     return [
         (
@@ -197,10 +197,8 @@ def _parameter_row(
 
 
 def _shown(unit: str) -> str:
-    """Return a unit such as N.m.s2/rad2 in its usual notation."""
-    if unit == "1":
-        return ""
-    return unit.replace(".", " ").replace("2", "²").replace("3", "³")
+    """Return a unit as the reader meets it everywhere, nothing for a pure number."""
+    return "" if unit == "1" else unit
 
 
 def _role(verdict: Verdict, hypothesis: Hypothesis) -> str:

@@ -91,10 +91,15 @@ class Session:
 
 
 class DriveEffect:
-    """An effect that Eq. (9) does not contain: base of all effects of a drive model.
+    """An effect that the equations of motion, Eq. (9), lack: base of all effects of a drive model.
 
     A subclass is a frozen dataclass whose fields are the quantities of its effect; it overrides
     what it changes.
+
+    Examples
+    --------
+    >>> [effect.name for effect in preset("calibrated").effects]
+    ['load_inertia', 'damping_reference', 'mesh_stiffness_variation']
     """
 
     name: ClassVar[str]
@@ -189,6 +194,13 @@ class LawAtPort(DriveEffect):
     ------
     InvalidInput
         For an unknown name, a port where such a law is not possible, or a law of another type.
+
+    Examples
+    --------
+    >>> from pymoo_hdte.effects.friction import CoulombFriction
+    >>> friction = LawAtPort("coulomb_friction", "input", CoulombFriction(0.02))
+    >>> friction.port, friction.law.level
+    ('input', 0.02)
     """
 
     name: str  # type: ignore[misc]

@@ -39,6 +39,12 @@ class Eccentricity(DriveEffect):
     ------
     InvalidInput
         For a number that is not finite, or an order that is not above 0.
+
+    Examples
+    --------
+    >>> disc = Eccentricity(amplitude=2e-5, phase=0.0)
+    >>> disc.port, disc.order
+    ('sensor', 1.0)
     """
 
     name: ClassVar[str] = "eccentricity"

@@ -34,6 +34,11 @@ class ThermalDrift(DriveEffect):
     ------
     InvalidInput
         For a rate that is not finite, or a time constant that is not above 0.
+
+    Examples
+    --------
+    >>> ThermalDrift(rate=1e-8).time
+    inf
     """
 
     name: ClassVar[str] = "thermal_drift"
@@ -148,6 +153,11 @@ class NewZero(DriveEffect):
     ------
     InvalidInput
         For a number that is not finite.
+
+    Examples
+    --------
+    >>> NewZero(size=5e-5, after=600.0).port
+    'sensor'
     """
 
     name: ClassVar[str] = "new_zero"

@@ -40,6 +40,11 @@ class MeshStiffnessVariation(DriveEffect):
     ------
     InvalidInput
         For a number that is not finite or out of range.
+
+    Examples
+    --------
+    >>> MeshStiffnessVariation(depth=0.03, phase=0.0).order
+    2.0
     """
 
     name: ClassVar[str] = "mesh_stiffness_variation"

@@ -27,12 +27,21 @@ class LoadInertia(DriveEffect):
     name : str
         ``"load_inertia"``, in model files and verdicts.
     inertia : float
-        J_L, kg.m2, added to J_out of Eq. (9).
+        J_L, kg.m2, added to J_out of the equations of motion, Eq. (9).
 
     Raises
     ------
     InvalidInput
         If the inertia is negative or not finite.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> model = preset("published")
+    >>> heavy = replace(model, effects=(*model.effects, LoadInertia(0.45)))
+    >>> rows = model.nominal[np.newaxis]
+    >>> bool(heavy.dte_arcsec(rows)[0] > model.dte_arcsec(rows)[0])
+    True
     """
 
     name: ClassVar[str] = "load_inertia"
@@ -102,6 +111,12 @@ class DampingReference(DriveEffect):
     ------
     InvalidInput
         If the factor is not above 0 or not finite.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> [effect.factor for effect in model.effects if isinstance(effect, DampingReference)]
+    [4.011]
     """
 
     name: ClassVar[str] = "damping_reference"

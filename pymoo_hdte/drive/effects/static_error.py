@@ -23,7 +23,7 @@ from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 class KinematicErrorLine(DriveEffect):
     """A further order of theta_s: amplitude sin(order theta_in + phase).
 
-    It does not scale with theta_s, which is a property of the orders of Eq. (1).
+    It does not scale with theta_s, which is a property of the orders of the static error, Eq. (1).
 
     Attributes
     ----------
@@ -38,6 +38,15 @@ class KinematicErrorLine(DriveEffect):
     ------
     InvalidInput
         For a number that is not finite, or an order that is not above 0.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> model = preset("calibrated")
+    >>> wrong = replace(model, effects=(*model.effects, KinematicErrorLine(3.0, 2e-5, 0.0)))
+    >>> rows = model.nominal[np.newaxis]
+    >>> print(f"{(wrong.dte_arcsec(rows) - model.dte_arcsec(rows))[0]:.1f} arcsec more")
+    1.0 arcsec more
     """
 
     name: ClassVar[str] = "kinematic_error"
@@ -156,7 +165,7 @@ register(
 class KinematicReaction(DriveEffect):
     """The mesh torque acts back on the input through the slope of theta_s.
 
-    Eq. (9) leaves out this term of Lagrange's equation.
+    The equations of motion, Eq. (9), leave out this term of Lagrange's equation.
 
     Attributes
     ----------
@@ -169,6 +178,11 @@ class KinematicReaction(DriveEffect):
     ------
     InvalidInput
         If the share is not finite.
+
+    Examples
+    --------
+    >>> KinematicReaction(share=0.5)
+    KinematicReaction(share=0.5)
     """
 
     name: ClassVar[str] = "kinematic_reaction"

@@ -23,7 +23,7 @@ from pymoo_hdte.effects.stiffness import PeriodicStiffness
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Coefficients of Eq. (9), with what effects add to it, of n designs under one condition.
+    """Coefficients of the motion, Eq. (9), and of effects, of n designs under one condition.
 
     Attributes
     ----------
@@ -62,6 +62,13 @@ class Coefficients:
         Eq. (9), 1 by the principle of virtual work; dimensionless.
     temperature : float or ndarray, shape (n,)
         Of the drive in kelvin; NaN where it is not known.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> coefficients = model.coefficients(model.nominal[np.newaxis])
+    >>> coefficients.ratio, coefficients.stiffness.shape
+    (101.0, (1,))
     """
 
     ratio: float

@@ -29,7 +29,7 @@ _TAIL = 1e-9
 def transfer_function(
     coefficients: Coefficients, orders: NDArray[np.float64]
 ) -> NDArray[np.complex128]:
-    """Return H from theta_s to theta_d of Eq. (9) at constant stiffness.
+    """Return H from theta_s to theta_d of the motion, Eq. (9), at constant stiffness.
 
     H = Z G / (1 + Z G), Z = K + i w c and G = 1/P the compliance of the two free inertias.
 
@@ -44,6 +44,13 @@ def transfer_function(
     -------
     ndarray of complex, shape (n, n_orders)
         Dimensionless.
+
+    Examples
+    --------
+    >>> model = preset("published")
+    >>> gain = transfer_function(model.coefficients(model.nominal[np.newaxis]), np.array([2.0]))
+    >>> print(f"{abs(gain).item():.3f}")
+    1.006
     """
     frequency = orders * coefficients.input_speed
     mesh = coefficients.stiffness[:, None] + 1j * frequency * coefficients.damping[:, None]
@@ -74,6 +81,13 @@ def hill_steady_state(coefficients: Coefficients) -> OrderSpectrum:
     ArithmeticError
         If laws at ports are such that the harmonic balance finds no steady state, or the harmonics
         of a deeply varying stiffness do not die out.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> spectrum = hill_steady_state(model.coefficients(model.nominal[np.newaxis]))
+    >>> print(f"{np.degrees(spectrum.peak_to_peak(model.sheet.ratio)[0]) * 3600:.1f} arcsec")
+    86.7 arcsec
     """
     require_stable(coefficients)
     found, spectrum = _solved(coefficients)

@@ -41,6 +41,13 @@ class OrderSpectrum:
     ------
     InvalidInput
         If shapes do not match or a value is not finite.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> spectrum = model.steady_state(model.nominal[np.newaxis])
+    >>> print(f"{np.degrees(spectrum.peak_to_peak(101.0)[0]) * 3600:.1f} arcsec")
+    86.7 arcsec
     """
 
     orders: NDArray[np.float64]

@@ -53,6 +53,14 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     ------
     InvalidInput
         For a torque that is not finite or of another shape.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> coefficients = model.coefficients(model.nominal[np.newaxis])
+    >>> loop = quasi_static_torsion(coefficients, np.array([0.0, 40.0, 0.0, -40.0, 0.0]))
+    >>> print(np.round(np.degrees(loop) * 3600))
+    [[   0.  319.    0. -319.    0.]]
     """
     return np.hstack([_none(coefficients), *(leg.torsion for leg in _legs(coefficients, torque))])
 
@@ -69,6 +77,14 @@ def mean_torsion(coefficients: Coefficients, torque: Values) -> Values:
     -------
     ndarray, shape (n, b - 1)
         rad.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> coefficients = model.coefficients(model.nominal[np.newaxis])
+    >>> twist = mean_torsion(coefficients, np.array([0.0, 40.0]))
+    >>> print(np.round(np.degrees(twist) * 3600))
+    [[160.]]
     """
     parts = [_none(coefficients)]
     for leg in _legs(coefficients, torque):

@@ -27,7 +27,20 @@ _IN_MOTION = (
 
 
 class UnstableDrive(ArithmeticError):
-    """The motion of a drive grows from period to period: it has no steady state."""
+    """The motion of a drive grows from period to period: it has no steady state.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> model = preset("published")
+    >>> loose = replace(model, effects=(MeshStiffnessVariation(0.95, 0.0), LoadInertia(0.45)))
+    >>> try:
+    ...     _ = loose.dte_arcsec(loose.nominal[np.newaxis])
+    ... except UnstableDrive as error:
+    ...     print("no steady state")
+    ...
+    no steady state
+    """
 
 
 def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
@@ -50,6 +63,13 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
     -------
     ndarray of complex, shape (n, 3)
         Dimensionless; a modulus above 1 is a motion that grows.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> multipliers = floquet_multipliers(model.coefficients(model.nominal[np.newaxis]))
+    >>> bool((abs(multipliers) < 1.0).all())
+    True
     """
     period, cycles = _period(coefficients)
     least, most = _LEAST_STEPS * cycles, _MOST_STEPS * cycles

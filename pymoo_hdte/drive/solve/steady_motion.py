@@ -26,6 +26,15 @@ class SpeedLoop:
         P, N.m.s/rad at the input.
     integral : float
         I, N.m/rad at the input.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> motion = harmonic_balance(
+    ...     model.coefficients(model.nominal[np.newaxis]), motor=SpeedLoop(0.02, 0.5)
+    ... )
+    >>> motion.converged.tolist()
+    [True]
     """
 
     proportional: float = 0.0
@@ -56,6 +65,13 @@ class SteadyMotion:
         Half the square of the input speed, rad2/s2.
     converged : ndarray of bool, shape (n,)
         Whether the balance of the case was found; if not, its other values mean nothing.
+
+    Examples
+    --------
+    >>> model = preset("calibrated")
+    >>> motion = harmonic_balance(model.coefficients(model.nominal[np.newaxis]))
+    >>> motion.converged.tolist(), motion.transmission_error.shape[0]
+    ([True], 1)
     """
 
     torus: Torus

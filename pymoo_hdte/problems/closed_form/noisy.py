@@ -170,7 +170,7 @@ class BeamReliability(ClosedFormProblem):
         return {"F": scipy.stats.norm(*self._force), "R": scipy.stats.norm(*self._strength)}
 
     def simulator(self, **inputs: Array) -> dict[str, Array]:
-        """Return mass in kg, margin in N m and slenderness, shape (n,) each."""
+        """Return mass in kg, margin in N.m and slenderness, shape (n,) each."""
         b, h = inputs["b"], inputs["h"]
         return {
             "mass": self._density * b * h,

@@ -75,6 +75,12 @@ def Robust(
         If the problem is none of these, the scatter does not fit, or as `robust_problem`.
     UntrustedSurrogate, SimulatorFailed
         As `robust_problem`.
+
+    Examples
+    --------
+    >>> from pymoo.problems import get_problem
+    >>> problem = Robust(get_problem("bnh"), scatter=0.02)  # doctest: +SKIP
+    >>> problem.n_obj, problem.n_ieq_constr  # doctest: +SKIP
     """
     if not isinstance(problem, Problem):
         raise InvalidInput("problem", problem, "a Problem of pymoo")

@@ -47,6 +47,12 @@ class Design:
         If bounds are not finite and in order, both kinds of deviation are given or one is not
         allowed, the scatter is relative and the bounds do not have one sign, or the logarithm is
         asked for where the variable is not positive or deviates absolutely.
+
+    Examples
+    --------
+    >>> width = Design(0.02, 0.05, tolerance=0.02)
+    >>> width.lower, width.upper
+    (0.02, 0.05)
     """
 
     lower: float

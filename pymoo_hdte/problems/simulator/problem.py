@@ -73,6 +73,14 @@ class SimulatorProblem(Problem):
         The search space.
     responses, objectives, constraints
         As given.
+
+    Examples
+    --------
+    >>> problem = robust_problem(
+    ...     lambda x: x**2, {"x": Design(1.0, 2.0, tolerance=0.1)}, progress=False
+    ... )
+    >>> problem.n_runs < 100, problem.obj_names
+    (True, ('mean', 'std'))
     """
 
     def __init__(

@@ -140,6 +140,17 @@ def robust_problem(
     -----
     RuntimeWarning
         If runs failed; their inputs are in ``failed`` of the result.
+
+    Examples
+    --------
+    >>> problem = robust_problem(
+    ...     lambda x, load: load * x**2,
+    ...     {"x": Design(1.0, 2.0, tolerance=0.1)},
+    ...     {"load": TruncatedNormal(5.0, 0.5)},
+    ...     progress=False,
+    ... )
+    >>> print(f"{problem.evaluate(np.array([[1.0]]))[0, 0]:.2f}")
+    5.02
     """
     inputs = Inputs(designs, {} if noise is None else noise)
     accuracy = real_number("accuracy", accuracy, above=0.0)

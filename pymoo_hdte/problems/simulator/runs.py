@@ -23,7 +23,20 @@ SMALLEST, LARGEST = 1e-100, 1e100
 
 
 class SimulatorFailed(RuntimeError):
-    """The simulator fails where no surrogate can do without it; the message names the place."""
+    """The simulator fails where no surrogate can do without it; the message names the place.
+
+    Examples
+    --------
+    >>> def broken(x):
+    ...     raise RuntimeError("no licence")
+    ...
+    >>> try:
+    ...     _ = robust_problem(broken, {"x": Design(0.0, 1.0, deviation=0.1)}, progress=False)
+    ... except SimulatorFailed as error:
+    ...     print("failed")
+    ...
+    failed
+    """
 
 
 class Simulator:

@@ -64,6 +64,11 @@ class Quantile(_TailStatistic):
     ------
     InvalidInput
         If an argument is not in its range.
+
+    Examples
+    --------
+    >>> Quantile(0.99, response="stress").response
+    'stress'
     """
 
     def __post_init__(self) -> None:
@@ -100,6 +105,11 @@ class CVaR(_TailStatistic):
     ------
     InvalidInput
         If an argument is not in its range.
+
+    Examples
+    --------
+    >>> CVaR(0.95, response="stress").response
+    'stress'
     """
 
     def __post_init__(self) -> None:
@@ -139,6 +149,11 @@ class FailureProbability(Statistic):
     ------
     InvalidInput
         If an argument is not in its range.
+
+    Examples
+    --------
+    >>> FailureProbability(above=250e6, response="stress").above
+    250000000.0
     """
 
     above: float | None = None

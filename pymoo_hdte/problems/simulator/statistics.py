@@ -115,6 +115,12 @@ class RobustConstraint:
         In the statistic's unit.
     side : float
         Dimensionless: 1 where the statistic must not be above the bound, -1 where not below.
+
+    Examples
+    --------
+    >>> limit = MeanPlusStd(3, response="stress") <= 250e6
+    >>> isinstance(limit, RobustConstraint), limit.bound
+    (True, 250000000.0)
     """
 
     statistic: Statistic
@@ -132,6 +138,14 @@ class Mean(Statistic):
         Name of the response; None for the only one.
     sign : float
         Dimensionless factor: -1 to maximise, which ``-statistic`` sets.
+
+    Examples
+    --------
+    >>> problem = robust_problem(
+    ...     lambda x: x**2, {"x": Design(1.0, 2.0, tolerance=0.1)}, None, [Mean()], progress=False
+    ... )
+    >>> print(f"{problem.evaluate(np.array([[1.0]]))[0, 0]:.4f}")
+    1.0033
     """
 
     def _of(self, around: Around) -> tuple[Array, Array]:
@@ -155,6 +169,11 @@ class Std(Statistic):
         Name of the response; None for the only one.
     sign : float
         Dimensionless factor: -1 to maximise, which ``-statistic`` sets.
+
+    Examples
+    --------
+    >>> Std(response="stress").response
+    'stress'
     """
 
     def _of(self, around: Around) -> tuple[Array, Array]:
@@ -188,6 +207,11 @@ class MeanPlusStd(Statistic):
     ------
     InvalidInput
         If an argument is not in its range.
+
+    Examples
+    --------
+    >>> MeanPlusStd(3, response="deflection").k
+    3.0
     """
 
     k: float = 3.0
@@ -229,6 +253,11 @@ class WorstCase(Statistic):
     ------
     InvalidInput
         If an argument is not in its range.
+
+    Examples
+    --------
+    >>> WorstCase("smallest", response="margin").side
+    'smallest'
     """
 
     side: str = "largest"

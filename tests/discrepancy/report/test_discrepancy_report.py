@@ -207,6 +207,9 @@ def test_directions_that_do_not_matter_are_no_shift():
     # B_in hardly moves the DTE, so that nothing holds it where it is on either front.
     assert max(choice.distance for choice in shift.choices) > 0.05
     assert all(choice.stays for choice in shift.choices)
+    for choice in shift.choices:
+        for free in (choice.free_before, choice.free_after):
+            assert free.tolist() == [False, False, True, False]
     assert "stays where it was" in shift.sentence
 
 
@@ -258,8 +261,9 @@ def test_model_without_steady_state_has_no_optimum():
     ("lower", "upper", "shown"),
     [
         (0.015735405, 0.015741384, 6),
-        (1.0, 2.0, 4),
-        (-3.0, 3.0, 4),
+        (1.0, 2.0, 3),
+        (-3.0, 3.0, 2),
+        (0.25, 0.35, 3),
         (0.99999, 1.00001, 7),
         (5.0, 5.0, 4),
         (1.0, 1.0 + 1e-15, 12),

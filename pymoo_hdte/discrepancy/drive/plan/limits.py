@@ -64,6 +64,12 @@ class PlanLimits:
     ------
     InvalidInput
         For a value out of range, an empty list, or a number given twice.
+
+    Examples
+    --------
+    >>> limits = read_limits("bench.toml")
+    >>> limits.loads, limits.most_records
+    ((0.0, 20.0, 40.0), 16)
     """
 
     rig: Rig
@@ -135,6 +141,11 @@ def read_limits(path: str | Path) -> PlanLimits:
         With file and line, for a missing, unknown or impossible field.
     OSError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> read_limits("bench.toml").power
+    0.9
     """
     path = Path(path)
     with toml_with_lines(path) as top:

@@ -62,6 +62,11 @@ class Plan:
         Of the effects that are detected from each other one.
     wanted : float
         Probability that was wanted as power.
+
+    Examples
+    --------
+    >>> plan = plan_tests(preset("calibrated"), read_limits("bench.toml"))  # doctest: +SKIP
+    >>> plan.tests[0], plan.missed  # doctest: +SKIP
     """
 
     tests: tuple[PlannedTest, ...]
@@ -133,6 +138,11 @@ def plan_tests(
     ------
     InvalidInput
         If records within the limits could not be analysed: see `Campaign` and `expected_orders`.
+
+    Examples
+    --------
+    >>> plan = plan_tests(preset("calibrated"), read_limits("bench.toml"))  # doctest: +SKIP
+    >>> len(plan.tests)  # doctest: +SKIP
     """
     rng = np.random.default_rng(0) if rng is None else rng
     believed, tests = limits.believed(model), possible_tests(limits)

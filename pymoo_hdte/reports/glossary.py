@@ -1,0 +1,92 @@
+"""Words of reports and documentation in plain language; both print them from here."""
+
+from __future__ import annotations
+
+DRIVE = {
+    "DTE": "dynamic transmission error: how far the output of a drive is from where the input, "
+    "divided by the ratio, would have it. Here the peak-to-peak over one output turn, in arcsec.",
+    "fading": "of Stribeck friction: the speed within which the extra friction of a slow start "
+    "dies away.",
+    "harmonic balance": "a steady motion found as a sum of sines, without stepping through time.",
+    "locked stiffness": "the stiffness seen in a torsion sweep, over the mean stiffness in motion. "
+    "With the input locked, the teeth stand in one place; in motion all places are averaged.",
+    "nominal": "as on the data sheet, before parts vary.",
+    "order": "how often per turn of the input something repeats: order 2 comes twice a turn.",
+    "order line": "the part of a channel that repeats at one order, with its amplitude and phase.",
+    "port": "a place where a force acts: input, output, mesh (between the two) and sensor of a "
+    "drive; in a mechanism, the relative motion that was given a name.",
+    "ripple": "a torque that repeats with the angle, such as a motor's cogging.",
+    "theta_s": "size of the static transmission error, the error of the teeth at very slow motion.",
+    "torsion": "by how much the drive is twisted, an angle at its output.",
+    "torsion sweep": "the input locked, the output torque moved slowly there and back.",
+    "wind-up": "torsion under torque; a soft one is softer near zero torque.",
+}
+VERDICT = {
+    "adequate": "a verdict, shown as 'nothing missing': what is believed explains the records to "
+    "within their noise.",
+    "base": "the believed model alone, its values fitted within their tolerances, no effect added.",
+    "believed": "what you gave as your model, with how far each value may be off.",
+    "BIC": "how well a set of effects fits, with a penalty for each unknown; smaller is better. "
+    "Only differences count: 10 is strong evidence.",
+    "campaign": "all records of one machine, with its noise and what is believed of it.",
+    "chi-square": "sum of squared misfits in units of their noise; about one per degree of freedom "
+    "if only noise is left.",
+    "class": "a verdict, shown as 'one of several': one of the effects listed is the cause, and "
+    "these records cannot tell which.",
+    "effect": "a law at a port, such as dry friction at the input.",
+    "gap": "root mean square of measured minus predicted.",
+    "held out": "kept away from every fit, to see whether the corrected model holds there.",
+    "law": "how a force, torque or error follows from position, speed or temperature.",
+    "misfit": "what is measured and not predicted, in units of the noise.",
+    "named": "a verdict, shown as 'found': the effects named explain the records, and nothing "
+    "that was compared does as well.",
+    "noise floor": "the gap that a perfect model would still leave.",
+    "parameter": "a verdict, shown as 'believed value wrong': no effect is missing, but a value "
+    "is outside its tolerance.",
+    "partial": "a verdict, shown as 'found in part': what is named is missing, but something is "
+    "left or is not quite right.",
+    "record": "one test: a file with time and channels.",
+    "repeatability": "how much the error changes from one record to the next when nothing else "
+    "does.",
+    "shrinkage": "the part of the gap above the noise floor that the correction removes.",
+    "unlisted": "a verdict, shown as 'unknown effect': something is missing, and no effect of "
+    "the list explains it.",
+}
+DESIGN = {
+    "box": "all designs that may be chosen: each variable between its two bounds.",
+    "dominated": "another design is at least as good in everything and better in something.",
+    "front": "the designs that no other design beats in every objective at once.",
+    "robust": "good on average and with little scatter, although parts, loads or material vary.",
+    "scatter": "how far built parts and conditions of use differ from what was drawn.",
+    "Sobol index": "the share of the scatter of a result that one cause alone makes.",
+    "surrogate": "a polynomial in the place of the simulator, fitted to some of its runs.",
+    "tolerance": "by which share of its value, or between which limits, a part may be off.",
+    "utopia distance": "how far a design is from the best value of every objective at once, which "
+    "no design has; weights say which objective counts more.",
+}
+COMPARISON = {
+    "evaluation": "one design whose objectives are asked for; what algorithms have to spend.",
+    "Holm": "a correction for looking many times: without it, some comparison is lucky.",
+    "hypervolume": "the size of what a front dominates, up to a stated point; larger is better. "
+    "It counts closeness and spread together.",
+    "IGD": "mean distance from points all along the true front to the nearest point found; "
+    "smaller is better. It asks for every part of the front.",
+    "IGD+": "as IGD, but only what is worse counts as distance.",
+    "Spacing": "how unevenly the points found are spaced; 0 is even. It says nothing about how "
+    "close they are to the front, so it is never read alone.",
+    "true front": "the best that any algorithm could find, known in closed form or computed "
+    "without any of the algorithms compared.",
+}
+GLOSSARY = {
+    "Drives and mechanisms": DRIVE,
+    "Verdicts on a model": VERDICT,
+    "Robust designs": DESIGN,
+    "Comparing algorithms": COMPARISON,
+}
+"""By chapter, for each term what it means; terms in the order of the alphabet."""
+
+
+def terms_of(*chapters: str) -> dict[str, str]:
+    """Return the terms of some chapters with their meanings, in the order of the alphabet."""
+    found = {term: said for chapter in chapters for term, said in GLOSSARY[chapter].items()}
+    return dict(sorted(found.items(), key=lambda one: one[0].lower()))

@@ -1,0 +1,53 @@
+"""The glossary has the words that reports use, once, and every report ends with those it needs."""
+
+import re
+from itertools import chain
+
+import pytest
+from places import ROOT
+
+from pymoo_hdte.discrepancy.engine.verdict import STATUSES
+from pymoo_hdte.discrepancy.report import tables
+from pymoo_hdte.reports.glossary import GLOSSARY, terms_of
+from pymoo_hdte.reports.html import page
+
+REPORTS = {
+    path.name: path.read_text(encoding="utf-8")
+    for path in (ROOT / "pymoo_hdte").rglob("*.html.j2")
+    if "<html" in path.read_text(encoding="utf-8")
+}
+WORDS = {
+    *("adequate", "base", "believed", "box", "class", "fading", "front", "IGD", "locked stiffness"),
+    *("partial", "Spacing", "surrogate", "unlisted", "utopia distance"),
+}
+
+
+def test_a_term_stands_in_one_chapter_and_in_order():
+    for terms in GLOSSARY.values():
+        assert list(terms) == sorted(terms, key=str.lower)
+    every = [*chain(*GLOSSARY.values())]
+    assert len(every) == len({*every})
+    assert list(terms_of(*GLOSSARY)) == sorted(every, key=str.lower)
+
+
+def test_the_words_that_readers_stumbled_over_are_there():
+    assert {*terms_of(*GLOSSARY)} >= WORDS
+
+
+def test_every_status_is_told_with_the_words_that_reports_show():
+    for status in STATUSES:
+        assert f"'{tables.STATUSES[status]}'" in terms_of("Verdicts on a model")[status]
+
+
+def test_every_report_ends_with_a_glossary():
+    assert len(REPORTS) == 6
+    for text in REPORTS.values():
+        end = re.search(r"{% set chapters = \[(.*)\] %}\n{% include \"glossary", text)
+        assert end
+        assert {*re.findall('"(.*?)"', end[1])} <= {*GLOSSARY}
+
+
+@pytest.mark.parametrize("chapter", GLOSSARY)
+def test_the_list_is_drawn_with_every_term(chapter):
+    drawn = page("pymoo_hdte.reports", "glossary.html.j2", chapters=[chapter])
+    assert re.findall("<dt>(.*?)</dt>", drawn) == list(terms_of(chapter))

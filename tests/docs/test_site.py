@@ -1,0 +1,107 @@
+"""The site: public names in groups of the reference, examples of the README, how to cite."""
+
+import re
+import sys
+from collections import Counter
+from importlib import import_module
+
+import pytest
+from places import DOCS, ROOT
+from public_names import PACKAGES
+
+import pymoo_hdte
+
+PAGES = {path.stem: path.read_text(encoding="utf-8") for path in (DOCS / "reference").glob("*.md")}
+LISTED = Counter(
+    name
+    for page in PAGES.values()
+    for block in re.findall(r"autosummary::\n   :toctree: names\n\n(.*?)```", page, re.DOTALL)
+    for name in block.replace("~", "").split()
+)
+PUBLIC = {
+    f"{package}.{name}"
+    for package in PACKAGES
+    for name in import_module(f"pymoo_hdte.{package}").__all__
+}
+
+
+def as_public(name):
+    """Return the name by package: a constant is listed by the module that has its docstring."""
+    parts = name.split(".")
+    return f"{parts[1]}.{parts[-1]}"
+
+
+def test_every_public_name_is_in_exactly_one_group():
+    assert {as_public(name) for name in LISTED} == PUBLIC
+    assert {*Counter(map(as_public, LISTED.elements())).values()} == {1}
+
+
+def test_every_package_for_users_is_in_the_reference():
+    packages = {path.parent.name for path in (ROOT / "pymoo_hdte").glob("*/__init__.py")}
+    # Those serve the command line and extensions, which have pages of their own.
+    assert packages - {"cli", "io", "effects", "reports", "virtual"} <= {*PACKAGES}
+
+
+@pytest.mark.parametrize("name", sorted(LISTED))
+def test_a_listed_name_is_imported_from_where_its_page_says(name):
+    module, _, last = name.rpartition(".")
+    package, public = as_public(name).split(".")
+    shown = getattr(import_module(module), last)
+    assert shown is getattr(import_module(f"pymoo_hdte.{package}"), public)
+
+
+def test_every_group_has_its_task_on_the_front_page_of_the_reference():
+    for page in {*PAGES} - {"index"}:
+        assert re.search(rf"^\| .+ \| \[.+\]\({page}\.md\) \|$", PAGES["index"], re.MULTILINE)
+        assert f"\n{page}\n" in PAGES["index"]
+
+
+@pytest.fixture
+def readme_code(monkeypatch):
+    pytest.importorskip("sphinx")
+    monkeypatch.syspath_prepend(DOCS / "_extensions")
+    monkeypatch.delitem(sys.modules, "readme_code", raising=False)
+    return import_module("readme_code")
+
+
+def test_the_front_page_shows_the_tested_examples_of_the_readme(readme_code):
+    front = (DOCS / "index.md").read_text(encoding="utf-8")
+    words = re.findall(r"```{readme-code} (.*)\n", front)
+    readme = readme_code.README.read_text(encoding="utf-8")
+    languages = [readme_code.block_with(word, readme)[0] for word in words]
+    assert languages == ["python", "python", "sh"]
+    assert len(re.findall(r"^\[!\[.+?\]\((\w+\.png)\)", front, re.MULTILINE)) == 3
+    assert [bool(readme_code.block_with(word, readme)[2]) for word in words[:2]] == [True, True]
+
+
+def test_a_word_of_no_block_or_of_two_is_an_error(readme_code):
+    text = "```sh\none\n```\n\n```sh\none two\n```\n"
+    assert readme_code.block_with("two", text) == ("sh", "one two", "")
+    for word in ("one", "three"):
+        with pytest.raises(ValueError, match="unpack"):
+            readme_code.block_with(word, text)
+
+
+def test_the_citation_is_that_of_this_version():
+    page = (DOCS / "cite.md").read_text(encoding="utf-8")
+    cff = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    for version in (
+        re.search("version = {(.*)}", page)[1],
+        re.search("(?m)^version: (.*)", cff)[1],
+    ):
+        assert version == pymoo_hdte.__version__
+    assert re.search("doi: (.*)", cff)[1] in page
+
+
+def test_pictures_of_gallery_and_front_page_are_drawn_by_scripts():
+    gallery = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    pictures = re.findall(r"!\[[^]]+\]\((.*?)\)", gallery)
+    assert len(pictures) >= 10
+    for picture in pictures:
+        guide = re.search(r"sphx_glr_(\w+)_\d{3}\.png$", picture)
+        if guide:
+            assert (DOCS / "guides" / f"{guide[1]}.py").is_file()
+        else:
+            assert (DOCS / picture).is_file()
+    for script in re.findall(r"{download}`(?:.*?<)?(.*?)>?`", gallery):
+        assert (DOCS / script).is_file()
