@@ -21,6 +21,11 @@ LARGEST_TWIST = 0.1
 
 Thirty times the wind-up of catalogued drives at their rated torque, some 1 to 3 mrad; a stiffness
 whose power of ten was overlooked, 10^4 N.m/rad, gives 10 rad and more."""
+LOST_POWER = (
+    "catalogues print it in 10^4 N.m/rad, in the head of the column, or in N.m/arcmin, which is "
+    "3438 N.m/rad"
+)
+"""Likely cause of a stiffness that is too small."""
 
 
 @dataclass(frozen=True)

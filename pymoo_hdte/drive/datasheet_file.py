@@ -10,6 +10,7 @@ from typing import Any
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.datasheet import (
     LARGEST_TWIST,
+    LOST_POWER,
     MEMBERS,
     NOMINAL_QUANTITIES,
     DataSheet,
@@ -65,6 +66,8 @@ def datasheet_from_fields(sheet: Fields, unstated: tuple[str, str] | None = None
         As `load_datasheet`.
     """
     teeth = sheet.table("teeth")
+    held: str
+    as_held: str | None
     if unstated is not None and not teeth.has("held"):
         held, as_held = unstated
     else:
@@ -101,8 +104,7 @@ def _check_twist(sheet: DataSheet, file: str) -> None:
     if sheet.load_torque > LARGEST_TWIST * stiffness:
         allowed = (
             f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load would "
-            f"twist the drive by more than {LARGEST_TWIST:g} rad; catalogues print it in 10^4 "
-            "N.m/rad, in the head of the column, or in N.m/arcmin, which is 3438 N.m/rad"
+            f"twist the drive by more than {LARGEST_TWIST:g} rad; {LOST_POWER}"
         )
         raise InvalidInput(f"{file}: nominal.stiffness", stiffness, allowed)
 
