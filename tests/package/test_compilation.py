@@ -10,6 +10,7 @@ from pymoo.optimize import minimize
 
 from pymoo_hdte.algorithms import ElitistSwarm
 from pymoo_hdte.algorithms.hypervolume import _kept_of_two, _kept_of_two_in_numpy
+from pymoo_hdte.algorithms.spread import _kept, _kept_in_numpy
 from pymoo_hdte.problems import RobustDTE
 
 NOWHERE = """
@@ -48,6 +49,13 @@ def test_without_numba_swarms_and_problems_give_the_same():
     assert done.returncode == 0, done.stderr
     result = minimize(RobustDTE(), ElitistSwarm(), ("n_eval", 1000), seed=1)
     assert bytes.fromhex(done.stdout) == result.F.tobytes()
+
+
+@pytest.mark.parametrize(("n_obj", "size"), [(2, 1), (2, 30), (3, 7), (5, 59)])
+def test_both_truncations_by_spread_keep_the_same(n_obj, size, rng):
+    # Steps of a tenth give equal distances.
+    scaled = np.round(rng.uniform(0.0, 1.0, (60, n_obj)), 1)
+    np.testing.assert_array_equal(_kept_in_numpy(scaled, size), _kept(scaled, size))
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 40])
