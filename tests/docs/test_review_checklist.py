@@ -38,7 +38,6 @@ NOT_MET = {
     "MY104": "ignores are few, and warn_unused_ignores finds those that are stale",
     "MY105": "checks of what users pass in are redundant by their types, and must stay",
     "MY106": "modules of other libraries have no types to tell what is true",
-    "RF002": "its version is set as target-version, which the rule counts only without our bounds",
 }
 """Rules of sp-repo-review that are not met, each with the reason."""
 
