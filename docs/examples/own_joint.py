@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 
 INERTIA, VISCOUS, GAIN, RATIO = 0.4, 2.0, 7.6, 101  # kg.m2, N.m.s/rad, N.m/A
 TRUTH = {"gravity": 3.0, "coulomb_friction": 1.5, "torque_ripple": 0.3}  # N.m

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 
 TRUTH = {  # SI; the first is hidden from the model: force over the cube of the deflection
     "hardening_stiffness: coefficient": 4e5,

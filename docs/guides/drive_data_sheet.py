@@ -7,7 +7,7 @@ teeth, rated speed and load, stiffness, inertias, dampings, errors of the parts.
 says how the static error is made up and which effects the drive has beside the equations of motion.
 Nothing has to be programmed.
 
-The two files here describe an invented drive of ratio 81; their values are plausible but not
+The two files here describe an invented drive of ratio 80; their values are plausible but not
 measured. They stand in :doc:`/examples`. Copy them and put your own numbers in.
 """
 
@@ -50,8 +50,11 @@ EXAMPLES = Path(sys.argv[0]).resolve().parents[1] / "examples"  # in a notebook:
 #    * - ``name``, ``source``
 #      - What the drive is called, and where the values come from.
 #    * - ``teeth``
-#      - Number of teeth of flexspline and circular spline. With the flexspline fixed the ratio is
-#        Z_c / (Z_c - Z_f).
+#      - Number of teeth of flexspline and circular spline, and which of them is ``held``. The ratio
+#        is Z_f / (Z_c - Z_f) with the circular spline held, as most makers have it, and
+#        Z_c / (Z_c - Z_f) with the flexspline held; the orders of the errors follow, too. The drive
+#        of the paper has the ratio of the one and the orders of the other, and says so with
+#        ``orders_as_held``.
 #    * - ``rated``
 #      - Input speed (``r/min`` or ``rad/s``) and load at the output (``N.m``). The DTE is that
 #        under these conditions.

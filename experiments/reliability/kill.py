@@ -174,7 +174,7 @@ def _die_at(step: int) -> None:
 
 
 if __name__ == "__main__":
-    from experiments.__main__ import main
+    from experiments.command_line import main
 
     _die_at(int(sys.argv[1]))
     sys.exit(main(sys.argv[2:]))

@@ -12,7 +12,7 @@ from moocore import hv_contributions
 from numpy.typing import NDArray
 
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.compilation import compiled
+from pymoo_hdte.compilation import COMPILES, compiled
 
 _REFERENCE = 1.1
 """Reference point with three objectives, in every range of the set, counted from its least value.
@@ -40,7 +40,8 @@ def most_hypervolume(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
     if n_obj == 2:
         order = np.lexsort(scaled.T[::-1])
-        return np.sort(order[_kept_of_two(scaled[order], order, size)])
+        kept = _kept_of_two if COMPILES else _kept_of_two_in_numpy
+        return np.sort(order[kept(scaled[order], order, size)])
     return _kept_of_three(scaled, size)
 
 
@@ -80,6 +81,35 @@ def _kept_of_two(
 def _rectangle(scaled: NDArray[np.float64], lower: int, row: int, upper: int) -> float:
     width = scaled[upper, 0] - scaled[row, 0]
     return float(width * (scaled[lower, 1] - scaled[row, 1]))
+
+
+def _kept_of_two_in_numpy(
+    scaled: NDArray[np.float64], number: NDArray[np.int_], size: int
+) -> NDArray[np.bool_]:
+    """Say the same as `_kept_of_two`, to the last bit, where there is no machine code."""
+    n = len(scaled)
+    rows, called = np.arange(n), number.copy()
+    stays = np.ones(n, dtype=np.bool_)
+    before, after = (rows - 1).tolist(), (rows + 1).tolist()
+    first, second = scaled.T.tolist()
+    added = np.full(n, np.inf)
+    added[1:-1] = np.diff(scaled[1:, 0]) * -np.diff(scaled[:-1, 1])
+    for _ in range(n - size):
+        least = np.flatnonzero(added == added.min())
+        leaving = int(least[called[least].argmin()])
+        stays[leaving] = False
+        # Of what is left, all may be without limit.
+        added[leaving], called[leaving] = np.inf, n
+        lower, upper = before[leaving], after[leaving]
+        if lower >= 0:
+            after[lower] = upper
+        if upper < n:
+            before[upper] = lower
+        for row in (lower, upper):
+            if 0 <= row < n and before[row] >= 0 and after[row] < n:
+                width = first[after[row]] - first[row]
+                added[row] = width * (second[before[row]] - second[row])
+    return stays
 
 
 def _kept_of_three(scaled: NDArray[np.float64], size: int) -> NDArray[np.int_]:

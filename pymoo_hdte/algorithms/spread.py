@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.compilation import compiled
+from pymoo_hdte.compilation import COMPILES, compiled
 
 
 def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
@@ -25,7 +25,8 @@ def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
         return np.arange(n)
     span = np.ptp(F, axis=0)
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
-    return np.flatnonzero(_kept(scaled, size))
+    kept = _kept if COMPILES else _kept_in_numpy
+    return np.flatnonzero(kept(scaled, size))
 
 
 @compiled
@@ -77,3 +78,33 @@ def _find_neighbours(
     # One by one: assigning a tuple to a row takes three seconds more to compile.
     neighbours[row, 0], neighbours[row, 1] = first, second
     gaps[row, 0], gaps[row, 1] = gap, second_gap
+
+
+def _kept_in_numpy(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
+    """Say the same as `_kept`, to the last bit, where there is no machine code."""
+    n = len(scaled)
+    # Added up objective by objective, as machine code does.
+    squared = np.zeros((n, n))
+    for values in scaled.T:
+        squared += (values[:, None] - values) ** 2
+    np.fill_diagonal(squared, np.inf)
+    stays = np.ones(n, dtype=np.bool_)
+    neighbours, gaps = np.empty((n, 2), dtype=np.int64), np.empty((n, 2))
+    rows = np.arange(n)
+    for _ in range(n - size + 1):
+        # Of the changed rows, the two nearest that stay.
+        near = squared[rows]
+        for place in range(2):
+            found = near.argmin(axis=1)
+            here = np.arange(len(rows)), found
+            neighbours[rows, place], gaps[rows, place] = found, near[here]
+            near[here] = np.inf
+        if np.count_nonzero(stays) == size:
+            break
+        alive = np.flatnonzero(stays)
+        closest = alive[gaps[alive, 0] == gaps[alive, 0].min()]
+        leaving = closest[gaps[closest, 1].argmin()]
+        stays[leaving] = False
+        squared[:, leaving] = np.inf
+        rows = np.flatnonzero(stays & (neighbours == leaving).any(axis=1))
+    return stays

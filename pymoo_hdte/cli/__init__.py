@@ -1,1 +1,1 @@
-"""What the command line can do, one module a command; `pymoo_hdte.cli.__main__` calls them."""
+"""What the command line can do, one module a command; `pymoo_hdte.cli.command_line` calls them."""

@@ -1,95 +1,27 @@
-"""Command line of the package; see ``pymoo-hdte --help``."""
+"""Start of the command line, which ends quietly while the rest is imported; see `command_line`."""
 
 from __future__ import annotations
 
-import argparse
-import json
+import os
 import sys
-from collections.abc import Sequence
-from pathlib import Path
 
-from pymoo_hdte import __version__
-from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.cli.discrepancy import DISCREPANCY
-from pymoo_hdte.cli.identify import IDENTIFY
-from pymoo_hdte.cli.optimise import OPTIMISE
-from pymoo_hdte.cli.parser import MISTAKE, OneLineParser
-from pymoo_hdte.cli.plan import PLAN
-from pymoo_hdte.cli.simulate import SIMULATE
-
-COMMANDS = (OPTIMISE, SIMULATE, IDENTIFY, PLAN, DISCREPANCY)
-"""In the order of the help."""
-INTERRUPTED = 130
-"""Exit code that a shell expects of a program ended by Ctrl-C."""
+try:
+    from pymoo_hdte.interrupts import ended_quietly
+except KeyboardInterrupt:
+    os._exit(130)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what the command line asks for; return the exit code."""
-    options = _parser().parse_args(arguments)
-    try:
-        # Progress is for a terminal only; a log file gets errors alone.
-        told = sys.stderr.isatty() and not options.quiet
-        outcome = options.command.run(options, _say if told else _silent)
-        if options.json:
-            _print(json.dumps(outcome.document, indent=1, ensure_ascii=False))
-        elif not options.quiet:
-            _print(outcome.summary)
-    except (InvalidInput, ArithmeticError, OSError) as error:
-        print(f"pymoo-hdte: error: {_message(error)}", file=sys.stderr)
-        return MISTAKE
-    except KeyboardInterrupt:
-        print("pymoo-hdte: interrupted, nothing was written", file=sys.stderr)
-        return INTERRUPTED
-    return 0
+def console() -> int:
+    """Run what the command line of this process asks for; return the exit code."""
+    return ended_quietly("pymoo-hdte", main)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = OneLineParser(
-        prog="pymoo-hdte",
-        description="Robust design of harmonic drives, and what a model lacks.",
-        epilog="pymoo-hdte COMMAND --help shows options, an example and the files of a command.",
-    )
-    parser.add_argument("--version", action="version", version=f"pymoo-hdte {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for command in COMMANDS:
-        summary = command.summary
-        one = commands.add_parser(
-            command.name,
-            help=summary,
-            description=f"{summary[0].upper()}{summary[1:]}.",
-            epilog=command.details,
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        one.set_defaults(command=command)
-        command.add_arguments(one)
-        one.add_argument(
-            "--out", type=Path, required=True, metavar="DIR", help="folder for the report"
-        )
-        output = one.add_mutually_exclusive_group()
-        output.add_argument("--json", action="store_true", help="print the result as JSON")
-        output.add_argument("--quiet", action="store_true", help="print nothing but errors")
-    return parser
+def main() -> int:
+    """Run it without a word on how it ends."""
+    from pymoo_hdte.cli.command_line import main as run
 
-
-def _print(text: str) -> None:
-    """Print to stdout, replacing characters it cannot show; flush, so that errors show here."""
-    encoding = sys.stdout.encoding or "utf-8"
-    print(text.encode(encoding, "replace").decode(encoding), flush=True)
-
-
-def _say(what: str) -> None:
-    print(f"{what} ...", file=sys.stderr, flush=True)
-
-
-def _silent(what: str) -> None:
-    pass
-
-
-def _message(error: Exception) -> str:
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
+    return run()
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(console())

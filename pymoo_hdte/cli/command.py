@@ -6,13 +6,24 @@ import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from pymoo_hdte import __version__
 from pymoo_hdte.reports.folder import PAGE_FILE
 
+MISTAKE = 2
+"""Exit code for input that the user can correct, as argparse has it."""
 Say = Callable[[str], None]
 """Tells the user what is being done."""
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong in one line; the usage is for ``--help``."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the line and exit with `MISTAKE`."""
+        line = " ".join(message.split())
+        self.exit(MISTAKE, f"{self.prog}: error: {line}; see {self.prog} --help\n")
 
 
 class Outcome(NamedTuple):

@@ -53,11 +53,12 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
+    from pymoo_hdte.discrepancy.report.write import FOLDER
     from pymoo_hdte.effects import register, registered
 
     believed = options.believed, options.sheet
     # A file may register its effects itself; and a believed model may have them.
-    with registered():
+    with FOLDER.held(options.out), registered():
         for effect in () if options.effects is None else own_effects(options.effects):
             register(effect)
         document = _analysed(options, believed, say)
@@ -67,9 +68,8 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
 def _analysed(options: argparse.Namespace, believed: ModelFiles, say: Say) -> dict[str, Any]:
     """Analyse a campaign or a rig and write its report; return the verdict's document."""
     from pymoo_hdte.cli.reading_bar import ReadingBar, SimulationBar
-    from pymoo_hdte.discrepancy import analyse, check_report_folder
+    from pymoo_hdte.discrepancy import analyse
 
-    check_report_folder(options.out)
     say("reading the records")
     with closing(ReadingBar(options.quiet)) as bar:
         measured = _believing(_measured(options.campaign, options.data, bar), *believed)

@@ -33,11 +33,11 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.cli.identification import identify_drive
     from pymoo_hdte.cli.identification_report import FOLDER, write_identification_report
 
-    FOLDER.check(options.out)
-    sheet = read_sheet(options.datasheet) if options.datasheet is not None else None
-    say("reading the records and fitting")
-    found = identify_drive(options.records)
-    return outcome_of(write_identification_report(found, sheet, options.out), options.out)
+    with FOLDER.held(options.out):
+        sheet = read_sheet(options.datasheet) if options.datasheet is not None else None
+        say("reading the records and fitting")
+        found = identify_drive(options.records)
+        return outcome_of(write_identification_report(found, sheet, options.out), options.out)
 
 
 IDENTIFY = Command(

@@ -62,30 +62,30 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.decision import PREFERENCES
     from pymoo_hdte.problems import load_conditions
 
-    FOLDER.check(options.out)
-    preference = one_of("--preference", options.preference, tuple(PREFERENCES))
-    settings = Settings(
-        tolerance=options.tolerance,
-        box=options.box,
-        conditions=load_conditions(options.cycle) if options.cycle is not None else None,
-        designs=whole_number("--designs", options.designs, LEAST_DESIGNS),
-        seed=whole_number("--seed", options.seed, 0),
-    )
-    model, notes = read_drive(options)
-    say("searching the front on the drive model")
-    # Without a terminal, or if quiet, there is no bar.
-    silent = True if options.quiet else None
-    with tqdm(unit="design", leave=False, disable=silent) as bar:
+    with FOLDER.held(options.out):
+        preference = one_of("--preference", options.preference, tuple(PREFERENCES))
+        settings = Settings(
+            tolerance=options.tolerance,
+            box=options.box,
+            conditions=load_conditions(options.cycle) if options.cycle is not None else None,
+            designs=whole_number("--designs", options.designs, LEAST_DESIGNS),
+            seed=whole_number("--seed", options.seed, 0),
+        )
+        model, notes = read_drive(options)
+        say("searching the front on the drive model")
+        # Without a terminal, or if quiet, there is no bar.
+        silent = True if options.quiet else None
+        with tqdm(unit="design", leave=False, disable=silent) as bar:
 
-        def notify(evaluated: int, difference: float) -> None:
-            if math.isfinite(difference):
-                bar.set_postfix_str(f"front known to {100.0 * difference:.1f} % of its width")
-            bar.update(evaluated - bar.n)
+            def notify(evaluated: int, difference: float) -> None:
+                if math.isfinite(difference):
+                    bar.set_postfix_str(f"front known to {100.0 * difference:.1f} % of its width")
+                bar.update(evaluated - bar.n)
 
-        study = run_design_study(model, preference, settings, notify)
-    say("writing the report")
-    document = write_optimum_report(study, notes, options.out)
-    return outcome_of(document, options.out)
+            study = run_design_study(model, preference, settings, notify)
+        say("writing the report")
+        document = write_optimum_report(study, notes, options.out)
+        return outcome_of(document, options.out)
 
 
 OPTIMISE = Command(

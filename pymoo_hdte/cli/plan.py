@@ -36,12 +36,12 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.cli.plan_report import FOLDER, plan_table, write_plan
     from pymoo_hdte.discrepancy import plan_tests, read_drive_model, read_limits
 
-    FOLDER.check(options.out)
-    model, limits = read_drive_model(options.model, options.sheet), read_limits(options.limits)
-    say("computing what each effect would change in each possible test")
-    plan = plan_tests(model, limits)
-    document = write_plan(plan, model.name, options.out)
-    return Outcome(document, "\n".join(plan_table(document, options.out)))
+    with FOLDER.held(options.out):
+        model, limits = read_drive_model(options.model, options.sheet), read_limits(options.limits)
+        say("computing what each effect would change in each possible test")
+        plan = plan_tests(model, limits)
+        document = write_plan(plan, model.name, options.out)
+        return Outcome(document, "\n".join(plan_table(document, options.out)))
 
 
 PLAN = Command(

@@ -38,17 +38,17 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.cli.simulation_report import FOLDER, write_simulation_report
     from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
-    FOLDER.check(options.out)
-    model, notes = read_drive(options)
-    speed, load = model.sheet.input_speed, model.sheet.load_torque
-    if options.speed is not None:
-        given = real_number("--speed", options.speed, above=0.0, at_most=FASTEST_INPUT)
-        speed = given * REVOLUTION_PER_MINUTE
-    if options.load is not None:
-        load = real_number("--load", options.load, at_least=0.0, at_most=LARGEST_LOAD)
-    say("integrating the equations of motion, and the steady state over all speeds")
-    found = simulate_condition(model.at(speed, load))
-    return outcome_of(write_simulation_report(found, notes, options.out), options.out)
+    with FOLDER.held(options.out):
+        model, notes = read_drive(options)
+        speed, load = model.sheet.input_speed, model.sheet.load_torque
+        if options.speed is not None:
+            given = real_number("--speed", options.speed, above=0.0, at_most=FASTEST_INPUT)
+            speed = given * REVOLUTION_PER_MINUTE
+        if options.load is not None:
+            load = real_number("--load", options.load, at_least=0.0, at_most=LARGEST_LOAD)
+        say("integrating the equations of motion, and the steady state over all speeds")
+        found = simulate_condition(model.at(speed, load))
+        return outcome_of(write_simulation_report(found, notes, options.out), options.out)
 
 
 SIMULATE = Command(

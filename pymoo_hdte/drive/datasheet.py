@@ -8,7 +8,24 @@ from pymoo_hdte.checks import InvalidInput, one_of, real_number, whole_number
 from pymoo_hdte.units import si_unit
 
 ERROR_CLASSES = ("e_m", "e_g", "e_w", "e_p", "e_h")
-"""Classes of Eq. (1): stationary, with the flexspline, with the wave generator, pitch, tooth."""
+"""Classes of Eq. (1): stationary, with the output, with the wave generator, pitch, tooth.
+
+In the paper what turns with the output is the flexspline."""
+MEMBERS = ("circular_spline", "flexspline")
+"""Members of which one is held in the housing and the other is the output; makers hold the first.
+
+Either turns against the wave generator, which is always the input."""
+
+LARGEST_TWIST = 0.1
+"""rad; more than any load twists a strain wave gear.
+
+Thirty times the wind-up of catalogued drives at their rated torque, some 1 to 3 mrad; a stiffness
+whose power of ten was overlooked, 10^4 N.m/rad, gives 10 rad and more."""
+LOST_POWER = (
+    "catalogues print it in 10^4 N.m/rad, in the head of the column, or in N.m/arcmin, which is "
+    "3438 N.m/rad"
+)
+"""Likely cause of a stiffness that is too small."""
 
 
 @dataclass(frozen=True)
@@ -142,14 +159,20 @@ def unit_of(symbol: str) -> str:
 
 @dataclass(frozen=True)
 class DataSheet:
-    """A harmonic drive with fixed flexspline, as its maker and the test bench describe it.
+    """A harmonic drive, as its maker and the test bench describe it.
 
     Attributes
     ----------
     name, source : str
         Of the drive, and of its numbers.
     flexspline_teeth, circular_spline_teeth : int
-        Z_f < Z_c.
+        Z_f < Z_c, by an even number: the wave generator has two ends, and both must mesh alike.
+    held : {"circular_spline", "flexspline"}
+        Member that does not turn; the other one is the output. Makers' drives hold the circular
+        spline, and their output turns against the input; angles here count in its own sense.
+    orders_as_held : {"circular_spline", "flexspline"}, optional
+        Member that `error_orders` take for held, of a source that mixes both arrangements, as the
+        paper does; by default ``held``.
     input_speed : float
         Rated, rad/s.
     load_torque : float
@@ -178,15 +201,21 @@ class DataSheet:
     source: str
     flexspline_teeth: int
     circular_spline_teeth: int
+    held: str
     input_speed: float
     load_torque: float
     nominal: Nominal
     mesh: Mesh
     error_sources: tuple[ErrorSource, ...]
+    orders_as_held: str | None = None
 
     def __post_init__(self) -> None:
         whole_number("flexspline_teeth", self.flexspline_teeth, 2)
         whole_number("circular_spline_teeth", self.circular_spline_teeth, self.flexspline_teeth + 1)
+        _check_difference(self.circular_spline_teeth - self.flexspline_teeth, self)
+        one_of("held", self.held, MEMBERS)
+        if self.orders_as_held is not None:
+            one_of("orders_as_held", self.orders_as_held, MEMBERS)
         real_number("input_speed", self.input_speed, above=0.0)
         real_number("load_torque", self.load_torque, at_least=0.0)
         symbols = [source.symbol for source in self.error_sources]
@@ -195,16 +224,46 @@ class DataSheet:
 
     @property
     def ratio(self) -> float:
-        """Transmission ratio N = Z_c / (Z_c - Z_f), dimensionless.
+        """Transmission ratio N, turns of the input per turn of the output, dimensionless.
 
-        The flexspline is fixed, the circular spline is the output (Musser, US Patent 2906143 of
-        1959).
+        Z_f / (Z_c - Z_f) with the circular spline held, Z_c / (Z_c - Z_f) with the flexspline held
+        (Musser, US Patent 2906143 of 1959).
         """
-        return self.circular_spline_teeth / (self.circular_spline_teeth - self.flexspline_teeth)
+        return 1.0 / abs(self._output_turn(self.held))
 
     @property
     def error_orders(self) -> dict[str, float]:
-        """Order of each class of the static error, Eq. (1), by name, in cycles per input turn."""
-        flexspline = 2.0 * self.circular_spline_teeth / self.flexspline_teeth
-        tooth = 2.0 * self.circular_spline_teeth
-        return {"e_m": 2.0, "e_g": flexspline, "e_w": 1.0, "e_p": 2.0, "e_h": tooth}
+        """Order of each class of the static error, Eq. (1), by name, in cycles per input turn.
+
+        Both ends of the wave generator pass each error of a spline once a turn against it. What is
+        held is passed 2 times per input turn, what turns with the output 2 (1 - w) times, where w
+        is the turn of the output per turn of the input, and teeth as often as the held member has
+        any. With 100 and 102 teeth the class e_g has order 2.04 with the circular spline held, and
+        1.96 with the flexspline held.
+        """
+        held = self.orders_as_held or self.held
+        output = 2.0 * (1.0 - self._output_turn(held))
+        return {"e_m": 2.0, "e_g": output, "e_w": 1.0, "e_p": 2.0, "e_h": 2.0 * self._teeth(held)}
+
+    def _output_turn(self, held: str) -> float:
+        """Return the turn of the output per turn of the input, negative if against it.
+
+        On its way round, the wave generator moves the output on the held member by the difference
+        of their teeth, counted in teeth of the output.
+        """
+        (output,) = set(MEMBERS) - {held}
+        return (self._teeth(output) - self._teeth(held)) / self._teeth(output)
+
+    def _teeth(self, member: str) -> int:
+        return self.flexspline_teeth if member == "flexspline" else self.circular_spline_teeth
+
+
+def _check_difference(difference: int, sheet: DataSheet) -> None:
+    if difference % 2:
+        near = sheet.flexspline_teeth + difference
+        allowed = (
+            f"{sheet.flexspline_teeth} (flexspline_teeth) + 2, or another even number more: teeth "
+            f"engage at both ends of the wave generator, which a difference of {difference} does "
+            "not let them; likely a tooth number was miscounted or computed from a rounded ratio"
+        )
+        raise InvalidInput("circular_spline_teeth", near, allowed)

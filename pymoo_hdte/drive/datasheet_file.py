@@ -7,10 +7,23 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
 
-from pymoo_hdte.drive.datasheet import NOMINAL_QUANTITIES, DataSheet, ErrorSource, Mesh, Nominal
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive.datasheet import (
+    LARGEST_TWIST,
+    LOST_POWER,
+    MEMBERS,
+    NOMINAL_QUANTITIES,
+    DataSheet,
+    ErrorSource,
+    Mesh,
+    Nominal,
+)
 from pymoo_hdte.effects.quantities import with_unit
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import read_toml
+
+EARLIER_ARRANGEMENT = ("flexspline", "circular_spline")
+"""``held`` and ``orders_as_held`` that stored models mean that do not say them: the paper's."""
 
 
 def load_datasheet(path: str | Path) -> DataSheet:
@@ -37,11 +50,20 @@ def load_datasheet(path: str | Path) -> DataSheet:
     >>> load_datasheet("my_drive.toml").ratio
     81.0
     """
-    return datasheet_from_fields(read_toml(Path(path)))
+    sheet = datasheet_from_fields(read_toml(Path(path)))
+    _check_twist(sheet, Path(path).name)
+    return sheet
 
 
-def datasheet_from_fields(sheet: Fields) -> DataSheet:
+def datasheet_from_fields(sheet: Fields, unstated: tuple[str, str] | None = None) -> DataSheet:
     """Build a data sheet from its table.
+
+    Parameters
+    ----------
+    sheet : Fields
+    unstated : (str, str), optional
+        ``held`` and ``orders_as_held`` of a table without them, such as `EARLIER_ARRANGEMENT`. By
+        default it is refused.
 
     Raises
     ------
@@ -49,12 +71,21 @@ def datasheet_from_fields(sheet: Fields) -> DataSheet:
         As `load_datasheet`.
     """
     teeth = sheet.table("teeth")
+    held: str
+    as_held: str | None
+    if unstated is not None and not teeth.has("held"):
+        held, as_held = unstated
+    else:
+        held = teeth.choice("held", MEMBERS)
+        as_held = teeth.choice("orders_as_held", MEMBERS) if teeth.has("orders_as_held") else None
     rated = sheet.table("rated")
     result = DataSheet(
         name=sheet.text("name"),
         source=sheet.text("source"),
         flexspline_teeth=teeth.whole("flexspline", 2),
         circular_spline_teeth=teeth.whole("circular_spline", 3),
+        held=held,
+        orders_as_held=as_held,
         input_speed=rated.quantity("input_speed", "speed", above=0.0),
         load_torque=rated.quantity("load_torque", "torque", at_least=0.0),
         nominal=_nominal(sheet.table("nominal")),
@@ -76,6 +107,17 @@ def hs_20_100() -> DataSheet:
     """
     with as_file(files("pymoo_hdte.drive") / "data" / "hs_20_100.toml") as path:
         return load_datasheet(path)
+
+
+def _check_twist(sheet: DataSheet, file: str) -> None:
+    """Refuse a stiffness that the rated load would twist as no drive can bear."""
+    stiffness = sheet.nominal.stiffness
+    if sheet.load_torque > LARGEST_TWIST * stiffness:
+        allowed = (
+            f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load would "
+            f"twist the drive by more than {LARGEST_TWIST:g} rad; {LOST_POWER}"
+        )
+        raise InvalidInput(f"{file}: nominal.stiffness", stiffness, allowed)
 
 
 def _nominal(table: Fields) -> Nominal:
@@ -119,6 +161,8 @@ def sheet_table(sheet: DataSheet) -> dict[str, Any]:
         "teeth": {
             "flexspline": sheet.flexspline_teeth,
             "circular_spline": sheet.circular_spline_teeth,
+            "held": sheet.held,
+            **({"orders_as_held": sheet.orders_as_held} if sheet.orders_as_held else {}),
         },
         "rated": {
             "input_speed": with_unit(sheet.input_speed, "speed"),

@@ -14,7 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of
 from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, DataSheet, unit_of
-from pymoo_hdte.drive.datasheet_file import datasheet_from_fields, hs_20_100, sheet_table
+from pymoo_hdte.drive.datasheet_file import (
+    EARLIER_ARRANGEMENT,
+    datasheet_from_fields,
+    hs_20_100,
+    sheet_table,
+)
 from pymoo_hdte.drive.effects import DriveEffect, effect_from_fields
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.solve.coefficients import Coefficients
@@ -392,7 +397,12 @@ def model_tables(model: DriveModel) -> dict[str, Any]:
     }
     # TOML has no empty array of tables.
     effects = {"effect": [effect.to_dict() for effect in model.effects]} if model.effects else {}
-    return {"data_sheet": sheet_table(model.sheet), "model": table | effects}
+    sheet = sheet_table(model.sheet)
+    if (model.sheet.held, model.sheet.orders_as_held) == EARLIER_ARRANGEMENT:
+        # Files keep the bytes that they had when there was no other arrangement.
+        for name in ("held", "orders_as_held"):
+            del sheet["teeth"][name]
+    return {"data_sheet": sheet, "model": table | effects}
 
 
 def parts_of(tables: dict[str, Any]) -> tuple[Fields, DataSheet]:
@@ -403,5 +413,6 @@ def parts_of(tables: dict[str, Any]) -> tuple[Fields, DataSheet]:
     InvalidInput
         For a wrong, missing or superfluous field of the data sheet.
     """
-    sheet = datasheet_from_fields(Fields(tables["data_sheet"], "data_sheet"))
+    table = Fields(tables["data_sheet"], "data_sheet")
+    sheet = datasheet_from_fields(table, EARLIER_ARRANGEMENT)
     return Fields(tables["model"], "model"), sheet

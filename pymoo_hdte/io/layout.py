@@ -216,7 +216,7 @@ def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel
     if not isinstance(unwrap, bool):
         raise InvalidInput(table._name("unwrap"), unwrap, "true or false")
     units = UNITS["angle"] if unwrap else units
-    unit = table.choice("unit", (COUNTS, *units) if set(UNITS["angle"]) <= set(units) else units)
+    unit = _unit(table, (COUNTS, *units) if set(UNITS["angle"]) <= set(units) else tuple(units))
     options: dict[str, Any] = {
         name: table.number(name, at_least=-LARGEST, at_most=LARGEST)
         for name in ("scale", "wraps", "counts_per_turn", "zero")
@@ -232,3 +232,14 @@ def _channel(table: Fields, form: str | None, units: Collection[str]) -> Channel
         return Channel(column, unit, unwrap=unwrap, **options)
     except InvalidInput as error:
         raise InvalidInput(table._name(error.field), error.value, error.allowed) from None
+
+
+def _unit(table: Fields, units: tuple[str, ...]) -> str:
+    """Take the unit; one of another quantity is refused with what it is a unit of."""
+    unit = table.take("unit", f"one of {', '.join(units)}")
+    if isinstance(unit, str) and unit not in units and unit in CHANNEL_UNITS:
+        kind = next(one for one in MEASURED if unit in UNITS[one])
+        known = ", ".join(map(repr, units))
+        allowed = f"no unit of {kind}, which this column does not hold, but one of {known}"
+        raise InvalidInput(table._name("unit"), unit, allowed)
+    return one_of(table._name("unit"), unit, units)

@@ -6,12 +6,15 @@ import errno
 import json
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.interrupts import orderly
+from pymoo_hdte.reports.in_use import in_use
 
 PAGE_FILE = "report.html"
 
@@ -74,6 +77,28 @@ class ReportFolder:
         if not os.access(parent, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(parent))
 
+    @contextmanager
+    def held(self, out: Path) -> Iterator[None]:
+        """Check a folder and keep other commands from it, until the report is written.
+
+        Parameters
+        ----------
+        out : Path
+            As for `check`.
+
+        Raises
+        ------
+        InvalidInput
+            As `check`, or if another command is about to write there.
+        OSError
+            As `check`.
+        """
+        self.check(out)
+        # Beside the folder, which will be replaced.
+        whole = out.absolute()
+        with in_use(whole.with_name(f".{whole.name}.in-use"), "folder of the report", out):
+            yield
+
     def write(
         self, out: Path, page: str, document: dict[str, Any], texts: Mapping[str, str]
     ) -> None:
@@ -105,7 +130,8 @@ class ReportFolder:
         contents = {self.document: text, PAGE_FILE: page, **texts}
         if not set(self.always) <= set(contents) <= set(self.files):
             raise ValueError(f"files of a report: {sorted(contents)}, allowed: {self.files}")
-        _write_all(out, contents)
+        with orderly():
+            _write_all(out, contents)
 
 
 def _write_all(out: Path, files: Mapping[str, str]) -> None:

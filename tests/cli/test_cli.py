@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import discrepancy
 from pymoo_hdte.drive import UnstableDrive
 
@@ -146,7 +146,7 @@ def test_progress_goes_to_a_terminal_alone(monkeypatch, capsys):
 
 
 def test_what_a_terminal_cannot_show_is_replaced():
-    code = "from pymoo_hdte.cli import __main__ as cli; cli._print('K 2·10⁻⁴')"
+    code = "from pymoo_hdte.cli import command_line as cli; cli._print('K 2·10⁻⁴')"
     options = {"env": os.environ | {"PYTHONIOENCODING": "latin-1"}, "capture_output": True}
     done = subprocess.run([sys.executable, "-c", code], check=True, **options)
     assert done.stdout == "K 2·10??\n".encode("latin-1")
@@ -155,7 +155,7 @@ def test_what_a_terminal_cannot_show_is_replaced():
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_a_full_disk_behind_stdout_is_one_line():
     code = (
-        "import sys; from pymoo_hdte.cli import __main__ as cli, discrepancy;"
+        "import sys; from pymoo_hdte.cli import command_line as cli, discrepancy;"
         "discrepancy._analysed = lambda *a: {'a': 1};"
         "discrepancy._summary = lambda *a: 'found';"
         "sys.exit(cli.main(['discrepancy', 'x', '--out', 'y']))"
@@ -168,7 +168,8 @@ def test_a_full_disk_behind_stdout_is_one_line():
 
 def test_help_waits_for_nothing_heavy():
     code = (
-        "import sys; from pymoo_hdte.cli import __main__ as cli; cli._parser(); print(*sys.modules)"
+        "import sys; from pymoo_hdte.cli import command_line as cli;"
+        "cli._parser(); print(*sys.modules)"
     )
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True

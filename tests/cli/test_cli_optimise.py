@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import optimum_report
 from pymoo_hdte.cli.design_check import Check, check_designs
 from pymoo_hdte.cli.design_study import AGREEMENT, Settings, run_design_study

@@ -7,7 +7,7 @@ import pytest
 from measured_oscillator import EYRING_DRAG, OF_ROTOR, ROTOR, rotor_record
 from places import DOCS
 
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli.own_effects import own_effects
 from pymoo_hdte.discrepancy import MeasuredMechanism, analyse, read_rig
 from pymoo_hdte.discrepancy.mechanism.models import model_text

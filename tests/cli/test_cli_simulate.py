@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from night import others_at_night
 
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.drive import hs_20_100, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE

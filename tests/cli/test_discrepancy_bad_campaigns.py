@@ -18,7 +18,7 @@ from quick_campaigns import (
     ripple_campaign,
 )
 
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.discrepancy import analysis as api
 from pymoo_hdte.discrepancy import read_campaign, write_campaign
 from pymoo_hdte.discrepancy.report import write as report

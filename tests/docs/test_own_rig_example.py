@@ -16,7 +16,7 @@ import pytest
 from kept_results import kept, put_files
 from places import DOCS
 
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
 from pymoo_hdte.mechanism.effects import law_effects
 

@@ -62,7 +62,7 @@ from experiments.robust.job import METHODS, OPENTURNS, OURS
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA
 from experiments.runner.registry import Context
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import optimum_report
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import harmonic_balance, preset

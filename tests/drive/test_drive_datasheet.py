@@ -1,7 +1,7 @@
 """The data sheet: Table 4 and Table 2 as printed, and every way to get it wrong."""
 
 import math
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 from importlib.resources import files
 
 import pytest
@@ -44,6 +44,49 @@ def test_orders_follow_from_the_teeth():
     assert orders == {"e_m": 2.0, "e_g": 2.02, "e_w": 1.0, "e_p": 2.0, "e_h": 404.0}
 
 
+@pytest.mark.parametrize(
+    ("held", "ratio", "of_output", "of_teeth"),
+    [("circular_spline", 50.0, 2.04, 204.0), ("flexspline", 51.0, 2.0 * 100 / 102, 200.0)],
+)
+def test_ratio_and_orders_follow_from_the_held_member(held, ratio, of_output, of_teeth):
+    sheet = replace(
+        hs_20_100(),
+        flexspline_teeth=100,
+        circular_spline_teeth=102,
+        held=held,
+        orders_as_held=None,
+    )
+    assert sheet.ratio == pytest.approx(ratio, rel=1e-15)
+    orders = sheet.error_orders
+    assert orders == pytest.approx(
+        {"e_m": 2, "e_g": of_output, "e_w": 1, "e_p": 2, "e_h": of_teeth}
+    )
+    # Either end passes errors of the output as often as the wave generator turns against it.
+    turn = {"circular_spline": -1.0, "flexspline": 1.0}[held] / ratio
+    assert orders["e_g"] == pytest.approx(2.0 * (1.0 - turn), rel=1e-14)
+    # In one turn of the generator against the output, as many of its teeth mesh as it has.
+    teeth = {"circular_spline": 100, "flexspline": 102}[held]
+    assert orders["e_g"] * teeth == pytest.approx(orders["e_h"], rel=1e-14)
+
+
+def test_the_paper_has_the_ratio_of_one_arrangement_and_the_orders_of_the_other():
+    sheet = hs_20_100()
+    assert (sheet.held, sheet.orders_as_held) == ("flexspline", "circular_spline")
+    other = replace(sheet, held="circular_spline", orders_as_held=None)
+    assert (other.ratio, other.error_orders) == (100.0, sheet.error_orders)
+
+
+def test_the_twist_at_the_rated_load_tells_a_lost_power_of_ten(tmp_path):
+    path = tmp_path / "hs.toml"
+    for lost, refused in ((1.0, False), (1e-1, False), (1e-4, True)):
+        path.write_text(TEXT.replace("2.583e4", f"{2.583e4 * lost}"), encoding="utf-8")
+        if refused:
+            with pytest.raises(InvalidInput, match=r"nominal.stiffness is 2.583.*10\^4 N.m/rad"):
+                load_datasheet(path)
+        else:
+            load_datasheet(path)
+
+
 def test_is_immutable():
     with pytest.raises(FrozenInstanceError):
         hs_20_100().nominal.stiffness = 1.0
@@ -67,6 +110,10 @@ STIFFNESS = 'stiffness = { value = 2.583e4, unit = "N.m/rad" }'
         (STIFFNESS, STIFFNESS + "\nstifness = 1", "nominal.stifness", "no such field"),
         ("flexspline = 200", "flexspline = 203", "circular_spline_teeth", "204"),
         ("flexspline = 200", "flexspline = 200.5", "teeth.flexspline", "whole number"),
+        ("flexspline = 200", "flexspline = 201", "circular_spline_teeth", "likely a tooth number"),
+        ('held = "flexspline"', "", "teeth.held", "circular_spline, flexspline"),
+        ('held = "flexspline"', 'held = "housing"', "teeth.held", "'circular_spline'"),
+        ('as_held = "circ', 'as_held = "c', "teeth.orders_as_held", "'circular_spline'"),
         ('class = "e_h"', 'class = "e_x"', "error class of dfi1", "'e_m'"),
         ('symbol = "dfi1"', 'symbol = "dFp1"', "symbols", "each symbol once"),
         ('symbol = "dfi1"', 'symbol = ""', "error_source[1].symbol", "non-empty"),

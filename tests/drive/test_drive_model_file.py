@@ -27,7 +27,7 @@ from pymoo_hdte.drive import (
     NewZero,
     ThermalDrift,
 )
-from pymoo_hdte.drive.datasheet import ERROR_CLASSES, ErrorSource, Mesh, Nominal
+from pymoo_hdte.drive.datasheet import ERROR_CLASSES, MEMBERS, ErrorSource, Mesh, Nominal
 from pymoo_hdte.drive.effects import drive_effects
 from pymoo_hdte.effects.effect import place_of
 
@@ -71,8 +71,10 @@ sheets = st.builds(
     DataSheet,
     texts,
     texts,
-    st.integers(2, 200),
-    st.integers(201, 2**70),
+    # Even numbers differ by an even number, as they must.
+    st.integers(1, 100).map(lambda half: 2 * half),
+    st.integers(101, 2**69).map(lambda half: 2 * half),
+    st.sampled_from(MEMBERS),
     above_0,
     at_least_0,
     st.builds(Nominal, *[above_0] * 7),
@@ -91,6 +93,7 @@ sheets = st.builds(
         max_size=3,
         unique_by=lambda source: source.symbol,
     ).map(tuple),
+    st.sampled_from((None, *MEMBERS)),
 )
 errors = st.integers(1, 4).flatmap(
     lambda n: st.builds(

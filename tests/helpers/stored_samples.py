@@ -25,6 +25,9 @@ MODEL = DriveModel(
         source="tests/stored_samples.py",
         flexspline_teeth=160,
         circular_spline_teeth=162,
+        # What files mean that were written before they said it.
+        held="flexspline",
+        orders_as_held="circular_spline",
         input_speed=123.4,
         load_torque=1.0 / 3.0,
         nominal=Nominal(1.7e-4, 2.5e4, 2e-4, 1.7e-4, 4.4e-4, 8.5e-4, 5e-4),

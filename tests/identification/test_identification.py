@@ -245,6 +245,19 @@ def test_bad_input_is_named(call, message):
         call()
 
 
+def test_a_loop_that_turns_the_wrong_way_is_refused_with_the_likely_cause():
+    loop = TorsionBench().record(K, np.random.default_rng(3))
+    with pytest.raises(InvalidInput, match=r"slope of torsion over torque is -.*opposite senses"):
+        TorsionLoop(loop.torque, -loop.torsion)
+    # Run through in time backwards, and turned about the origin, it is the same loop giving work.
+    with pytest.raises(InvalidInput, match=r"work of the loop.* is -0\..*rows stand in reverse"):
+        TorsionLoop(-loop.torque[::-1], -loop.torsion[::-1])
+    elastic = quiet_loop(200, friction_torque=0.0)
+    assert lost_energy(TorsionLoop(elastic.torque, elastic.torque / K)) == pytest.approx(
+        0.0, abs=1e-9
+    )
+
+
 def test_assemblies_at_different_speeds_are_refused(rng):
     bearing = INPUT_BEARING.record(1.7e-4, rng)
     slower = replace(COMPLETE_DRIVE, speeds=INPUT_SPEEDS * np.r_[np.ones(4), 0.98, np.ones(5)])

@@ -12,7 +12,7 @@ ROOT = Path(pymoo_hdte.__file__).parent
 EXPERIMENTS = Path(experiments.__file__).parent
 TESTS = Path(__file__).parents[1]
 LOWEST_FIRST = (
-    *("checks", "lazy", "units", "compilation", "io", "effects", "reports"),
+    *("checks", "lazy", "units", "compilation", "interrupts", "io", "effects", "reports"),
     *("drive.solve", "drive.effects", "drive", "mechanism", "surrogate", "surrogate.sparse"),
     "validation",
     "identification",
@@ -37,7 +37,7 @@ LOWEST_FIRST = (
 The modules of `discrepancy` itself are what users call, above all that they put together.
 """
 LOWEST_EXPERIMENTS_FIRST = (
-    *("published_values", "runner", "__main__", "comparison", "fronts", "anytime"),
+    *("published_values", "runner", "command_line", "__main__", "comparison", "fronts", "anytime"),
     *("paper.static_error", "paper.prototypes", "paper", "paper.calibrating", "paper.inference"),
     *("contest", "cards", "robust", "blind.rig", "blind", "measured", "reliability", "studies"),
 )

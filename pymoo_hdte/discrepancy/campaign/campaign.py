@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.campaign.plausibility import (
     check_believed,
     check_noise,
     check_running,
+    check_stiffness,
     check_torsion,
 )
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
@@ -83,14 +84,20 @@ class Campaign:
         if not self.running:
             raise InvalidInput("running records", 0, "at least one")
         self._check_each_once()
-        check_believed(self.believed, rules)
         largest_load = max(abs(record.load_torque) for record in self.running)
+        try:
+            check_believed(self.believed, rules)
+        except InvalidInput:
+            # An inertia that seems too heavy may hang on a stiffness that is too small.
+            check_stiffness(self.believed, largest_load, rules)
+            raise
         for record in self.running:
             with _named(record.name):
                 check_running(record, self.believed, self.rig, largest_load, rules)
         for sweep in self.torsion:
             with _named(sweep.name):
                 check_torsion(sweep, self.believed, rules)
+        check_stiffness(self.believed, largest_load, rules)
         check_noise(self.running, self.torsion, self.believed, self.rig, rules)
 
     def believing(self, model: DriveModel) -> Campaign:

@@ -16,6 +16,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.drive.datasheet import LOST_POWER
 from pymoo_hdte.units import ARCSEC
 
 
@@ -58,6 +59,29 @@ def check_believed(believed: BelievedDrive, rules: Rules) -> None:
         if not (amplitude == 0.0 or least <= amplitude <= most):
             allowed = f"zero, or {least / ARCSEC:.2g} to {most / ARCSEC:.2g} arcsec"
             raise InvalidInput("believed.error_amplitudes", amplitude, allowed)
+
+
+def check_stiffness(believed: BelievedDrive, largest_load: float, rules: Rules) -> None:
+    """Refuse a believed stiffness that the loads of the campaign would twist too far.
+
+    Parameters
+    ----------
+    believed : BelievedDrive
+    largest_load : float
+        Of all running records, N.m.
+    rules : Rules
+
+    Raises
+    ------
+    InvalidInput
+        If the largest load twists the drive by more than `Rules.largest_twist`.
+    """
+    if largest_load > rules.largest_twist * believed.stiffness:
+        allowed = (
+            f"at least {largest_load / rules.largest_twist:.3g} N.m/rad, or {largest_load:g} N.m "
+            f"would twist the drive by more than {rules.largest_twist:g} rad; {LOST_POWER}"
+        )
+        raise InvalidInput("believed.stiffness", believed.stiffness, allowed)
 
 
 def check_noise(

@@ -139,6 +139,9 @@ def _sheet(campaign: Campaign, values: Mapping[str, float], static_error: float)
         ),
         flexspline_teeth=circular_spline - difference,
         circular_spline_teeth=circular_spline,
+        # A campaign says no more than the ratio; lines of the static error stand in the model.
+        held="flexspline",
+        orders_as_held="circular_spline",
         input_speed=max(abs(record.input_speed) for record in campaign.running),
         load_torque=max(abs(record.load_torque) for record in campaign.running),
         nominal=Nominal(

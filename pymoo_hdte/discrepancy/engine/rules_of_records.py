@@ -29,6 +29,13 @@ class RecordRules(RuleSet):
         "Smaller amplitudes of the believed static error that are not zero are refused.",
         f"{BY_HAND}: 0.001 arcsec; no encoder would show a smaller line.",
     )
+    largest_twist: float = rule(
+        0.1,
+        "rad",
+        "A believed stiffness that the largest load would twist further is refused.",
+        f"{BY_HAND}: thirty times the wind-up of catalogued drives at their rated torque; a "
+        "stiffness whose 10^4 was overlooked gives 10 rad and more.",
+    )
     least_natural_frequency: float = rule(
         0.5,
         "Hz",

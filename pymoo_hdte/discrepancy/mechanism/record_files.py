@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
@@ -9,7 +10,7 @@ from pathlib import Path, PureWindowsPath
 from pymoo_hdte.checks import InvalidInput, one_of
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.joined import read_joined
-from pymoo_hdte.io.layout import TableLayout, layout_from_fields, with_zeros
+from pymoo_hdte.io.layout import Channel, TableLayout, layout_from_fields, with_zeros
 from pymoo_hdte.io.parts import Part, part_from_fields
 from pymoo_hdte.io.tables import check_sha256
 from pymoo_hdte.io.text_lines import Seen
@@ -20,6 +21,9 @@ from pymoo_hdte.units import UNITS
 SPLIT = 0.6
 """Share of a record without a role that is fitted; the rest is held out."""
 _SPEEDS = {*UNITS["speed"], *UNITS["linear speed"]}
+_OF_POSITIONS = {"position", "pos", "angle", "travel", "displacement"}
+_OF_SPEEDS = {"speed", "velocity", "vel", "rate", "rpm", "omega"}
+"""Words in the title of a column that say what it holds."""
 _ACCELERATIONS = {*UNITS["acceleration"], *UNITS["linear acceleration"]}
 
 
@@ -197,6 +201,7 @@ def _with_positions(
             )
             raise InvalidInput(f"unit of the coordinate {name}", unit, allowed)
         if unit in _SPEEDS:
+            _check_title(name, channels[name])
             channels[name] = replace(channels[name], integrated=True)
             told.append(
                 f"The position {name} is its speed, integrated from the first row of the file: "
@@ -204,6 +209,19 @@ def _with_positions(
                 "constant force may be that of a spring, and phases over the position are relative."
             )
     return replace(listed.layout, channels=channels), told
+
+
+def _check_title(name: str, channel: Channel) -> None:
+    """Refuse a speed in a column whose title says that it holds a position."""
+    title = str(channel.column)
+    words = set(re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", title).lower()))
+    if words & _OF_POSITIONS and not words & _OF_SPEEDS:
+        allowed = (
+            f"a unit of angle or length, as the title of its column {title!r} says: "
+            f"{', '.join((*UNITS['angle'], *UNITS['length']))}. In a unit of speed its readings "
+            "would be integrated; likely the unit of another column was put here"
+        )
+        raise InvalidInput(f"unit of the coordinate {name}", channel.unit, allowed)
 
 
 def _check_sha256(path: Path, expected: str, place: str) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder
 from numpy.typing import NDArray
 
+from pymoo_hdte.compilation import COMPILES
 from pymoo_hdte.surrogate.moments import divide_or_zero
 from pymoo_hdte.surrogate.sparse.axes import Axis
 from pymoo_hdte.surrogate.sparse.index_set import AxisMap
@@ -85,7 +86,7 @@ class SparseMoments:
 
     def __call__(self, designs: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (n, r) each, in the responses' units."""
-        if len(designs) >= MANY:
+        if COMPILES and len(designs) >= MANY:
             return self._many_moments(designs)
         expansion = self.expansion(designs)
         return expansion[..., 0], deviation(expansion)

@@ -176,6 +176,11 @@ BAD_FIELDS = {
         "rad = 7.5",
         r"torsion.csv.gz.*slope.*believed stiffness of 7\.5 N\.m/rad.*the unit of either",
     ),
+    "stiffness without its power of ten": (
+        "rad = 25830",
+        "rad = 2.583",
+        r"line 6: believed.stiffness.* is 2\.583.*in 10\^4 N\.m/rad",
+    ),
     "inertia in g.cm2": (
         "inertia_kgm2 = 0.000197",
         "inertia_kgm2 = 1970",

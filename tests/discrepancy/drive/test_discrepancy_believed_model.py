@@ -12,7 +12,7 @@ from quick_campaigns import ripple_analysis_and_report, ripple_campaign
 from virtual_rig_cases import BELIEVED
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.discrepancy import (
     MeasuredMechanism,
     analyse,

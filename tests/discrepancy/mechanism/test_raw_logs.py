@@ -14,8 +14,10 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
     fine_enough,
     usual_cutoff,
 )
+from pymoo_hdte.discrepancy.mechanism.record_files import ListedRecord, _with_positions
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
 from pymoo_hdte.discrepancy.report.mechanism_document import effects, limits, quantities
+from pymoo_hdte.io.layout import Channel, TableLayout
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.motion import highest_share
 
@@ -128,6 +130,19 @@ def test_a_speed_is_integrated_and_what_that_leaves_open_is_said(folder):
         assert abs(np.mean(one.channels["joint"] - angle)) < 1e-2
     with pytest.raises(InvalidInput, match=r"unit of the coordinate joint is 'rad/s2'"):
         rig(folder, speed, ('"rad"', '"rad/s2"'))
+
+
+def test_a_unit_of_speed_for_a_column_of_positions_is_refused():
+    for title, refused in (("motorPosition", True), ("angle rad", True), ("pos_rate", False)):
+        channel = Channel(title, "r/min")
+        listed = ListedRecord(
+            "records[0]", {}, TableLayout("csv", {"q": channel}, None, 100.0, 0), (), None
+        )
+        if refused:
+            with pytest.raises(InvalidInput, match=r"unit of the coordinate q is 'r/min'.*title"):
+                _with_positions(listed, ["q"])
+        else:
+            assert _with_positions(listed, ["q"])[0].channels["q"].integrated
 
 
 def test_without_a_gain_the_ratios_are_determined_and_that_is_said(folder):

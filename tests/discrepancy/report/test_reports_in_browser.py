@@ -15,7 +15,7 @@ from quick_campaigns import ripple_analysis_and_report
 
 from experiments.runner.report import write_report
 from experiments.runner.store import save
-from pymoo_hdte.cli import __main__ as cli
+from pymoo_hdte.cli import command_line as cli
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 WIDE, NARROW = 1280, 500

@@ -13,7 +13,6 @@ import places
 import pytest
 from planted_features import analysed, known_data, listed, measured
 
-from experiments.__main__ import FAILED, main
 from experiments.blind import campaigns
 from experiments.blind import experiment as blind
 from experiments.blind import scoring as blind_scoring
@@ -44,6 +43,7 @@ from experiments.blind.targets import (
     median,
     rate,
 )
+from experiments.command_line import FAILED, main
 from experiments.runner import committed
 from experiments.runner.campaign import Campaign, Run
 from experiments.runner.registry import Context

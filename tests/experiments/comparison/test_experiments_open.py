@@ -14,7 +14,7 @@ from pymoo.algorithms.moo.nsga3 import NSGA3
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 
-from experiments.__main__ import main
+from experiments.command_line import main
 from experiments.comparison.named import algorithm_named, problem_named
 from experiments.comparison.open_runs import OpenRun
 from experiments.comparison.paired import compare
@@ -194,7 +194,9 @@ def test_other_seeds_are_still_the_setting_of_the_paper():
 
 def test_the_command_of_a_page_gives_the_same_setting_again(monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr("experiments.__main__._run", lambda chosen, context: asked.append(context))
+    monkeypatch.setattr(
+        "experiments.command_line._run", lambda chosen, context: asked.append(context)
+    )
     given = "--seeds 21-40 --evaluations 200 --pop 20 --problems zdt1 --algorithms NSGA2"
     main(["table7", *given.split(), "--workers", "1", "--out", str(tmp_path)])
     command = asked[0].comparison_command("table7")

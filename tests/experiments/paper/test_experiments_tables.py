@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.__main__ import main
+from experiments.command_line import main
 from experiments.comparison import paired
 from experiments.comparison.runs import ALGORITHMS, OptimisationRun, robust_problem
 from experiments.paper.scatter import dte_samples, exact_moments
@@ -25,7 +25,7 @@ SMALL = {"population": 20, "generations": 5, "final_size": 8}
 SMALL_RUNS = f"""
 import sys
 from functools import partial
-from experiments.__main__ import main
+from experiments.command_line import main
 from experiments.comparison import paired
 paired.OptimisationRun = partial(paired.OptimisationRun, **{SMALL})
 sys.exit(main())

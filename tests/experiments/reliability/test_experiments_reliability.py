@@ -13,7 +13,7 @@ import pytest
 from night import others_at_night
 from places import ROOT
 
-from experiments.__main__ import main
+from experiments.command_line import main
 from experiments.reliability import experiment as reliability
 from experiments.reliability import kill as reliability_kill
 from experiments.reliability.commands import Wrong
@@ -250,7 +250,7 @@ def test_a_full_disk_is_one_sentence_and_code_1(tmp_path, monkeypatch, capsys):
     def full(*_):
         raise OSError(28, "No space left on device", str(tmp_path))
 
-    monkeypatch.setattr("experiments.__main__.save", full)
+    monkeypatch.setattr("experiments.command_line.save", full)
     monkeypatch.setattr("experiments.measured.emps.run", lambda context: Result("", "", "done"))
     assert main(["emps", "--workers", "1", "--out", str(tmp_path)]) == 1
     assert "emps: [Errno 28] No space left on device" in capsys.readouterr().err

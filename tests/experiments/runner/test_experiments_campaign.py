@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from experiments.__main__ import main
+from experiments.command_line import main
 from experiments.runner.campaign import Campaign, Run, execute, origin
 from experiments.runner.workers import WrongWorker, arithmetic, make_executor
 from pymoo_hdte.checks import InvalidInput

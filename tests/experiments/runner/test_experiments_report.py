@@ -15,7 +15,7 @@ import pytest
 from example_result import example
 
 import experiments
-from experiments.__main__ import main
+from experiments.command_line import main
 from experiments.runner import committed, provenance
 from experiments.runner.campaign import Campaign
 from experiments.runner.catalogue import EXPERIMENTS

@@ -1,0 +1,139 @@
+"""Ctrl-C while modules are imported, a pipe that is closed, and a folder that another run uses."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.cli.command_line import COMMANDS, MISTAKE
+from pymoo_hdte.interrupts import INTERRUPTED, UNREAD
+from pymoo_hdte.reports.in_use import in_use
+
+ROOT = Path(__file__).parents[2]
+AT_IMPORT = """
+import os, runpy, signal, sys
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+sys.meta_path.insert(0, Interrupting())
+sys.argv = {arguments!r}
+runpy.run_module({program!r}, run_name="__main__", alter_sys=True)
+"""
+ARGUMENTS = {
+    "optimise": ["hs_20_100"],
+    "simulate": ["hs_20_100"],
+    "identify": ["records"],
+    "plan": ["model.toml", "--limits", "limits.toml"],
+    "discrepancy": ["campaign"],
+}
+HELD = """
+import sys, time
+from pathlib import Path
+from pymoo_hdte.reports.in_use import in_use
+with in_use(Path(sys.argv[1]), "folder", Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def python(*arguments, **options):
+    return subprocess.run(
+        [sys.executable, *arguments], capture_output=True, text=True, timeout=60, **options
+    )
+
+
+def interrupted(program, arguments, module, folder):
+    code = AT_IMPORT.format(module=module, arguments=[program, *arguments], program=program)
+    return python("-c", code, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)})
+
+
+@pytest.mark.parametrize("name", [command.name for command in COMMANDS])
+def test_ctrl_c_during_imports_of_a_command(name, tmp_path):
+    arguments = [name, *ARGUMENTS[name], "--out", "new/out"]
+    done = interrupted("pymoo_hdte.cli", arguments, "scipy", tmp_path)
+    assert done.stderr == "pymoo-hdte: interrupted, nothing was written\n"
+    assert done.returncode == INTERRUPTED
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("module", ["argparse", "numpy", "numpy._core", "experiments.command_line"])
+def test_ctrl_c_during_early_imports(module, tmp_path):
+    program = "experiments" if "experiments" in module else "pymoo_hdte.cli"
+    done = interrupted(program, ["--help"], module, tmp_path)
+    assert re.fullmatch(r"[\w. -]+: interrupted, nothing was written\n", done.stderr)
+    assert done.returncode == INTERRUPTED
+
+
+def test_ctrl_c_after_the_folder_is_held_leaves_nothing(tmp_path):
+    arguments = ["discrepancy", "none", "--out", "new/out"]
+    module = "pymoo_hdte.discrepancy.campaign.format"
+    done = interrupted("pymoo_hdte.cli", arguments, module, tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (INTERRUPTED, 1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_program_in_the_background_goes_on_ignoring_ctrl_c(tmp_path):
+    code = f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n{AT_IMPORT}"
+    code = code.format(module="numpy", arguments=["x", "--version"], program="pymoo_hdte.cli")
+    done = python("-c", code, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)})
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["-m pymoo_hdte.cli --help", "-m pymoo_hdte.cli simulate --help", "-m experiments --list"],
+)
+def test_output_that_nobody_reads(command):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "wb") as closed:
+        done = subprocess.run(
+            [sys.executable, *command.split()],
+            cwd=ROOT,
+            stdout=closed,
+            stderr=subprocess.PIPE,
+            env={key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"},
+            check=False,
+        )
+    assert (done.returncode, done.stderr) == (UNREAD, b"")
+
+
+def test_a_folder_in_use_is_refused_with_the_process_that_holds_it(tmp_path):
+    file = tmp_path / "new" / ".out.in-use"
+    command = [sys.executable, "-c", HELD, str(file)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as holder:
+        assert holder.stdout.readline() == "held\n"
+        out = str(tmp_path / "new" / "out")
+        second = python("-m", "pymoo_hdte.cli", "simulate", "hs_20_100", "--out", out)
+        assert second.returncode == MISTAKE
+        assert second.stderr.count("\n") == 1
+        assert f"process {holder.pid} on" in second.stderr
+        holder.send_signal(signal.SIGKILL)
+    # The file of a killed process holds nothing.
+    assert file.exists()
+    with in_use(file, "folder", file):
+        assert file.exists()
+    assert not file.exists()
+
+
+def test_folders_made_for_the_lock_go_with_it(tmp_path):
+    again = in_use(tmp_path / "a" / "b" / "lock", "folder", tmp_path)
+    with in_use(tmp_path / "a" / "b" / "lock", "folder", tmp_path):
+        allowed = pytest.raises(InvalidInput, match=f"process {os.getpid()} on")
+        with allowed, again:
+            pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_second_run_of_the_experiments_is_refused(tmp_path):
+    with in_use(tmp_path / ".in-use", "--out", tmp_path):
+        done = python("-m", "experiments", "table2", "--out", str(tmp_path), cwd=ROOT)
+    assert done.returncode == MISTAKE
+    assert f"process {os.getpid()} on" in done.stderr
+    assert not list(tmp_path.iterdir())
