@@ -6,6 +6,7 @@ import logging
 import random
 import tempfile
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -167,13 +168,18 @@ def _gde3(problem: WrappedProblem, budget: int) -> GDE3:
     )
 
 
+@cache
+def _weights(objectives: int) -> NDArray[np.float64]:
+    return get_reference_directions("energy", objectives, POPULATION, seed=1)
+
+
 def _moead_de(problem: WrappedProblem, budget: int) -> MOEAD:
     """Return MOEA/D with differential evolution, settings of Li and Zhang (2009)."""
     objectives = problem.number_of_objectives()
     with tempfile.TemporaryDirectory() as folder:
-        # For more than two objectives jMetalPy reads the weights from a file of this name.
-        weights = get_reference_directions("energy", objectives, POPULATION, seed=1)
-        np.savetxt(Path(folder) / f"W{objectives}D_{POPULATION}.dat", weights)
+        if objectives > 2:
+            # jMetalPy reads the weights from a file of this name; those of two it makes itself.
+            np.savetxt(Path(folder) / f"W{objectives}D_{POPULATION}.dat", _weights(objectives))
         return MOEAD(
             problem=problem,
             population_size=POPULATION,

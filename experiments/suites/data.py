@@ -119,7 +119,7 @@ def outcome_for(context: Context) -> Outcome:
     """
     if not (context.full or context.quick):
         return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, BBOB)))
-    for package, extra in (("cocoex", EXTRA), ("comocma", EXTRA), ("jmetal", "peers")):
+    for package, extra in (("cocoex", EXTRA), ("comocma", EXTRA), ("jmetal", EXTRA)):
         require(package, extra)
     parts: Iterable[SuitePart | BbobPart] = FULL if context.full else STORED
     outcome = Outcome()

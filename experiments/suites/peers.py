@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 
+import numpy as np
+from numpy.typing import NDArray
 from pymoo.algorithms.moo.ctaea import CTAEA
 from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
@@ -19,9 +21,9 @@ from pymoo_hdte.algorithms import CompactSwarm
 OURS = "CompactSwarm"
 
 
-def _ctaea(problem: Problem) -> Algorithm:
-    directions = get_reference_directions("energy", problem.n_obj, POPULATION, seed=1)
-    return CTAEA(directions)
+@cache
+def _directions(n_obj: int) -> NDArray[np.float64]:
+    return get_reference_directions("energy", n_obj, POPULATION, seed=1)
 
 
 def _como(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
@@ -35,7 +37,7 @@ MADE: dict[str, Callable[[Problem], Algorithm]] = {
     OURS: lambda _: CompactSwarm(),
     **{name: make for name, (make, _) in OWN.items()},
     **PYMOO,
-    "C-TAEA": _ctaea,
+    "C-TAEA": lambda problem: CTAEA(_directions(problem.n_obj)),
 }
 """Those that come with pymoo's interface, which can be told where to start."""
 
