@@ -23,6 +23,8 @@ from experiments.suites.protocol import FULL, STORED, BbobPart, SuitePart
 NAME = "suites"
 BBOB = f"{NAME}_bbob"
 DIGITS = 6
+COMMAND = "python -m experiments suites --quick"
+"""What the stored outcome is made by; told in its first line."""
 SUITE_COLUMNS = ("problem", "algorithm", "evaluations", "seed", "spent", *MEASURES)
 BBOB_COLUMNS = (
     "dimension",
@@ -139,7 +141,7 @@ def _rounded(value: float) -> float:
 def suites_text(outcome: Outcome) -> str:
     """Return the CSV text of the runs on suites, with origin in a first comment line."""
     rows = ([*key, *(f"{n:.{DIGITS}g}" for n in row)] for key, row in outcome.suites.items())
-    return table_with_origin(SUITE_COLUMNS, rows)
+    return table_with_origin(SUITE_COLUMNS, rows, command=COMMAND)
 
 
 def bbob_text(outcome: Outcome) -> str:
@@ -153,7 +155,7 @@ def bbob_text(outcome: Outcome) -> str:
         for run, shares in outcome.bbob.items()
         for mark, share in shares.items()
     )
-    return table_with_origin(BBOB_COLUMNS, rows)
+    return table_with_origin(BBOB_COLUMNS, rows, command=COMMAND)
 
 
 def read_outcome(suites: Path, bbob: Path) -> Outcome:

@@ -132,13 +132,16 @@ def _constrained(outcome: Outcome) -> Iterable[Demand]:
             )
         for budget in budgets:
             ours, runs = feasible_runs(outcome, suite, budget, OURS)
-            present = [n for n in FEASIBLE_RIVALS if n in outcome.algorithms(suite, budget)]
-            theirs = {name: feasible_runs(outcome, suite, budget, name)[0] for name in present}
+            theirs = {
+                name: feasible_runs(outcome, suite, budget, name)[0]
+                for name in FEASIBLE_RIVALS
+                if name in outcome.algorithms(suite, budget)
+            }
             yield Demand(
                 f"{suite}: feasible in as many runs as {' and '.join(FEASIBLE_RIVALS)}",
                 budget,
                 f"{ours} of {runs}",
-                ", ".join(f"{name} {count}" for name, count in theirs.items()),
+                ", ".join(f"{name} {theirs.get(name, 'not run')}" for name in FEASIBLE_RIVALS),
                 all(ours >= count for count in theirs.values()),
             )
             yield _first(

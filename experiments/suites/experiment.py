@@ -16,6 +16,7 @@ from experiments.suites.bbob_tables import duels_table, reached, shares_table
 from experiments.suites.data import NAME, Outcome, outcome_for
 from experiments.suites.demands import demands_table, in_one_sentence
 from experiments.suites.figures import how_to_choose, runtime_profiles
+from experiments.suites.in_short import in_short
 from experiments.suites.peers import OURS
 from experiments.suites.problems import DIFFICULTY, SUITES
 from experiments.suites.protocol import DIMENSIONS, HELD_OUT
@@ -55,6 +56,7 @@ def run(context: Context) -> Result:
         answer=in_one_sentence(outcome),
         paragraphs=(*stored_outcome(context, NAME), SETS, SETTING, PEERS_NOTE, *sources),
         tables=(
+            in_short(outcome),
             demands_table(outcome),
             shares_table(outcome),
             duels_table(outcome),
