@@ -85,7 +85,7 @@ def shares_table(outcome: Outcome) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for dimension in DIMENSIONS:
         told = tuple(reached(outcome, dimension, budget) for budget in BUDGETS)
-        rows.append((f"{OURS}, told each budget", dimension, "here", *told))
+        rows.append((f"{OURS}, told each budget", dimension, f"here{_fewer(outcome)}", *told))
         for algorithm, budget in _told(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
             name = f"{algorithm}, told {budget:,}" if algorithm == OURS else algorithm
@@ -112,6 +112,16 @@ def _told(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
     ran = {(run.algorithm, run.told) for run in outcome.bbob if run.dimension == dimension}
     largest = {name: max(told for one, told in ran if one == name) for name, _ in ran}
     return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
+
+
+def _fewer(outcome: Outcome) -> str:
+    """Name the budgets for which our swarm did not run on all instances."""
+    fewer = []
+    for budget in BUDGETS:
+        ran = {r.instance for r in outcome.bbob if (r.algorithm, r.told) == (OURS, budget)}
+        if ran and len(ran) < len(INSTANCES):
+            fewer.append(f"{budget:,}: instance {' and '.join(map(str, sorted(ran)))}")
+    return f" ({', '.join(fewer)})" if fewer else ""
 
 
 def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:

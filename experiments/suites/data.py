@@ -16,7 +16,7 @@ from experiments.runner.registry import Context, require
 from experiments.runner.store import write_atomically
 from experiments.suites.coco import EXTRA
 from experiments.suites.jobs import MEASURES, BbobRun, SuiteRun
-from experiments.suites.peers import PEERS
+from experiments.suites.peers import OURS, PEERS
 from experiments.suites.problems import PROBLEMS, SUITES
 from experiments.suites.protocol import FULL, STORED, BbobPart, SuitePart
 
@@ -79,15 +79,21 @@ class Outcome:
         ran = {k[1] for k in self.suites if PROBLEMS[k[0]].suite == suite and k[2] == budget}
         return [name for name in PEERS if name in ran]
 
+    def problems(self, suite: str, budget: int) -> list[str]:
+        """Return the problems of a suite on which ours was judged at a budget."""
+        ran = {key[0] for key in self.suites if key[1:3] == (OURS, budget)}
+        return [one.name for one in SUITES[suite] if one.name in ran]
+
     def medians(
         self, suite: str, budget: int, measure: str, algorithms: Sequence[str]
     ) -> NDArray[np.float64]:
         """Return medians over the seeds, shape (problems, algorithms); NaN where none ran."""
         place = 1 + MEASURES.index(measure)
-        values = np.full((len(SUITES[suite]), len(algorithms)), np.nan)
-        for row, problem in enumerate(SUITES[suite]):
+        problems = self.problems(suite, budget)
+        values = np.full((len(problems), len(algorithms)), np.nan)
+        for row, problem in enumerate(problems):
             for column, algorithm in enumerate(algorithms):
-                runs = self.runs(problem.name, algorithm, budget, place)
+                runs = self.runs(problem, algorithm, budget, place)
                 if runs:
                     values[row, column] = np.median(runs)
         return values

@@ -23,6 +23,7 @@ from experiments.suites.suite_tables import (
     NAMES,
     feasible_runs,
     indicators,
+    named,
     ranks,
     tests,
 )
@@ -85,7 +86,7 @@ def _first_of_all(outcome: Outcome) -> Iterable[Demand]:
     for suite in HELD_OUT:
         for evaluations in BUDGETS:
             for measure, name in NAMES.items():
-                asked = f"{suite}: lowest average rank, {name}"
+                asked = f"{named(outcome, suite)}: lowest average rank, {name}"
                 if evaluations not in outcome.budgets(suite):
                     yield Demand(asked, evaluations, "not run", "", None)
                     continue
@@ -93,7 +94,7 @@ def _first_of_all(outcome: Outcome) -> Iterable[Demand]:
                 beaten = tests(outcome, suite, evaluations, measure)
                 shown = sum(test.beaten for test in beaten)
                 yield Demand(
-                    f"{suite}: better than each beyond chance (Holm), {name}",
+                    f"{named(outcome, suite)}: better than each beyond chance (Holm), {name}",
                     evaluations,
                     f"{shown} of {len(beaten)}",
                     "",
@@ -163,15 +164,17 @@ def in_one_sentence(outcome: Outcome) -> str:
         budgets = outcome.budgets(suite)
         places = []
         for budget in budgets:
-            named = []
+            by_measure = []
             for measure, name in NAMES.items():
                 found = ranks(outcome, suite, budget, measure)
                 place = 1 + int(np.sum([rank < found[OURS] for rank in found.values()]))
-                named.append(f"{place} by {name}")
-            places.append(f"{' and '.join(named)} after {budget:,}")
+                by_measure.append(f"{place} by {name}")
+            places.append(f"{' and '.join(by_measure)} after {budget:,}")
         if places:
             count = len(outcome.algorithms(suite, budgets[0]))
-            parts.append(f"on {suite} its place among up to {count} is {', '.join(places)}")
+            parts.append(
+                f"on {named(outcome, suite)} its place among up to {count} is {', '.join(places)}"
+            )
     text = "; ".join(parts)
     return f"{OURS}, on suites held out: {text}." if text else "Nothing was run."
 

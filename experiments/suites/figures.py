@@ -73,7 +73,7 @@ def how_to_choose(outcome: Outcome) -> Figure:
         axis.set_ylabel("average rank, 1 is best")
         axis.invert_yaxis()
         _over_evaluations(axis)
-    axes[0, 0].legend(fontsize=7, frameon=False)
+    axes[0, 0].legend(fontsize=7, frameon=False, loc="lower right")
     axis = axes[0, 2]
     _ours(axis, outcome, DIMENSIONS[0])
     cited = {n: share for (d, n), share in CITED.items() if d == DIMENSIONS[0]}

@@ -8,7 +8,7 @@ from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
 from experiments.suites.published import BEST, CITED
-from experiments.suites.suite_tables import NAMES, ranks
+from experiments.suites.suite_tables import NAMES, named, ranks
 
 SWARMS = (OURS, "ElitistSwarm")
 
@@ -39,7 +39,9 @@ def _shares(outcome: Outcome, dimension: int) -> tuple[str | None, ...]:
 def _ranks(outcome: Outcome, suite: str, measure: str) -> tuple[str | None, ...]:
     budgets = outcome.budgets(suite)
     count = max((len(outcome.algorithms(suite, budget)) for budget in budgets), default=0)
-    cells: list[str | None] = [f"{suite}: average rank of {count} by {NAMES[measure]}"]
+    cells: list[str | None] = [
+        f"{named(outcome, suite)}: average rank of {count} by {NAMES[measure]}"
+    ]
     for budget in BUDGETS:
         if budget not in budgets:
             cells.append(None)

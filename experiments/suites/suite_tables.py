@@ -26,6 +26,13 @@ def indicators(suite: str) -> list[str]:
     return list(NAMES) if known else ["hypervolume"]
 
 
+def named(outcome: Outcome, suite: str) -> str:
+    """Return the name of a suite, with the number of its problems that ran if not all did."""
+    ran = len(outcome.problems(suite, outcome.budgets(suite)[-1])) if outcome.budgets(suite) else 0
+    whole = len(SUITES[suite])
+    return suite if ran in (0, whole) else f"{suite} ({ran} of {whole} problems)"
+
+
 def ranks(outcome: Outcome, suite: str, budget: int, measure: str) -> dict[str, float]:
     """Return average ranks of the medians over the seeds by algorithm, 1 being the best."""
     algorithms = outcome.algorithms(suite, budget)
@@ -59,7 +66,9 @@ def feasible_runs(outcome: Outcome, suite: str, budget: int, algorithm: str) -> 
     """Return in how many runs an algorithm found feasible solutions, and how many it made."""
     place = 1 + MEASURES.index("solutions")
     counts = [
-        count for one in SUITES[suite] for count in outcome.runs(one.name, algorithm, budget, place)
+        count
+        for problem in outcome.problems(suite, budget)
+        for count in outcome.runs(problem, algorithm, budget, place)
     ]
     return sum(count > 0 for count in counts), len(counts)
 
@@ -88,13 +97,17 @@ def _ranks_table(outcome: Outcome, suite: str) -> Table:
     if constrained:
         columns.append(Column("feasible runs"))
     kind = "held out" if suite in HELD_OUT else "validation"
+    problems = outcome.problems(suite, budgets[-1])
+    ran = f"{len(problems)} of its {len(SUITES[suite])} problems"
+    if len(problems) < len(SUITES[suite]):
+        ran += f" ({', '.join(problems)})"
     return Table(
         f"ranks_{suite.lower().replace('-', '')}",
-        f"{suite}, {kind}: average ranks over its {len(SUITES[suite])} problems, 1 being the best",
+        f"{suite}, {kind}: average ranks over {ran}, 1 being the best",
         tuple(columns),
         tuple(rows),
-        note=f"Ranks of medians over {outcome.seeds(suite)} seeds; one that cannot take a problem "
-        "ranks last there.",
+        note=f"Ranks of medians over {outcome.seeds(suite)} seeds, if 1 of single runs; one that "
+        "cannot take a problem ranks last there.",
         folded=suite not in HELD_OUT,
     )
 
@@ -118,8 +131,9 @@ def rivals_table(outcome: Outcome) -> Table:
         tuple(columns),
         tuple(rows),
         note="Better and worse compare medians. p is Wilcoxon's over the problems that both take, "
-        "after Holm over the rivals: eight problems cannot give less than 0.0078 before and 0.05 "
-        "after the correction over seven or more, so that no lead here can be beyond chance.",
+        "after Holm over the rivals: eight problems cannot give less than 0.0078, which the "
+        "correction over seven rivals or more lifts above 0.05, so that no lead here can be beyond "
+        "chance.",
         folded=True,
     )
 
@@ -137,8 +151,8 @@ def medians_tables(outcome: Outcome) -> list[Table]:
                     f"{suite}: median hypervolume after {budget:,} evaluations",
                     (Column("problem"), *map(Column, algorithms)),
                     tuple(
-                        (one.name, *(None if np.isnan(value) else float(value) for value in row))
-                        for one, row in zip(SUITES[suite], values, strict=True)
+                        (one, *(None if np.isnan(value) else float(value) for value in row))
+                        for one, row in zip(outcome.problems(suite, budget), values, strict=True)
                     ),
                     folded=True,
                 )
