@@ -14,11 +14,11 @@ from experiments.suites.peers import OURS
 
 SUITE_RUNS = (
     SuiteRun("IMOP1", OURS, 1, (500,)),
-    SuiteRun("IMOP7", OURS, 2, (500,)),
+    SuiteRun("IMOP4", OURS, 1, (500,)),
     SuiteRun("IMOP3", "ElitistSwarm", 1, (500,)),
-    SuiteRun("IMOP5", "NSGA-II", 3, (500,)),
+    SuiteRun("IMOP2", "NSGA-II", 1, (500,)),
 )
-BBOB_RUNS = (BbobRun(1, 10, 3, OURS, 500), BbobRun(28, 20, 3, OURS, 500))
+BBOB_RUNS = (BbobRun(1, 10, 3, OURS, 500), BbobRun(28, 10, 3, OURS, 500))
 SAME = 2e-5
 """Relative difference that digits of the table leave open."""
 

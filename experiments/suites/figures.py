@@ -11,7 +11,7 @@ from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
 from experiments.suites.published import BEST, CITED, curves
-from experiments.suites.suite_tables import ranks
+from experiments.suites.suite_tables import named, ranks
 
 LINES = {OURS: BLUE, "ElitistSwarm": SKY, "NSGA-II": GREEN, "COMO-CMA-ES": PINK}
 PUBLISHED = {BEST: ORANGE, "SMS-EMOA-SA": YELLOW}
@@ -69,7 +69,7 @@ def how_to_choose(outcome: Outcome) -> Figure:
             line = {b: by_name[name] for b, by_name in found.items() if name in by_name}
             bold = name in (OURS, "ElitistSwarm")
             axis.plot(*_line(line), "o-", color=colour, lw=2.2 if bold else 1.0, ms=4, label=name)
-        axis.set_title(f"{suite}, {words}", fontsize=10)
+        axis.set_title(f"{named(outcome, suite)}, {words}", fontsize=9)
         axis.set_ylabel("average rank, 1 is best")
         axis.invert_yaxis()
         _over_evaluations(axis)
