@@ -31,12 +31,14 @@ class Contestant:
         Whether every budget is a run of its own: because the algorithm moves otherwise if it may
         spend more, or cannot be stopped on the way.
     takes_constraints : bool
+    two_objectives_only : bool
     """
 
     library: str
     run: RunFunction
     starts_anew: bool = False
     takes_constraints: bool = True
+    two_objectives_only: bool = False
 
     @property
     def available(self) -> bool:
@@ -53,7 +55,9 @@ def run_random(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offe
     return [Offer(F[:budget][feasible[:budget]], budget) for budget in budgets]
 
 
-def _jmetal(name: str) -> RunFunction:
+def of_jmetal(name: str) -> RunFunction:
+    """Return what runs an algorithm of jMetalPy."""
+
     def run(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
         # Imported where it is used, because the extra may be absent.
         from experiments.contest.peers_jmetal import run_jmetal
@@ -75,8 +79,8 @@ CONTESTANTS = {
         for name, (make, knows) in OWN.items()
     },
     **{name: Contestant("pymoo", partial(run_pymoo, make)) for name, make in PYMOO.items()},
-    "SMPSO": Contestant("jmetal", _jmetal("SMPSO")),
-    "OMOPSO": Contestant("jmetal", _jmetal("OMOPSO"), starts_anew=True),
+    "SMPSO": Contestant("jmetal", of_jmetal("SMPSO")),
+    "OMOPSO": Contestant("jmetal", of_jmetal("OMOPSO"), starts_anew=True),
     "NSPSO": Contestant("pygmo", _pygmo, starts_anew=True, takes_constraints=False),
     "random search": Contestant("numpy", run_random),
 }

@@ -1,19 +1,26 @@
-"""SMPSO and OMOPSO of jMetalPy, as its users run them."""
+"""SMPSO, OMOPSO, GDE3 and MOEA/D-DE of jMetalPy, as its users run them."""
 
 from __future__ import annotations
 
 import logging
 import random
+import tempfile
 from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jmetal.algorithm.multiobjective.gde3 import GDE3
+from jmetal.algorithm.multiobjective.moead import MOEAD
 from jmetal.algorithm.multiobjective.omopso import OMOPSO
 from jmetal.algorithm.multiobjective.smpso import SMPSO
 from jmetal.core.observer import Observer
 from jmetal.core.problem import FloatProblem
 from jmetal.core.solution import FloatSolution
+from jmetal.operator.crossover import DifferentialEvolutionCrossover
 from jmetal.operator.mutation import NonUniformMutation, PolynomialMutation, UniformMutation
+from jmetal.util.aggregation_function import Tschebycheff
 from jmetal.util.archive import CrowdingDistanceArchive
 from jmetal.util.comparator import DominanceComparator, DominanceWithConstraintsComparator
 from jmetal.util.evaluator import Evaluator
@@ -21,6 +28,7 @@ from jmetal.util.observable import DefaultObservable
 from jmetal.util.termination_criterion import StoppingByEvaluations
 from numpy.typing import NDArray
 from pymoo.core.problem import Problem
+from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.contest.offer import POPULATION, Offer
 
@@ -90,9 +98,9 @@ class _Snapshots(Observer):
 
 
 def run_jmetal(name: str, problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
-    """Run SMPSO or OMOPSO once and return what it offers at every budget.
+    """Run one of them once and return what it offers at every budget.
 
-    Budgets are multiples of the swarm; OMOPSO's mutation shrinks until the largest is spent.
+    Budgets are multiples of the population; OMOPSO's mutation shrinks until the largest is spent.
 
     Raises
     ------
@@ -103,7 +111,8 @@ def run_jmetal(name: str, problem: Problem, budgets: Sequence[int], seed: int) -
     random.seed(seed)
     np.random.seed(seed)  # noqa: NPY002
     wrapped = WrappedProblem(problem)
-    make = {"SMPSO": _smpso, "OMOPSO": _omopso}[name]
+    makers = {"SMPSO": _smpso, "OMOPSO": _omopso, "GDE3": _gde3, "MOEA/D-DE": _moead_de}
+    make = makers[name]
     algorithm = make(wrapped, budgets[-1])
     snapshots = _Snapshots(budgets)
     algorithm.observable = DefaultObservable()
@@ -145,6 +154,45 @@ def _omopso(problem: WrappedProblem, budget: int) -> OMOPSO:
         termination_criterion=StoppingByEvaluations(budget),
         swarm_evaluator=BatchEvaluator(),
     )
+
+
+def _gde3(problem: WrappedProblem, budget: int) -> GDE3:
+    return GDE3(
+        problem=problem,
+        population_size=POPULATION,
+        cr=0.5,
+        f=0.5,
+        termination_criterion=StoppingByEvaluations(budget),
+        population_evaluator=BatchEvaluator(),
+        dominance_comparator=_dominance(problem),
+    )
+
+
+@cache
+def _weights(objectives: int) -> NDArray[np.float64]:
+    return get_reference_directions("energy", objectives, POPULATION, seed=1)
+
+
+def _moead_de(problem: WrappedProblem, budget: int) -> MOEAD:
+    """Return MOEA/D with differential evolution, settings of Li and Zhang (2009)."""
+    objectives = problem.number_of_objectives()
+    with tempfile.TemporaryDirectory() as folder:
+        if objectives > 2:
+            # jMetalPy reads the weights from a file of this name; those of two it makes itself.
+            np.savetxt(Path(folder) / f"W{objectives}D_{POPULATION}.dat", _weights(objectives))
+        return MOEAD(
+            problem=problem,
+            population_size=POPULATION,
+            mutation=PolynomialMutation(1.0 / problem.number_of_variables(), 20),
+            crossover=DifferentialEvolutionCrossover(CR=1.0, F=0.5, K=0.5),
+            aggregation_function=Tschebycheff(objectives),
+            neighbor_size=20,
+            neighbourhood_selection_probability=0.9,
+            max_number_of_replaced_solutions=2,
+            weight_files_path=folder,
+            termination_criterion=StoppingByEvaluations(budget),
+            population_evaluator=BatchEvaluator(),
+        )
 
 
 def _feasible(solutions: list[FloatSolution]) -> NDArray[np.float64]:

@@ -144,6 +144,14 @@ EXPERIMENTS = (
         has_small_version=True,
     ),
     Experiment(
+        "suites",
+        "suites.experiment",
+        "The swarms on bbob-biobj and other suites that they were not tuned on",
+        "Is the swarm the best on suites that it has never seen?",
+        reads_outcome=True,
+        has_small_version=True,
+    ),
+    Experiment(
         "cards",
         "cards.experiment",
         "Problem cards: what makes each robust problem hard, and which separate algorithms",

@@ -15,7 +15,10 @@ import pymoo_hdte
 
 PACKAGES = ("numpy", "scipy", "numba", "pymoo", "moocore", "chaospy", "matplotlib")
 """Installed packages whose version can change a result."""
-EXTRAS = ("jmetalpy", "pygmo", "pysindy", "sysidentpy", "openturns", "scikit-learn", "emcee")
+EXTRAS = (
+    *("jmetalpy", "pygmo", "coco-experiment", "comocma", "cma"),
+    *("pysindy", "sysidentpy", "openturns", "scikit-learn", "emcee"),
+)
 """Packages that can as well, where they are installed."""
 
 

@@ -62,6 +62,13 @@ from experiments.robust.job import METHODS, OPENTURNS, OURS
 from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA
 from experiments.runner.registry import Context
+from experiments.suites import data as suites
+from experiments.suites.bbob_tables import reached
+from experiments.suites.demands import demands
+from experiments.suites.in_short import in_short
+from experiments.suites.published import CITED
+from experiments.suites.suite_tables import feasible_runs
+from experiments.suites.suite_tables import ranks as suite_ranks
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import optimum_report
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
@@ -498,6 +505,54 @@ def test_the_readme_says_what_came_of_the_blind_campaigns():
     assert not any(one.wrong_confident for one in plain)
     both = sum(one.all_named for one in pairs)
     assert f"it named both in {both} of {len(pairs)}" in said
+
+
+class TestNumbersOfTheSuites:
+    @pytest.fixture(scope="class")
+    @classmethod
+    def outcome(cls, tmp_path_factory):
+        folder = tmp_path_factory.mktemp("suites")
+        return suites.outcome_for(Context(1, folder, Campaign(folder)))
+
+    def test_the_held_out_table_is_that_of_the_stored_outcome(self, outcome):
+        for row in in_short(outcome).rows:
+            line = " | ".join("—" if cell is None else str(cell) for cell in row)
+            assert f"| {line} |" in README
+            assert f"| {line} |" in PAGES
+        for dimension in (10, 20):
+            assert reached(outcome, dimension, 10_000) < CITED[dimension, 10_000]
+        assert "stays below the best published on COCO's bbob-biobj" in WORDS
+        assert not any(d.met for d in demands(outcome) if "share of targets" in d.asked)
+
+    def test_constraints(self, outcome):
+        found = suite_ranks(outcome, "MW", 10_000, "hypervolume")
+        feasible = {name: feasible_runs(outcome, "MW", 10_000, name) for name in found}
+        ours, runs = feasible["CompactSwarm"]
+        said = f"feasible in {ours} of {runs} runs (NSGA-II in {feasible['NSGA-II'][0]})"
+        assert said in WORDS
+        assert (
+            f"hypervolume of {found['CompactSwarm']:.2f} (`ElitistSwarm` "
+            f"{found['ElitistSwarm']:.2f}, NSGA-II {found['NSGA-II']:.2f})"
+        ) in WORDS
+
+    def test_what_was_not_run_is_told(self, outcome):
+        missing = [name for name in ("RE", "DAS-CMOP", "LZ09") if not outcome.budgets(name)]
+        assert f"and {', '.join(missing[:-1])} and {missing[-1]} were not run" in WORDS
+        assert f"IMOP has {outcome.seeds('IMOP')} seed" in WORDS
+
+    @pytest.mark.skipif(
+        matplotlib.__version_info__ < (3, 11), reason="matplotlib lays it out otherwise before 3.11"
+    )
+    def test_the_picture_of_how_to_choose_is_drawn_by_its_script(self, tmp_path):
+        script = ROOT / "docs" / "which_algorithm_picture.py"
+        scope = {"__file__": str(script), "__name__": "picture"}
+        exec(compile(script.read_text(), str(script), "exec"), scope)
+        scope["draw"](tmp_path / "drawn.png")
+        drawn, stored = (
+            np.asarray(Image.open(path), float)
+            for path in (tmp_path / "drawn.png", scope["PICTURE"])
+        )
+        assert np.mean(np.abs(drawn - stored)) < 0.5
 
 
 class TestNumbersOfThePeers:

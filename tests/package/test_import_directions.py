@@ -39,7 +39,17 @@ The modules of `discrepancy` itself are what users call, above all that they put
 LOWEST_EXPERIMENTS_FIRST = (
     *("published_values", "runner", "command_line", "__main__", "comparison", "fronts", "anytime"),
     *("paper.static_error", "paper.prototypes", "paper", "paper.calibrating", "paper.inference"),
-    *("contest", "cards", "robust", "blind.rig", "blind", "measured", "reliability", "studies"),
+    *(
+        "contest",
+        "suites",
+        "cards",
+        "robust",
+        "blind.rig",
+        "blind",
+        "measured",
+        "reliability",
+        "studies",
+    ),
 )
 MOST_FILES = 20
 OUTSIDE = ("experiments", "tests")

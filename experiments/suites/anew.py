@@ -1,0 +1,59 @@
+"""A few cheap runs of the stored outcome made anew, so that code and outcome cannot part."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import numpy as np
+
+from experiments.runner.campaign import Campaign
+from experiments.runner.result import Cell, Column, Finding, Table
+from experiments.suites.data import Outcome
+from experiments.suites.jobs import MEASURES, BbobRun, SuiteRun
+from experiments.suites.peers import OURS
+
+SUITE_RUNS = (
+    SuiteRun("IMOP1", OURS, 1, (500,)),
+    SuiteRun("IMOP4", OURS, 1, (500,)),
+    SuiteRun("IMOP3", "ElitistSwarm", 1, (500,)),
+    SuiteRun("IMOP2", "NSGA-II", 1, (500,)),
+)
+BBOB_RUNS = (BbobRun(1, 10, 3, OURS, 500), BbobRun(28, 10, 3, OURS, 500))
+SAME = 2e-5
+"""Relative difference that digits of the table leave open."""
+
+
+def anew_table(campaign: Campaign, outcome: Outcome) -> Table:
+    """Run them, and set their hypervolume or share beside the stored one."""
+    jobs: list[SuiteRun | BbobRun] = [*SUITE_RUNS]
+    if find_spec("cocoex") is not None:
+        jobs += BBOB_RUNS
+    made = Outcome()
+    made.add(jobs, campaign.run(jobs, "anew"))
+    rows: list[tuple[Cell, ...]] = []
+    place = 1 + MEASURES.index("hypervolume")
+    for key, numbers in made.suites.items():
+        if key in outcome.suites:
+            rows.append((key[0], *key[1:], outcome.suites[key][place], numbers[place]))
+    for run, shares in made.bbob.items():
+        if run in outcome.bbob:
+            name = f"bbob-biobj f{run.function}, instance {run.instance}, {run.dimension}-D"
+            pair = outcome.bbob[run][run.told], shares[run.told]
+            rows.append((name, run.algorithm, run.told, run.seed, *pair))
+    stored, now = np.array([row[-2:] for row in rows], dtype=float).reshape(-1, 2).T
+    same = int(np.sum(np.isclose(stored, now, rtol=SAME, atol=1e-12)))
+    sentence = f"{same} of {len(rows)} runs made anew here give the stored numbers."
+    if same < len(rows):
+        sentence += " Another processor or version may round otherwise, which a search amplifies."
+    return Table(
+        "anew",
+        "Runs of the stored outcome made anew",
+        (
+            *(Column("problem"), Column("algorithm"), Column("evaluations"), Column("seed")),
+            *(Column("stored", digits=6), Column("now", digits=6)),
+        ),
+        tuple(rows),
+        note="Hypervolume; on bbob-biobj the share of targets.",
+        findings=(Finding(same == len(rows), sentence, check=True),),
+        folded=True,
+    )

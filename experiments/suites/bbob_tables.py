@@ -1,0 +1,163 @@
+"""What came out on bbob-biobj: shares of targets beside published ones, and duels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.comparison.rivals import RivalTest, holm_against
+from experiments.runner.result import Cell, Column, Table
+from experiments.suites.data import Outcome
+from experiments.suites.peers import BBOB_PEERS, OURS
+from experiments.suites.protocol import BUDGETS, DIMENSIONS, INSTANCES
+from experiments.suites.published import curves
+
+
+def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
+    """Return the mean share of our swarm that was told a budget, at its end; None if not run."""
+    return outcome.shares(dimension, OURS, evaluations).get(evaluations)
+
+
+class Duel(NamedTuple):
+    """Our swarm beside a rival on the problems that both ran; mean shares and the test."""
+
+    rival: str
+    evaluations: int
+    problems: int
+    ours: float
+    theirs: float
+    test: RivalTest
+
+
+def duels(outcome: Outcome, evaluations: int) -> list[Duel]:
+    """Return the duels after so many evaluations, p corrected over the rivals.
+
+    Ours is told this budget; a rival that moves alike whatever its budget may have been told more.
+    """
+    found = []
+    for rival in BBOB_PEERS:
+        pairs = _pairs(outcome, rival, evaluations)
+        if rival != OURS and len(pairs):
+            found.append((rival, pairs))
+    # Each rival has problems of its own: its differences are padded with problems without any.
+    most = max((len(pairs) for _, pairs in found), default=0)
+    values = np.zeros((most, 1 + len(found)))
+    for column, (_, pairs) in enumerate(found, start=1):
+        values[: len(pairs), column] = pairs[:, 1] - pairs[:, 0]
+    if not found:
+        return []
+    names = [OURS, *(rival for rival, _ in found)]
+    tests = holm_against(OURS, names, values, smaller_is_better=False)
+    return [
+        Duel(
+            rival,
+            evaluations,
+            len(pairs),
+            float(pairs[:, 0].mean()),
+            float(pairs[:, 1].mean()),
+            test,
+        )
+        for (rival, pairs), test in zip(found, tests, strict=True)
+    ]
+
+
+def _pairs(outcome: Outcome, rival: str, evaluations: int) -> NDArray[np.float64]:
+    """Return our share and the rival's on the problems that both ran, shape (problems, 2)."""
+    ours = {
+        (run.dimension, run.function, run.instance, run.seed): shares[evaluations]
+        for run, shares in outcome.bbob.items()
+        if run.algorithm == OURS and run.told == evaluations
+    }
+    anew = BBOB_PEERS[rival].starts_anew
+    pairs = []
+    for run, shares in outcome.bbob.items():
+        place = run.dimension, run.function, run.instance, run.seed
+        fits = run.told == evaluations or (not anew and evaluations in shares)
+        if run.algorithm == rival and fits and place in ours:
+            pairs.append((ours[place], shares[evaluations]))
+    return np.array(pairs).reshape(-1, 2)
+
+
+def shares_table(outcome: Outcome) -> Table:
+    """Mean shares of targets by dimension and evaluations, ours before the published ones."""
+    rows: list[tuple[Cell, ...]] = []
+    for dimension in DIMENSIONS:
+        told = tuple(reached(outcome, dimension, budget) for budget in BUDGETS)
+        rows.append((f"{OURS}, told each budget", dimension, f"here{_fewer(outcome)}", *told))
+        for algorithm, budget in _told(outcome, dimension):
+            shares = outcome.shares(dimension, algorithm, budget)
+            name = f"{algorithm}, told {budget:,}" if algorithm == OURS else algorithm
+            where = f"here{_extent(outcome, dimension, algorithm, budget)}"
+            rows.append((name, dimension, where, *(shares.get(one) for one in BUDGETS)))
+        for name, curve in curves(dimension).items():
+            rows.append((name, dimension, "published", *(curve.get(one) for one in BUDGETS)))
+    return Table(
+        "shares",
+        "bbob-biobj, held out: share of COCO's 58 targets reached, every evaluation counted",
+        (
+            *(Column("algorithm"), Column("dimension"), Column("from")),
+            *(Column(f"{budget:,}", "", 3, "evaluations") for budget in BUDGETS),
+        ),
+        tuple(rows),
+        note="Ours on all 55 functions and instances 3 to 5 but where it says otherwise, one run "
+        "each; published are averages over all functions and instances, read from pictures to some "
+        ".01.",
+    )
+
+
+def _told(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
+    """Return who ran to which largest budget."""
+    ran = {(run.algorithm, run.told) for run in outcome.bbob if run.dimension == dimension}
+    largest = {name: max(told for one, told in ran if one == name) for name, _ in ran}
+    return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
+
+
+def _fewer(outcome: Outcome) -> str:
+    """Name the budgets for which our swarm did not run on all instances."""
+    fewer = []
+    for budget in BUDGETS:
+        ran = {r.instance for r in outcome.bbob if (r.algorithm, r.told) == (OURS, budget)}
+        if ran and len(ran) < len(INSTANCES):
+            fewer.append(f"{budget:,}: instance {' and '.join(map(str, sorted(ran)))}")
+    return f" ({', '.join(fewer)})" if fewer else ""
+
+
+def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:
+    """Say on how many functions and instances an algorithm ran, if not on all."""
+    ran = [
+        run
+        for run in outcome.bbob
+        if (run.dimension, run.algorithm, run.told) == (dimension, algorithm, told)
+    ]
+    functions = {run.function for run in ran}
+    instances = sorted({run.instance for run in ran})
+    said = [f"{len(functions)} functions"] if len(functions) < 55 else []
+    if len(instances) < len(INSTANCES):
+        said.append(f"instance {' and '.join(map(str, instances))}")
+    return f" ({', '.join(said)})" if said else ""
+
+
+def duels_table(outcome: Outcome) -> Table:
+    """Our swarm beside others that ran here, problem by problem."""
+    rows = [
+        (
+            *(duel.rival, duel.evaluations, duel.problems, duel.ours, duel.theirs),
+            *(duel.test.better, duel.test.worse, duel.test.p),
+        )
+        for budget in BUDGETS
+        for duel in duels(outcome, budget)
+    ]
+    return Table(
+        "bbob_duels",
+        f"bbob-biobj, held out: {OURS} beside others on the same problems",
+        (
+            *(Column("rival"), Column("evaluations"), Column("problems")),
+            *(Column(name, "", 3, "mean share") for name in ("ours", "theirs")),
+            *(Column("better"), Column("worse"), Column("p", digits=2)),
+        ),
+        tuple(rows),
+        note="Better and worse count problems; p is Wilcoxon's over them, after Holm over the "
+        "rivals of a row's budget.",
+    )

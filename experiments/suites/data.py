@@ -1,0 +1,179 @@
+"""Outcomes on suites: computed, and as the two CSV files that the repo keeps."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.runner.campaign import Run
+from experiments.runner.committed import committed_file, read_rows, table_with_origin
+from experiments.runner.registry import Context, require
+from experiments.runner.store import write_atomically
+from experiments.suites.coco import EXTRA
+from experiments.suites.jobs import MEASURES, BbobRun, SuiteRun
+from experiments.suites.peers import OURS, PEERS
+from experiments.suites.problems import PROBLEMS, SUITES
+from experiments.suites.protocol import FULL, STORED, BbobPart, SuitePart
+
+NAME = "suites"
+BBOB = f"{NAME}_bbob"
+DIGITS = 6
+COMMAND = "python -m experiments suites --quick"
+"""What the stored outcome is made by; told in its first line."""
+SUITE_COLUMNS = ("problem", "algorithm", "evaluations", "seed", "spent", *MEASURES)
+BBOB_COLUMNS = (
+    "dimension",
+    "function",
+    "instance",
+    "seed",
+    "algorithm",
+    "told",
+    "evaluations",
+    "share",
+)
+
+SuiteKey = tuple[str, str, int, int]
+"""Problem, algorithm, budget and seed."""
+
+
+@dataclass
+class Outcome:
+    """What was found.
+
+    Attributes
+    ----------
+    suites : dict of tuple
+        By problem, algorithm, budget and seed: evaluations spent and the `MEASURES`.
+    bbob : dict of dict
+        By run: the share of targets by number of evaluations.
+    """
+
+    suites: dict[SuiteKey, tuple[float, ...]] = field(default_factory=dict)
+    bbob: dict[BbobRun, dict[int, float]] = field(default_factory=dict)
+
+    def add(self, jobs: Sequence[SuiteRun | BbobRun], runs: Sequence[Run]) -> None:
+        """Take what finished jobs give, rounded as the CSV keeps it."""
+        for job, run in zip(jobs, runs, strict=True):
+            if isinstance(job, BbobRun):
+                self.bbob[job] = {int(mark): _rounded(share) for mark, share in run.values}
+                continue
+            for budget, *rest in run.values.tolist():
+                key = job.problem, job.algorithm, int(budget), job.seed
+                self.suites[key] = tuple(map(_rounded, rest))
+
+    def budgets(self, suite: str) -> list[int]:
+        """Return the budgets at which a suite was judged, rising."""
+        return sorted({key[2] for key in self.suites if PROBLEMS[key[0]].suite == suite})
+
+    def seeds(self, suite: str) -> int:
+        """Return how many seeds the algorithm with the most of them ran on a suite."""
+        return len({key[3] for key in self.suites if PROBLEMS[key[0]].suite == suite})
+
+    def algorithms(self, suite: str, budget: int) -> list[str]:
+        """Return who ran on a suite at a budget, in the order of `PEERS`."""
+        ran = {k[1] for k in self.suites if PROBLEMS[k[0]].suite == suite and k[2] == budget}
+        return [name for name in PEERS if name in ran]
+
+    def problems(self, suite: str, budget: int) -> list[str]:
+        """Return the problems of a suite on which ours was judged at a budget."""
+        ran = {key[0] for key in self.suites if key[1:3] == (OURS, budget)}
+        return [one.name for one in SUITES[suite] if one.name in ran]
+
+    def medians(
+        self, suite: str, budget: int, measure: str, algorithms: Sequence[str]
+    ) -> NDArray[np.float64]:
+        """Return medians over the seeds, shape (problems, algorithms); NaN where none ran."""
+        place = 1 + MEASURES.index(measure)
+        problems = self.problems(suite, budget)
+        values = np.full((len(problems), len(algorithms)), np.nan)
+        for row, problem in enumerate(problems):
+            for column, algorithm in enumerate(algorithms):
+                runs = self.runs(problem, algorithm, budget, place)
+                if runs:
+                    values[row, column] = np.median(runs)
+        return values
+
+    def runs(self, problem: str, algorithm: str, budget: int, place: int) -> list[float]:
+        """Return one number of all runs of an algorithm on a problem, by rising seed."""
+        found = {
+            key[3]: numbers[place]
+            for key, numbers in self.suites.items()
+            if key[:3] == (problem, algorithm, budget)
+        }
+        return [found[seed] for seed in sorted(found)]
+
+    def shares(
+        self, dimension: int, algorithm: str, told: int, *, instance: int | None = None
+    ) -> dict[int, float]:
+        """Return the mean share by number of evaluations over problems, empty if none ran."""
+        gathered: dict[int, list[float]] = defaultdict(list)
+        for run, shares in self.bbob.items():
+            same = (run.dimension, run.algorithm, run.told) == (dimension, algorithm, told)
+            if same and instance in (None, run.instance):
+                for mark, share in shares.items():
+                    gathered[mark].append(share)
+        return {mark: float(np.mean(gathered[mark])) for mark in sorted(gathered)}
+
+
+def outcome_for(context: Context) -> Outcome:
+    """Return the stored outcome, or run what it takes (quick) or the whole (full).
+
+    Files are written after every part, so that an interrupted run leaves what is done.
+    """
+    if not (context.full or context.quick):
+        return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, BBOB)))
+    for package, extra in (("cocoex", EXTRA), ("comocma", EXTRA), ("jmetal", EXTRA)):
+        require(package, extra)
+    parts: Iterable[SuitePart | BbobPart] = FULL if context.full else STORED
+    outcome = Outcome()
+    for part in parts:
+        jobs: list[SuiteRun | BbobRun] = list(part.jobs())
+        name = part.suite if isinstance(part, SuitePart) else f"bbob-biobj, {part.algorithm}"
+        outcome.add(jobs, context.campaign.run(jobs, name))
+        for file, text in ((NAME, suites_text(outcome)), (BBOB, bbob_text(outcome))):
+            write_atomically(context.out / NAME / f"{file}.csv", text.encode())
+    return outcome
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def suites_text(outcome: Outcome) -> str:
+    """Return the CSV text of the runs on suites, with origin in a first comment line."""
+    rows = ([*key, *(f"{n:.{DIGITS}g}" for n in row)] for key, row in outcome.suites.items())
+    return table_with_origin(SUITE_COLUMNS, rows, command=COMMAND)
+
+
+def bbob_text(outcome: Outcome) -> str:
+    """Return the CSV text of the shares on bbob-biobj."""
+    rows = (
+        [
+            *(run.dimension, run.function, run.instance, run.seed, run.algorithm, run.told),
+            mark,
+            f"{share:.{DIGITS}g}",
+        ]
+        for run, shares in outcome.bbob.items()
+        for mark, share in shares.items()
+    )
+    return table_with_origin(BBOB_COLUMNS, rows, command=COMMAND)
+
+
+def read_outcome(suites: Path, bbob: Path) -> Outcome:
+    """Read what `suites_text` and `bbob_text` wrote."""
+    outcome = Outcome()
+    for row in read_rows(suites):
+        key = row["problem"], row["algorithm"], int(row["evaluations"]), int(row["seed"])
+        outcome.suites[key] = tuple(float(row[name]) for name in ("spent", *MEASURES))
+    for row in read_rows(bbob):
+        function, dimension, instance, told, seed = (
+            int(row[name]) for name in ("function", "dimension", "instance", "told", "seed")
+        )
+        run = BbobRun(function, dimension, instance, row["algorithm"], told, seed)
+        outcome.bbob.setdefault(run, {})[int(row["evaluations"])] = float(row["share"])
+    return outcome

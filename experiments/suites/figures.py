@@ -1,0 +1,90 @@
+"""Runtime profiles as COCO draws them, and the picture of how to choose."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
+from experiments.suites.bbob_tables import reached
+from experiments.suites.data import Outcome
+from experiments.suites.peers import OURS
+from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
+from experiments.suites.published import BEST, CITED, curves
+from experiments.suites.suite_tables import named, ranks
+
+LINES = {OURS: BLUE, "ElitistSwarm": SKY, "NSGA-II": GREEN, "COMO-CMA-ES": PINK}
+PUBLISHED = {BEST: ORANGE, "SMS-EMOA-SA": YELLOW}
+CHOICE = ("CompactSwarm", "ElitistSwarm", "SMS-EMOA", "NSGA-II", "AGE-MOEA-II", "CMOPSO")
+
+
+def runtime_profiles(outcome: Outcome) -> Figure:
+    """Draw the share of targets over evaluations, a panel a dimension, published curves dashed."""
+    figure, axes = grid(1, len(DIMENSIONS), width=5.2, height=4.2, share_rows=True)
+    for dimension, axis in zip(DIMENSIONS, axes[0], strict=True):
+        for place, (name, curve) in enumerate(curves(dimension).items()):
+            shares = {n: share for n, share in curve.items() if n <= BUDGETS[-1]}
+            colour, style = PUBLISHED.get(name, GREY), ("--", ":", "-.")[place % 3]
+            axis.plot(*_line(shares), style, color=colour, lw=1.2, label=f"{name}, published")
+        _ours(axis, outcome, dimension)
+        axis.set_title(f"bbob-biobj, {dimension} dimensions", fontsize=10)
+        axis.set_xscale("log")
+        axis.set_xlabel("evaluations")
+        axis.legend(fontsize=7, frameon=False, loc="upper left")
+    axes[0, 0].set_ylabel("share of COCO's 58 targets")
+    return figure
+
+
+def _ours(axis: Axes, outcome: Outcome, dimension: int) -> None:
+    """Draw what ran here: lines of the largest budgets, and our swarm told each budget."""
+    for name, colour in LINES.items():
+        told = max(
+            (r.told for r in outcome.bbob if (r.algorithm, r.dimension) == (name, dimension)),
+            default=0,
+        )
+        shares = outcome.shares(dimension, name, told)
+        if shares:
+            label = f"{name}, told {told:,}" if name == OURS else f"{name}, here"
+            axis.plot(*_line(shares), color=colour, lw=2.2 if name == OURS else 1.3, label=label)
+    ends = {budget: reached(outcome, dimension, budget) for budget in BUDGETS}
+    points = {budget: share for budget, share in ends.items() if share is not None}
+    axis.plot(*_line(points), "o", color=BLUE, markersize=6, label=f"{OURS}, told each budget")
+
+
+def _line(shares: dict[int, float]) -> tuple[list[int], list[float]]:
+    return list(shares), list(shares.values())
+
+
+def how_to_choose(outcome: Outcome) -> Figure:
+    """Draw average ranks over the budget on the held-out suite, and the shares of targets."""
+    figure, axes = grid(1, 3, width=3.9, height=3.3)
+    (suite,) = HELD_OUT
+    budgets = outcome.budgets(suite)
+    colours = dict(zip(CHOICE, (BLUE, SKY, YELLOW, GREEN, PINK, ORANGE), strict=True))
+    for axis, (measure, words) in zip(
+        axes[0], (("hypervolume", "hypervolume"), ("igd_plus", "IGD+")), strict=False
+    ):
+        found = {budget: ranks(outcome, suite, budget, measure) for budget in budgets}
+        for name, colour in colours.items():
+            line = {b: by_name[name] for b, by_name in found.items() if name in by_name}
+            bold = name in (OURS, "ElitistSwarm")
+            axis.plot(*_line(line), "o-", color=colour, lw=2.2 if bold else 1.0, ms=4, label=name)
+        axis.set_title(f"{named(outcome, suite)}, {words}", fontsize=9)
+        axis.set_ylabel("average rank, 1 is best")
+        axis.invert_yaxis()
+        _over_evaluations(axis)
+    axes[0, 0].legend(fontsize=7, frameon=False, loc="lower right")
+    axis = axes[0, 2]
+    _ours(axis, outcome, DIMENSIONS[0])
+    cited = {n: share for (d, n), share in CITED.items() if d == DIMENSIONS[0]}
+    axis.plot(*_line(cited), "s", color=ORANGE, markersize=5, label=f"{BEST}, published")
+    axis.set_title(f"bbob-biobj, {DIMENSIONS[0]} dimensions", fontsize=10)
+    axis.set_ylabel("share of targets")
+    axis.legend(fontsize=7, frameon=False, loc="upper left")
+    _over_evaluations(axis)
+    return figure
+
+
+def _over_evaluations(axis: Axes) -> None:
+    axis.set_xscale("log")
+    axis.set_xlabel("evaluations")

@@ -1,0 +1,126 @@
+"""What is run: written and committed before the first run on what is held out.
+
+Sets of problems:
+
+- tuning, on which settings may be chosen: ZDT, moved ZDT and DTLZ2 of ``peers``, and functions 1 to
+  20 of bbob-biobj in five dimensions;
+- validation, whose outcomes led to the demands: RE, MW, DAS-CMOP, LZ09;
+- held out: bbob-biobj, all 55 functions, instances 3 to 5, in 10 and 20 dimensions; IMOP. They are
+  run once, and what comes out is shown as it is.
+
+Settings: all algorithms with the defaults of their libraries and a population of 100; MOEA/D-DE
+with those of Li and Zhang, GDE3 with F = CR = 0.5, COMO-CMA-ES with 10 kernels and a first step of
+a fifth of the box of first positions. `CompactSwarm()` as it is, told its budget, so that each
+budget is a run of its own; nothing was chosen for this experiment.
+
+Seeds count from 1. On bbob-biobj each instance is one run, as with COCO, from first positions in
+[-5, 5] in the box [-100, 100] that the suite states.
+
+Indicators: on bbob-biobj the share of COCO's 58 targets, every evaluation counted. Elsewhere the
+hypervolume up to 1.1 in normalised objectives and, where the front is known in closed form, IGD+,
+of at most 100 solutions. Ranks are those of medians over the seeds; tests are Wilcoxon's signed
+ranks over problems, corrected after Holm.
+
+Demands, besides: own time per generation at most half of NSGA-II's, which ``experiments benchmark``
+measures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from experiments.suites.coco import FUNCTIONS
+from experiments.suites.jobs import BbobRun, SuiteRun
+from experiments.suites.peers import BBOB_PEERS, OURS, PEERS, takes
+from experiments.suites.problems import SUITES, problem_of
+
+HELD_OUT, VALIDATION = ("IMOP",), ("RE", "MW", "DAS-CMOP", "LZ09")
+INSTANCES = (3, 4, 5)
+DIMENSIONS = (10, 20)
+BUDGETS = (500, 2000, 10_000, 25_000)
+
+SHARES = {(10, 10_000): 0.38, (10, 25_000): 0.42, (20, 10_000): 0.34, (20, 25_000): 0.38}
+"""Shares of targets that must be reached, by dimension and evaluations."""
+RIVAL_ON_RE = "SMS-EMOA"
+FEASIBLE_RIVALS = ("NSGA-II", "C-TAEA")
+"""Those than which ours must not be feasible in fewer runs on MW and DAS-CMOP."""
+
+
+@dataclass(frozen=True)
+class SuitePart:
+    """Some algorithms on a suite; slow ones may have fewer budgets in a part of their own."""
+
+    suite: str
+    algorithms: tuple[str, ...]
+    budgets: tuple[int, ...]
+    seeds: int
+
+    def jobs(self) -> Iterable[SuiteRun]:
+        """Return the runs, by seed, problem, algorithm."""
+        for seed in range(1, self.seeds + 1):
+            for problem in (one.name for one in SUITES[self.suite]):
+                for algorithm in self.algorithms:
+                    if takes(algorithm, problem_of(problem)):
+                        anew = PEERS[algorithm].starts_anew
+                        for budgets in [(b,) for b in self.budgets] if anew else [self.budgets]:
+                            yield SuiteRun(problem, algorithm, seed, budgets)
+
+
+@dataclass(frozen=True)
+class BbobPart:
+    """One algorithm, told some budgets, on problems of bbob-biobj."""
+
+    algorithm: str
+    told: tuple[int, ...]
+    instances: tuple[int, ...] = INSTANCES
+    functions: tuple[int, ...] = tuple(FUNCTIONS)
+    dimensions: tuple[int, ...] = DIMENSIONS
+    seeds: int = 1
+
+    def jobs(self) -> Iterable[BbobRun]:
+        """Return the runs."""
+        for seed in range(1, self.seeds + 1):
+            for dimension in self.dimensions:
+                for told in self.told:
+                    for instance in self.instances:
+                        for function in self.functions:
+                            yield BbobRun(function, dimension, instance, self.algorithm, told, seed)
+
+
+WITHOUT_CONSTRAINTS = tuple(name for name in PEERS if name != "C-TAEA")
+SLOW = ("MOEA/D-DE",)
+"""Those that take milliseconds an evaluation: budgets up to 2,000 in what is stored."""
+QUICK_ENOUGH = tuple(name for name in WITHOUT_CONSTRAINTS if name not in SLOW)
+
+STORED: tuple[SuitePart | BbobPart, ...] = (
+    BbobPart(OURS, (10_000,)),
+    BbobPart(OURS, (25_000,), instances=(3,)),
+    SuitePart("IMOP", QUICK_ENOUGH, (500, 2000, 10_000), seeds=3),
+    BbobPart(OURS, (500, 2000), instances=(3,)),
+    BbobPart("ElitistSwarm", (25_000,), instances=(3,)),
+    BbobPart("NSGA-II", (10_000,), instances=(3,)),
+    SuitePart("IMOP", SLOW, (500, 2000), seeds=3),
+    SuitePart("MW", (OURS, "ElitistSwarm", "NSGA-II"), (10_000,), seeds=3),
+    SuitePart("RE", (OURS, "ElitistSwarm", "SMS-EMOA"), (10_000,), seeds=3),
+    SuitePart("DAS-CMOP", (OURS, "ElitistSwarm", "NSGA-II"), (10_000,), seeds=3),
+    BbobPart(OURS, (25_000,), instances=(4,)),
+    BbobPart(OURS, (25_000,), instances=(5,)),
+    BbobPart("COMO-CMA-ES", (10_000,), instances=(3,), functions=tuple(range(1, 56, 6))),
+    SuitePart("LZ09", (OURS, "ElitistSwarm", "NSGA-II"), (10_000,), seeds=3),
+    SuitePart("MW", ("C-TAEA",), (10_000,), seeds=3),
+)
+"""What is run for the stored outcome, in this order; what a session has no time for is not shown.
+
+It is smaller than was asked for: one to three seeds in place of 15, no 25,000 evaluations outside
+bbob-biobj, on bbob-biobj four algorithms of ours and others beside the published curves.
+"""
+
+FULL: tuple[SuitePart | BbobPart, ...] = (
+    *(BbobPart(name, BUDGETS if peer.starts_anew else BUDGETS[-1:], seeds=5)
+      for name, peer in BBOB_PEERS.items() if name != "C-TAEA"),
+    SuitePart("IMOP", WITHOUT_CONSTRAINTS, BUDGETS, seeds=15),
+    *(SuitePart(suite, WITHOUT_CONSTRAINTS, BUDGETS, seeds=15) for suite in ("RE", "LZ09")),
+    *(SuitePart(suite, tuple(PEERS), BUDGETS, seeds=15) for suite in ("MW", "DAS-CMOP")),
+)  # fmt: skip
+"""The whole: 15 seeds (3 instances with 5 each), all peers, four budgets; some days of a core."""

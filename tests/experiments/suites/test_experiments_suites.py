@@ -1,0 +1,142 @@
+"""Outcome on disk, demands judged, duels, published curves, and the report of what is stored."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from experiments.runner.campaign import Campaign
+from experiments.runner.registry import Context
+from experiments.suites import experiment
+from experiments.suites.anew import BBOB_RUNS, SUITE_RUNS
+from experiments.suites.bbob_tables import duels, reached
+from experiments.suites.coco import MARKS
+from experiments.suites.data import Outcome, bbob_text, outcome_for, read_outcome, suites_text
+from experiments.suites.demands import demands, in_one_sentence
+from experiments.suites.jobs import BbobRun
+from experiments.suites.peers import OURS
+from experiments.suites.problems import SUITES
+from experiments.suites.protocol import FULL, SHARES, STORED
+from experiments.suites.published import BEST, CITED, curves
+from experiments.suites.suite_tables import feasible_runs, ranks
+
+RIVALS = ("NSGA-II", "SMS-EMOA", "C-TAEA")
+
+
+def planted(gain):
+    """Return an outcome in which ours is better than every rival by a gain, everywhere."""
+    outcome, rng = Outcome(), np.random.default_rng(1)
+    for suite, seed in product(SUITES, (1, 2)):
+        for one, name in product(SUITES[suite], (OURS, *RIVALS)):
+            value = 0.5 + 0.1 * rng.random() + gain * (name == OURS)
+            solutions = 100.0 if gain > 0 or name != OURS else 0.0
+            row = (10_000.0, round(value, 4), round(1.0 - value, 4), solutions)
+            outcome.suites[one.name, name, 10_000, seed] = row
+    for dimension, function, name in product((10, 20), range(1, 56), (OURS, "NSGA-II")):
+        for told in (10_000, 25_000) if name == OURS else (25_000,):
+            share = 0.35 + 0.01 * rng.random() + gain * (name == OURS)
+            run = BbobRun(function, dimension, 3, name, told)
+            outcome.bbob[run] = {mark: round(share, 4) for mark in MARKS if mark <= told}
+    return outcome
+
+
+def test_an_outcome_comes_back_from_its_files(tmp_path):
+    outcome = planted(0.2)
+    for name, text in (("a", suites_text(outcome)), ("b", bbob_text(outcome))):
+        (tmp_path / name).write_text(text)
+    assert read_outcome(tmp_path / "a", tmp_path / "b") == outcome
+
+
+def test_demands_are_met_by_one_who_leads_and_missed_by_one_who_trails():
+    leading = {demand.asked: demand.met for demand in demands(planted(0.2))}
+    trailing = {demand.asked: demand.met for demand in demands(planted(-0.2))}
+    shares = [asked for asked in leading if "share of targets" in asked]
+    assert len(shares) == len(SHARES)
+    for asked in [*shares, "RE: no worse than SMS-EMOA, hypervolume", "MW: first by hypervolume"]:
+        assert leading[asked] is True
+        assert trailing[asked] is False
+    met = [d.met for d in demands(planted(0.2)) if d.asked.startswith("IMOP") and d.met is not None]
+    assert met == [True] * 4
+    feasible = next(asked for asked in leading if "feasible in as many" in asked)
+    assert (leading[feasible], trailing[feasible]) == (True, False)
+
+
+def test_what_did_not_run_is_neither_met_nor_missed():
+    assert {demand.met for demand in demands(Outcome())} == {None}
+    assert in_one_sentence(Outcome()) == "Nothing was run."
+
+
+def test_what_falls_short_comes_first():
+    said = in_one_sentence(planted(-0.2))
+    assert said.startswith(f"{OURS}, on suites held out: on bbob-biobj it falls short")
+    assert "falls short" not in in_one_sentence(planted(0.2))
+
+
+def test_duels_compare_the_same_problems():
+    outcome = planted(0.2)
+    del outcome.bbob[BbobRun(7, 10, 3, "NSGA-II", 25_000)]
+    (duel,) = duels(outcome, 10_000)
+    assert (duel.rival, duel.problems, duel.test.better, duel.test.worse) == (
+        "NSGA-II",
+        109,
+        109,
+        0,
+    )
+    assert duel.ours - duel.theirs == pytest.approx(0.2, abs=0.01)
+    assert duel.test.beaten
+    assert not duels(planted(-0.2), 10_000)[0].test.ahead
+
+
+def test_ranks_and_feasible_runs():
+    outcome = planted(0.2)
+    found = ranks(outcome, "IMOP", 10_000, "igd_plus")
+    assert found[OURS] == 1.0
+    assert np.sum(list(found.values())) == pytest.approx(10.0)
+    assert feasible_runs(planted(-0.2), "MW", 10_000, OURS) == (0, 28)
+
+
+def test_published_curves_are_those_that_are_cited(tmp_path):
+    for (dimension, evaluations), share in CITED.items():
+        assert curves(dimension, tmp_path / "none")[BEST][evaluations] == share
+        # Beside the repository lie the whole curves, on some machines.
+        assert curves(dimension)[BEST][evaluations] == share
+
+
+def test_published_curves_are_read(tmp_path):
+    (tmp_path / "a.csv").write_text(
+        "algorithm,dimension,year,share_at_100,share_at_25000\n"
+        "HMO-CMA-ES Loshc,10,2016,0.1,0.4\n"
+        "SMS-EMOA-PM Auge,10,2016,0.0,0.2\n"
+        "SMS-EMOA-,10,2017,0.1,\n"
+        "best 2016,20,2016,0.1,0.2\n"
+    )
+    assert curves(10, tmp_path / "a.csv") == {
+        "HMO-CMA-ES": {100: 0.1, 25_000: 0.4},
+        "SMS-EMOA-SA": {100: 0.1},
+    }
+
+
+def test_the_whole_has_what_is_stored_and_more():
+    stored, whole = ({job.key for part in parts for job in part.jobs()} for parts in (STORED, FULL))
+    assert len(whole) > 10 * len(stored)
+    assert all(run.key in stored for run in BBOB_RUNS)
+
+
+def test_the_stored_outcome_gives_the_report_and_repeats(tmp_path):
+    result = experiment.run(Context(1, tmp_path, Campaign(tmp_path)))
+    assert result.answer
+    anew = result.tables[-1]
+    assert len(anew.rows) >= len(SUITE_RUNS)
+    for *_, stored, now in anew.rows:
+        # Another processor may round otherwise, which a search amplifies.
+        assert now == pytest.approx(stored, abs=0.1)
+
+
+def test_shares_of_the_stored_outcome_are_of_all_functions():
+    outcome = outcome_for(Context(1, None, None))
+    problems = set(product(range(1, 56), (3, 4, 5)))
+    for dimension in (10, 20):
+        place = dimension, OURS, 10_000
+        ran = [run for run in outcome.bbob if (run.dimension, run.algorithm, run.told) == place]
+        assert {(run.function, run.instance) for run in ran} == problems
+        assert 0.0 < reached(outcome, dimension, 10_000) < 1.0
