@@ -184,14 +184,15 @@ def scores():
 
 
 class TestStoredOutcome:
+    @pytest.mark.parametrize("moments", [EXACT, COMMON, FRESH])
     @pytest.mark.parametrize("algorithm", OF_TABLE_7)
-    def test_it_is_what_a_run_gives_today(self, algorithm, scores):
-        job = AnytimeRun("calibrated", EXACT, algorithm, 10, 2, (200,))
+    def test_it_is_what_a_run_gives_today(self, algorithm, moments, scores):
+        job = AnytimeRun("calibrated", moments, algorithm, 10, 2, (200,))
         found = measure(
             {(algorithm, 2): job.execute()}, 200, 10, robust_problem("calibrated").pareto_front()
         )
         for counted in (RETURNED, EQUAL):
-            case = Case("calibrated", EXACT, counted, 10, 200, algorithm)
+            case = Case("calibrated", moments, counted, 10, 200, algorithm)
             today = dict(zip(MEASURES, found[counted, algorithm, 2], strict=True))
             for name in ("size", *COMPARED.values()):
                 assert scores.of(case, name)[1] == pytest.approx(today[name], rel=1e-3)
