@@ -16,12 +16,16 @@ from experiments.suites.bbob_tables import duels_table, reached, shares_table
 from experiments.suites.data import NAME, Outcome, outcome_for
 from experiments.suites.demands import demands_table, in_one_sentence
 from experiments.suites.figures import how_to_choose, runtime_profiles
-from experiments.suites.in_short import in_short
 from experiments.suites.peers import OURS
 from experiments.suites.problems import DIFFICULTY, SUITES
 from experiments.suites.protocol import DIMENSIONS, HELD_OUT
 from experiments.suites.published import BEST, CITED
-from experiments.suites.suite_tables import medians_tables, ranks_tables, rivals_table
+from experiments.suites.suite_tables import (
+    in_short,
+    medians_tables,
+    ranks_tables,
+    rivals_table,
+)
 
 SETTING = (
     f"{OURS} is told its budget, so that each is a run of its own; all others run as their users "

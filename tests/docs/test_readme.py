@@ -65,9 +65,8 @@ from experiments.runner.registry import Context
 from experiments.suites import data as suites
 from experiments.suites.bbob_tables import reached
 from experiments.suites.demands import demands
-from experiments.suites.in_short import in_short
 from experiments.suites.published import CITED
-from experiments.suites.suite_tables import feasible_runs
+from experiments.suites.suite_tables import feasible_runs, in_short
 from experiments.suites.suite_tables import ranks as suite_ranks
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import optimum_report
