@@ -71,8 +71,12 @@ class Outcome:
         return sorted({key[2] for key in self.suites if PROBLEMS[key[0]].suite == suite})
 
     def seeds(self, suite: str) -> int:
-        """Return how many seeds the algorithm with the most of them ran on a suite."""
-        return len({key[3] for key in self.suites if PROBLEMS[key[0]].suite == suite})
+        """Return how many seeds ran on each problem of a suite that ran at all, or more."""
+        ran: dict[str, set[int]] = defaultdict(set)
+        for problem, _, _, seed in self.suites:
+            if PROBLEMS[problem].suite == suite:
+                ran[problem].add(seed)
+        return min(map(len, ran.values()), default=0)
 
     def algorithms(self, suite: str, budget: int) -> list[str]:
         """Return who ran on a suite at a budget, in the order of `PEERS`.

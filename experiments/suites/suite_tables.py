@@ -119,8 +119,8 @@ def _ranks_table(outcome: Outcome, suite: str) -> Table:
         f"{suite}, {kind}: average ranks over {ran}, 1 being the best",
         tuple(columns),
         tuple(rows),
-        note=f"Ranks of medians over {outcome.seeds(suite)} seeds, if 1 of single runs; one that "
-        "cannot take a problem ranks last there.",
+        note=f"Ranks of medians over {outcome.seeds(suite)} seeds or more, single runs if 1; one "
+        "that cannot take a problem ranks last there.",
         folded=suite not in HELD_OUT,
     )
 
