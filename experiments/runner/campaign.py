@@ -146,10 +146,16 @@ class Campaign:
         write_atomically(self._path(job), table.encode())
 
     def _read(self, job: Job) -> Run:
-        table = read_text_table(self._path(job))
-        values = np.column_stack([*table.numbers(table.titles, gaps=True).values()])
+        run = read_run(self._path(job))
         seconds, *parts = map(float, self._time_path(job).read_text().split())
-        return Run(tuple(table.titles), values, seconds, tuple(parts))
+        return Run(run.columns, run.values, seconds, tuple(parts))
+
+
+def read_run(path: Path) -> Run:
+    """Read a finished run from its file, without the seconds, which lie elsewhere."""
+    table = read_text_table(path)
+    values = np.column_stack([*table.numbers(table.titles, gaps=True).values()])
+    return Run(tuple(table.titles), values, np.nan)
 
 
 def _run_in_executor(executor: Executor, jobs: Sequence[Job], keep: Keep) -> None:

@@ -16,8 +16,8 @@ from experiments.runner.registry import Context, require
 from experiments.runner.store import write_atomically
 from experiments.suites.coco import EXTRA
 from experiments.suites.jobs import MEASURES, BbobRun, SuiteRun
-from experiments.suites.peers import OURS, PEERS
-from experiments.suites.problems import PROBLEMS, SUITES
+from experiments.suites.peers import OURS, PEERS, takes
+from experiments.suites.problems import PROBLEMS, SUITES, problem_of
 from experiments.suites.protocol import FULL, STORED, BbobPart, SuitePart
 
 NAME = "suites"
@@ -71,13 +71,26 @@ class Outcome:
         return sorted({key[2] for key in self.suites if PROBLEMS[key[0]].suite == suite})
 
     def seeds(self, suite: str) -> int:
-        """Return how many seeds the algorithm with the most of them ran on a suite."""
-        return len({key[3] for key in self.suites if PROBLEMS[key[0]].suite == suite})
+        """Return how many seeds ran on each problem of a suite that ran at all, or more."""
+        ran: dict[str, set[int]] = defaultdict(set)
+        for problem, _, _, seed in self.suites:
+            if PROBLEMS[problem].suite == suite:
+                ran[problem].add(seed)
+        return min(map(len, ran.values()), default=0)
 
     def algorithms(self, suite: str, budget: int) -> list[str]:
-        """Return who ran on a suite at a budget, in the order of `PEERS`."""
-        ran = {k[1] for k in self.suites if PROBLEMS[k[0]].suite == suite and k[2] == budget}
-        return [name for name in PEERS if name in ran]
+        """Return who ran on a suite at a budget, in the order of `PEERS`.
+
+        One that could take a problem, but was not run on it, is left out: it would rank last there.
+        """
+        problems = self.problems(suite, budget)
+        ran = {key[:2] for key in self.suites if key[2] == budget}
+        return [
+            name
+            for name in PEERS
+            if any((one, name) in ran for one in problems)
+            and all((one, name) in ran or not takes(name, problem_of(one)) for one in problems)
+        ]
 
     def problems(self, suite: str, budget: int) -> list[str]:
         """Return the problems of a suite on which ours was judged at a budget."""
@@ -144,13 +157,13 @@ def _rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
 
 
-def suites_text(outcome: Outcome) -> str:
+def suites_text(outcome: Outcome, command: str = COMMAND) -> str:
     """Return the CSV text of the runs on suites, with origin in a first comment line."""
     rows = ([*key, *(f"{n:.{DIGITS}g}" for n in row)] for key, row in outcome.suites.items())
-    return table_with_origin(SUITE_COLUMNS, rows, command=COMMAND)
+    return table_with_origin(SUITE_COLUMNS, rows, command=command)
 
 
-def bbob_text(outcome: Outcome) -> str:
+def bbob_text(outcome: Outcome, command: str = COMMAND) -> str:
     """Return the CSV text of the shares on bbob-biobj."""
     rows = (
         [
@@ -161,7 +174,7 @@ def bbob_text(outcome: Outcome) -> str:
         for run, shares in outcome.bbob.items()
         for mark, share in shares.items()
     )
-    return table_with_origin(BBOB_COLUMNS, rows, command=COMMAND)
+    return table_with_origin(BBOB_COLUMNS, rows, command=command)
 
 
 def read_outcome(suites: Path, bbob: Path) -> Outcome:

@@ -21,6 +21,7 @@ from experiments.suites.protocol import (
 from experiments.suites.published import BEST, CITED
 from experiments.suites.suite_tables import (
     NAMES,
+    can_show,
     feasible_runs,
     indicators,
     named,
@@ -93,10 +94,12 @@ def _first_of_all(outcome: Outcome) -> Iterable[Demand]:
                 yield _first(outcome, suite, evaluations, measure, asked)
                 beaten = tests(outcome, suite, evaluations, measure)
                 shown = sum(test.beaten for test in beaten)
+                problems = len(outcome.problems(suite, evaluations))
+                too_few = "" if can_show(problems, len(beaten)) else "; too few problems to show it"
                 yield Demand(
                     f"{named(outcome, suite)}: better than each beyond chance (Holm), {name}",
                     evaluations,
-                    f"{shown} of {len(beaten)}",
+                    f"{shown} of {len(beaten)}{too_few}",
                     "",
                     shown == len(beaten),
                 )

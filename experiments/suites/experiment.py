@@ -16,12 +16,17 @@ from experiments.suites.bbob_tables import duels_table, reached, shares_table
 from experiments.suites.data import NAME, Outcome, outcome_for
 from experiments.suites.demands import demands_table, in_one_sentence
 from experiments.suites.figures import how_to_choose, runtime_profiles
-from experiments.suites.in_short import in_short
+from experiments.suites.gather import kept_table
 from experiments.suites.peers import OURS
 from experiments.suites.problems import DIFFICULTY, SUITES
 from experiments.suites.protocol import DIMENSIONS, HELD_OUT
 from experiments.suites.published import BEST, CITED
-from experiments.suites.suite_tables import medians_tables, ranks_tables, rivals_table
+from experiments.suites.suite_tables import (
+    in_short,
+    medians_tables,
+    ranks_tables,
+    rivals_table,
+)
 
 SETTING = (
     f"{OURS} is told its budget, so that each is a run of its own; all others run as their users "
@@ -63,6 +68,7 @@ def run(context: Context) -> Result:
             *ranks_tables(outcome),
             rivals_table(outcome),
             *medians_tables(outcome),
+            kept_table(outcome),
             anew_table(context.campaign, outcome),
         ),
         pictures=(
@@ -106,7 +112,7 @@ def _new(outcome: Outcome) -> str:
 
 def _extent(outcome: Outcome) -> tuple[str, ...]:
     runs = ", ".join(
-        f"{suite} {outcome.seeds(suite)} seeds at "
+        f"{suite} {outcome.seeds(suite)} seeds or more at "
         + ", ".join(f"{budget:,}" for budget in outcome.budgets(suite))
         for suite in SUITES
         if outcome.budgets(suite)
@@ -114,6 +120,6 @@ def _extent(outcome: Outcome) -> tuple[str, ...]:
     missing = [suite for suite in (*HELD_OUT, *protocol.VALIDATION) if not outcome.budgets(suite)]
     return (
         f"Of 15 seeds and four budgets asked for, this holds: {runs}; bbob-biobj one run an "
-        "instance.",
+        "instance. The run was stopped before its end; the table of the parts says what is there.",
         *((f"Not run: {', '.join(missing)}.",) if missing else ()),
     )

@@ -12,6 +12,7 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
+from experiments.comparison.indicators import front_among
 from experiments.contest.contestants import CONTESTANTS, Contestant, of_jmetal
 from experiments.contest.offer import POPULATION, Offer
 from experiments.contest.peers_pymoo import OWN, PYMOO, run_pymoo
@@ -20,6 +21,11 @@ from pymoo_hdte.algorithms import CompactSwarm
 
 OURS = "CompactSwarm"
 
+KERNELS = 10
+"""Of COMO-CMA-ES, each a CMA-ES of its own."""
+STEP = 0.2
+"""First step size, as a part of the box in which first positions are drawn."""
+
 
 @cache
 def _directions(n_obj: int) -> NDArray[np.float64]:
@@ -27,10 +33,34 @@ def _directions(n_obj: int) -> NDArray[np.float64]:
 
 
 def _como(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
-    # Imported where it is used, because the extra may be absent.
-    from experiments.suites.como import run_como
+    """Run several CMA-ES that share the hypervolume; return the front of all points evaluated.
 
-    return run_como(problem, budgets, seed)
+    It needs to be told a point that bounds the hypervolume: ``problem.reference`` (2,), the corner
+    to which the experiment measures, which no other algorithm here knows.
+    """
+    # Imported where it is used, because the extra may be absent.
+    import comocma
+
+    # Kernels draw from numpy's global generator; nothing else in this process uses it.
+    np.random.seed(seed)  # noqa: NPY002
+    low, high = problem.start
+    bounds = [problem.xl.tolist(), problem.xu.tolist()]
+    options = {"bounds": bounds, "verbose": -9, "seed": np.nan, "CMA_stds": high - low}
+    places = [np.random.uniform(low, high) for _ in range(KERNELS)]  # noqa: NPY002
+    kernels = comocma.get_cmas(places, STEP, inopts=options)
+    optimiser = comocma.Sofomore(kernels, reference_point=list(problem.reference))
+    found, spent, offers = [np.empty((0, 2))], 0, []
+    asked = optimiser.ask()
+    for budget in budgets:
+        while spent + len(asked) <= budget and not optimiser.stop():
+            F = problem.evaluate(np.array(asked), return_values_of=["F"])
+            found.append(F)
+            spent += len(asked)
+            optimiser.tell(asked, F.tolist())
+            asked = optimiser.ask()
+        found = [front_among(np.concatenate(found))]
+        offers.append(Offer(found[0], spent))
+    return offers
 
 
 MADE: dict[str, Callable[[Problem], Algorithm]] = {

@@ -1,4 +1,4 @@
-"""What came out on the other suites: ranks, tests, feasible runs and medians."""
+"""What came out on the suites: in short, ranks, tests, feasible runs and medians."""
 
 from __future__ import annotations
 
@@ -7,16 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.comparison.paired import SIGNIFICANT
 from experiments.comparison.ranks import average_ranks
 from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
+from experiments.suites.bbob_tables import reached
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import MEASURES
 from experiments.suites.peers import OURS
 from experiments.suites.problems import SUITES
-from experiments.suites.protocol import HELD_OUT, VALIDATION
+from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT, VALIDATION
+from experiments.suites.published import BEST, CITED
 
 NAMES = {"hypervolume": "hypervolume", "igd_plus": "IGD+"}
+SWARMS = (OURS, "ElitistSwarm")
 SMALLER = {"hypervolume": False, "igd_plus": True}
 
 
@@ -54,6 +58,15 @@ def tests(outcome: Outcome, suite: str, budget: int, measure: str) -> list[Rival
     return holm_against(
         OURS, algorithms, _missing_as_ours(values, algorithms), smaller_is_better=SMALLER[measure]
     )
+
+
+def can_show(problems: int, rivals: int) -> bool:
+    """Say whether so few problems can show a lead over each of so many rivals beyond chance.
+
+    If ours wins on all n problems, Wilcoxon's two-sided p is 2 / 2^n, and Holm multiplies the
+    smallest p by the number of rivals.
+    """
+    return rivals * 2.0 ** (1 - problems) < SIGNIFICANT
 
 
 def _missing_as_ours(values: NDArray[np.float64], algorithms: Sequence[str]) -> NDArray[np.float64]:
@@ -106,8 +119,8 @@ def _ranks_table(outcome: Outcome, suite: str) -> Table:
         f"{suite}, {kind}: average ranks over {ran}, 1 being the best",
         tuple(columns),
         tuple(rows),
-        note=f"Ranks of medians over {outcome.seeds(suite)} seeds, if 1 of single runs; one that "
-        "cannot take a problem ranks last there.",
+        note=f"Ranks of medians over {outcome.seeds(suite)} seeds or more, single runs if 1; one "
+        "that cannot take a problem ranks last there.",
         folded=suite not in HELD_OUT,
     )
 
@@ -131,9 +144,9 @@ def rivals_table(outcome: Outcome) -> Table:
         tuple(columns),
         tuple(rows),
         note="Better and worse compare medians. p is Wilcoxon's over the problems that both take, "
-        "after Holm over the rivals: eight problems cannot give less than 0.0078, which the "
-        "correction over seven rivals or more lifts above 0.05, so that no lead here can be beyond "
-        "chance.",
+        "after Holm over the rivals: n problems cannot give less than 2 / 2^n times the number of "
+        "rivals, which for up to eight problems and seven rivals or more is above 0.05, so that no "
+        "lead here can be beyond chance.",
         folded=True,
     )
 
@@ -158,3 +171,43 @@ def medians_tables(outcome: Outcome) -> list[Table]:
                 )
             )
     return tables
+
+
+def in_short(outcome: Outcome) -> Table:
+    """Shares of targets beside the best published, average ranks beside the best rival's."""
+    rows = [_shares_in_short(outcome, dimension) for dimension in DIMENSIONS]
+    rows += [_ranks_in_short(outcome, suite, measure) for suite in HELD_OUT for measure in NAMES]
+    return Table(
+        "in_short",
+        "The held-out suites in short",
+        (Column("suite"), *(Column(f"{budget:,}", group="evaluations") for budget in BUDGETS)),
+        tuple(rows),
+        note=f"bbob-biobj: {OURS}, in brackets the best published. Ranks: {' / '.join(SWARMS)}, in "
+        "brackets the best of the others; 1 is the best.",
+    )
+
+
+def _shares_in_short(outcome: Outcome, dimension: int) -> tuple[str | None, ...]:
+    cells: list[str | None] = [f"bbob-biobj, {dimension} dimensions: share of targets"]
+    for budget in BUDGETS:
+        share, cited = reached(outcome, dimension, budget), CITED.get((dimension, budget))
+        beside = "" if cited is None else f" ({BEST} {cited:.3f})"
+        cells.append(None if share is None else f"{share:.3f}{beside}")
+    return tuple(cells)
+
+
+def _ranks_in_short(outcome: Outcome, suite: str, measure: str) -> tuple[str | None, ...]:
+    budgets = outcome.budgets(suite)
+    count = max((len(outcome.algorithms(suite, budget)) for budget in budgets), default=0)
+    cells: list[str | None] = [
+        f"{named(outcome, suite)}: average rank of {count} by {NAMES[measure]}"
+    ]
+    for budget in BUDGETS:
+        if budget not in budgets:
+            cells.append(None)
+            continue
+        found = ranks(outcome, suite, budget, measure)
+        ours = " / ".join(f"{found.pop(name):.2f}" for name in SWARMS if name in found)
+        best = min(found, key=lambda name: found[name])
+        cells.append(f"{ours} ({best} {found[best]:.2f})")
+    return tuple(cells)

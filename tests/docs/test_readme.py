@@ -63,11 +63,11 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA
 from experiments.runner.registry import Context
 from experiments.suites import data as suites
-from experiments.suites.bbob_tables import reached
+from experiments.suites.bbob_tables import duels, reached
 from experiments.suites.demands import demands
-from experiments.suites.in_short import in_short
+from experiments.suites.protocol import BUDGETS
 from experiments.suites.published import CITED
-from experiments.suites.suite_tables import feasible_runs
+from experiments.suites.suite_tables import feasible_runs, in_short
 from experiments.suites.suite_tables import ranks as suite_ranks
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import optimum_report
@@ -519,10 +519,17 @@ class TestNumbersOfTheSuites:
             line = " | ".join("—" if cell is None else str(cell) for cell in row)
             assert f"| {line} |" in README
             assert f"| {line} |" in PAGES
-        for dimension in (10, 20):
-            assert reached(outcome, dimension, 10_000) < CITED[dimension, 10_000]
+        for place, cited in CITED.items():
+            assert reached(outcome, *place) < cited
         assert "stays below the best published on COCO's bbob-biobj" in WORDS
         assert not any(d.met for d in demands(outcome) if "share of targets" in d.asked)
+
+    def test_the_two_swarms_side_by_side(self, outcome):
+        found = [one for budget in BUDGETS for one in duels(outcome, budget)]
+        assert all(one.test.beaten for one in found if one.rival == "ElitistSwarm")
+        last = found[-1]
+        said = f"{last.test.better} of {last.problems} functions, fewer on {last.test.worse}"
+        assert (last.evaluations, said in WORDS) == (25_000, True)
 
     def test_constraints(self, outcome):
         found = suite_ranks(outcome, "MW", 10_000, "hypervolume")
@@ -538,7 +545,8 @@ class TestNumbersOfTheSuites:
     def test_what_was_not_run_is_told(self, outcome):
         missing = [name for name in ("RE", "DAS-CMOP", "LZ09") if not outcome.budgets(name)]
         assert f"and {', '.join(missing[:-1])} and {missing[-1]} were not run" in WORDS
-        assert f"IMOP has {outcome.seeds('IMOP')} seed" in WORDS
+        assert f"IMOP has {outcome.seeds('IMOP')} seeds" in WORDS
+        assert f"MW {outcome.seeds('MW')} on all but one problem" in WORDS
 
     @pytest.mark.skipif(
         matplotlib.__version_info__ < (3, 11), reason="matplotlib lays it out otherwise before 3.11"

@@ -13,6 +13,7 @@ from experiments.suites.bbob_tables import duels, reached
 from experiments.suites.coco import MARKS
 from experiments.suites.data import Outcome, bbob_text, outcome_for, read_outcome, suites_text
 from experiments.suites.demands import demands, in_one_sentence
+from experiments.suites.gather import gathered
 from experiments.suites.jobs import BbobRun
 from experiments.suites.peers import OURS
 from experiments.suites.problems import SUITES
@@ -114,6 +115,20 @@ def test_published_curves_are_read(tmp_path):
         "HMO-CMA-ES": {100: 0.1, 25_000: 0.4},
         "SMS-EMOA-SA": {100: 0.1},
     }
+
+
+def test_only_whole_groups_are_gathered(tmp_path):
+    first, second = [*STORED[1].groups()]
+    for job in [*first, *second[1:]]:
+        (tmp_path / f"{job.key}.csv").write_text("evaluations,share\n100,0.5\n")
+    assert set(gathered(tmp_path).bbob) == set(first)
+
+
+def test_one_that_was_not_run_on_a_problem_is_not_ranked_last_there():
+    outcome = planted(0.2)
+    for seed in (1, 2):
+        del outcome.suites["IMOP3", "NSGA-II", 10_000, seed]
+    assert "NSGA-II" not in ranks(outcome, "IMOP", 10_000, "hypervolume")
 
 
 def test_the_whole_has_what_is_stored_and_more():
