@@ -48,7 +48,7 @@ def load_datasheet(path: str | Path) -> DataSheet:
     Examples
     --------
     >>> load_datasheet("my_drive.toml").ratio
-    81.0
+    80.0
     """
     sheet = datasheet_from_fields(read_toml(Path(path)))
     _check_twist(sheet, Path(path).name)
