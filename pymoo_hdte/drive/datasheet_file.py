@@ -22,7 +22,11 @@ from pymoo_hdte.effects.quantities import with_unit
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import read_toml
 
-EARLIER_ARRANGEMENT = ("flexspline", "circular_spline")
+Arrangement = tuple[str, str | None]
+
+USUAL_ARRANGEMENT: Arrangement = ("circular_spline", None)
+"""``held`` and ``orders_as_held`` of a data sheet that does not say them."""
+EARLIER_ARRANGEMENT: Arrangement = ("flexspline", "circular_spline")
 """``held`` and ``orders_as_held`` that stored models mean that do not say them: the paper's."""
 
 
@@ -48,22 +52,22 @@ def load_datasheet(path: str | Path) -> DataSheet:
     Examples
     --------
     >>> load_datasheet("my_drive.toml").ratio
-    81.0
+    80.0
     """
     sheet = datasheet_from_fields(read_toml(Path(path)))
     _check_twist(sheet, Path(path).name)
     return sheet
 
 
-def datasheet_from_fields(sheet: Fields, unstated: tuple[str, str] | None = None) -> DataSheet:
+def datasheet_from_fields(sheet: Fields, unstated: Arrangement | None = None) -> DataSheet:
     """Build a data sheet from its table.
 
     Parameters
     ----------
     sheet : Fields
-    unstated : (str, str), optional
+    unstated : (str, str or None), optional
         ``held`` and ``orders_as_held`` of a table without them, such as `EARLIER_ARRANGEMENT`. By
-        default it is refused.
+        default the circular spline is held, as makers state their ratios.
 
     Raises
     ------
@@ -71,13 +75,11 @@ def datasheet_from_fields(sheet: Fields, unstated: tuple[str, str] | None = None
         As `load_datasheet`.
     """
     teeth = sheet.table("teeth")
-    held: str
-    as_held: str | None
-    if unstated is not None and not teeth.has("held"):
-        held, as_held = unstated
-    else:
-        held = teeth.choice("held", MEMBERS)
-        as_held = teeth.choice("orders_as_held", MEMBERS) if teeth.has("orders_as_held") else None
+    held, as_held = unstated or USUAL_ARRANGEMENT
+    if teeth.has("held"):
+        held, as_held = teeth.choice("held", MEMBERS), None
+    if teeth.has("orders_as_held"):
+        as_held = teeth.choice("orders_as_held", MEMBERS)
     rated = sheet.table("rated")
     result = DataSheet(
         name=sheet.text("name"),

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.effects.law import Law, Memory, PortState, periodic_phase
-from pymoo_hdte.mechanism.mechanism import Loop, Mechanism, Port
+from pymoo_hdte.mechanism.mechanism import Mechanism
+from pymoo_hdte.mechanism.parts import Loop, Port
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force, load_at_port
 from pymoo_hdte.mechanism.records import Record
 

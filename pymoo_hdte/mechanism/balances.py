@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.interpolate import make_interp_spline
 
-from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism, Port
+from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.mechanism.motion import finer_than, motion_of, smooth, smoothed_noise
+from pymoo_hdte.mechanism.parts import LawAt, Port
 from pymoo_hdte.mechanism.port_motion import (
     PortMotion,
     followed_angles,

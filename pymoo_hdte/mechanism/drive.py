@@ -12,7 +12,8 @@ from pymoo_hdte.drive.model import PARAMETERS, DriveModel
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.mechanism.believed import BelievedValue
 from pymoo_hdte.mechanism.error_line import ErrorLine
-from pymoo_hdte.mechanism.mechanism import Input, LawAt, Mechanism, Port
+from pymoo_hdte.mechanism.mechanism import Mechanism
+from pymoo_hdte.mechanism.parts import Input, LawAt, Port
 
 
 def drive_mechanism(

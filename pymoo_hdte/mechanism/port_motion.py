@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.effects.law import Law, PortState, periodic_phase
-from pymoo_hdte.mechanism.mechanism import Input, Mechanism, Port
+from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.mechanism.motion import SmoothedMotion, noise_of
+from pymoo_hdte.mechanism.parts import Input, Port
 from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.mechanism.mechanism import LawAt, Mechanism
+from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.mechanism.motion import smoothed_noise
+from pymoo_hdte.mechanism.parts import LawAt
 from pymoo_hdte.mechanism.port_motion import PortMotion
 from pymoo_hdte.mechanism.records import Record
 

@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
 from pymoo_hdte.mechanism.acting_forces import Command, PortForce, coordinate_row
 from pymoo_hdte.mechanism.exponential_steps import ExponentialIntegrator
-from pymoo_hdte.mechanism.mechanism import LawAt, Loop, Mechanism
+from pymoo_hdte.mechanism.mechanism import Mechanism
+from pymoo_hdte.mechanism.parts import LawAt, Loop
 from pymoo_hdte.mechanism.records import Record
 
 Values = NDArray[np.float64]

@@ -70,6 +70,17 @@ def minimize_asynchronously(
     -----
     RuntimeWarning
         If designs were lost.
+
+    Examples
+    --------
+    >>> from pymoo.problems.functional import FunctionalProblem
+    >>> parabolas = [lambda x: x @ x, lambda x: (x - 1) @ (x - 1)]
+    >>> clock = VirtualWorkers(3, np.random.default_rng(1).exponential)  # unequal times
+    >>> with ExecutorParallelization(clock) as runner:
+    ...     problem = FunctionalProblem(2, parabolas, xl=-1, xu=2, elementwise_runner=runner)
+    ...     result = minimize_asynchronously(problem, CompactSwarm(), ("n_eval", 200), seed=1)
+    >>> print(result.evaluations, f"workers busy {clock.efficiency:.0%} of the time")
+    200 designs evaluated workers busy 98% of the time
     """
     runner = problem.elementwise_runner
     if not problem.elementwise or not isinstance(runner, ExecutorParallelization):

@@ -24,6 +24,13 @@ class Counts:
         Evaluations made again because the first one failed.
     first_loss : str
         What was said at the first loss; empty without one.
+
+    Examples
+    --------
+    >>> counts = Counts(made=9)
+    >>> counts.lose("raised", "no convergence")
+    >>> print(counts)
+    9 designs evaluated, 1 designs lost (1 raised); the first: no convergence
     """
 
     made: int = 0

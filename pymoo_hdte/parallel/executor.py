@@ -57,6 +57,16 @@ class ExecutorParallelization:
         stored comes back without workers.
     SimulatorFailed
         If nothing but failures came so far, at the end of the first generation.
+
+    Examples
+    --------
+    >>> from pymoo.optimize import minimize
+    >>> from pymoo.problems.functional import FunctionalProblem
+    >>> parabolas = [lambda x: x @ x, lambda x: (x - 1) @ (x - 1)]
+    >>> with ExecutorParallelization() as runner:  # here; 4 would be four processes
+    ...     problem = FunctionalProblem(2, parabolas, xl=-1, xu=2, elementwise_runner=runner)
+    ...     print(minimize(problem, CompactSwarm(), ("n_eval", 200), seed=1).evaluations)
+    200 designs evaluated
     """
 
     def __init__(

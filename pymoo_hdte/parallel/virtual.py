@@ -39,6 +39,15 @@ class VirtualWorkers:
     ------
     InvalidInput
         If a number is not allowed, or an evaluation would never end.
+
+    Examples
+    --------
+    >>> seconds = iter([3.0, 1.0, 1.0])
+    >>> queue = VirtualWorkers(2, lambda: next(seconds))
+    >>> for name in "abc":
+    ...     queue.start(name, str.upper, name)
+    >>> [(queue.next(), queue.now) for _ in range(3)]
+    [(('b', 'B'), 1.0), (('c', 'C'), 2.0), (('a', 'A'), 3.0)]
     """
 
     def __init__(

@@ -12,13 +12,9 @@ from pymoo.core.problem import Problem
 
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.problems.simulator.around import Around, CommonSamples
+from pymoo_hdte.problems.simulator.asked import asked_of, place_of
 from pymoo_hdte.problems.simulator.inputs import Inputs
-from pymoo_hdte.problems.simulator.statistics import (
-    RobustConstraint,
-    Statistic,
-    asked_of,
-    place_of,
-)
+from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.problems.simulator.stored import read_problem, write_problem
 from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.sensitivity import SobolIndices
@@ -65,10 +61,8 @@ class SimulatorProblem(Problem):
         the design box. Of a `FailureProbability` it is the error itself, of a `WorstCase` NaN.
     failed : ndarray, shape (k, d)
         Inputs in their units at which the simulator failed; the fit goes on without them.
-    var_names, obj_names : tuple of str
-        Names in the order of X and F.
-    input_names : tuple of str
-        Of all inputs of the simulator, the designs first.
+    var_names, obj_names, input_names : tuple of str
+        In the order of X, in that of F, and of all inputs of the simulator, the designs first.
     design_box : Box
         The search space.
     responses, objectives, constraints
@@ -96,7 +90,7 @@ class SimulatorProblem(Problem):
         bounds = np.array([axis.design for axis in inputs.axes if axis.designed])
         self.design_box = Box(inputs.designed, *bounds.T)
         self.objectives, self.constraints = tuple(objectives), tuple(constraints)
-        self.responses = responses
+        self.responses, self.n_runs, self._fit = responses, n_runs, fit
         self._asked = asked_of(objectives, constraints, responses)
         super().__init__(
             n_var=len(bounds),
@@ -105,11 +99,8 @@ class SimulatorProblem(Problem):
             xl=bounds[:, 0].copy(),
             xu=bounds[:, 1].copy(),
         )
-        self.var_names = inputs.designed
+        self.var_names, self.input_names = inputs.designed, inputs.names
         self.obj_names = tuple(one.name for one in objectives)
-        self.input_names = inputs.names
-        self.n_runs = n_runs
-        self._fit = fit
         self._common = CommonSamples(fit.moments, seed=1)
         self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
         self.accuracy = self._accuracy()

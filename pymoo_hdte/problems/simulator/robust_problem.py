@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
+from pymoo_hdte.problems.simulator.asked import place_of
 from pymoo_hdte.problems.simulator.identity import identity
 from pymoo_hdte.problems.simulator.inputs import Design, Inputs
 from pymoo_hdte.problems.simulator.problem import SimulatorProblem
@@ -24,7 +25,6 @@ from pymoo_hdte.problems.simulator.statistics import (
     RobustConstraint,
     Statistic,
     Std,
-    place_of,
 )
 from pymoo_hdte.problems.simulator.trust import (
     failing,

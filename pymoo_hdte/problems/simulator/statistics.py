@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.checks import InvalidInput, one_of, real_number
+from pymoo_hdte.checks import one_of, real_number
 from pymoo_hdte.problems.simulator.around import Around
 from pymoo_hdte.surrogate.moments import divide_or_zero
 
@@ -275,39 +274,3 @@ class WorstCase(Statistic):
 def reach_of(values: Array, around: Around) -> Array:
     """Return how many deviations values lie from the mean, shape (n,), 0 without scatter."""
     return np.abs(divide_or_zero(values - around.mean, around.std))
-
-
-def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
-    """Return the position of the statistic's response.
-
-    Raises
-    ------
-    InvalidInput
-        If there is none of that name, or none is named and there are several.
-    """
-    if statistic.response is None and len(responses) == 1:
-        return 0
-    if statistic.response not in responses:
-        raise InvalidInput("response of a statistic", statistic.response, f"one of {responses}")
-    return responses.index(statistic.response)
-
-
-def asked_of(
-    objectives: Sequence[Statistic],
-    constraints: Sequence[RobustConstraint],
-    responses: tuple[str, ...],
-) -> list[tuple[Statistic, float, float, int]]:
-    """Return objectives and constraints as statistic, factor, bound and place of the response.
-
-    What is to be small is the factor times the statistic's value, less the bound.
-
-    Raises
-    ------
-    InvalidInput
-        As `place_of`.
-    """
-    asked = [(one, one.sign, 0.0) for one in objectives]
-    for limit in constraints:
-        one, side = limit.statistic, limit.side
-        asked.append((one, side * one.sign, side * limit.bound))
-    return [(*one, place_of(one[0], responses)) for one in asked]

@@ -1,0 +1,44 @@
+"""Objectives and constraints of a problem as statistics of its responses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic
+
+
+def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
+    """Return the position of the statistic's response.
+
+    Raises
+    ------
+    InvalidInput
+        If there is none of that name, or none is named and there are several.
+    """
+    if statistic.response is None and len(responses) == 1:
+        return 0
+    if statistic.response not in responses:
+        raise InvalidInput("response of a statistic", statistic.response, f"one of {responses}")
+    return responses.index(statistic.response)
+
+
+def asked_of(
+    objectives: Sequence[Statistic],
+    constraints: Sequence[RobustConstraint],
+    responses: tuple[str, ...],
+) -> list[tuple[Statistic, float, float, int]]:
+    """Return objectives and constraints as statistic, factor, bound and place of the response.
+
+    What is to be small is the factor times the statistic's value, less the bound.
+
+    Raises
+    ------
+    InvalidInput
+        As `place_of`.
+    """
+    asked = [(one, one.sign, 0.0) for one in objectives]
+    for limit in constraints:
+        one, side = limit.statistic, limit.side
+        asked.append((one, side * one.sign, side * limit.bound))
+    return [(*one, place_of(one[0], responses)) for one in asked]
