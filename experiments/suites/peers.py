@@ -28,7 +28,7 @@ def _directions(n_obj: int) -> NDArray[np.float64]:
 
 def _como(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
     # Imported where it is used, because the extra may be absent.
-    from experiments.suites.como import run_como
+    from experiments.contest.peers_como import run_como
 
     return run_como(problem, budgets, seed)
 
