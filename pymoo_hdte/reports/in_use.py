@@ -89,7 +89,7 @@ def _opened(file: Path) -> IO[str]:
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
             return open(file, "a+", encoding="utf-8")
-        except FileNotFoundError:
+        except (FileNotFoundError, FileExistsError):
             # Whoever held it may just be removing the folders that it made.
             if not left:
                 raise

@@ -52,7 +52,9 @@ def python(*arguments, **options):
 
 
 def interrupted(program, arguments, module, folder):
-    code = MINDED + AT_IMPORT.format(module=module, arguments=[program, *arguments], program=program)
+    code = MINDED + AT_IMPORT.format(
+        module=module, arguments=[program, *arguments], program=program
+    )
     return python("-c", code, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)})
 
 
