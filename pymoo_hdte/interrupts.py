@@ -51,6 +51,10 @@ def ended_quietly(name: str, main: Callable[[], int]) -> int:
             if minded:
                 # The work is done: what is left is the end of the interpreter.
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
+    except KeyboardInterrupt:
+        # Within `orderly`, where there was nothing to put in order.
+        _tell(name)
+        return INTERRUPTED
     except BrokenPipeError:
         _to_nowhere()
         return UNREAD
@@ -74,11 +78,15 @@ def orderly() -> Iterator[None]:
 def _leave(name: str, *signal_and_frame: Any) -> None:
     for give_back in GIVEN_BACK:
         give_back()
+    _tell(name)
+    os._exit(INTERRUPTED)
+
+
+def _tell(name: str) -> None:
     # Not print(): its lock may be held by the code that was interrupted. A terminal may have a bar.
     line = "\n" if os.isatty(2) else ""
     with suppress(OSError):
         os.write(2, f"{line}{name}: interrupted, nothing was written\n".encode())
-    os._exit(INTERRUPTED)
 
 
 def _to_nowhere() -> None:

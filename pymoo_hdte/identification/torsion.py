@@ -46,7 +46,7 @@ class TorsionLoop:
     ------
     InvalidInput
         If the torque does not run 0 -> +T -> 0 -> -T -> 0 once, a positive torque turns the output
-        backwards, or the loop gives work, which no drive does.
+        backwards or not at all, or the loop gives work, which no drive does.
 
     Examples
     --------
@@ -66,11 +66,14 @@ class TorsionLoop:
         self._check_sense()
 
     def _check_sense(self) -> None:
-        """Refuse a loop that turns the wrong way: its torsion, or the way around it."""
+        """Refuse a loop without twist, or that turns the wrong way: its torsion, or around it."""
         torque, torsion = self.torque, self.torsion
         compliance = float(
             (torque - torque.mean()) @ torsion / np.sum((torque - torque.mean()) ** 2)
         )
+        if np.ptp(torsion) == 0.0:
+            allowed = "some twist: the angle was not recorded, or in too coarse steps"
+            raise InvalidInput("torsion", float(torsion[0]), allowed)
         if compliance < 0.0:
             allowed = (
                 "above 0: a positive torque twists the output forwards. Likely torque and angle "

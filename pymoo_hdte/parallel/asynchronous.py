@@ -127,6 +127,10 @@ class _SteadyState:
                 break
             number, output = self._evaluations.next()
             self._tell(*self._under_way.pop(number), output)
+        if not self._swarm.is_initialized and self._arrived:
+            # Fewer evaluations than the first swarm has designs.
+            self._swarm.pop_size = len(self._arrived)
+            self._tell_the_first()
 
     def _start(self) -> None:
         move = None
@@ -160,5 +164,8 @@ class _SteadyState:
         else:
             self._arrived.append(particle)
             if len(self._arrived) == swarm.pop_size:
-                self._evaluations.refuse_failures()
-                swarm.tell(infills=Population(self._arrived))
+                self._tell_the_first()
+
+    def _tell_the_first(self) -> None:
+        self._evaluations.refuse_failures()
+        self._swarm.tell(infills=Population(self._arrived))

@@ -18,6 +18,9 @@ from pymoo_hdte.interrupts import GIVEN_BACK
 if sys.platform != "win32":
     import fcntl
 
+_TRIES = 100
+"""How often a folder that vanishes while a file is opened in it is made again; by hand."""
+
 
 @contextmanager
 def in_use(file: Path, field: str, folder: Path) -> Iterator[None]:
@@ -46,7 +49,6 @@ def in_use(file: Path, field: str, folder: Path) -> Iterator[None]:
         yield
         return
     made = [one for one in file.parents if not one.exists()]
-    file.parent.mkdir(parents=True, exist_ok=True)
     lock = _locked(file, field, folder)
 
     def release() -> None:
@@ -69,16 +71,29 @@ def in_use(file: Path, field: str, folder: Path) -> Iterator[None]:
 def _locked(file: Path, field: str, folder: Path) -> IO[str]:
     """Return the open file with its lock, as soon as it is the file of that name."""
     while True:
-        lock = open(file, "a+", encoding="utf-8")  # noqa: SIM115
+        lock = _opened(file)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if file.exists() and os.path.samestat(file.stat(), os.fstat(lock.fileno())):
-                return lock
+            with suppress(FileNotFoundError):
+                if os.path.samestat(file.stat(), os.fstat(lock.fileno())):
+                    return lock
         except BlockingIOError:
             allowed = f"a folder that no other command writes to; {_holder(lock)}"
             lock.close()
             raise InvalidInput(field, str(folder), allowed) from None
         lock.close()
+
+
+def _opened(file: Path) -> IO[str]:
+    for left in reversed(range(_TRIES)):
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            return open(file, "a+", encoding="utf-8")
+        except (FileNotFoundError, FileExistsError):
+            # Whoever held it may just be removing the folders that it made.
+            if not left:
+                raise
+    raise AssertionError
 
 
 def _describe(lock: IO[str]) -> None:

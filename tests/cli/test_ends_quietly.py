@@ -6,15 +6,18 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command_line import COMMANDS, MISTAKE
-from pymoo_hdte.interrupts import INTERRUPTED, UNREAD
+from pymoo_hdte.interrupts import INTERRUPTED, UNREAD, ended_quietly, orderly
 from pymoo_hdte.reports.in_use import in_use
 
 ROOT = Path(__file__).parents[2]
+# Whatever this process inherits: a shell starts programs in the background without Ctrl-C.
+MINDED = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
 AT_IMPORT = """
 import os, runpy, signal, sys
 class Interrupting:
@@ -49,7 +52,9 @@ def python(*arguments, **options):
 
 
 def interrupted(program, arguments, module, folder):
-    code = AT_IMPORT.format(module=module, arguments=[program, *arguments], program=program)
+    code = MINDED + AT_IMPORT.format(
+        module=module, arguments=[program, *arguments], program=program
+    )
     return python("-c", code, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)})
 
 
@@ -129,6 +134,44 @@ def test_folders_made_for_the_lock_go_with_it(tmp_path):
         with allowed, again:
             pass
     assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_taken_in_turns_has_one_holder_and_no_mishap(tmp_path):
+    inside, mishaps, turns = [], [], []
+
+    def take():
+        for _ in range(150):
+            try:
+                with in_use(tmp_path / "a" / "b" / "lock", "folder", tmp_path):
+                    inside.append(1)
+                    turns.append(len(inside))
+                    inside.pop()
+            except InvalidInput:
+                pass
+            except Exception as error:
+                mishaps.append(error)
+
+    threads = [Thread(target=take) for _ in range(4)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert not mishaps
+    assert turns
+    assert set(turns) == {1}
+
+
+def test_ctrl_c_where_nobody_has_put_things_in_order_yet(capfd):
+    def waits_for_a_scheduler():
+        with orderly():
+            raise KeyboardInterrupt
+
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        assert ended_quietly("program", waits_for_a_scheduler) == INTERRUPTED
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert capfd.readouterr().err == "program: interrupted, nothing was written\n"
 
 
 def test_a_second_run_of_the_experiments_is_refused(tmp_path):

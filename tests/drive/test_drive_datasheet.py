@@ -44,6 +44,14 @@ def test_orders_follow_from_the_teeth():
     assert orders == {"e_m": 2.0, "e_g": 2.02, "e_w": 1.0, "e_p": 2.0, "e_h": 404.0}
 
 
+def test_without_a_word_the_circular_spline_is_held(tmp_path):
+    lines = [one for one in TEXT.splitlines() if "held =" not in one]
+    path = tmp_path / "sheet.toml"
+    path.write_text("\n".join(lines))
+    # 200 and 202 teeth.
+    assert load_datasheet(path).ratio == 100.0
+
+
 @pytest.mark.parametrize(
     ("held", "ratio", "of_output", "of_teeth"),
     [("circular_spline", 50.0, 2.04, 204.0), ("flexspline", 51.0, 2.0 * 100 / 102, 200.0)],
@@ -111,7 +119,6 @@ STIFFNESS = 'stiffness = { value = 2.583e4, unit = "N.m/rad" }'
         ("flexspline = 200", "flexspline = 203", "circular_spline_teeth", "204"),
         ("flexspline = 200", "flexspline = 200.5", "teeth.flexspline", "whole number"),
         ("flexspline = 200", "flexspline = 201", "circular_spline_teeth", "likely a tooth number"),
-        ('held = "flexspline"', "", "teeth.held", "circular_spline, flexspline"),
         ('held = "flexspline"', 'held = "housing"', "teeth.held", "'circular_spline'"),
         ('as_held = "circ', 'as_held = "c', "teeth.orders_as_held", "'circular_spline'"),
         ('class = "e_h"', 'class = "e_x"', "error class of dfi1", "'e_m'"),

@@ -245,6 +245,12 @@ def test_bad_input_is_named(call, message):
         call()
 
 
+def test_a_loop_without_twist_is_refused():
+    torque = 9.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 40))
+    with pytest.raises(InvalidInput, match="not recorded"):
+        TorsionLoop(torque, np.full(40, 0.1))
+
+
 def test_a_loop_that_turns_the_wrong_way_is_refused_with_the_likely_cause():
     loop = TorsionBench().record(K, np.random.default_rng(3))
     with pytest.raises(InvalidInput, match=r"slope of torsion over torque is -.*opposite senses"):

@@ -29,6 +29,7 @@ from pymoo_hdte.surrogate import Box
 
 TIME = np.arange(20.0) / 100.0
 WAVE = np.sin(TIME)
+LOOP = np.sin(np.linspace(0.0, 2.0 * np.pi, 40))
 RUNNING = {
     "name": "run",
     "role": "train",
@@ -67,7 +68,7 @@ VALID = {
     ),
     "TorsionLoop": (
         TorsionLoop,
-        {"torque": 40.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 40)), "torsion": np.arange(40.0)},
+        {"torque": 40.0 * LOOP, "torsion": 1e-3 * LOOP},
     ),
     "NoLoadRun": (NoLoadRun, {"speed": np.arange(1.0, 6.0), "torque": np.arange(5.0)}),
     "BelievedValue": (BelievedValue, {"value": 1.0, "tolerance": 0.1}),

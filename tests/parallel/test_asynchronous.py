@@ -5,6 +5,7 @@ import pytest
 from costly_problems import Parabolas
 from pymoo.indicators.hv import HV
 from pymoo.optimize import minimize
+from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
 
 from pymoo_hdte.algorithms import AMPMOPSO, CompactSwarm, ElitistSwarm
 from pymoo_hdte.checks import InvalidInput
@@ -92,6 +93,19 @@ def test_a_fifth_lost_costs_no_more_than_its_evaluations(optimise):
 def hanging(seed):
     random_state = np.random.default_rng(seed)
     return lambda: random_state.lognormal() if random_state.random() < 0.9 else np.inf
+
+
+@pytest.mark.parametrize("swarm", [CompactSwarm(), ElitistSwarm(pop_size=16)])
+def test_a_run_shorter_than_its_first_swarm_gives_the_best_of_what_it_evaluated(swarm):
+    problem = on(VirtualWorkers(3, lognormal(1)), {"raises": 0.2})
+    seen = []
+    problem.callback = lambda X, out: seen.append((*out["F"][0], out["G"][0, 0]))
+    with pytest.warns(RuntimeWarning, match="designs were lost"):
+        result = minimize_asynchronously(problem, swarm, ("n_eval", 7), seed=1)
+    assert len(seen) == 7
+    allowed = np.array([row[:2] for row in seen if row[2] <= 0.0])
+    front = allowed[NonDominatedSorting().do(allowed, only_non_dominated_front=True)]
+    assert sorted(result.F.tolist()) == sorted(front.tolist())
 
 
 def test_nothing_but_failures_ends_the_run():

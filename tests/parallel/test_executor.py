@@ -157,8 +157,15 @@ def finished(folder):
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
-@pytest.mark.parametrize("optimise", OPTIMISERS)
-@pytest.mark.parametrize("executor", [None, 2])
+@pytest.mark.parametrize(
+    ("executor", "optimise"),
+    [
+        (None, "generations"),
+        pytest.param(None, "asynchronous", marks=pytest.mark.nightly),
+        pytest.param(2, "generations", marks=pytest.mark.nightly),
+        (2, "asynchronous"),
+    ],
+)
 def test_after_a_kill_nothing_finished_is_evaluated_again(tmp_path, executor, optimise):
     arguments = executor, OPTIMISERS[optimise]
     kept = killed(tmp_path, 25, *arguments)

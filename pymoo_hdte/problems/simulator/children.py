@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event, Lock, Timer
+from threading import Event, RLock, Timer
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
@@ -58,13 +58,20 @@ class Children:
     """Processes that make one call at a time each, started when there is none to spare."""
 
     def __init__(self) -> None:
-        self._lock = Lock()
+        self._lock = RLock()
         self._idle: list[subprocess.Popen[bytes]] = []
         self._all: set[subprocess.Popen[bytes]] = set()
+        self._process = os.getpid()
+        self.round = 0
 
-    def call(self, written: bytes, time_limit: float | None) -> Any:
-        """Return what a `parcel` gives, or a `Failure`; seconds count once it is unpacked."""
-        child, over = self._take(), Event()
+    def call(self, written: bytes, time_limit: float | None, round_: int | None = None) -> Any:
+        """Return what a `parcel` gives, or a `Failure`; seconds count once it is unpacked.
+
+        A call of a ``round`` that was ended before it began is lost.
+        """
+        child, over = self._take(round_), Event()
+        if child is None:
+            return Failure(LOST, "ended before it began")
 
         def stop() -> None:
             over.set()
@@ -102,10 +109,19 @@ class Children:
             timer.cancel()
             timer.join()
 
-    def _take(self) -> subprocess.Popen[bytes]:
+    def _take(self, round_: int | None) -> subprocess.Popen[bytes] | None:
+        if self._process != os.getpid():
+            # A fork of ours: pipes to the processes belong to the one that started them.
+            self.__init__()  # type: ignore[misc]
         with self._lock:
-            if self._idle:
-                return self._idle.pop()
+            if round_ is not None and round_ != self.round:
+                return None
+            while self._idle:
+                child = self._idle.pop()
+                if child.poll() is None:
+                    return child
+                # It was ended from outside while it waited, for memory, say.
+                self._drop(child)
             # Of a group of its own: programs that the simulator starts end with it, and Ctrl-C in
             # the terminal does not reach it.
             child = subprocess.Popen(
@@ -116,7 +132,9 @@ class Children:
             )
             self._all.add(child)
         assert child.stdin is not None
-        send(child.stdin, pickle.dumps(sys.path))
+        # If it was ended meanwhile, the call will notice.
+        with suppress(OSError):
+            send(child.stdin, pickle.dumps(sys.path))
         return child
 
     def _drop(self, child: subprocess.Popen[bytes]) -> None:
@@ -130,8 +148,11 @@ class Children:
         child.wait()
 
     def end(self) -> None:
-        """End all processes; calls under way count as lost."""
+        """End all processes; calls under way or still to begin in this round count as lost."""
+        if self._process != os.getpid():
+            return
         with self._lock:
+            self.round += 1
             idle, self._idle = self._idle, []
             busy = self._all - set(idle)
         for child in busy:

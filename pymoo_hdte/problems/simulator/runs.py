@@ -171,11 +171,11 @@ class Simulator:
         self, rows: Sequence[tuple[float, ...]]
     ) -> Iterable[tuple[tuple[float, ...], Any]]:
         """Yield runs as they end, so that a finished one is kept whatever happens to the others."""
-        for row in rows:
-            inputs = dict(zip(self.names, row, strict=True))
-            # Not by a function of ours: processes beside workers would import this package for it.
-            self.workers.start(row, partial(self.function, **inputs))
         try:
+            for row in rows:
+                inputs = dict(zip(self.names, row, strict=True))
+                # Not by a function of ours: processes beside workers would import our package.
+                self.workers.start(row, partial(self.function, **inputs))
             for _ in rows:
                 row, gave = self.workers.next()  # type: ignore[assignment]
                 if isinstance(gave, Failure):

@@ -98,8 +98,9 @@ class Workers:
         if not isinstance(call, bytes):
             asked = call
         else:
-            within = self._children.call if self._own else call_in_child
-            asked = (within, call, self.time_limit)
+            asked = (call_in_child, call, self.time_limit)
+            if self._own:
+                asked = (self._children.call, call, self.time_limit, self._children.round)
         try:
             future = self._executor.submit(*asked, **options)
         except BrokenExecutor:
