@@ -17,7 +17,7 @@ from experiments.anytime.moments import COMMON, EXACT, FRESH
 from experiments.comparison.references import true_front
 from experiments.published_values import TABLE_7
 from experiments.runner.campaign import Campaign
-from experiments.runner.committed import committed_file, read_rows, table_with_origin
+from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
 from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.io.text_table import csv_text
@@ -152,7 +152,7 @@ def run_scores(campaign: Campaign, extent: Extent) -> Scores:
             for counted, algorithm in dict.fromkeys(key[:2] for key in found):
                 case = Case(part.model, part.moments, counted, population, budget, algorithm)
                 rows = [found[counted, algorithm, 1 + seed] for seed in range(part.seeds)]
-                values[case] = np.vectorize(_rounded)(np.array(rows))
+                values[case] = np.vectorize(rounded)(np.array(rows), DIGITS)
     return Scores(values, seconds)
 
 
@@ -166,11 +166,6 @@ def _jobs(part: Part, extent: Extent) -> list[AnytimeRun]:
 
 def _is(job: AnytimeRun, population: int, algorithm: str | None = None) -> bool:
     return job.population == population and algorithm in (None, job.algorithm)
-
-
-def _rounded(value: float) -> float:
-    """Return the number that the CSV keeps, so that both ways to the report give the same."""
-    return float(f"{value:.{DIGITS}g}")
 
 
 def format_scores(scores: Scores) -> str:

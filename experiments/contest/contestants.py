@@ -45,6 +45,10 @@ class Contestant:
         """Whether its library is installed."""
         return find_spec(self.library) is not None
 
+    def budgets_of_runs(self, budgets: tuple[int, ...]) -> list[tuple[int, ...]]:
+        """Return the budgets that share a run: all, unless it starts anew for each."""
+        return [(budget,) for budget in budgets] if self.starts_anew else [budgets]
+
 
 def run_random(problem: Problem, budgets: Sequence[int], seed: int) -> list[Offer]:
     """Draw designs uniformly and return the feasible objectives after each budget."""

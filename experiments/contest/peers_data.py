@@ -21,7 +21,7 @@ from experiments.contest.contestants import EVERYONE
 from experiments.contest.job import EVALUATIONS, SPENT, ContestRun
 from experiments.contest.problems import BENCHMARKS, EVERY
 from experiments.runner.campaign import Campaign, Run
-from experiments.runner.committed import committed_file, read_rows, table_with_origin
+from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context
 from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.algorithms.crowding import least_crowded
@@ -129,7 +129,7 @@ def contest_scores(
     jobs = [
         ContestRun(*entry, budget)
         for entry in entries
-        for budget in budgets_of_runs(entry[1], budgets)
+        for budget in EVERYONE[entry[1]].budgets_of_runs(budgets)
     ]
     shape = (len(problems), len(algorithms), len(budgets), len(seeds))
     values = np.full((len(MEASURES), *shape), np.nan)
@@ -147,7 +147,7 @@ def contest_scores(
         tuple(algorithms),
         budgets,
         tuple(seeds),
-        np.vectorize(_rounded)(values),
+        np.vectorize(rounded)(values, DIGITS),
         spent,
         np.median(seconds, axis=-1),
     )
@@ -157,13 +157,6 @@ def takes_part(algorithm: str, problem: str) -> bool:
     """Say whether an algorithm takes the problem at all."""
     unconstrained = not EVERY[problem].family.startswith("constrained")
     return unconstrained or EVERYONE[algorithm].takes_constraints
-
-
-def budgets_of_runs(algorithm: str, budgets: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return the budgets that share a run: all, unless the algorithm starts anew for each."""
-    if EVERYONE[algorithm].starts_anew:
-        return [(budget,) for budget in budgets]
-    return [budgets]
 
 
 @cache
@@ -181,11 +174,6 @@ def measure(problem: str, run: Run, budget: int) -> tuple[list[float], int]:
     crowding = indicators(front[least_crowded(front, FINAL_SIZE)])
     measured = [*even, crowding.igd, crowding.hypervolume]
     return measured, int(rows[0, run.columns.index(SPENT)])
-
-
-def _rounded(value: float) -> float:
-    """Return the number that the CSV keeps, so that both ways to the report give the same."""
-    return float(f"{value:.{DIGITS}g}")
 
 
 def format_scores(scores: Scores) -> str:

@@ -39,6 +39,11 @@ def table_with_origin(columns: Sequence[str], rows: Iterable[Iterable[Any]], **f
     return f"# {json.dumps(origin)}\n" + csv_text(columns, rows)
 
 
+def rounded(value: float, digits: int) -> float:
+    """Return the number that a CSV keeps, so that both ways to a report give the same."""
+    return float(f"{value:.{digits}g}")
+
+
 def read_origin(path: Path) -> dict[str, Any]:
     """Return what the first line of a table with an origin says.
 

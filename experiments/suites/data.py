@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.runner.campaign import Run
-from experiments.runner.committed import committed_file, read_rows, table_with_origin
+from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context, require
 from experiments.runner.store import write_atomically
 from experiments.suites.coco import EXTRA
@@ -60,11 +60,18 @@ class Outcome:
         """Take what finished jobs give, rounded as the CSV keeps it."""
         for job, run in zip(jobs, runs, strict=True):
             if isinstance(job, BbobRun):
-                self.bbob[job] = {int(mark): _rounded(share) for mark, share in run.values}
+                self.bbob[job] = {int(mark): rounded(share, DIGITS) for mark, share in run.values}
                 continue
             for budget, *rest in run.values.tolist():
                 key = job.problem, job.algorithm, int(budget), job.seed
-                self.suites[key] = tuple(map(_rounded, rest))
+                self.suites[key] = tuple(rounded(number, DIGITS) for number in rest)
+
+    def has(self, job: SuiteRun | BbobRun) -> bool:
+        """Say whether a job's run is there, at all its budgets."""
+        if isinstance(job, BbobRun):
+            return job in self.bbob
+        keys = ((job.problem, job.algorithm, budget, job.seed) for budget in job.budgets)
+        return all(key in self.suites for key in keys)
 
     def budgets(self, suite: str) -> list[int]:
         """Return the budgets at which a suite was judged, rising."""
@@ -148,13 +155,17 @@ def outcome_for(context: Context) -> Outcome:
         jobs: list[SuiteRun | BbobRun] = list(part.jobs())
         name = part.suite if isinstance(part, SuitePart) else f"bbob-biobj, {part.algorithm}"
         outcome.add(jobs, context.campaign.run(jobs, name))
-        for file, text in ((NAME, suites_text(outcome)), (BBOB, bbob_text(outcome))):
-            write_atomically(context.out / NAME / f"{file}.csv", text.encode())
+        write_outcome(outcome, context.out / NAME)
     return outcome
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+def write_outcome(outcome: Outcome, folder: Path, command: str = COMMAND) -> None:
+    """Write both CSV files into a folder."""
+    for name, text in (
+        (NAME, suites_text(outcome, command)),
+        (BBOB, bbob_text(outcome, command)),
+    ):
+        write_atomically(folder / f"{name}.csv", text.encode())
 
 
 def suites_text(outcome: Outcome, command: str = COMMAND) -> str:

@@ -13,9 +13,7 @@ from pathlib import Path
 from experiments.runner.campaign import read_run
 from experiments.runner.committed import DATA
 from experiments.runner.result import Cell, Column, Table
-from experiments.runner.store import write_atomically
-from experiments.suites.data import BBOB, COMMAND, NAME, Outcome, bbob_text, suites_text
-from experiments.suites.jobs import BbobRun
+from experiments.suites.data import COMMAND, Outcome, write_outcome
 from experiments.suites.protocol import STORED, BbobPart
 
 STOPPED = f"{COMMAND}, stopped before its end; whole groups of runs only"
@@ -34,19 +32,10 @@ def gathered(folder: Path) -> Outcome:
 
 def kept_table(outcome: Outcome) -> Table:
     """Show of which parts of the stored protocol how many groups are there."""
-    ran = set(outcome.suites)
     rows: list[tuple[Cell, ...]] = []
     for part in STORED:
         groups = [*part.groups()]
-        whole = sum(
-            all(
-                (job in outcome.bbob)
-                if isinstance(job, BbobRun)
-                else all((job.problem, job.algorithm, b, job.seed) in ran for b in job.budgets)
-                for job in group
-            )
-            for group in groups
-        )
+        whole = sum(all(map(outcome.has, group)) for group in groups)
         if isinstance(part, BbobPart):
             instances = ", ".join(map(str, part.instances))
             name, budgets = f"bbob-biobj, instances {instances}", part.told
@@ -72,12 +61,7 @@ def kept_table(outcome: Outcome) -> Table:
 
 def main(folder: Path) -> None:
     """Write what was gathered over the stored outcome."""
-    outcome = gathered(folder)
-    for name, text in (
-        (NAME, suites_text(outcome, STOPPED)),
-        (BBOB, bbob_text(outcome, STOPPED)),
-    ):
-        write_atomically(DATA / f"{name}.csv", text.encode())
+    write_outcome(gathered(folder), DATA, STOPPED)
 
 
 if __name__ == "__main__":

@@ -69,8 +69,7 @@ class SuitePart:
     def _group(self, problem: str, seed: int) -> Iterable[SuiteRun]:
         for algorithm in self.algorithms:
             if takes(algorithm, problem_of(problem)):
-                anew = PEERS[algorithm].starts_anew
-                for budgets in [(b,) for b in self.budgets] if anew else [self.budgets]:
+                for budgets in PEERS[algorithm].budgets_of_runs(self.budgets):
                     yield SuiteRun(problem, algorithm, seed, budgets)
 
 

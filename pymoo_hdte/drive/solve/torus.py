@@ -113,15 +113,16 @@ class Torus:
         self._phases = np.array([axis.ravel() for axis in mesh])
         self.size = self._phases.shape[1]
         lines = self._multiples
-        self._differences = self._flat(lines[:, None] - lines)
-        self._sums = self._flat(lines[:, None] + lines)
+        self._differences = self._flat(lines[:, None] - lines, self._shape)
+        self._sums = self._flat(lines[:, None] + lines, self._shape)
         # The real transform has the lines whose last multiple is not negative, the others by their
         # conjugates; of a line at 0 in that multiple both halves have a place.
         self._half_shape = (*self._shape[:-1], self._shape[-1] // 2 + 1)
         self._reversed = lines[:, -1] < 0
-        self._kept = self._half(np.where(self._reversed[:, None], -lines, lines))
+        positive = np.where(self._reversed[:, None], -lines, lines)
+        self._kept = self._flat(positive, self._half_shape)
         self._twice = np.flatnonzero(lines[:, -1] == 0)
-        self._conjugates = self._half(-lines[self._twice])
+        self._conjugates = self._flat(-lines[self._twice], self._half_shape)
         self._axes = tuple(range(1, 1 + len(self._shape)))
         self._places: dict[float, tuple[int, bool] | None] = {}
         self._rate = 1j * self.orders
@@ -153,15 +154,10 @@ class Torus:
             np.concatenate([analysis[:, ::2], analysis[:, 1::2]], axis=1).T,
         )
 
-    def _flat(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
-        """Return the indices of multiples (..., n_angles) in a flattened transform of the grid."""
+    def _flat(self, multiples: NDArray[np.int_], shape: tuple[int, ...]) -> NDArray[np.int_]:
+        """Return the indices of multiples (..., n_angles) in a flattened transform of a shape."""
         wrapped = np.moveaxis(multiples % np.array(self._shape), -1, 0)
-        return np.asarray(np.ravel_multi_index(tuple(wrapped), self._shape))
-
-    def _half(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
-        """Return the indices of multiples in a flattened real transform of the grid."""
-        wrapped = np.moveaxis(multiples % np.array(self._shape), -1, 0)
-        return np.asarray(np.ravel_multi_index(tuple(wrapped), self._half_shape))
+        return np.asarray(np.ravel_multi_index(tuple(wrapped), shape))
 
     def phase(self, order: float) -> NDArray[np.float64]:
         """Return ``order`` times the input angle on the grid, shape (G,), up to whole turns."""
