@@ -66,6 +66,21 @@ def test_hysteresis_of_any_strength_converges_under_load(name, force, torsion):
     assert np.all(balance.converged)
 
 
+@pytest.mark.parametrize("force", [2.5, 8.0])
+def test_springs_stiffer_than_the_gearing_converge_at_any_load_and_speed(force):
+    """Most of them stick: without their memory the steps cycle between sticking and slipping."""
+    coefficients = drive("calibrated", force, 4e-5)
+    speed, load = np.meshgrid([20.0, 100.0, 209.4], [0.0, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0])
+    balance = harmonic_balance(
+        coefficients.rows(np.zeros(speed.size, dtype=int)),
+        input_speed=speed.ravel(),
+        load_torque=load.ravel(),
+        motor=SpeedLoop(0.02, 0.5),
+        tolerance=1e-8,
+    )
+    assert np.all(balance.converged)
+
+
 def test_springs_that_slip_bear_their_force():
     """Without a static error nothing turns the torsion back: the load has wound it up for good."""
     coefficients = drive("published", 2.0, 1e-12)

@@ -1,9 +1,8 @@
 """Steady state of the full equations, laws at ports included, by harmonic balance over the angle.
 
 The terms of `angle_equations` are evaluated on a grid (`torus`) and brought to zero harmonic by
-harmonic (Newton's method; alternating time and frequency, Cameron and Griffin, J. Applied Mechanics
-56, 1989); the coupling of speed and torsion is weak and treated by iteration. Hysteresis enters the
-step with its memory: the torque of a sticking spring depends on the torsion where it last slipped.
+harmonic (`newton`; alternating time and frequency, Cameron and Griffin, J. Applied Mechanics 56,
+1989); the coupling of speed and torsion is weak and treated by iteration.
 """
 
 from __future__ import annotations
@@ -12,40 +11,28 @@ import numpy as np
 
 # Parts of SciPy load when they are first used: signals and statistics take longer than a study.
 import scipy
-from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive.solve.angle_equations import AngleEquations, TorsionMotion, Values, mean
+from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values
 from pymoo_hdte.drive.solve.coefficients import Coefficients
+from pymoo_hdte.drive.solve.newton import Place, nearer
 from pymoo_hdte.drive.solve.steady_motion import (
     BY_CASE,
     CONSTANT_TORQUE,
-    Phasors,
     SpeedLoop,
     SteadyMotion,
 )
 from pymoo_hdte.drive.solve.torus import (
-    Matrices,
     Torus,
     fundamental_orders,
     largest_multiples,
-    multiplication,
     shared_torus,
-    stacked,
-    unstacked,
 )
 
 HIGHEST = 8
 """Least number of harmonics of the input turn that are kept."""
 STEPS = 50
 """Most steps of Newton's method."""
-_WITHOUT_MEMORY = 10
-"""Steps before those that include the memory of hysteresis, which cost ten times as much."""
-_NEARLY_CONSTANT = 0.02
-"""Relative variation of the mesh stiffness up to which Newton's step uses its mean."""
-_SHRINKS = 0.9
-"""A full step is taken again only where it is shorter than this share of the previous one."""
-_LEAST_PART = 0.1
 _ROWS_AT_ONCE = 64
 
 
@@ -193,19 +180,12 @@ class _Solver:
         """Iterate until the torsion converges; rows that do not are marked."""
         equations, left = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
-        before, part = np.full_like(size, np.inf), np.ones_like(size)
-        for step in range(steps):
-            torsion, energy = self.torsion[left], self.energy[left]
-            if step == _WITHOUT_MEMORY:
-                before[left], part[left] = np.inf, 1.0
-            recall = equations.recall_matrix(torsion) if step >= _WITHOUT_MEMORY else None
-            change, energy_change = _newton_step(equations, torsion, energy, size[left], recall)
-            longest = np.abs(change).max(axis=1, keepdims=True)
-            part[left] = _part(part[left], longest <= _SHRINKS * before[left])
-            before[left] = longest
-            self.torsion[left] = torsion + part[left] * change
-            self.energy[left] = equations.at_wanted_speed(energy + part[left] * energy_change)
-            settled = longest[:, 0] <= tolerance * size[left, 0]
+        at = Place(equations, self.torsion, self.energy)
+        for _ in range(steps):
+            change, energy_change = at.newton_step(size[left])
+            settled = np.abs(change).max(axis=1) <= tolerance * size[left, 0]
+            at = nearer(at, change, energy_change, settled)
+            self.torsion[left], self.energy[left] = at.torsion, at.energy
             self.converged[left] = settled
             if np.all(settled):
                 break
@@ -213,6 +193,7 @@ class _Solver:
             if 2 * np.sum(settled) >= len(left):
                 left = left[~settled]
                 equations = self.equations.rows(left)
+                at = Place(equations, self.torsion[left], self.energy[left])
 
     def result(self) -> SteadyMotion:
         """Return the steady state as it is now."""
@@ -233,66 +214,3 @@ class _Solver:
             energy=self.energy,
             converged=self.converged,
         )
-
-
-def _part(part: Values, shrinks: NDArray[np.bool_]) -> Values:
-    """Return the part of a step to take: between kinks, full steps may cycle."""
-    longer, shorter = np.minimum(2.0 * part, 1.0), np.maximum(0.5 * part, _LEAST_PART)
-    return np.where(shrinks, longer, shorter)
-
-
-def _newton_step(
-    equations: AngleEquations,
-    torsion: Phasors,
-    energy: Phasors,
-    size: Values,
-    recall: Matrices | None,
-) -> tuple[Phasors, Phasors]:
-    """Return a Newton step of torsion and E together, at most ``size`` (n, 1) of the torsion.
-
-    ``recall`` is what laws with a memory add to its matrix.
-
-    E is eliminated: near the steady state it answers to the mesh torque harmonic by harmonic.
-    """
-    motion = equations.motion(torsion, energy)
-    operator = equations.coefficients.ratio * equations.input_operator()
-    impedance, coupling, share = equations.impedance(mean(motion.output_loss), operator)
-    missing = equations.input_residual(motion, equations.loop_torque(motion))
-    energy_change = -equations.coefficients.ratio * missing / operator
-    energy_change[:, 0] = 0.0
-    right = (equations.output_residual(motion) + coupling * energy_change) / share
-    change = _torsion_change(equations, motion, impedance, recall, right)
-    # Where a law removes the stiffness, a full step may be far too long.
-    longest = np.abs(change).max(axis=1, keepdims=True)
-    change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
-    energy_change[:, 1:] -= ((right + impedance * change) / operator)[:, 1:]
-    # Nor may the speed come near zero on the way.
-    largest = np.abs(energy_change).sum(axis=1, keepdims=True)
-    slowest = 0.5 * energy[:, :1].real
-    energy_change *= np.minimum(1.0, slowest / np.maximum(largest, 1e-300))
-    return change, energy_change
-
-
-def _torsion_change(
-    equations: AngleEquations,
-    motion: TorsionMotion,
-    impedance: Phasors,
-    recall: Matrices | None,
-    right: Phasors,
-) -> Phasors:
-    """Return the change of the torsion by the linearised mesh for the right-hand side ``right``."""
-    orders, slope = equations.torus.orders, motion.mesh_slope
-    viscous = 1j * orders * equations.speed * mean(motion.mesh_damping) - impedance
-    level = mean(slope)
-    nearly_constant = np.all(np.abs(slope - level) <= _NEARLY_CONSTANT * np.abs(level))
-    if nearly_constant and recall is None:
-        return right / (level + viscous)
-    matrix = equations.torus.product_matrix(slope) + multiplication(viscous)
-    if recall is not None:
-        matrix += recall
-    # The mean has no imaginary part: an equation for it must not be missing.
-    empty = len(orders)
-    matrix[:, empty, empty] = np.abs(matrix[:, 0, 0])
-    real = stacked(right)
-    real[:, empty] = 0.0
-    return unstacked(np.asarray(np.linalg.solve(matrix, real[:, :, None])[:, :, 0]))
