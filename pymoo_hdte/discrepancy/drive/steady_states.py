@@ -44,6 +44,7 @@ def steady_motions(
             tolerance=TOLERANCE,
             start=None if start is None else start.rows(rows),
             steps=steps,
+            tangents=True,
         )
 
     bare, torus = replace(coefficients, laws=()), torus_of(coefficients)

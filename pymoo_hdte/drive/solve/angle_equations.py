@@ -171,14 +171,17 @@ class AngleEquations:
         second = np.where(self._backward[:, None], second[:, ::-1], second)
         return self.torus.back(np.hstack([second, second]))
 
-    def recall_matrix(self, torsion: Phasors) -> Matrices | None:
-        """Return how the mesh torque depends on the torsion elsewhere, if a law has memory.
+    @property
+    def remembers(self) -> bool:
+        """Tell whether a law has memory: its torque depends on the torsion elsewhere."""
+        return any(law.states for _, law in self.coefficients.laws)
+
+    def recall_matrix(self, torsion: Phasors) -> Matrices:
+        """Return how the mesh torque depends on the torsion elsewhere, by laws with memory.
 
         Shape (n, 2 H, 2 H), to be added to what ``mesh_slope`` gives.
         """
         memories = [cast(Memory, law) for _, law in self.coefficients.laws if law.states]
-        if not memories:
-            return None
         along = self._path(self.torus.signal(torsion))
         every = np.arange(self.torus.size, dtype=float)
         passed = self._path(np.tile(every, (len(along), 1)))

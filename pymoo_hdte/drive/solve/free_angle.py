@@ -7,20 +7,25 @@ harmonic (`newton`; alternating time and frequency, Cameron and Griffin, J. Appl
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 # Parts of SciPy load when they are first used: signals and statistics take longer than a study.
 import scipy
+from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.newton import Place, nearer
+from pymoo_hdte.drive.solve.newton import Matrix, Place, nearer
 from pymoo_hdte.drive.solve.steady_motion import (
     BY_CASE,
     CONSTANT_TORQUE,
     SpeedLoop,
     SteadyMotion,
+    Tangents,
 )
 from pymoo_hdte.drive.solve.torus import (
     Torus,
@@ -34,6 +39,8 @@ HIGHEST = 8
 STEPS = 50
 """Most steps of Newton's method."""
 _ROWS_AT_ONCE = 64
+_SHRINKS = 0.1
+"""Share of a step to which the next has to shrink for a nearby case's matrix to serve further."""
 
 
 def torus_of(coefficients: Coefficients) -> Torus:
@@ -61,6 +68,7 @@ def harmonic_balance(
     tolerance: float = 1e-11,
     start: SteadyMotion | None = None,
     steps: int = STEPS,
+    tangents: bool = False,
 ) -> SteadyMotion:
     """Return the steady state of the n designs of ``coefficients``, laws at ports included.
 
@@ -84,6 +92,9 @@ def harmonic_balance(
         Nearby cases, a row each, to begin from; ignored if their torus is another.
     steps : int
         Most steps of Newton's method; a row that would need more has not converged.
+    tangents : bool
+        Whether the result is to serve as ``start`` of cases so near that its matrices are good
+        enough for them, as for difference quotients; it then holds all that it was found from.
 
     Returns
     -------
@@ -111,18 +122,28 @@ def harmonic_balance(
     torus = torus_of(coefficients) if torus is None else torus
     if start is not None and not np.array_equal(start.torus.orders, torus.orders):
         start = None
-    parts = []
+    solvers = []
     for first in range(0, max(n, 1), _ROWS_AT_ONCE):
         rows = slice(first, first + _ROWS_AT_ONCE)
         equations = AngleEquations(coefficients.rows(rows), speed[rows], load[rows], motor, torus)
         solver = _Solver(equations, None if start is None else start.rows(rows))
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
-            solver.solve(tolerance, steps)
-            parts.append(solver.result())
-    return SteadyMotion(
-        torus, *(np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE)
-    )
+            solver.solve(tolerance, steps, _inverses(start, rows, len(equations.speed)))
+        solvers.append(solver)
+    parts = [solver.result() for solver in solvers]
+    values = [np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE]
+    kept = Tangents(_Solved(solvers).inverted, np.arange(n)) if tangents else None
+    return SteadyMotion(torus, *values, tangents=kept)
+
+
+def _inverses(start: SteadyMotion | None, rows: slice, count: int) -> list[Matrix | None]:
+    """Return the inverse matrix of the case from which each row begins; None without one."""
+    if start is None or start.tangents is None:
+        return [None] * count
+    found = start.tangents.rows(rows).inverses()
+    ended = start.converged[rows]
+    return [one if good else None for one, good in zip(found, ended, strict=True)]
 
 
 def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) -> SteadyMotion:
@@ -176,24 +197,38 @@ class _Solver:
         if near is not None:
             self.energy = equations.at_wanted_speed(self.energy)
 
-    def solve(self, tolerance: float, steps: int) -> None:
-        """Iterate until the torsion converges; rows that do not are marked."""
+    def solve(self, tolerance: float, steps: int, inverses: list[Matrix | None]) -> None:
+        """Iterate until the torsion converges; rows that do not are marked.
+
+        Steps are taken with the ``inverses`` of nearby cases as long as they shrink fast.
+        """
         equations, left = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
         at = Place(equations, self.torsion, self.energy)
+        before = np.full(len(left), np.inf)
         for _ in range(steps):
-            change, energy_change = at.newton_step(size[left])
-            settled = np.abs(change).max(axis=1) <= tolerance * size[left, 0]
+            change, energy_change = at.newton_step(size[left], inverses)
+            longest = np.abs(change).max(axis=1)
+            settled = longest <= tolerance * size[left, 0]
             at = nearer(at, change, energy_change, settled)
             self.torsion[left], self.energy[left] = at.torsion, at.energy
             self.converged[left] = settled
             if np.all(settled):
                 break
+            shrinks = longest <= _SHRINKS * before
+            inverses = [one if ok else None for one, ok in zip(inverses, shrinks, strict=True)]
+            before = longest
             # Once half of the rows have converged, only the others are iterated further.
             if 2 * np.sum(settled) >= len(left):
-                left = left[~settled]
+                kept = np.flatnonzero(~settled)
+                left, before, inverses = left[kept], before[kept], [inverses[one] for one in kept]
                 equations = self.equations.rows(left)
                 at = Place(equations, self.torsion[left], self.energy[left])
+
+    def matrix(self, rows: NDArray[np.int_]) -> Matrix | None:
+        """Return the matrices (m, 2 H, 2 H) of Newton's method of some rows as they are now."""
+        equations = self.equations.rows(rows)
+        return Place(equations, self.torsion[rows], self.energy[rows]).matrix(np.arange(len(rows)))
 
     def result(self) -> SteadyMotion:
         """Return the steady state as it is now."""
@@ -214,3 +249,21 @@ class _Solver:
             energy=self.energy,
             converged=self.converged,
         )
+
+
+@dataclass(frozen=True)
+class _Solved:
+    """Blocks of rows that have been solved."""
+
+    solvers: Sequence[_Solver]
+
+    def inverted(self, places: NDArray[np.int_]) -> Matrix | None:
+        """Return the inverse matrices (m, 2 H, 2 H) at some rows, in rising order."""
+        of_blocks = places // _ROWS_AT_ONCE
+        matrices = [
+            solver.matrix(places[of_blocks == block] % _ROWS_AT_ONCE)
+            for block, solver in enumerate(self.solvers)
+            if np.any(of_blocks == block)
+        ]
+        found = [matrix for matrix in matrices if matrix is not None]
+        return np.linalg.inv(np.concatenate(found)) if len(found) == len(matrices) else None

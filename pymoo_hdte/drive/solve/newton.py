@@ -7,12 +7,16 @@ far as it reduces what the equations leave.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values, mean
 from pymoo_hdte.drive.solve.steady_motion import Phasors
 from pymoo_hdte.drive.solve.torus import multiplication, stacked, unstacked
+
+Matrix = NDArray[np.float64]
 
 _NEARLY_CONSTANT = 0.02
 """Relative variation of the mesh stiffness up to which a step uses its mean."""
@@ -54,9 +58,15 @@ class Place:
         energy = self.equations.at_wanted_speed(self.energy + energy_change)
         return Place(self.equations, self.torsion + change, energy)
 
-    def newton_step(self, size: Values) -> tuple[Phasors, Phasors]:
-        """Return a step of torsion and E together, at most ``size`` (n, 1) of the torsion."""
-        change = self._torsion_change()
+    def newton_step(
+        self, size: Values, inverses: Sequence[Matrix | None]
+    ) -> tuple[Phasors, Phasors]:
+        """Return a step of torsion and E together, at most ``size`` (n, 1) of the torsion.
+
+        It is taken with the given inverse of a nearby place for each row, or with the row's own
+        matrix where that is None.
+        """
+        change = self._torsion_change(inverses)
         # Where a law removes the stiffness, a full step may be far too long.
         longest = np.abs(change).max(axis=1, keepdims=True)
         change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
@@ -68,22 +78,44 @@ class Place:
         energy_change *= np.minimum(1.0, slowest / np.maximum(largest, 1e-300))
         return change, energy_change
 
-    def _torsion_change(self) -> Phasors:
+    def _torsion_change(self, inverses: Sequence[Matrix | None]) -> Phasors:
         """Return the change of the torsion by the linearised mesh, its memory included."""
-        torus, slope, left = self.equations.torus, self._motion.mesh_slope, self._left
-        recall = self.equations.recall_matrix(self.torsion)
-        varies = np.abs(slope - self._level) > _NEARLY_CONSTANT * np.abs(self._level)
-        if recall is None and not np.any(varies):
-            return left / (self._level + self._viscous)
-        matrix = torus.product_matrix(slope) + multiplication(self._viscous)
-        if recall is not None:
+        own = np.array([row for row, inverse in enumerate(inverses) if inverse is None], dtype=int)
+        real = stacked(self._left)
+        # The mean has no imaginary part.
+        real[:, self._left.shape[1]] = 0.0
+        found = np.empty_like(real)
+        for row, inverse in enumerate(inverses):
+            if inverse is not None:
+                found[row] = inverse @ real[row]
+        if own.size:
+            matrix = self.matrix(own)
+            if matrix is None:
+                found[own] = stacked((self._left / (self._level + self._viscous))[own])
+            else:
+                found[own] = np.linalg.solve(matrix, real[own, :, None])[:, :, 0]
+        return unstacked(found)
+
+    def matrix(self, rows: NDArray[np.int_]) -> Matrix | None:
+        """Return the derivative (m, 2 H, 2 H) of what is left of some rows by their torsion.
+
+        None where the mesh is so nearly linear that each harmonic answers for itself.
+        """
+        equations = self.equations
+        if equations.remembers:
+            of_rows = equations if len(rows) == len(self.torsion) else equations.rows(rows)
+            recall = of_rows.recall_matrix(self.torsion[rows])
+        slope, level = self._motion.mesh_slope[rows], self._level[rows]
+        varies = np.abs(slope - level) > _NEARLY_CONSTANT * np.abs(level)
+        if not (equations.remembers or np.any(varies)):
+            return None
+        matrix = equations.torus.product_matrix(slope) + multiplication(self._viscous[rows])
+        if equations.remembers:
             matrix += recall
         # The mean has no imaginary part: an equation for it must not be missing.
-        empty = len(torus.orders)
+        empty = len(equations.torus.orders)
         matrix[:, empty, empty] = np.abs(matrix[:, 0, 0])
-        real = stacked(left)
-        real[:, empty] = 0.0
-        return unstacked(np.asarray(np.linalg.solve(matrix, real[:, :, None])[:, :, 0]))
+        return matrix
 
 
 def nearer(at: Place, change: Phasors, energy_change: Phasors, settled: NDArray[np.bool_]) -> Place:

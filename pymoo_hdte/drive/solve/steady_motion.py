@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,37 @@ class SpeedLoop:
 CONSTANT_TORQUE = SpeedLoop()
 
 
+@dataclass(frozen=True, eq=False)
+class Tangents:
+    """Inverse matrices of Newton's method at steady states, computed when first asked for.
+
+    Attributes
+    ----------
+    inverted : callable
+        From places (m,) of solved cases to their inverses (m, 2 H, 2 H); None where the step needs
+        no matrix.
+    places : ndarray of int, shape (n,)
+        Of each row among the solved cases.
+    """
+
+    inverted: Callable[[NDArray[np.int_]], NDArray[np.float64] | None]
+    places: NDArray[np.int_]
+    _known: dict[int, NDArray[np.float64] | None] = field(default_factory=dict)
+
+    def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> Tangents:
+        """Return those of some of the rows, which share what is computed."""
+        return Tangents(self.inverted, self.places[rows], self._known)
+
+    def inverses(self) -> list[NDArray[np.float64] | None]:
+        """Return the inverse (2 H, 2 H) of each row."""
+        new = np.array(sorted({*self.places.tolist()} - self._known.keys()), dtype=int)
+        if new.size:
+            found = self.inverted(new)
+            each = [None] * len(new) if found is None else list(found)
+            self._known.update(zip(new.tolist(), each, strict=True))
+        return [self._known[place] for place in self.places.tolist()]
+
+
 @dataclass(frozen=True)
 class SteadyMotion:
     """Steady state of n cases, as harmonics of the input angle.
@@ -65,6 +97,8 @@ class SteadyMotion:
         Half the square of the input speed, rad2/s2.
     converged : ndarray of bool, shape (n,)
         Whether the balance of the case was found; if not, its other values mean nothing.
+    tangents : Tangents, optional
+        By which nearby cases are found without matrices of their own.
 
     Examples
     --------
@@ -82,6 +116,7 @@ class SteadyMotion:
     lead: Phasors
     energy: Phasors
     converged: NDArray[np.bool_]
+    tangents: Tangents | None = field(default=None, kw_only=True, repr=False, compare=False)
 
     def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> SteadyMotion:
         """Return some of the cases, each as often as its place is given.
@@ -95,7 +130,9 @@ class SteadyMotion:
         -------
         SteadyMotion
         """
-        return SteadyMotion(self.torus, *(getattr(self, name)[rows] for name in BY_CASE))
+        tangents = None if self.tangents is None else self.tangents.rows(rows)
+        values = [getattr(self, name)[rows] for name in BY_CASE]
+        return SteadyMotion(self.torus, *values, tangents=tangents)
 
     def spectrum(self) -> OrderSpectrum:
         """Return theta_d of the n cases as an order spectrum, rad."""
