@@ -40,14 +40,32 @@ def read_drive(options: argparse.Namespace) -> tuple[DriveModel, tuple[str, ...]
     from pymoo_hdte.drive import PRESETS, hs_20_100, load_model, preset
 
     sheet = read_sheet(options.datasheet)
+    unsaid = _of_the_held_member(options.datasheet, sheet)
     if options.model not in PRESETS:
-        return load_model(Path(options.model), sheet), ()
+        return load_model(Path(options.model), sheet), unsaid
     model, own = replace(preset(options.model), sheet=sheet), hs_20_100()
     if _make(sheet) == _make(own):
-        return model, ()
+        return model, unsaid
     return model, (
+        *unsaid,
         f"Effects, order lines and scatter of theta_s are those of the model {model.name!r}, made "
         f"for the {own.name}; they need not hold for {sheet.name}. Measure them, or give --model.",
+    )
+
+
+def _of_the_held_member(named: str, sheet: DataSheet) -> tuple[str, ...]:
+    """Say which member is taken for held, and the ratio that follows, if the file does not."""
+    from pymoo_hdte.drive.datasheet import MEMBERS
+    from pymoo_hdte.io.toml import read_toml
+
+    if named == BUILT_IN_SHEET or read_toml(Path(named)).table("teeth").has("held"):
+        return ()
+    (member,) = set(MEMBERS) - {sheet.held}
+    held, other = sheet.held.replace("_", " "), member.replace("_", " ")
+    return (
+        f"{Path(named).name} does not say which member is held (teeth.held). The {held} is taken, "
+        f"as makers state their ratios: ratio {sheet.ratio:g}; with the {other} held it would be "
+        f"{replace(sheet, held=member).ratio:g}.",
     )
 
 

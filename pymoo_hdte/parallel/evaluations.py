@@ -95,7 +95,8 @@ class Evaluations:
             return gave
 
         assert self._cache is not None
-        return KeptDesigns(self._cache, getattr(bare, "problem", f), n_var, again)
+        problem, limit = getattr(bare, "problem", f), self._workers.time_limit
+        return KeptDesigns(self._cache, problem, n_var, again, limit)
 
     def next(self) -> tuple[int, Output | None]:
         """Return number and outputs of the next design that is finished, None if it is lost.

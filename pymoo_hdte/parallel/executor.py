@@ -41,8 +41,9 @@ class ExecutorParallelization:
         File of finished evaluations, lost ones included, for a simulator that gives the same at the
         same design. With it nothing that had ended is evaluated again, though the process be
         killed; the first one is, if the source of the problem has changed, to see whether the file
-        is its own. Outputs have to be numbers. To have lost designs tried again, take their lines
-        (``"failed"``) out of the file.
+        is its own. Outputs have to be numbers. Designs that were over the time limit are tried
+        again under a longer one; to have others tried again, take their lines (``"failed"``) out of
+        the file. One process at a time may use it.
 
     Attributes
     ----------

@@ -30,6 +30,8 @@ class KeptDesigns:
         Number of its variables.
     again : callable
         Evaluates a design: its outputs, or a `Failure`. Called once if the problem may be another.
+    time_limit : float or None
+        Seconds that an evaluation has; one that was ended after fewer is lost no longer.
 
     Attributes
     ----------
@@ -43,6 +45,7 @@ class KeptDesigns:
         problem: object,
         n_var: int,
         again: Callable[[Row], Output | Failure],
+        time_limit: float | None,
     ) -> None:
         names = tuple(f"x{k + 1}" for k in range(n_var))
         self._file = RunFile(path, names, identity(problem))  # type: ignore[arg-type]
@@ -55,6 +58,7 @@ class KeptDesigns:
             self._file.check(numbers)
             # Another source may do better where the former one failed.
             self._file.failures.clear()
+        self._file.retry_within(time_limit)
         done = [row for row in self._file.order if row in self._file.runs | self._file.failures]
         self.order = {row: place for place, row in enumerate(done)}
         self._early: dict[Row, Failure] = {}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable
 from typing import Any
 
 from pymoo_hdte.checks import InvalidInput, real_number, whole_number
-from pymoo_hdte.problems.simulator.children import TOO_LONG, Failure
+from pymoo_hdte.problems.simulator.children import over_the_limit
 from pymoo_hdte.problems.simulator.workers import failure_of
 
 
@@ -55,9 +55,9 @@ class VirtualWorkers:
     ) -> None:
         self.number = whole_number("number", number, 1)
         self._seconds = seconds
-        self._limit = float("inf")
+        self.time_limit = float("inf")
         if time_limit is not None:
-            self._limit = real_number("time_limit", time_limit, above=0.0)
+            self.time_limit = real_number("time_limit", time_limit, above=0.0)
         self.now = self.busy = 0.0
         self._free = [0.0] * self.number
         self._running: list[tuple[float, int, float, Hashable, Any]] = []
@@ -86,12 +86,12 @@ class VirtualWorkers:
             If the call would never end.
         """
         wanted = float(self._seconds())
-        lasts = min(wanted, self._limit)
+        lasts = min(wanted, self.time_limit)
         if not 0.0 <= lasts < float("inf"):
             raise InvalidInput("seconds of an evaluation", wanted, "finite, or with a time_limit")
         begins = max(self.now, heapq.heappop(self._free))
         heapq.heappush(self._free, begins + lasts)
-        call = None if wanted > self._limit else (function, *arguments)
+        call = None if wanted > self.time_limit else (function, *arguments)
         # The count keeps the order of the queue where two end at once.
         self._count += 1
         heapq.heappush(self._running, (begins + lasts, self._count, lasts, key, call))
@@ -101,7 +101,7 @@ class VirtualWorkers:
         self.now, _, lasts, key, call = heapq.heappop(self._running)
         self.busy += lasts
         if call is None:
-            return key, Failure(TOO_LONG, f"no result within {self._limit:g} s")
+            return key, over_the_limit(self.time_limit)
         try:
             return key, call[0](*call[1:])
         except Exception as error:  # A user's simulator may raise anything.

@@ -2,10 +2,13 @@
 
 import csv
 import json
+import re
+import shutil
 
 import numpy as np
 import pytest
 from night import others_at_night
+from places import DOCS
 
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.drive import hs_20_100, preset
@@ -99,6 +102,20 @@ def test_files_of_a_drive_are_taken(written, tmp_path):
     names = ("transmission_error.csv", "order_lines.csv", "speeds.csv")
     for name in names:
         assert (tmp_path / "files" / name).read_bytes() == (written / name).read_bytes()
+
+
+def test_the_ratio_of_a_sheet_that_does_not_say_which_member_is_held_is_said(tmp_path):
+    sheet, model = tmp_path / "sheet.toml", tmp_path / "model.toml"
+    said = (DOCS / "examples" / "my_drive.toml").read_text(encoding="utf-8")
+    shutil.copy(DOCS / "examples" / "my_drive_model.toml", model)
+    limits = []
+    for text in (said, re.sub("held = .*", "", said)):
+        sheet.write_text(text, encoding="utf-8")
+        assert simulate(sheet, "--model", model, "--out", tmp_path / "report", "--quiet") == 0
+        limits.append(json.loads((tmp_path / "report" / "simulation.json").read_text())["limits"])
+    (added,) = set(limits[1]) - set(limits[0])
+    assert "teeth.held" in added
+    assert re.findall(r"\d+", added) == ["80", "81"]
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Every public name has an example in its docstring, which prints what it says."""
 
 import doctest
+import inspect
 import re
 import shutil
 import warnings
@@ -24,8 +25,9 @@ PUBLIC = {
 
 
 def examples_of(name):
-    text = CONSTANTS.get(name) or public_objects()[name].__doc__
-    return text.partition("\nExamples\n" if name in CONSTANTS else "    Examples\n")[2]
+    # Python 3.13 takes the indentation of docstrings away, older ones leave it.
+    text = inspect.cleandoc(CONSTANTS.get(name) or public_objects()[name].__doc__)
+    return text.partition("\nExamples\n")[2]
 
 
 @pytest.fixture(scope="module")

@@ -2,12 +2,15 @@
 
 import concurrent.futures
 import contextlib
+import gc
+import itertools
 import json
 import multiprocessing
 import os
 import pickle
 import signal
 import subprocess
+import sys
 import time
 from threading import Timer
 
@@ -15,6 +18,7 @@ import numpy as np
 import pytest
 from costly_problems import MISHAPS, KillsOnce, Parabolas, calls
 from pymoo.algorithms.moo.nsga2 import NSGA2
+from pymoo.core.problem import ElementwiseEvaluationFunction
 from pymoo.optimize import minimize
 
 from pymoo_hdte.algorithms import CompactSwarm
@@ -197,6 +201,43 @@ def test_designs_are_not_given_up_for_ever_where_nothing_has_run(tmp_path):
         optimised(broken)
     mended.elementwise_runner = ExecutorParallelization(cache=file)
     assert digest(optimised(mended)) == digest(optimised(Parabolas()))
+
+
+def test_designs_over_the_time_limit_are_tried_again_under_a_longer_one(tmp_path):
+    def lost(limit):
+        lasts = itertools.cycle([1.0, 3.0])
+        queue = VirtualWorkers(1, lambda: next(lasts), time_limit=limit)
+        runner = ExecutorParallelization(queue, cache=tmp_path / "runs")
+        # An interrupted run's file: a finished one is checked, and its failures are tried anyway.
+        X = np.random.default_rng(1).random((4, 3))
+        runner(ElementwiseEvaluationFunction(Parabolas(), (), {}), X)
+        return runner.counts.n_lost, runner.counts.made, runner.counts.from_file
+
+    assert lost(2.0) == (2, 2, 0)
+    assert lost(1.5) == (2, 0, 2)
+    assert lost(4.0) == (0, 2, 2)
+    assert lost(4.0) == (0, 0, 4)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="nothing is locked there")
+def test_a_file_that_another_process_writes_to_is_refused_until_that_one_ends(tmp_path):
+    file = tmp_path / "runs"
+    runner = ExecutorParallelization(cache=file)
+    optimised(Parabolas(elementwise_runner=runner))
+    held = f"import fcntl; file = open({str(file)!r}, 'a'); fcntl.lockf(file, fcntl.LOCK_EX"
+    # This process holds it as long as the runner is there.
+    refused = subprocess.run([sys.executable, "-c", f"{held} | fcntl.LOCK_NB)"], check=False)
+    assert refused.returncode
+    del runner
+    gc.collect()
+    holds = [sys.executable, "-uc", f"{held}); print('held'); input()"]
+    with subprocess.Popen(holds, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"held\n"
+        with pytest.raises(InvalidInput, match=r"cache.*no other process"):
+            optimised(Parabolas(elementwise_runner=ExecutorParallelization(cache=file)))
+        other.kill()
+    again = optimised(Parabolas(elementwise_runner=ExecutorParallelization(cache=file)))
+    assert again.evaluations.made == 0
 
 
 def test_a_file_of_another_problem_is_refused(tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -30,6 +31,17 @@ class Failure:
     kind: str
     text: str
     error: BaseException | None = None
+
+
+def over_the_limit(seconds: float) -> Failure:
+    """Return what stands in the place of a result that did not come within a time limit."""
+    return Failure(TOO_LONG, f"no result within {seconds!r} s")
+
+
+def limit_in(text: str) -> float | None:
+    """Return the time limit in seconds that a failure's text tells; None for other failures."""
+    told = re.search(r"no result within (\S+) s", text)
+    return float(told[1]) if told else None
 
 
 def parcel(function: Callable[..., Any], *arguments: Any) -> bytes:
@@ -84,7 +96,7 @@ class Children:
         except (EOFError, OSError):
             self._drop(child)
             if over.is_set():
-                return Failure(TOO_LONG, f"no result within {time_limit:g} s")
+                return over_the_limit(time_limit or 0.0)
             return Failure(LOST, f"the process ended with code {child.returncode}")
         # A limit that falls together with the result: the process is gone, the result counts.
         if over.is_set():

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import sys
+import weakref
 from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
@@ -12,6 +14,10 @@ from typing import Any
 import numpy as np
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.problems.simulator.children import limit_in
+
+if sys.platform != "win32":
+    import fcntl
 
 _SAME = 1e-6
 """Relative difference of two runs of one simulator, on two machines say; set by hand."""
@@ -23,7 +29,7 @@ class RunFile:
     """Finished runs on disk, one line each, written before the next is waited for.
 
     The file only grows. A line that a killed process left unfinished is dropped. Numbers are kept
-    to the last bit.
+    to the last bit. While it is open no other process may open it, except on Windows.
 
     Parameters
     ----------
@@ -50,7 +56,8 @@ class RunFile:
     Raises
     ------
     InvalidInput
-        If the file holds runs of other inputs or is none of these files.
+        If the file holds runs of other inputs, is none of these files, or another process writes
+        to it.
     OSError
         If it cannot be read or written.
     """
@@ -65,7 +72,8 @@ class RunFile:
         self.order: dict[tuple[float, ...], int] = {}
         self.responses: tuple[str, ...] = ()
         self.goes_on = self._finished = False
-        contents = self.path.read_bytes() if self.path.exists() else b""
+        self._open_alone()
+        contents = self._contents()
         whole = contents[: contents.rfind(b"\n") + 1]
         # A file without a line is what a kill left of the first one.
         beginning = json.dumps({"inputs": list(names), "simulator": ""})[:-2].encode()
@@ -75,9 +83,36 @@ class RunFile:
             self._read(whole)
         if len(whole) < len(contents):
             # Not written anew: a kill would then leave less than there was.
-            os.truncate(self.path, len(whole))
+            os.ftruncate(self._descriptor, len(whole))
         if not whole:
             self._append({"inputs": list(names), "simulator": simulator})
+
+    def _open_alone(self) -> None:
+        """Open the file and lock it for this process, until this object or the process ends.
+
+        The lock is of the kind that processes started from this one do not inherit: a worker that
+        outlives a killed study does not hold it. It would end with the first descriptor of the
+        file that is closed, hence there is only one.
+        """
+        binary = getattr(os, "O_BINARY", 0)
+        self._descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND | binary, 0o666)
+        weakref.finalize(self, os.close, self._descriptor)
+        if sys.platform == "win32":
+            return
+        try:
+            fcntl.lockf(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except (BlockingIOError, PermissionError):
+            allowed = "a file that no other process writes to"
+            raise InvalidInput("cache", str(self.path), allowed) from None
+        except OSError:
+            # Some network folders have no locks.
+            return
+
+    def _contents(self) -> bytes:
+        parts = []
+        while part := os.read(self._descriptor, 1 << 20):
+            parts.append(part)
+        return b"".join(parts)
 
     def _read(self, contents: bytes) -> None:
         try:
@@ -126,6 +161,20 @@ class RunFile:
         self._append({"at": [value.hex() for value in at], "failed": why})
         self._finished = False
 
+    def retry_within(self, time_limit: float | None) -> None:
+        """Forget failures of runs that were ended after a shorter time than they have now.
+
+        Parameters
+        ----------
+        time_limit : float or None
+            Seconds that a run has now; None if it has any time.
+        """
+        now = float("inf") if time_limit is None else time_limit
+        limits = {row: limit_in(why) for row, why in self.failures.items()}
+        for row, limit in limits.items():
+            if limit is not None and limit < now:
+                del self.failures[row]
+
     def check(self, again: Callable[[tuple[float, ...]], Any]) -> None:
         """Make a run of the file again: names and inputs of simulators may be the same.
 
@@ -158,7 +207,7 @@ class RunFile:
             self._finished = True
 
     def _append(self, line: dict[str, Any]) -> None:
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(line) + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+        left = (json.dumps(line) + "\n").encode()
+        while left:
+            left = left[os.write(self._descriptor, left) :]
+        os.fsync(self._descriptor)

@@ -89,6 +89,7 @@ class Simulator:
         self._last: Failure | None = None
         self._given_up: set[tuple[float, ...]] = set()
         if file and file.goes_on:
+            file.retry_within(workers.time_limit)
             self._given_up |= set(file.failures)
         elif file:
             file.check(self._again)

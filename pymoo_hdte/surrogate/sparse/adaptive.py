@@ -40,6 +40,7 @@ LOOSEST = 0.02
 
 The stated errors were held against true ones at 1 %; from few runs, at 10 %, one was three times
 too small. A surrogate that the budget leaves between this and what is asked for is accepted.
+The error of what lies beyond all runs does not count here: more runs would not make it smaller.
 """
 IN_A_ROW = 2
 """Judgements that have to pass one after the other; with few runs one may pass by chance."""
@@ -206,7 +207,7 @@ def fit_adaptively(
     function : callable
         Maps points of shape (n, d) in -1..1 to (n, r) values, NaN where it fails.
     accuracy : float
-        Largest error of both as a share of the scatter; it grows to `LOOSEST` at least.
+        Largest error of both as a share of the scatter; it grows to `LOOSEST` at least inside.
     budget : int
         Most points at which the function is called.
     random_state : numpy.random.Generator
@@ -226,10 +227,11 @@ def fit_adaptively(
     passed, goal = 0, min(accuracy, LOOSEST)
     while True:
         fit = growth.judge()
-        if fit.largest_error <= accuracy:
+        inside = fit.largest_error
+        if inside <= accuracy:
             fit = growth.with_tails(fit)
         good = fit.largest_error <= accuracy and acceptable(fit)
-        passed = passed + 1 if good and fit.largest_error <= goal else 0
+        passed = passed + 1 if good and inside <= goal else 0
         if passed >= IN_A_ROW and growth.n_runs >= least_runs(len(axes)):
             return fit
         count = min(max(at_once, int(BATCH * growth.n_runs)), budget - growth.n_runs)
