@@ -17,6 +17,7 @@ from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.horizon import evaluation_limit
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.quadratic import ModelStep
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.algorithms.survival import Quality, guests, survivors, tolerant
 from pymoo_hdte.checks import whole_number
@@ -42,8 +43,9 @@ class CompactSwarm(ElitistSwarm):
     With few evaluations a small swarm has more generations than a large one. All that it finds is
     offered to two archives: the result, which `quality` thins out in every generation, and
     `archive_all`. Moves and mutation are those of `ElitistSwarm`; added are a move among
-    neighbours, `NeighbourDifference`, for variables that depend on each other, and infeasible
-    particles that stay beside the feasible ones.
+    neighbours, `NeighbourDifference`, and one by quadratic models of the objectives, `ModelStep`,
+    for variables that depend on each other, and infeasible particles that stay beside the feasible
+    ones.
 
     Parameters
     ----------
@@ -59,7 +61,8 @@ class CompactSwarm(ElitistSwarm):
     quality : "spread", "hypervolume" or callable
         As of `ElitistSwarm`, for the swarm and for the result.
     sampling, moves, **kwargs
-        As of `ElitistSwarm`; by default the three moves there and `NeighbourDifference`.
+        As of `ElitistSwarm`; by default the three moves there, `NeighbourDifference` and
+        `ModelStep`.
 
     Raises
     ------
@@ -84,8 +87,10 @@ class CompactSwarm(ElitistSwarm):
       nothing as the swarm follows: an epsilon level (Takahama, Sakai 2006) without a schedule, for
       regions as thin as equality constraints make them. The result is feasible as pymoo defines it,
       with equalities met to 1e-4;
-    - archives know what was evaluated: a callback that changes the problem has to evaluate the
-      individuals of `archive_all` and of ``opt`` again.
+    - the models know objectives only, not constraints;
+    - archives and models know what was evaluated: a callback that changes the problem has to
+      evaluate the individuals of `archive_all` and of ``opt`` again, and the models forget the old
+      problem in a thousand evaluations.
 
     Examples
     --------
@@ -114,7 +119,7 @@ class CompactSwarm(ElitistSwarm):
         if pop_size is None and isinstance(sampling, np.ndarray):
             pop_size = len(sampling)
         if moves is None:
-            moves = (Attraction(), Exchange(), Difference(), NeighbourDifference())
+            moves = (Attraction(), Exchange(), Difference(), NeighbourDifference(), ModelStep())
         size = LARGEST if pop_size is None else pop_size
         super().__init__(size, sampling=sampling, moves=moves, quality=quality, **kwargs)
         self._by_budget = pop_size is None
@@ -132,6 +137,10 @@ class CompactSwarm(ElitistSwarm):
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         super()._initialize_advance(infills, **kwargs)
+        self._learners = [move for move in self.moves if isinstance(move, ModelStep)]
+        for move in self._learners:
+            move.forget()
+            move.learn(self._points(self.pop))
         self._remember(self.pop)
 
     def _remember(self, population: Population) -> None:
@@ -147,6 +156,8 @@ class CompactSwarm(ElitistSwarm):
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         former = self.pop
         super()._advance(infills, **kwargs)
+        for move in self._learners:
+            move.learn(self._points(infills))
         # Callbacks may have put in individuals that nobody asked for.
         self._remember(Population.merge(former, infills))
 
