@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome
-from experiments.suites.peers import BBOB_PEERS, OURS
+from experiments.suites.peers import BBOB_PEERS, LESS, ON_BBOB, OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, INSTANCES
 from experiments.suites.published import curves
 
@@ -31,13 +32,15 @@ class Duel(NamedTuple):
     test: RivalTest
 
 
-def duels(outcome: Outcome, evaluations: int) -> list[Duel]:
-    """Return the duels after so many evaluations, p corrected over the rivals.
+def duels(
+    outcome: Outcome, evaluations: int, rivals: Iterable[str] = tuple(BBOB_PEERS)
+) -> list[Duel]:
+    """Return the duels after so many evaluations, p corrected over the rivals that ran.
 
     Ours is told this budget; a rival that moves alike whatever its budget may have been told more.
     """
     found = []
-    for rival in BBOB_PEERS:
+    for rival in rivals:
         pairs = _pairs(outcome, rival, evaluations)
         if rival != OURS and len(pairs):
             found.append((rival, pairs))
@@ -70,7 +73,7 @@ def _pairs(outcome: Outcome, rival: str, evaluations: int) -> NDArray[np.float64
         for run, shares in outcome.bbob.items()
         if run.algorithm == OURS and run.told == evaluations
     }
-    anew = BBOB_PEERS[rival].starts_anew
+    anew = ON_BBOB[rival].starts_anew
     pairs = []
     for run, shares in outcome.bbob.items():
         place = run.dimension, run.function, run.instance, run.seed
@@ -101,7 +104,7 @@ def shares_table(outcome: Outcome) -> Table:
             *(Column(f"{budget:,}", "", 3, "evaluations") for budget in BUDGETS),
         ),
         tuple(rows),
-        note="Ours on all 55 functions and instances 3 to 5 but where it says otherwise, one run "
+        note="Ours on all 55 functions and instances 6 to 8 but where it says otherwise, one run "
         "each; published are averages over all functions and instances, read from pictures to some "
         ".01.",
     )
@@ -160,4 +163,40 @@ def duels_table(outcome: Outcome) -> Table:
         tuple(rows),
         note="Better and worse count problems; p is Wilcoxon's over them, after Holm over the "
         "rivals of a row's budget.",
+    )
+
+
+ABLATION_AT = 10_000
+
+
+def shown_to_help(duel: Duel) -> bool:
+    """Say whether the swarm without a part is worse beyond chance."""
+    return duel.test.beaten
+
+
+def parts_table(outcome: Outcome) -> Table:
+    """Our swarm beside itself with a part left out."""
+    rows = [
+        (
+            *(duel.rival, duel.problems, duel.ours, duel.theirs),
+            *(duel.test.better, duel.test.worse, duel.test.p),
+            "yes" if shown_to_help(duel) else "no",
+        )
+        for duel in duels(outcome, ABLATION_AT, LESS)
+    ]
+    return Table(
+        "parts",
+        f"bbob-biobj, held out: {OURS} with a part left out, after {ABLATION_AT:,} evaluations",
+        (
+            *(Column("left out"), Column("problems")),
+            *(Column(name, "", 3, "mean share") for name in ("whole", "less")),
+            *(Column("whole better"), Column("worse"), Column("p", digits=2)),
+            Column("shown to help"),
+        ),
+        tuple(rows),
+        note="Every second function of instance 7 in ten dimensions, as written before the run; p "
+        "is Wilcoxon's over the problems, after Holm over the parts. Moves that are not shown to "
+        "help here alone were kept together: in tuning (functions 1 to 20, instance 1, 2,000 "
+        "evaluations) the swarm reached .366 of the targets in 10 dimensions and .295 in 20, "
+        "without attraction, exchange and difference .330 and .264.",
     )

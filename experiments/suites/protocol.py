@@ -4,7 +4,8 @@ Sets of problems:
 
 - tuning, on which settings may be chosen: ZDT, moved ZDT and DTLZ2 of ``peers``, and functions 1 to
   20 of bbob-biobj, instances 1 and 2, in 5, 10 and 20 dimensions, on which `ModelStep` was chosen;
-- validation, whose outcomes led to the demands: RE, MW, DAS-CMOP, LZ09;
+- validation, whose outcomes led to the demands: RE, MW, DAS-CMOP, LZ09; on MW it was chosen, after
+  the first run of this protocol, that `ModelStep` takes no part with constraints;
 - held out: bbob-biobj, all 55 functions, instances 6 to 8, in 10 and 20 dimensions; IMOP. They are
   run once, and what comes out is shown as it is. Functions 1 to 20 are those of tuning in other
   instances, 21 to 55 were never used. Before `ModelStep` the swarm was looked at once on instances

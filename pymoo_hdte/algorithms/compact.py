@@ -87,7 +87,9 @@ class CompactSwarm(ElitistSwarm):
       nothing as the swarm follows: an epsilon level (Takahama, Sakai 2006) without a schedule, for
       regions as thin as equality constraints make them. The result is feasible as pymoo defines it,
       with equalities met to 1e-4;
-    - the models know objectives only, not constraints;
+    - the models know objectives only: with constraints they led away from feasible regions (MW:
+      feasible in 26 of 29 runs in place of 29), so that `ModelStep` is not among the moves there
+      unless ``moves`` names it;
     - archives and models know what was evaluated: a callback that changes the problem has to
       evaluate the individuals of `archive_all` and of ``opt`` again, and the models forget the old
       problem in a thousand evaluations.
@@ -118,6 +120,7 @@ class CompactSwarm(ElitistSwarm):
     ) -> None:
         if pop_size is None and isinstance(sampling, np.ndarray):
             pop_size = len(sampling)
+        self._by_problem = moves is None
         if moves is None:
             moves = (Attraction(), Exchange(), Difference(), NeighbourDifference(), ModelStep())
         size = LARGEST if pop_size is None else pop_size
@@ -134,6 +137,8 @@ class CompactSwarm(ElitistSwarm):
         # A running swarm goes on as it is when it is given more evaluations.
         if self._by_budget and not self.is_initialized:
             self.pop_size = size_for(evaluation_limit(self.termination))
+        if self._by_problem and not self.is_initialized and self.problem.has_constraints():
+            self.moves = tuple(move for move in self.moves if not isinstance(move, ModelStep))
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         super()._initialize_advance(infills, **kwargs)
