@@ -190,9 +190,9 @@ def parts_table(outcome: Outcome) -> Table:
             Column("shown to help"),
         ),
         tuple(rows),
-        note="After 10,000 every second function of instance 7 in ten dimensions, as written before; "
-        "after fewer all functions of instance 6 in both dimensions, decided once the former had "
-        "come out for the models. p "
+        note="After 10,000 every second function of instance 7 in ten dimensions, as written "
+        "before; after fewer all functions of instance 6 in both dimensions, decided once the "
+        "former had come out for the models. p "
         "is Wilcoxon's over the problems, after Holm over the parts. Moves that are not shown to "
         "help here alone were kept together: in tuning (functions 1 to 20, instance 1, 2,000 "
         "evaluations) the swarm reached .366 of the targets in 10 dimensions and .295 in 20, "

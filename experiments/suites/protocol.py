@@ -28,8 +28,8 @@ Ablation: the swarm with one part left out (`LESS`) on every second function of 
 dimensions, 10,000 evaluations. A part is shown to help if the swarm without it is worse beyond
 chance (Holm over the parts); the page says of each part whether it is. After that had come out for
 `ModelStep` (not shown to help there), and before this was run: the swarm without `ModelStep` after
-500 and 2,000 evaluations, for which it was built, on all functions of instance 6 in both dimensions,
-where the whole swarm had been run already.
+500 and 2,000 evaluations, for which it was built, on all functions of instance 6 in both
+dimensions, where the whole swarm had been run already.
 
 Demands, besides: own time per generation at most half of NSGA-II's, which ``experiments benchmark``
 measures.
