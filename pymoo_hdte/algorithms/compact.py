@@ -99,7 +99,7 @@ class CompactSwarm(ElitistSwarm):
     >>> from pymoo.optimize import minimize
     >>> from pymoo.problems import get_problem
     >>> len(minimize(get_problem("zdt1"), CompactSwarm(), ("n_eval", 1000), seed=1).F)
-    32
+    31
     """
 
     GUESTS = 0.2
