@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome
-from experiments.suites.peers import BBOB_PEERS, OURS
+from experiments.suites.peers import BBOB_PEERS, LESS, ON_BBOB, OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, INSTANCES
 from experiments.suites.published import curves
 
@@ -31,13 +32,15 @@ class Duel(NamedTuple):
     test: RivalTest
 
 
-def duels(outcome: Outcome, evaluations: int) -> list[Duel]:
-    """Return the duels after so many evaluations, p corrected over the rivals.
+def duels(
+    outcome: Outcome, evaluations: int, rivals: Iterable[str] = tuple(BBOB_PEERS)
+) -> list[Duel]:
+    """Return the duels after so many evaluations, p corrected over the rivals that ran.
 
     Ours is told this budget; a rival that moves alike whatever its budget may have been told more.
     """
     found = []
-    for rival in BBOB_PEERS:
+    for rival in rivals:
         pairs = _pairs(outcome, rival, evaluations)
         if rival != OURS and len(pairs):
             found.append((rival, pairs))
@@ -70,7 +73,7 @@ def _pairs(outcome: Outcome, rival: str, evaluations: int) -> NDArray[np.float64
         for run, shares in outcome.bbob.items()
         if run.algorithm == OURS and run.told == evaluations
     }
-    anew = BBOB_PEERS[rival].starts_anew
+    anew = ON_BBOB[rival].starts_anew
     pairs = []
     for run, shares in outcome.bbob.items():
         place = run.dimension, run.function, run.instance, run.seed
@@ -85,7 +88,9 @@ def shares_table(outcome: Outcome) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for dimension in DIMENSIONS:
         told = tuple(reached(outcome, dimension, budget) for budget in BUDGETS)
-        rows.append((f"{OURS}, told each budget", dimension, f"here{_fewer(outcome)}", *told))
+        rows.append(
+            (f"{OURS}, told each budget", dimension, f"here{_fewer(outcome, dimension)}", *told)
+        )
         for algorithm, budget in _told(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
             name = f"{algorithm}, told {budget:,}" if algorithm == OURS else algorithm
@@ -101,7 +106,7 @@ def shares_table(outcome: Outcome) -> Table:
             *(Column(f"{budget:,}", "", 3, "evaluations") for budget in BUDGETS),
         ),
         tuple(rows),
-        note="Ours on all 55 functions and instances 3 to 5 but where it says otherwise, one run "
+        note="Ours on all 55 functions and instances 6 to 8 but where it says otherwise, one run "
         "each; published are averages over all functions and instances, read from pictures to some "
         ".01.",
     )
@@ -114,11 +119,12 @@ def _told(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
     return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
 
 
-def _fewer(outcome: Outcome) -> str:
+def _fewer(outcome: Outcome, dimension: int) -> str:
     """Name the budgets for which our swarm did not run on all instances."""
     fewer = []
     for budget in BUDGETS:
-        ran = {r.instance for r in outcome.bbob if (r.algorithm, r.told) == (OURS, budget)}
+        place = dimension, OURS, budget
+        ran = {r.instance for r in outcome.bbob if (r.dimension, r.algorithm, r.told) == place}
         if ran and len(ran) < len(INSTANCES):
             fewer.append(f"{budget:,}: instance {' and '.join(map(str, sorted(ran)))}")
     return f" ({', '.join(fewer)})" if fewer else ""
@@ -160,4 +166,35 @@ def duels_table(outcome: Outcome) -> Table:
         tuple(rows),
         note="Better and worse count problems; p is Wilcoxon's over them, after Holm over the "
         "rivals of a row's budget.",
+    )
+
+
+def parts_table(outcome: Outcome) -> Table:
+    """Our swarm beside itself with a part left out."""
+    rows = [
+        (
+            *(duel.rival, duel.evaluations, duel.problems, duel.ours, duel.theirs),
+            *(duel.test.better, duel.test.worse, duel.test.p),
+            "yes" if duel.test.beaten else "no",
+        )
+        for budget in BUDGETS
+        for duel in duels(outcome, budget, LESS)
+    ]
+    return Table(
+        "parts",
+        f"bbob-biobj, held out: {OURS} with a part left out",
+        (
+            *(Column("left out"), Column("evaluations"), Column("problems")),
+            *(Column(name, "", 3, "mean share") for name in ("whole", "less")),
+            *(Column("whole better"), Column("worse"), Column("p", digits=2)),
+            Column("shown to help"),
+        ),
+        tuple(rows),
+        note="After 10,000 every second function of instance 7 in ten dimensions, as written "
+        "before; after fewer all functions of instance 6 in both dimensions, decided once the "
+        "former had come out for the models. p "
+        "is Wilcoxon's over the problems, after Holm over the parts. Moves that are not shown to "
+        "help here alone were kept together: in tuning (functions 1 to 20, instance 1, 2,000 "
+        "evaluations) the swarm reached .366 of the targets in 10 dimensions and .295 in 20, "
+        "without attraction, exchange and difference .330 and .264.",
     )

@@ -13,7 +13,7 @@ from pymoo.indicators.igd_plus import IGDPlus
 from experiments.comparison.indicators import CORNER, front_among
 from experiments.runner.campaign import Run
 from experiments.suites.coco import MARKS, BbobProblem, shares_of_run
-from experiments.suites.peers import BBOB_PEERS, PEERS
+from experiments.suites.peers import ON_BBOB, PEERS
 from experiments.suites.problems import box_of, front_of, problem_of
 from pymoo_hdte.algorithms.hypervolume import most_hypervolume
 
@@ -89,11 +89,11 @@ class BbobRun:
     def key(self) -> str:
         """All settings in one name."""
         problem = f"bbob_f{self.function}_d{self.dimension}_i{self.instance}"
-        return f"{problem}_{self.algorithm}_{self.told}_seed{self.seed}"
+        return f"{problem}_{self.algorithm.replace(' ', '-')}_{self.told}_seed{self.seed}"
 
     def execute(self) -> Run:
         """Run; columns are the number of evaluations and the share of targets reached by then."""
-        run = BBOB_PEERS[self.algorithm].run
+        run = ON_BBOB[self.algorithm].run
         # Instances are runs of their own, as for COCO: the same first positions would link them.
         seed = 1000 * self.seed + self.instance
 

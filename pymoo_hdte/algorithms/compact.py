@@ -17,6 +17,7 @@ from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.horizon import evaluation_limit
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.quadratic import ModelStep
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.algorithms.survival import Quality, guests, survivors, tolerant
 from pymoo_hdte.checks import whole_number
@@ -42,8 +43,9 @@ class CompactSwarm(ElitistSwarm):
     With few evaluations a small swarm has more generations than a large one. All that it finds is
     offered to two archives: the result, which `quality` thins out in every generation, and
     `archive_all`. Moves and mutation are those of `ElitistSwarm`; added are a move among
-    neighbours, `NeighbourDifference`, for variables that depend on each other, and infeasible
-    particles that stay beside the feasible ones.
+    neighbours, `NeighbourDifference`, and one by quadratic models of the objectives, `ModelStep`,
+    for variables that depend on each other, and infeasible particles that stay beside the feasible
+    ones.
 
     Parameters
     ----------
@@ -59,7 +61,8 @@ class CompactSwarm(ElitistSwarm):
     quality : "spread", "hypervolume" or callable
         As of `ElitistSwarm`, for the swarm and for the result.
     sampling, moves, **kwargs
-        As of `ElitistSwarm`; by default the three moves there and `NeighbourDifference`.
+        As of `ElitistSwarm`; by default the three moves there, `NeighbourDifference` and
+        `ModelStep`.
 
     Raises
     ------
@@ -84,15 +87,19 @@ class CompactSwarm(ElitistSwarm):
       nothing as the swarm follows: an epsilon level (Takahama, Sakai 2006) without a schedule, for
       regions as thin as equality constraints make them. The result is feasible as pymoo defines it,
       with equalities met to 1e-4;
-    - archives know what was evaluated: a callback that changes the problem has to evaluate the
-      individuals of `archive_all` and of ``opt`` again.
+    - the models know objectives only: with constraints they led away from feasible regions (MW:
+      feasible in 26 of 29 runs in place of 29), so that `ModelStep` is not among the moves there
+      unless ``moves`` names it;
+    - archives and models know what was evaluated: a callback that changes the problem has to
+      evaluate the individuals of `archive_all` and of ``opt`` again, and the models forget the old
+      problem in a thousand evaluations.
 
     Examples
     --------
     >>> from pymoo.optimize import minimize
     >>> from pymoo.problems import get_problem
     >>> len(minimize(get_problem("zdt1"), CompactSwarm(), ("n_eval", 1000), seed=1).F)
-    32
+    31
     """
 
     GUESTS = 0.2
@@ -113,8 +120,9 @@ class CompactSwarm(ElitistSwarm):
     ) -> None:
         if pop_size is None and isinstance(sampling, np.ndarray):
             pop_size = len(sampling)
+        self._by_problem = moves is None
         if moves is None:
-            moves = (Attraction(), Exchange(), Difference(), NeighbourDifference())
+            moves = (Attraction(), Exchange(), Difference(), NeighbourDifference(), ModelStep())
         size = LARGEST if pop_size is None else pop_size
         super().__init__(size, sampling=sampling, moves=moves, quality=quality, **kwargs)
         self._by_budget = pop_size is None
@@ -129,9 +137,15 @@ class CompactSwarm(ElitistSwarm):
         # A running swarm goes on as it is when it is given more evaluations.
         if self._by_budget and not self.is_initialized:
             self.pop_size = size_for(evaluation_limit(self.termination))
+        if self._by_problem and not self.is_initialized and self.problem.has_constraints():
+            self.moves = tuple(move for move in self.moves if not isinstance(move, ModelStep))
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         super()._initialize_advance(infills, **kwargs)
+        self._learners = [move for move in self.moves if isinstance(move, ModelStep)]
+        for move in self._learners:
+            move.forget()
+            move.learn(self._points(self.pop))
         self._remember(self.pop)
 
     def _remember(self, population: Population) -> None:
@@ -147,6 +161,8 @@ class CompactSwarm(ElitistSwarm):
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         former = self.pop
         super()._advance(infills, **kwargs)
+        for move in self._learners:
+            move.learn(self._points(infills))
         # Callbacks may have put in individuals that nobody asked for.
         self._remember(Population.merge(former, infills))
 

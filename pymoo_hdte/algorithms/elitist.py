@@ -145,7 +145,9 @@ class ElitistSwarm(Swarm):
             rows = self.chosen == number
             around = self._around(move, swarm, movers[rows])
             steps[rows] = move(X[rows], leaders[rows], around, random_state)
-        steps += self.mutation(steps, highest - lowest, random_state)
+        exact = [number for number, move in enumerate(self.moves) if getattr(move, "EXACT", False)]
+        mutated = ~np.isin(self.chosen, exact)
+        steps[mutated] += self.mutation(steps[mutated], highest - lowest, random_state)
         moved = particles_at(np.clip(X + steps, lowest, highest))
         if type(self.repair) is NoRepair:
             return moved

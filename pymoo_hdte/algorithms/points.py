@@ -50,7 +50,7 @@ class Points:
     def __len__(self) -> int:
         return len(self.violation)
 
-    def __getitem__(self, rows: NDArray) -> Points:
+    def __getitem__(self, rows: NDArray | slice) -> Points:
         return Points(self.X[rows], self.F[rows], self.violation[rows])
 
     def followed_by(self, other: Points) -> Points:

@@ -13,10 +13,9 @@ from pymoo.core.sampling import Sampling
 
 from pymoo_hdte.algorithms.archive import LeaderArchive
 from pymoo_hdte.algorithms.base import Swarm, particles_at
-from pymoo_hdte.algorithms.dominance import best_front, constrained_ranks
+from pymoo_hdte.algorithms.dominance import best_front, constrained_ranks, dominates
 from pymoo_hdte.algorithms.horizon import generation_limit
 from pymoo_hdte.algorithms.inertia import InertiaWeight
-from pymoo_hdte.algorithms.personal_best import improves, personal_bests
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.pyramid import Hierarchy
 from pymoo_hdte.checks import whole_number
@@ -208,3 +207,19 @@ class ParticleSwarm(Swarm):
         if len(best):
             best = best[best_front(self._points(best))]
         self.opt = best if len(best) else self.pop[:1]
+
+
+def personal_bests(particles: Population) -> Population:
+    """Return the best individual that each particle carries in its data, itself by default."""
+    return Population([particle.data.get("best") or particle for particle in particles.tolist()])
+
+
+def improves(best: Points, visited: Points, random_state: np.random.Generator) -> NDArray[np.bool_]:
+    """Say row by row whether a visited point becomes the personal best; shape (n,).
+
+    The dominating one of the two stays. If neither dominates, a fair coin decides, as in
+    C. A. Coello Coello, G. T. Pulido, M. S. Lechuga, "Handling multiple objectives with particle
+    swarm optimization", IEEE Transactions on Evolutionary Computation 8 (2004) 256-279.
+    """
+    coin = random_state.random(len(best)) < 0.5
+    return dominates(visited, best) | (coin & ~dominates(best, visited))

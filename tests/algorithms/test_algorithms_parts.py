@@ -14,9 +14,9 @@ from scipy.stats import entropy
 from pymoo_hdte.algorithms import EntropyWeight, Flat, LinearDecrease, Pyramid
 from pymoo_hdte.algorithms.horizon import generation_limit
 from pymoo_hdte.algorithms.inertia import normalised_entropy
-from pymoo_hdte.algorithms.personal_best import improves, personal_bests
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.pyramid import mutation_step
+from pymoo_hdte.algorithms.swarm import improves, personal_bests
 from pymoo_hdte.checks import InvalidInput
 
 LINE = np.column_stack([np.arange(8.0), np.arange(8.0)[::-1]])

@@ -15,6 +15,7 @@ from pymoo_hdte.algorithms.compact import size_for
 from pymoo_hdte.algorithms.horizon import evaluation_limit
 from pymoo_hdte.algorithms.moves import NeighbourDifference, nearest_in_objectives
 from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.quadratic import ModelStep, Quadratic, fitted, lowest_within
 from pymoo_hdte.algorithms.spread import most_spread
 from pymoo_hdte.algorithms.survival import guests, tolerant
 
@@ -165,3 +166,90 @@ def test_the_swarm_grows_with_the_square_root_of_the_budget():
 )
 def test_the_budget_is_what_the_termination_tells_in_evaluations(termination, limit):
     assert evaluation_limit(termination) == limit
+
+
+# --- quadratic models -----------------------------------------------------------------------------
+
+
+def _quadratics(rng):
+    """Two ill-conditioned quadratics, turned and shifted: objectives of X, lowest places."""
+    turned = ortho_group.rvs(D, random_state=rng)
+    hessians = [turned @ np.diag(10.0 ** np.linspace(0, 4, D)) @ turned.T, np.diag(np.arange(1, 6))]
+    lowest = rng.standard_normal((2, D))
+
+    def objectives(X):
+        away = X[:, np.newaxis] - lowest
+        return np.stack(
+            [0.5 * np.einsum("ni,ij,nj->n", away[:, k], hessians[k], away[:, k]) for k in (0, 1)], 1
+        )
+
+    return objectives, np.array(hessians), lowest
+
+
+def test_quadratics_are_found_again(rng):
+    objectives, hessians, lowest = _quadratics(rng)
+    Z = rng.standard_normal((60, D))
+    model = fitted(Z, objectives(Z))
+    expected = -np.einsum("kij,kj->ki", hessians, lowest)
+    scale = np.abs(hessians).max(axis=(1, 2))
+    assert np.all(np.abs(model.hessian - hessians).max(axis=(1, 2)) < 0.01 * scale)
+    assert np.all(np.abs(model.gradient - expected).max(axis=1) < 0.01 * scale)
+
+
+def test_fewer_points_than_coefficients_give_the_slope(rng):
+    Z, slope = rng.standard_normal((D + 3, D)), rng.standard_normal((D, 2))
+    model = fitted(Z, Z @ slope)
+    assert np.linalg.norm(model.gradient - slope.T) < 0.1 * np.linalg.norm(slope)
+    assert np.abs(model.hessian).max() < 0.2 * np.abs(slope).max()
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1, 1, 1), (1, 1, 1, -1, 1), (-1, -1, -1, -1, -1)])
+def test_no_place_within_the_radius_is_lower(rng, signs):
+    turned = ortho_group.rvs(D, random_state=rng)
+    hessian = turned @ np.diag(np.array(signs) * np.array([1.0, 3.0, 0.1, 10.0, 2.0])) @ turned.T
+    model = Quadratic(rng.standard_normal((1, D)), hessian[np.newaxis])
+    radii = np.array([0.1, 1.0, 30.0])
+    places = lowest_within(model, np.zeros(3, dtype=int), radii)
+
+    def values(Z):
+        return Z @ model.gradient[0] + 0.5 * np.einsum("ni,ij,nj->n", Z, hessian, Z)
+
+    assert np.all(np.linalg.norm(places, axis=1) <= radii * (1 + 1e-6))
+    directions = rng.standard_normal((2000, D))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for place, radius in zip(places, radii, strict=True):
+        inside = directions * radius * rng.random((2000, 1)) ** 0.2
+        found = values(place[np.newaxis])[0]
+        assert found <= values(inside).min() + 1e-3 * abs(found)
+
+
+def test_model_steps_lead_to_the_front_of_quadratics(rng):
+    """After one generation's step, positions satisfy the condition of a weighted optimum."""
+    objectives, _, lowest = _quadratics(rng)
+    X = lowest.mean(axis=0) + 4.0 * rng.standard_normal((35, D))
+    move = ModelStep()
+    assert not move(X, X, X, rng).any()
+    F = objectives(X)
+    move.learn(Points(X, F, np.zeros(35)))
+    steps = move(X, X[[F.sum(axis=1).argmin()]].repeat(35, axis=0), X, rng)
+    reached = objectives(X + steps)
+    assert np.all(reached.min(axis=0) < 0.1 * F.min(axis=0))
+
+
+def test_model_steps_survive_what_cannot_be_fitted(rng):
+    X = np.ones((12, D))
+    move = ModelStep()
+    move.learn(Points(X, np.ones((12, 2)), np.zeros(12)))
+    assert not move(X, X, X, rng).any()
+    move.learn(Points(X, np.full((12, 2), np.nan), np.full(12, np.inf)))
+    assert not move(X, X, X, rng).any()
+    move.forget()
+    assert not move(X, X, X, rng).any()
+
+
+def test_model_steps_remember_no_more_than_they_say(rng):
+    move, one = ModelStep(), Points(rng.random((300, D)), rng.random((300, 2)), np.zeros(300))
+    for _ in range(20):
+        move.learn(one)
+        assert len(move._known[-move.MEMORY :]) <= move.MEMORY
+        assert len(move._known) <= 2 * move.MEMORY

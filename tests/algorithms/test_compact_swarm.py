@@ -17,12 +17,24 @@ from swarm_problems import Cliff, Parabolas, Unreachable, assert_clean_front, di
 
 from experiments.contest.moved_zdt import MovedZDT
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
+from pymoo_hdte.algorithms.moves import Attraction
+from pymoo_hdte.algorithms.quadratic import ModelStep
 from pymoo_hdte.checks import InvalidInput
 
 
 def run(problem, n_eval, seed=1, make=CompactSwarm, **kwargs):
     problem = get_problem(problem) if isinstance(problem, str) else problem
     return minimize(problem, make(**kwargs), ("n_eval", n_eval), seed=seed)
+
+
+def test_models_of_objectives_take_no_part_with_constraints_unless_asked():
+    def has_models(problem, **kwargs):
+        moves = run(problem, 100, **kwargs).algorithm.moves
+        return any(isinstance(move, ModelStep) for move in moves)
+
+    assert has_models("zdt1")
+    assert not has_models("tnk")
+    assert has_models("tnk", moves=(Attraction(), ModelStep()))
 
 
 # --- result and archive ---------------------------------------------------------------------------

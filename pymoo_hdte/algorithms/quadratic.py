@@ -1,0 +1,143 @@
+"""A move by local quadratic models of the objectives, fitted to what was evaluated nearby."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pymoo_hdte.algorithms.points import Points
+
+
+class Quadratic(NamedTuple):
+    """g z + z H z / 2 for each of m objectives: ``gradient`` (m, d), ``hessian`` (m, d, d)."""
+
+    gradient: NDArray[np.float64]
+    hessian: NDArray[np.float64]
+
+    def weighted(self, weights: NDArray[np.float64]) -> Quadratic:
+        """Return the sums of the objectives with ``weights`` (k, m), k models."""
+        return Quadratic(
+            weights @ self.gradient, np.tensordot(weights, self.hessian, axes=([1], [0]))
+        )
+
+
+_FREE, _RIDGE = 100.0, 1e-6
+_HALVINGS = 16
+
+
+def fitted(Z: NDArray[np.float64], F: NDArray[np.float64]) -> Quadratic:
+    """Return quadratics near objectives ``F`` (n, m) at places ``Z`` (n, d) of size one.
+
+    Of all that fit alike it is the one of smallest second derivatives, so that fewer points than
+    coefficients do: ridge regression with a polynomial kernel, in which constant and gradient are
+    all but free (M. J. D. Powell, "The NEWUOA software for unconstrained optimization without
+    derivatives", 2006, takes the smallest change of second derivatives).
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If places are such that nothing can be fitted.
+    """
+    products = Z @ Z.T
+    kernel = _FREE * (1.0 + products) + 0.5 * products**2
+    kernel[np.diag_indices(len(Z))] += _RIDGE * np.trace(kernel) / len(Z)
+    parts = np.linalg.solve(kernel, F)
+    return Quadratic(
+        _FREE * parts.T @ Z, np.array([(Z * part[:, np.newaxis]).T @ Z for part in parts.T])
+    )
+
+
+def lowest_within(
+    model: Quadratic, which: NDArray[np.int_], radii: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the lowest places (k, d) of the models ``which`` (k,) within ``radii`` (k,) of zero.
+
+    They solve (H + l I) z = -g with the smallest l that makes the matrix positive and z short
+    enough, found by halving in the eigenvectors of H.
+    """
+    values, vectors = np.linalg.eigh(model.hessian)
+    slopes = np.einsum("kij,ki->kj", vectors, model.gradient)[which]
+    values, radii = values[which], radii[:, np.newaxis]
+    least = np.maximum(-values[:, :1], 0.0) + 1e-14 * np.abs(values).max(axis=1, keepdims=True)
+    least = np.maximum(least * (1.0 + 1e-9), np.finfo(float).tiny)
+    most = least + np.linalg.norm(slopes, axis=1, keepdims=True) / radii
+    for _ in range(_HALVINGS):
+        middle = np.sqrt(least * most)
+        long = (slopes**2 / (values + middle) ** 2).sum(axis=1, keepdims=True) > radii**2
+        least, most = np.where(long, middle, least), np.where(long, most, middle)
+    return np.einsum("kij,kj->ki", vectors[which], -slopes / (values + most))
+
+
+class ModelStep:
+    """To where quadratic models of the objectives are lowest, near one leader of a generation.
+
+    Fitted to the 3 d + 20 evaluated points nearest to the leader, at most 200; their median
+    distance is the unit of length. A particle goes to the lowest place of a weighted sum of the
+    models within a radius of 0.1 to 1 units, log-uniform; weights are uniform on the simplex, one
+    in five an objective alone. Sums in which a quadratic model is right have their lowest places on
+    the front, whatever the scales and directions of the variables are; the swarm does the rest.
+
+    It remembers the latest 1,000 points that it is told.
+    """
+
+    EXACT = True
+    """A mutation would spoil what is computed."""
+    MEMORY = 1000
+    LARGEST_FIT = 200
+    WEIGHTS = 3
+    """Different sums in a generation: each costs eigenvectors."""
+    ALONE = 0.2
+    SMALLEST_EXPONENT, LARGEST_EXPONENT = -1.0, 0.0
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all points: a run begins."""
+        self._known: Points | None = None
+
+    def learn(self, points: Points) -> None:
+        """Remember evaluated points."""
+        points = points[np.flatnonzero(np.isfinite(points.F).all(axis=1))]
+        if self._known is not None:
+            points = self._known.followed_by(points)
+        self._known = points[-self.MEMORY :] if len(points) > 2 * self.MEMORY else points
+
+    def __call__(
+        self,
+        X: NDArray[np.float64],
+        leaders: NDArray[np.float64],
+        swarm: NDArray[np.float64],
+        random_state: np.random.Generator,
+    ) -> NDArray[np.float64]:
+        """Return the steps (n, d); none while there is nothing to fit."""
+        n, d = X.shape
+        if not n or self._known is None or len(self._known) < 3:
+            return np.zeros((n, d))
+        centre, known = leaders[0], self._known[-self.MEMORY :]
+        away = known.X - centre
+        distances = np.sqrt((away**2).sum(axis=1))
+        nearest = min(len(distances), 3 * d + 20, self.LARGEST_FIT)
+        near = np.argpartition(distances, nearest - 1)[:nearest]
+        unit = float(np.median(distances[near]))
+        F = known.F[near] - known.F[distances.argmin()]
+        span = np.ptp(F, axis=0)
+        if not unit > 0.0 or not np.isfinite(span).all():
+            return np.zeros((n, d))
+        F = F / np.where(span > 0.0, span, 1.0)
+        weights = self._weights(F.shape[1], random_state)
+        radii = 10.0 ** random_state.uniform(self.SMALLEST_EXPONENT, self.LARGEST_EXPONENT, n)
+        try:
+            model = fitted(away[near] / unit, F).weighted(weights)
+            places = lowest_within(model, np.arange(n) % len(weights), radii)
+        except np.linalg.LinAlgError:
+            return np.zeros((n, d))
+        return centre + unit * places - X
+
+    def _weights(self, n_obj: int, random_state: np.random.Generator) -> NDArray[np.float64]:
+        weights = random_state.dirichlet(np.ones(n_obj), self.WEIGHTS)
+        alone = random_state.random(self.WEIGHTS) < self.ALONE
+        weights[alone] = np.eye(n_obj)[random_state.integers(n_obj, size=int(alone.sum()))]
+        return weights
