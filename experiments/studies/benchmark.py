@@ -22,7 +22,7 @@ from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
 from experiments.studies.benchmark_workers import ratios_of_workers, virtual_table
 from experiments.studies.timing import Ratio, best_time, ratio_table
-from pymoo_hdte.algorithms import AMPMOPSO, ElitistSwarm
+from pymoo_hdte.algorithms import AMPMOPSO, CompactSwarm, ElitistSwarm
 from pymoo_hdte.drive import (
     PARAMETERS,
     PRESETS,
@@ -158,7 +158,10 @@ def _algorithms() -> Iterator[Ratio]:
         "NSGA-II": lambda: NSGA2(pop_size=100),
         "AMP-MOPSO": lambda: AMPMOPSO(pop_size=100, archive_size=50),
         "ElitistSwarm": lambda: ElitistSwarm(pop_size=100),
+        "CompactSwarm": lambda: CompactSwarm(pop_size=100),
     }
+    # The models of CompactSwarm are for evaluations that take far longer than it does.
+    demanded = dict.fromkeys(makers, 3.0) | {"CompactSwarm": 2.0}
     own, total = (
         {
             name: min(_seconds_per_generation(problem, make())[kind] for _ in range(REPEATS))
@@ -174,8 +177,8 @@ def _algorithms() -> Iterator[Ratio]:
             seconds["NSGA-II"],
             name,
             seconds[name],
-            "at least 3" if label == "own cost" else "",
-            seconds["NSGA-II"] >= 3.0 * seconds[name] or label != "own cost",
+            f"at least {demanded[name]:.0f}" if label == "own cost" else "",
+            seconds["NSGA-II"] >= demanded[name] * seconds[name] or label != "own cost",
         )
 
 

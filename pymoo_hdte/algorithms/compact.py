@@ -90,6 +90,8 @@ class CompactSwarm(ElitistSwarm):
     - the models know objectives only: with constraints they led away from feasible regions (MW:
       feasible in 26 of 29 runs in place of 29), so that `ModelStep` is not among the moves there
       unless ``moves`` names it;
+    - the models are solved by BLAS, so that the same seed gives the same bytes on the same kind of
+      processor with the same number of its threads;
     - archives and models know what was evaluated: a callback that changes the problem has to
       evaluate the individuals of `archive_all` and of ``opt`` again, and the models forget the old
       problem in a thousand evaluations.
@@ -98,8 +100,9 @@ class CompactSwarm(ElitistSwarm):
     --------
     >>> from pymoo.optimize import minimize
     >>> from pymoo.problems import get_problem
-    >>> len(minimize(get_problem("zdt1"), CompactSwarm(), ("n_eval", 1000), seed=1).F)
-    31
+    >>> found = minimize(get_problem("zdt1"), CompactSwarm(), ("n_eval", 1000), seed=1).F
+    >>> 20 <= len(found) <= 100
+    True
     """
 
     GUESTS = 0.2
@@ -143,8 +146,9 @@ class CompactSwarm(ElitistSwarm):
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         super()._initialize_advance(infills, **kwargs)
         self._learners = [move for move in self.moves if isinstance(move, ModelStep)]
+        lowest, highest = self.problem.bounds()
         for move in self._learners:
-            move.forget()
+            move.forget(highest - lowest)
             move.learn(self._points(self.pop))
         self._remember(self.pop)
 

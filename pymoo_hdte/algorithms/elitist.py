@@ -146,7 +146,8 @@ class ElitistSwarm(Swarm):
             around = self._around(move, swarm, movers[rows])
             steps[rows] = move(X[rows], leaders[rows], around, random_state)
         exact = [number for number, move in enumerate(self.moves) if getattr(move, "EXACT", False)]
-        mutated = ~np.isin(self.chosen, exact)
+        # A particle that stays would be evaluated twice.
+        mutated = ~np.isin(self.chosen, exact) | ~steps.any(axis=1)
         steps[mutated] += self.mutation(steps[mutated], highest - lowest, random_state)
         moved = particles_at(np.clip(X + steps, lowest, highest))
         if type(self.repair) is NoRepair:

@@ -25,6 +25,8 @@ class Quadratic(NamedTuple):
 
 _FREE, _RIDGE = 100.0, 1e-6
 _HALVINGS = 16
+_LEAST_SHIFT = 1e-100
+"""Keeps a model without slope and curvature at its place; its square is still a number."""
 
 
 def fitted(Z: NDArray[np.float64], F: NDArray[np.float64]) -> Quadratic:
@@ -61,7 +63,7 @@ def lowest_within(
     slopes = np.einsum("kij,ki->kj", vectors, model.gradient)[which]
     values, radii = values[which], radii[:, np.newaxis]
     least = np.maximum(-values[:, :1], 0.0) + 1e-14 * np.abs(values).max(axis=1, keepdims=True)
-    least = np.maximum(least * (1.0 + 1e-9), np.finfo(float).tiny)
+    least = np.maximum(least * (1.0 + 1e-9), _LEAST_SHIFT)
     most = least + np.linalg.norm(slopes, axis=1, keepdims=True) / radii
     for _ in range(_HALVINGS):
         middle = np.sqrt(least * most)
@@ -94,9 +96,18 @@ class ModelStep:
     def __init__(self) -> None:
         self.forget()
 
-    def forget(self) -> None:
-        """Forget all points: a run begins."""
+    def forget(self, widths: NDArray[np.float64] | None = None) -> None:
+        """Forget all points: a run begins.
+
+        Parameters
+        ----------
+        widths : ndarray, shape (d,), optional
+            Ranges of the variables, in which distances are measured; by default they are equal.
+        """
         self._known: Points | None = None
+        self._reach = np.ones(1)
+        if widths is not None and np.any(widths > 0.0):
+            self._reach = widths / widths.max()
 
     def learn(self, points: Points) -> None:
         """Remember evaluated points."""
@@ -117,7 +128,7 @@ class ModelStep:
         if not n or self._known is None or len(self._known) < 3:
             return np.zeros((n, d))
         centre, known = leaders[0], self._known[-self.MEMORY :]
-        away = known.X - centre
+        away = (known.X - centre) / np.where(self._reach > 0.0, self._reach, 1.0)
         distances = np.sqrt((away**2).sum(axis=1))
         nearest = min(len(distances), 3 * d + 20, self.LARGEST_FIT)
         near = np.argpartition(distances, nearest - 1)[:nearest]
@@ -134,7 +145,8 @@ class ModelStep:
             places = lowest_within(model, np.arange(n) % len(weights), radii)
         except np.linalg.LinAlgError:
             return np.zeros((n, d))
-        return centre + unit * places - X
+        # A variable without a range does not move.
+        return centre + unit * places * self._reach - X
 
     def _weights(self, n_obj: int, random_state: np.random.Generator) -> NDArray[np.float64]:
         weights = random_state.dirichlet(np.ones(n_obj), self.WEIGHTS)

@@ -253,3 +253,34 @@ def test_model_steps_remember_no_more_than_they_say(rng):
         move.learn(one)
         assert len(move._known[-move.MEMORY :]) <= move.MEMORY
         assert len(move._known) <= 2 * move.MEMORY
+
+
+def test_flat_models_give_no_step_without_a_warning():
+    """A plateau of one objective is as usual as an objective taken alone."""
+    steep = np.eye(1, D)
+    for slope in (np.zeros((1, D)), 1e-200 * steep, steep):
+        places = lowest_within(Quadratic(slope, np.zeros((1, D, D))), np.zeros(2, int), np.ones(2))
+        assert np.all(np.linalg.norm(places, axis=1) <= 1.0)
+    assert places[:, 0] == pytest.approx(-1.0, rel=0.02)
+
+
+def test_model_steps_do_not_depend_on_the_units_of_variables(rng):
+    objectives, _, lowest = _quadratics(rng)
+    X = lowest.mean(axis=0) + 4.0 * rng.standard_normal((35, D))
+    units = 2.0 ** np.array([0, -30, 20, 3, -7])
+    points = objectives(X), np.zeros(35)
+    steps = []
+    for scale in (np.ones(D), units):
+        move = ModelStep()
+        move.forget(scale)
+        move.learn(Points(X * scale, *points))
+        here = X * scale
+        steps.append(move(here, here, here, np.random.default_rng(1)) / scale)
+    np.testing.assert_allclose(steps[1], steps[0], rtol=1e-9)
+    fixed = ModelStep()
+    fixed.forget(np.array([1.0, 1.0, 0.0, 1.0, 1.0]))
+    X[:, 2] = 0.5
+    fixed.learn(Points(X, *points))
+    steps = fixed(X, X, X, rng)
+    assert steps.any()
+    assert not steps[:, 2].any()

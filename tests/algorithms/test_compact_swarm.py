@@ -37,6 +37,12 @@ def test_models_of_objectives_take_no_part_with_constraints_unless_asked():
     assert has_models("tnk", moves=(Attraction(), ModelStep()))
 
 
+def test_a_model_that_has_no_step_yet_does_not_evaluate_the_same_again():
+    found = run("zdt1", 8, pop_size=2, moves=(ModelStep(),), save_history=True)
+    visited = np.vstack([one.off.get("X") for one in found.history if one.off is not None])
+    assert len(np.unique(visited, axis=0)) == len(visited) == 8
+
+
 # --- result and archive ---------------------------------------------------------------------------
 
 

@@ -9,6 +9,7 @@ from scipy.optimize import least_squares
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations
 from pymoo_hdte.drive.solve.free_angle import torus_of
+from pymoo_hdte.drive.solve.newton import Place
 from pymoo_hdte.drive.solve.torus import stacked, unstacked
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -79,6 +80,36 @@ def test_springs_stiffer_than_the_gearing_converge_at_any_load_and_speed(force):
         tolerance=1e-8,
     )
     assert np.all(balance.converged)
+
+
+def test_matrices_of_nearby_cases_lead_to_the_same_states(monkeypatch):
+    """In several blocks of rows, and from rows in another order that occur more than once."""
+    coefficients = drive("calibrated", 2.5, 1e-4).rows(np.zeros(70, dtype=int))
+    speed, load = np.linspace(20.0, 210.0, 70), np.linspace(0.0, 60.0, 70)
+    motor = SpeedLoop(0.02, 0.5)
+    start = harmonic_balance(
+        coefficients, input_speed=speed, load_torque=load, motor=motor, tangents=True
+    )
+    rows = np.array([*range(69, -1, -1), 3, 3, 66])
+    nearby = replace(coefficients.rows(rows), stiffness=1.001 * coefficients.stiffness[rows])
+    made = []
+    matrix = Place.matrix
+    monkeypatch.setattr(Place, "matrix", lambda at, of: made.append(len(of)) or matrix(at, of))
+
+    def found(near):
+        made.clear()
+        motion = harmonic_balance(
+            nearby, input_speed=speed[rows], load_torque=load[rows], motor=motor, start=near
+        )
+        return motion, sum(made)
+
+    with_those, few = found(start.rows(rows))
+    with_own, many = found(replace(start, tangents=None).rows(rows))
+    assert np.all(with_those.converged & with_own.converged)
+    scale = np.abs(with_own.torsion).max()
+    assert with_those.torsion == pytest.approx(with_own.torsion, abs=1e-10 * scale)
+    assert few == 70
+    assert many > 2 * len(rows)
 
 
 def test_springs_that_slip_bear_their_force():

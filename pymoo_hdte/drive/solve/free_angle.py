@@ -141,9 +141,9 @@ def _inverses(start: SteadyMotion | None, rows: slice, count: int) -> list[Matri
     """Return the inverse matrix of the case from which each row begins; None without one."""
     if start is None or start.tangents is None:
         return [None] * count
-    found = start.tangents.rows(rows).inverses()
     ended = start.converged[rows]
-    return [one if good else None for one, good in zip(found, ended, strict=True)]
+    found = iter(start.tangents.rows(rows).rows(ended).inverses())
+    return [next(found) if good else None for good in ended]
 
 
 def continued_from_neighbours(coefficients: Coefficients, motion: SteadyMotion) -> SteadyMotion:
@@ -209,13 +209,17 @@ class _Solver:
         for _ in range(steps):
             change, energy_change = at.newton_step(size[left], inverses)
             longest = np.abs(change).max(axis=1)
-            settled = longest <= tolerance * size[left, 0]
-            at = nearer(at, change, energy_change, settled)
-            self.torsion[left], self.energy[left] = at.torsion, at.energy
+            shrinks = longest <= _SHRINKS * before
+            # With the matrix of another case a short step alone does not tell that it has arrived.
+            own = np.array([inverse is None for inverse in inverses], dtype=bool)
+            settled = (longest <= tolerance * size[left, 0]) & (shrinks | own)
             self.converged[left] = settled
             if np.all(settled):
+                self.torsion[left] = at.torsion + change
+                self.energy[left] = equations.at_wanted_speed(at.energy + energy_change)
                 break
-            shrinks = longest <= _SHRINKS * before
+            at = nearer(at, change, energy_change, settled)
+            self.torsion[left], self.energy[left] = at.torsion, at.energy
             inverses = [one if ok else None for one, ok in zip(inverses, shrinks, strict=True)]
             before = longest
             # Once half of the rows have converged, only the others are iterated further.

@@ -51,7 +51,9 @@ class Place:
         self._viscous = rate * mean(motion.mesh_damping) - self._impedance
         self._level = mean(motion.mesh_slope)
         of_each = self._left / (np.abs(self._level) + np.abs(self._viscous))
-        self.distance = np.linalg.norm(of_each, axis=1, keepdims=True)
+        distance = np.linalg.norm(of_each, axis=1, keepdims=True)
+        # A row that has diverged is farther away than any other place.
+        self.distance = np.where(np.isnan(distance), np.inf, distance)
 
     def moved(self, change: Phasors, energy_change: Phasors) -> Place:
         """Return the place after a change, at the wanted speed."""
@@ -127,14 +129,13 @@ def nearer(at: Place, change: Phasors, energy_change: Phasors, settled: NDArray[
     there = at.moved(change, energy_change)
     least = there.distance
     while True:
-        # Of a diverged row the distance is not a number.
-        shorter = ~(there.distance < at.distance) & (parts > _LEAST_PART) & ~settled[:, None]
+        shorter = (there.distance >= at.distance) & (parts > _LEAST_PART) & ~settled[:, None]
         if not np.any(shorter):
             break
         parts = np.where(shorter, parts / 2.0, parts)
         there = at.moved(parts * change, parts * energy_change)
         best = np.where(there.distance < least, parts, best)
-        least = np.fmin(there.distance, least)
+        least = np.minimum(there.distance, least)
     if np.array_equal(best, parts):
         return there
     return at.moved(best * change, best * energy_change)

@@ -40,7 +40,7 @@ def over_the_limit(seconds: float) -> Failure:
 
 def limit_in(text: str) -> float | None:
     """Return the time limit in seconds that a failure's text tells; None for other failures."""
-    told = re.search(r"no result within (\S+) s", text)
+    told = re.fullmatch(rf"(?:{TOO_LONG}: )?no result within (\d+(?:\.\d*)?(?:e[-+]?\d+)?) s", text)
     return float(told[1]) if told else None
 
 
