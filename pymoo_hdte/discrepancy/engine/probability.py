@@ -53,12 +53,51 @@ def of_names(
     }.get(status)
     if experience is None:
         return None
+    return experience * _share(chosen, equivalent, found, degrees_of_freedom)
+
+
+def likelier(
+    chosen: Hypothesis,
+    equivalent: Sequence[Hypothesis],
+    found: Sequence[Hypothesis],
+    degrees_of_freedom: int,
+) -> list[Hypothesis]:
+    """Return sets that make names improbable: all of more evidence, if these have less than half.
+
+    Of a plain name it must be more probable than not that it is true. Sets that contain the chosen
+    names, or those of an equivalent one, speak for them and do not count.
+
+    Parameters
+    ----------
+    chosen : Hypothesis
+    equivalent : sequence of Hypothesis
+        Others of its class.
+    found : sequence of Hypothesis
+        All compared sets.
+    degrees_of_freedom : int
+    """
+    if _share(chosen, equivalent, found, degrees_of_freedom) >= 0.5:
+        return []
+    others = (one for one in found if not _says(one, (chosen, *equivalent)))
+    return [one for one in others if one.fit.evidence < chosen.fit.evidence]
+
+
+def _share(
+    chosen: Hypothesis,
+    equivalent: Sequence[Hypothesis],
+    found: Sequence[Hypothesis],
+    degrees_of_freedom: int,
+) -> float:
+    """Return the share of the evidence of all compared sets that speaks for a class."""
     misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
     evidence = np.array([one.fit.evidence for one in found])
     weights = np.exp(-(evidence - evidence.min()) / (2.0 * misfit))
-    named = [one.names for one in (chosen, *equivalent)]
-    says = [any(names <= one.names for names in named) for one in found]
-    return experience * float(weights[says].sum() / weights.sum())
+    says = [_says(one, (chosen, *equivalent)) for one in found]
+    return float(weights[says].sum() / weights.sum())
+
+
+def _says(one: Hypothesis, named: Sequence[Hypothesis]) -> bool:
+    return any(each.names <= one.names for each in named)
 
 
 def of_nothing(screened: Sequence[Screened], n_residuals: int, rules: Rules) -> float:

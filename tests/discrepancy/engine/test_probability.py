@@ -50,6 +50,16 @@ def test_a_class_counts_all_its_members():
     assert of_named([one, two]) == pytest.approx(RULES.named_right / 2.0)
 
 
+def test_sets_of_more_evidence_are_rivals_of_an_improbable_name():
+    chosen, likely, other = compared(10.0, "a"), compared(0.0, "b"), compared(20.0, "c")
+    richer = compared(0.0, "a", "b")
+    assert probability.likelier(chosen, [], [chosen, likely, other], 100) == [likely]
+    assert probability.likelier(chosen, [likely], [chosen, likely, other], 100) == []
+    assert probability.likelier(likely, [], [chosen, likely, other], 100) == []
+    # What contains the names of the chosen set speaks for them.
+    assert probability.likelier(chosen, [], [chosen, richer, likely], 100) == []
+
+
 def test_what_a_model_leaves_beyond_noise_blurs_the_evidence():
     far, clear = (
         [compared(0.0, "a", chi_square=chi), compared(10.0, "b")] for chi in (1000.0, 100.0)
