@@ -95,7 +95,10 @@ def _measured(folder: Path, data: Path | None, progress: Callable[[int, int], No
     if data is not None:
         raise InvalidInput("--data", str(data), f"none without a {RIG_FILE}")
     if folder.is_dir() and not (folder / CAMPAIGN_FILE).is_file():
-        allowed = f"a folder with {CAMPAIGN_FILE}, of a harmonic drive, or {RIG_FILE}, of another"
+        allowed = (
+            f"a folder with {CAMPAIGN_FILE}, of a harmonic drive on a test bench with two encoders "
+            f"and torque sensors, or {RIG_FILE}, of a robot's joint or any other machine"
+        )
         raise InvalidInput("CAMPAIGN", str(folder), allowed)
     return read_campaign(folder, progress=progress)
 
@@ -123,13 +126,22 @@ def _summary(document: dict[str, Any], out: Path) -> str:
         document["sentence"],
         *([relevance["sentence"]] if (relevance := document.get("relevance")) else []),
         document["location"]["sentence"],
+        f"On records kept out: {document['gap_sentence']}",
         *document["limits"],
+        *_remarks(document.get("record_remarks", [])),
         *torsion["limits"],
         f"Next: {in_words(document['next_experiment']['description'])}",
         *([f"For the torsion: {test}"] if (test := torsion.get("next_experiment")) else []),
         f"Report: {out / PAGE_FILE}",
     ]
     return "\n".join(lines)
+
+
+def _remarks(remarks: list[str]) -> list[str]:
+    """Return one line on how records were read; the report has them all."""
+    if len(remarks) < 2:
+        return remarks
+    return [f"{remarks[0]} {len(remarks) - 1} more of these stand in the report."]
 
 
 def _name(effect: dict[str, Any]) -> str:

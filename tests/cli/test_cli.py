@@ -19,6 +19,7 @@ DOCUMENT = {
     "sentence": "There is play between the teeth.",
     "effects": [{"name": "backlash", "port": "mesh"}],
     "location": {"sentence": "In the mean."},
+    "gap_sentence": "Off by 3 before, 1 after.",
     "limits": ["No record was held out."],
     "next_experiment": {"description": "a sweep through zero"},
 }
@@ -69,7 +70,7 @@ def test_a_missing_campaign_is_one_line_and_writes_nothing(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["discrepancy", "."], "a folder with campaign.toml, of a harmonic drive, or rig.toml"),
+        (["discrepancy", "."], "or rig.toml, of a robot's joint"),
         (["optimise", "hs_20_10"], "a TOML file that is there, or hs_20_100"),
     ],
 )

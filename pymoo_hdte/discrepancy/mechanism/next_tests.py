@@ -14,9 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
+from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
+from pymoo_hdte.discrepancy.mechanism.rest import root_mean_square
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism.port_motion import PortMotion, law_force
 
@@ -35,7 +38,8 @@ class NextTest:
     record : str
         Training record to be repeated.
     size, rate : float
-        Factors on its motion and on its speed; a negative rate is the reverse direction.
+        Factors on its travel and on the rate at which it is played, so that ``size * rate`` is that
+        on its speed; a negative rate is the reverse direction.
     separates : tuple of str
         Hypotheses that it separates.
     separation : float
@@ -82,6 +86,12 @@ def next_test(finding: MechanismFinding) -> NextTest:
             f"Run the same speeds in the reverse direction: the {one_way[0]} moves one way only, "
             "in which dry friction cannot be told from a constant force.",
         )
+    if finding.verdict.status == "unlisted" and (reversed_inputs := _reversed(finding)):
+        text = (
+            f"First check the sign of the gain of {' and of '.join(reversed_inputs)}: with the "
+            "opposite sign the believed mechanism alone leaves less than anything that was found."
+        )
+        return NextTest(first, 1.0, 1.0, (), 0.0, text)
     hypothesis = _nearest(finding)
     if chosen is None or hypothesis is None:
         why = {
@@ -91,9 +101,32 @@ def next_test(finding: MechanismFinding) -> NextTest:
             finding.verdict.status,
             "no rival is left, and what was found is to be proved beyond where it was found",
         )
-        text = f"Repeat {first} at three times its size: {why}."
+        text = f"Repeat {first} {_how(3.0, 1.0)}: {why}."
         return NextTest(first, 3.0, 1.0, (), 0.0, text)
     return _best_repetition(finding, chosen, hypothesis)
+
+
+def _reversed(finding: MechanismFinding) -> list[str]:
+    """Return the inputs whose gain has the wrong sign, as far as the records tell.
+
+    With the opposite sign, the base alone leaves less in every balance than the best set of effects
+    does with the stated one.
+    """
+    verdict = finding.verdict
+    best = verdict.base if verdict.chosen is None else verdict.chosen.fit
+    left = root_mean_square(finding.data, best.residuals)
+    train = [record for record in finding.records if record.role == "train"]
+    found = []
+    for one in finding.mechanism.inputs:
+        if one.scaled:
+            opposite = {f"gain of {one.name}": -one.gain.value}
+            mechanism = finding.mechanism.with_values(opposite, exactly=False)
+            data = measured_data(
+                mechanism, train, finding.cutoff, finding.data.known, finding.data.rules
+            )
+            if np.all(root_mean_square(data, fit(data).residuals) < left):
+                found.append(one.name)
+    return found
 
 
 def _nearest(finding: MechanismFinding) -> Hypothesis | None:
@@ -123,26 +156,36 @@ def _best_repetition(
         )
     separation, place, size, rate = best
     name = finding.data.spectra[place].record.name
-    how = " and ".join(
-        text
-        for factor, text in (
-            (size, f"{size:g} times its size"),
-            (rate, f"{rate:g} times its speed"),
-        )
-        if factor != 1.0
-    )
-    told = f"{in_words(chosen.label)} and {in_words(hypothesis.label)}"
+    told = f"(1) {in_words(chosen.label)} and (2) {in_words(hypothesis.label)}"
     if separation < 1.0:
         description = (
-            "No repetition of these records at another size or speed separates "
+            "No repetition of these records with another travel or at another rate separates "
             f"{told}: it takes another motion."
         )
     else:
         description = (
-            f"Repeat {name} at {how or 'the same size, for longer'}: there {told} differ by "
-            f"{separation:.2g} times what the model leaves now."
+            f"Repeat {name} {_how(size, rate)}: this separates {told}, whose forces differ there "
+            f"by {separation:.2g} times what the model leaves now."
         )
     return NextTest(name, size, rate, (chosen.label, hypothesis.label), separation, description)
+
+
+def _how(size: float, rate: float) -> str:
+    """Return in words how a record is repeated.
+
+    Of a motion that is scaled and played at another rate, the speed changes by both.
+    """
+    words = []
+    if size != 1.0:
+        words.append(f"with {size:g} times its travel")
+    if rate != 1.0:
+        slower = rate < 1.0
+        words.append(
+            f"{1.0 / rate if slower else rate:.2g} times {'slower' if slower else 'faster'}"
+        )
+    if not words:
+        return "as it was, for longer"
+    return f"{', '.join(words)} ({size * rate:.2g} times its speed)"
 
 
 def _separation(

@@ -12,6 +12,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     unexplained,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.effects.sentence_blanks import in_words
 
@@ -42,6 +43,49 @@ def how_sure(finding: DriveFinding) -> str:
             + "".join(f" Against it: {in_words(one)}." for one in verdict.doubts)
         )
     return " ".join(_evidence(finding, verdict.chosen, share))
+
+
+def how_sure_of_records(finding: MechanismFinding) -> str:
+    """Return how sure the verdict on measured records is, in words.
+
+    Without a probability: what a model of a real machine leaves is no noise, so that its evidence
+    counts for more than it is worth.
+    """
+    verdict = finding.verdict
+    chosen = verdict.chosen
+    if verdict.status == "adequate":
+        return "An effect too small for these records may still be there."
+    if chosen is None:
+        return "It is seen in the forces beyond the cutoff only, and no rival was compared."
+    share = percent(chosen.explained)
+    if verdict.status == "unlisted":
+        return (
+            "That something is missing is certain; what it is, is not. The nearest known effect, "
+            f"{in_words(chosen.label)}, explains {share} of what known effects can explain."
+        )
+    others = [
+        one
+        for one in verdict.alternatives
+        if one not in verdict.equivalent
+        and _names(one) != _names(chosen)
+        and len(one.candidates) == len(chosen.candidates)
+    ]
+    words = [f"It explains {share} of what known effects can explain."]
+    if verdict.equivalent:
+        shares = ", ".join(percent(one.explained) for one in verdict.equivalent)
+        words.append(f"What these records cannot tell from it explains {shares}.")
+    elif others:
+        best = max(others, key=lambda one: one.explained)
+        words.append(
+            f"The next best, {in_words(best.label)}, explains {percent(best.explained)}, at a BIC "
+            f"of {best.bic - chosen.bic:+.2g}."
+        )
+    else:
+        words.append("No other set of as many effects came near enough to be compared.")
+    if not verdict.shown_in_held_out:
+        words.append("The records kept out of the fit do not show it.")
+    words.append("Real records leave more than noise, so that no probability is given.")
+    return " ".join(words)
 
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:

@@ -14,8 +14,14 @@ from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechanism
+from pymoo_hdte.discrepancy.report.balance_units import unit_of
+from pymoo_hdte.discrepancy.report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy.report.document import believed_in_words
-from pymoo_hdte.discrepancy.report.mechanism_document import mechanism_verdict_document
+from pymoo_hdte.discrepancy.report.gap_words import percent
+from pymoo_hdte.discrepancy.report.mechanism_document import (
+    evidence,
+    mechanism_verdict_document,
+)
 from pymoo_hdte.discrepancy.report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy.report.mechanism_figures import (
     misfit_over_frequency,
@@ -70,6 +76,7 @@ def write_mechanism_report(
     FOLDER.check(Path(out))
     document = mechanism_verdict_document(title, finding, gaps, test)
     document["revised_model"] = {"file": MODEL_FILE}
+    document["gap_sentence"] = proof_sentence(finding, gaps)
     revised = revised_mechanism(title, finding)
     if joint is not None:
         revised = revised_joint(title, joint)
@@ -97,7 +104,9 @@ def _page(
     rows = _effect_rows(document["effects"])
     sizes = [row for row in rows if not row["parameter"].endswith("phase")]
     shown = _shown(gaps)
-    pictures["overlay"] = data_uri(overlay(shown)) if shown else ""
+    pictures["overlay"] = data_uri(overlay(shown, _unit(finding, shown))) if shown else ""
+    chosen = finding.verdict.chosen
+    compared = [evidence(finding, chosen)] if chosen else []
     return page(
         "pymoo_hdte.discrepancy.report",
         "mechanism.html.j2",
@@ -111,7 +120,9 @@ def _page(
         gaps=gaps,
         shown=shown,
         pictures=pictures,
-        proof_sentence=proof_sentence(finding, gaps),
+        certainty=how_sure_of_records(finding),
+        compared=[*compared, *document["alternatives"]],
+        proof_sentence=document["gap_sentence"],
         extent_sentence=extent_sentence(gaps),
         believed_effects=believed_in_words(document),
         believed={name: one.value for name, one in finding.mechanism.quantities.items()},
@@ -129,11 +140,10 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
     if not gaps:
         return "No record was held out, so that nothing can be proved."
     if not finding.accepted.candidates:
-        words = [f"{gap.quantity} by {gap.kind}: {gap.after:.3g}" for gap in gaps]
-        return (
-            f"Nothing was added; the model is off by {', '.join(words)} (SI). "
-            f"{extent_sentence(gaps)}"
-        )
+        words = [
+            f"{gap.quantity} by {gap.kind}: {gap.after:.3g} {_unit(finding, gap)}" for gap in gaps
+        ]
+        return f"Nothing was added; the model is off by {', '.join(words)}. {extent_sentence(gaps)}"
     words = []
     for kind in ("simulation", "balance"):
         for quantity in dict.fromkeys(gap.quantity for gap in gaps if gap.kind == kind):
@@ -142,12 +152,15 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
                 float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in of_it])))
                 for one in ("before", "after")
             )
-            change = _change(before, after)
-            words.append(f"{quantity} by {kind} {change} from {before:.3g} to {after:.3g}")
-    return (
-        f"Root mean square errors (SI), before and after: {'; '.join(words)}. "
-        f"{extent_sentence(gaps)}"
-    )
+            change, unit = _change(before, after), _unit(finding, of_it[0])
+            words.append(f"{quantity} by {kind} {change} from {before:.3g} to {after:.3g} {unit}")
+    return f"Root mean square errors, before and after: {'; '.join(words)}. {extent_sentence(gaps)}"
+
+
+def _unit(finding: MechanismFinding, gap: MeasuredGap) -> str:
+    """Return the unit of a gap: of the position of a coordinate, or of a force."""
+    what = "position" if gap.kind == "simulation" else "force"
+    return unit_of(finding.mechanism, gap.quantity, what)
 
 
 def extent_sentence(gaps: Sequence[MeasuredGap]) -> str:
@@ -163,7 +176,7 @@ def extent_sentence(gaps: Sequence[MeasuredGap]) -> str:
 def _change(before: float, after: float) -> str:
     if not np.isfinite(before + after):
         return "diverges for one of the models,"
-    return "falls" if after < before else "does not fall,"
+    return f"falls by {percent(1.0 - after / before)}" if after < before else "does not fall,"
 
 
 def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, not_proven, rests_told
+from pymoo_hdte.discrepancy.report.balance_units import unit_of
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import in_words
@@ -63,6 +64,7 @@ def mechanism_verdict_document(
         "location": locate_in_mechanism(finding).summary(),
         "remainder": remainder(finding),
         "limits": limits(finding),
+        "record_remarks": record_remarks(finding),
         "held_out": [gap.as_dict() for gap in gaps]
         or {"reason": "no record was held out, so that nothing can be proved"},
         "next_experiment": test.as_dict(),
@@ -136,7 +138,8 @@ def remainder(finding: MechanismFinding) -> dict[str, Any]:
     """Return the residual of the accepted model, and its share of the misfit in words."""
     after, noise = finding.remainder, finding.sensor_noise
     size = ", ".join(
-        f"{one:.3g} in the {finding.data.what(name)} ({one / max(floor, 1e-300):.2g} times the "
+        f"{one:.3g} {unit_of(finding.mechanism, name)} in the {finding.data.what(name)} "
+        f"({one / max(floor, 1e-300):.2g} times the "
         "sensors' noise)"
         for name, one, floor in zip(finding.data.names, after, noise, strict=True)
     )
@@ -182,7 +185,7 @@ def band(finding: MechanismFinding) -> dict[str, Any]:
         "share_of_motion_beyond": motion,
         "share_of_force_beyond": force,
         "sentence": f"Model and records are compared up to {cutoff:.3g} Hz; beyond lie "
-        f"{100.0 * motion:.2g} % of the motion's power and {100.0 * force:.2g} % of the forces'"
+        f"{100.0 * motion:.2f} % of the motion's power and {100.0 * force:.2f} % of the forces'"
         f"{', in which only ripple is looked for' if much else ''}.",
     }
 
@@ -195,14 +198,7 @@ def limits(finding: MechanismFinding) -> list[str]:
         for port in finding.mechanism.ports
         if not port.read and not turns_back(finding.data, port.name)
     ]
-    found += [
-        f"Rows of {record.name} with values that are not finite: {record.dropped}. They are left "
-        "out at the ends and interpolated inside."
-        for record in finding.records
-        if record.dropped
-    ]
     found += rests_told(finding)
-    found += [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
     found += [
         f"What force a unit of {one.name} makes is not known: masses, springs, dampers and forces "
         f"are told in units of {one.name}. Their ratios and the kind of effect are determined, "
@@ -218,6 +214,17 @@ def limits(finding: MechanismFinding) -> list[str]:
         if names:
             found.append(f"At the bound of its tolerance: {', '.join(names)}.")
     return [*found, *finding.ripples.limits]
+
+
+def record_remarks(finding: MechanismFinding) -> list[str]:
+    """Return how the rows of records were read where they could not be taken as they are."""
+    found = [
+        f"Rows of {record.name} with values that are not finite: {record.dropped}. They are left "
+        "out at the ends and interpolated inside."
+        for record in finding.records
+        if record.dropped
+    ]
+    return found + [f"{r.name}: {remark}" for r in finding.records for remark in r.remarks]
 
 
 def _by_bic(one: Hypothesis) -> float:
@@ -239,6 +246,8 @@ def evidence(finding: MechanismFinding, one: Hypothesis) -> dict[str, Any]:
 
 def _role(finding: MechanismFinding, one: Hypothesis) -> str:
     chosen = finding.verdict.chosen
+    if one is chosen:
+        return "chosen"
     if one in finding.verdict.equivalent:
         return "as good"
     return "richer, hardly better" if chosen and one.bic < chosen.bic else "rejected"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
+from pymoo_hdte.discrepancy.report.balance_units import unit_of
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY
 
 Values = NDArray[np.float64]
@@ -43,9 +44,10 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
                         over[rows], balance.in_time(residual)[rows], marker, ms=3, color=colour,
                         alpha=0.6, label=label if record == 0 else None,
                     )  # fmt: skip
-        axes[row, 0].set_ylabel(f"left of {name} [SI]")
-        axes[row, 0].set_xlabel(f"speed of {port} [SI]")
-        axes[row, 1].set_xlabel(f"position of {port} [SI]")
+        axes[row, 0].set_ylabel(f"left of {name} [{unit_of(finding.mechanism, name)}]")
+        for column, quantity in enumerate(("speed", "position")):
+            unit = unit_of(finding.mechanism, port, quantity)
+            axes[row, column].set_xlabel(f"{quantity} of {port} [{unit}]")
         for axis in axes[row]:
             _plain(axis)
     axes[0, 0].legend(frameon=False)
@@ -80,15 +82,16 @@ def misfit_over_frequency(finding: MechanismFinding) -> Figure:
         axes[part].plot(
             *_banded(frequency[order], noise[order], edges), ":", color=GREY, label="sensors"
         )
+        unit = unit_of(finding.mechanism, name)
         axes[part].set(
-            xscale="log", yscale="log", xlabel="frequency [Hz]", ylabel=f"left of {name} [SI]"
+            xscale="log", yscale="log", xlabel="frequency [Hz]", ylabel=f"left of {name} [{unit}]"
         )
         _plain(axes[part])
     axes[0].legend(frameon=False)
     return figure
 
 
-def overlay(gap: MeasuredGap) -> Figure:
+def overlay(gap: MeasuredGap, unit: str) -> Figure:
     """Draw a held-out record: measured, before and after; below, the differences."""
     figure = Figure(figsize=(8.4, 3.8), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -97,7 +100,7 @@ def overlay(gap: MeasuredGap) -> Figure:
     upper.plot(time, gap.measured[stride], color=GREY, lw=2.5, label="measured")
     upper.plot(time, gap.predicted_before[stride], "--", color=BEFORE, label="before")
     upper.plot(time, gap.predicted_after[stride], "-", color=AFTER, lw=1.0, label="after")
-    upper.set_ylabel(f"{gap.quantity} [SI]")
+    upper.set_ylabel(f"{gap.quantity} [{unit}]")
     upper.legend(frameon=False, ncols=3)
     lower.plot(time, (gap.measured - gap.predicted_before)[stride], "--", color=BEFORE)
     lower.plot(time, (gap.measured - gap.predicted_after)[stride], "-", color=AFTER)

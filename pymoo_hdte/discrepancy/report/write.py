@@ -95,6 +95,7 @@ def write_report(
     model_files, shift = _revision(finding, optimum_shift)
     document["revised_model"] = {"file": MODEL_FILE if model_files else None}
     document["robust_optimum"] = _shift_document(shift)
+    document["gap_sentence"] = gap_sentence(finding, proof)
     html = _page(finding, location, proof, document, shift)
     FOLDER.write(Path(out), html, document, model_files)
     return document
@@ -164,7 +165,7 @@ def _page(
         status=STATUSES[finding.verdict.status],
         effects=effect_rows(document["effects"]),
         certainty=how_sure(finding),
-        gap=gap_sentence(finding, proof),
+        gap=document["gap_sentence"],
         next_test=in_words(document["next_experiment"]["description"]),
         pictures=pictures,
         hypotheses=hypothesis_rows(finding.verdict),

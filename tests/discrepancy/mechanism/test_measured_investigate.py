@@ -30,6 +30,7 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
     effects,
     limits,
     quantities,
+    record_remarks,
     remainder,
 )
 from pymoo_hdte.effects.friction import CoulombFriction
@@ -76,7 +77,8 @@ def test_nothing_hidden_is_adequate_and_proved_to_be():
     holed = Record(first.name, first.role, first.time, first.channels, dropped=3)
     finding = examine_mechanism(OSCILLATOR, [holed, *others])
     assert finding.verdict.status == "adequate"
-    (told,) = limits(finding)
+    assert limits(finding) == []
+    (told,) = record_remarks(finding)
     assert "Rows of train 1 with values that are not finite: 3." in told
     assert effects(finding) == []
     assert np.all(finding.base_misfit < 1.3 * finding.sensor_noise)
@@ -230,6 +232,26 @@ def test_the_next_test_sets_what_was_found_against_its_rival():
     assert "no rival is left" in alone.description
     unknown = next_test(finding_on(swinging_stiffness))
     assert "proved" not in unknown.description
+
+
+def test_a_repetition_is_told_by_its_travel_its_rate_and_the_speed_that_they_make():
+    test = next_test(finding_on(dry, 4))
+    if (test.size, test.rate) != (1.0, 1.0) and test.separation >= 1.0:
+        assert f"({test.size * test.rate:.2g} times its speed)" in test.description
+    alone = cubic_analysis()[0].next_experiment()
+    assert "with 3 times its travel (3 times its speed)" in alone.description
+
+
+def test_a_gain_of_the_wrong_sign_is_the_first_thing_to_check():
+    record = rig.record_of(nothing)
+    channels = {**record.channels, "force": -record.channels["force"]}
+    turned = Record("turned", "train", record.time, channels)
+    sized = replace(OSCILLATOR, inputs=[Input("force", {"x": 1.0}, BelievedValue(1.0))])
+    wrong = examine_mechanism(sized, [turned])
+    assert wrong.verdict.status == "unlisted"
+    assert "sign of the gain of force" in next_test(wrong).description
+    unknown = next_test(finding_on(swinging_stiffness))
+    assert "sign" not in unknown.description
 
 
 @pytest.mark.parametrize("roles", [(), ("held_out",)])

@@ -16,7 +16,12 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
 )
 from pymoo_hdte.discrepancy.mechanism.record_files import ListedRecord, _with_positions
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
-from pymoo_hdte.discrepancy.report.mechanism_document import effects, limits, quantities
+from pymoo_hdte.discrepancy.report.mechanism_document import (
+    effects,
+    limits,
+    quantities,
+    record_remarks,
+)
 from pymoo_hdte.io.layout import Channel, TableLayout
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.motion import highest_share
@@ -109,7 +114,7 @@ def test_a_log_with_uneven_times_and_no_titles_gives_the_friction_in_15_lines(fo
     finding = found(measured)
     assert is_the_joint(finding)
     said = "log_train: Time stamps are uneven, with steps of 10 ms to 12 ms"
-    assert any(said in one for one in limits(finding))
+    assert any(said in one for one in record_remarks(finding))
     # What was revised keeps the factor and the sign, and is read again.
     revised = revised_mechanism("A joint", finding)
     assert revised.mechanism.inertias["joint"].factor == 3.0
@@ -120,7 +125,7 @@ def test_a_speed_is_integrated_and_what_that_leaves_open_is_said(folder):
     speed = "column = 3", "column = 6"
     finding = found(rig(folder, speed, ('"rad"', '"rad/s"')))
     assert is_the_joint(finding)
-    assert any("where it began is not known" in one for one in limits(finding))
+    assert any("where it began is not known" in one for one in record_remarks(finding))
     # Both parts count from the first row of the file.
     first, second = finding.records
     start = moved(np.array([first.time[0]]))[0][0]
