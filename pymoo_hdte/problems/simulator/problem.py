@@ -59,6 +59,9 @@ class SimulatorProblem(Problem):
     accuracy : ndarray, shape (n_obj,)
         Estimated error of each objective as a share of the scatter of its response: the median over
         the design box. Of a `FailureProbability` it is the error itself, of a `WorstCase` NaN.
+    response_errors : dict of str to float
+        Estimated error of each response as a share of its scatter, the larger one of mean and
+        deviation; large perhaps for a response that no objective and no constraint names.
     failed : ndarray, shape (k, d)
         Inputs in their units at which the simulator failed; the fit goes on without them.
     var_names, obj_names, input_names : tuple of str
@@ -104,6 +107,8 @@ class SimulatorProblem(Problem):
         self._common = CommonSamples(fit.moments, seed=1)
         self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
         self.accuracy = self._accuracy()
+        errors = np.maximum(fit.mean_error, fit.std_error).tolist()
+        self.response_errors = dict(zip(responses, errors, strict=True))
 
     @property
     def degrees(self) -> dict[str, int]:
@@ -120,8 +125,8 @@ class SimulatorProblem(Problem):
         OSError
             If the file cannot be written.
         """
-        parts = self.responses, self.objectives, self.constraints, self.n_runs
-        write_problem(path, self._inputs, self._fit, *parts)
+        asked = self.objectives, self.constraints
+        write_problem(path, self._inputs, self._fit, self.responses, *asked, self.n_runs)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SimulatorProblem:

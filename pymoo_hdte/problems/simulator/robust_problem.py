@@ -29,11 +29,19 @@ from pymoo_hdte.problems.simulator.statistics import (
 from pymoo_hdte.problems.simulator.trust import (
     failing,
     inaccurate,
+    largest_error,
     negative_somewhere,
     positive_places,
+    random,
 )
 from pymoo_hdte.problems.simulator.workers import Workers
-from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit, fit_adaptively, least_runs
+from pymoo_hdte.surrogate.sparse.adaptive import (
+    IN_A_ROW,
+    LOOSEST,
+    AdaptiveFit,
+    fit_adaptively,
+    least_runs,
+)
 from pymoo_hdte.surrogate.trust import UntrustedSurrogate
 
 Array = NDArray[np.float64]
@@ -63,7 +71,9 @@ def robust_problem(
     """Return the robust design problem of a simulator.
 
     A sparse polynomial surrogate, the most probable one given the runs, gets more of them until
-    mean and standard deviation of every response are as accurate as asked for, twice in a row.
+    mean and standard deviation of every response that an objective or a constraint names are as
+    accurate as asked for, twice in a row. Others are kept for `SimulatorProblem.predict` as they
+    are then known: see `SimulatorProblem.response_errors`.
     These and their gradients are exact for the surrogate, whatever the independent distributions.
 
     The simulator is called within the support of a scatter, or between its quantiles of 1e-5 where
@@ -129,7 +139,7 @@ def robust_problem(
     Raises
     ------
     InvalidInput
-        For an argument that is not allowed.
+        For an argument that is not allowed, or a simulator that is random.
     UntrustedSurrogate
         If the budget is spent and the error is still larger than asked for, a positive response
         becomes negative, or more than a fifth of the runs fail; tells where.
@@ -139,7 +149,8 @@ def robust_problem(
     Warns
     -----
     RuntimeWarning
-        If runs failed; their inputs are in ``failed`` of the result.
+        If runs failed; their inputs are in ``failed`` of the result. If the budget is spent before
+        an error that is small enough was confirmed.
 
     Examples
     --------
@@ -165,6 +176,11 @@ def robust_problem(
     bar = _announce(inputs, least, budget) if progress else tqdm(disable=True)
     with bar, closing(Workers(executor, time_limit)) as workers:
         simulate = Simulator(simulator, inputs.names, vectorised, workers, count, file, bar)
+        statistics = [*objectives, *(limit.statistic for limit in constraints)]
+
+        def asked() -> list[int]:
+            return sorted({place_of(one, simulate.responses) for one in statistics})
+
         fit = fit_adaptively(
             inputs.axes,
             lambda cube: simulate(inputs.values(cube)),
@@ -175,15 +191,16 @@ def robust_problem(
                 not negative_somewhere(inputs, fit, positive_places(positive, simulate.responses))
             ),
             batch,
+            lambda fit: largest_error(fit, asked())[0],
         )
+        _refuse_untrusted(inputs, fit, accuracy, simulate, positive, asked())
     if file:
         file.finish()
     responses = simulate.responses
-    for one in [*objectives, *(limit.statistic for limit in constraints)]:
-        place_of(one, responses)
-    _refuse_untrusted(inputs, fit, accuracy, responses, positive)
     problem = SimulatorProblem(inputs, fit, responses, objectives, constraints, fit.n_runs)
     _tell_failures(problem)
+    if not fit.confirmed:
+        _tell_budget(fit, responses, asked())
     return problem
 
 
@@ -191,16 +208,31 @@ def _refuse_untrusted(
     inputs: Inputs,
     fit: AdaptiveFit,
     accuracy: float,
-    responses: tuple[str, ...],
+    simulate: Simulator,
     positive: Sequence[str] | bool,
+    asked: Sequence[int],
 ) -> None:
+    responses = simulate.responses
+    unsure = inaccurate(inputs, fit, accuracy, responses, asked)
+    if unsure and (cause := random(inputs, fit, accuracy, responses, simulate.again)):
+        raise cause
     refusal = (
         failing(inputs, fit)
-        or inaccurate(inputs, fit, accuracy, responses)
+        or unsure
         or negative_somewhere(inputs, fit, positive_places(positive, responses))
     )
     if refusal:
         raise UntrustedSurrogate(*refusal)
+
+
+def _tell_budget(fit: AdaptiveFit, responses: tuple[str, ...], asked: Sequence[int]) -> None:
+    error, _, place = largest_error(fit, asked)
+    message = (
+        f"the budget of {fit.n_runs} runs is used up: the error of {responses[place]!r} is "
+        f"{error:.2g} of its scatter, as asked for, but not confirmed: for that, {IN_A_ROW} "
+        f"judgements in a row have to find at most {LOOSEST:g} and what is asked for"
+    )
+    warnings.warn(message, RuntimeWarning, stacklevel=3)
 
 
 def _announce(inputs: Inputs, least: int, budget: int) -> tqdm:

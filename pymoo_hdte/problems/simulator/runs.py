@@ -92,9 +92,10 @@ class Simulator:
             file.retry_within(workers.time_limit)
             self._given_up |= set(file.failures)
         elif file:
-            file.check(self._again)
+            file.check(self.again)
 
-    def _again(self, row: tuple[float, ...]) -> Any:
+    def again(self, row: tuple[float, ...]) -> Any:
+        """Return what a run made anew gives, whatever the file has; None if it fails."""
         for _ in range(self.tries):
             ((_, gave),) = self._run([row])
             if self._good(gave):

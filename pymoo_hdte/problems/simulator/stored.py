@@ -241,9 +241,6 @@ def _read_fit(
     polynomial = SparsePolynomial(indices.astype(int), coefficients)
     pairs = zip(axes, tails, strict=True)
     measures = [axis.measure if one else axis.cut for axis, one in pairs]
-    return AdaptiveFit(
-        polynomial=polynomial,
-        moments=SparseMoments(polynomial, axes, measures),
-        n_runs=n_runs,
-        **{name: np.array(arrays[name]) for name in FORMAT.arrays[2:]},
-    )
+    others: dict[str, Any] = {name: np.array(arrays[name]) for name in FORMAT.arrays[2:]}
+    moments = SparseMoments(polynomial, axes, measures)
+    return AdaptiveFit(polynomial=polynomial, moments=moments, n_runs=n_runs, **others)

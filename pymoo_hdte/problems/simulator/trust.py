@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,10 @@ MOST_FAILED = 0.2
 """Largest share of failed runs that are left out: what they would have given is extrapolated."""
 _LIKE_THE_WORST = 0.3
 """Share of the largest error above which a point belongs to the region of the error."""
+_OF_ACCURACY = 0.1
+"""Share of the accuracy asked for up to which runs may differ, by rounding or iteration."""
+_REPEATED = 3
+"""Runs at one point. Two of a random simulator may agree by chance, three hardly."""
 _LOOKED_AT = 1024
 """Designs, with two draws of the scatter each, at which the sign of a response is looked at."""
 
@@ -34,13 +38,23 @@ def failing(inputs: Inputs, fit: AdaptiveFit) -> Refusal | None:
     return "share of runs that failed", share, f"at most {MOST_FAILED:g}", region
 
 
-def inaccurate(
-    inputs: Inputs, fit: AdaptiveFit, accuracy: float, responses: tuple[str, ...]
-) -> Refusal | None:
-    """Return why and where the surrogate is less accurate than asked for, or None."""
-    errors = np.array([fit.mean_error, fit.std_error])
+def largest_error(fit: AdaptiveFit, places: Sequence[int]) -> tuple[float, int, int]:
+    """Return the largest error of some responses, whether of mean (0) or std (1), and of which."""
+    errors = np.array([fit.mean_error, fit.std_error])[:, list(places)]
     which, place = np.unravel_index(np.argmax(errors), errors.shape)
-    if errors[which, place] <= accuracy:
+    return float(errors[which, place]), int(which), places[int(place)]
+
+
+def inaccurate(
+    inputs: Inputs,
+    fit: AdaptiveFit,
+    accuracy: float,
+    responses: tuple[str, ...],
+    places: Sequence[int],
+) -> Refusal | None:
+    """Return why and where the surrogate of some responses is less accurate than asked for."""
+    error, which, place = largest_error(fit, places)
+    if error <= accuracy:
         return None
     moment = ("mean", "standard deviation")[which]
     share = np.abs(fit.held_out_error[:, place])
@@ -48,7 +62,39 @@ def inaccurate(
     region = region_of(inputs.names, inputs.values(worst), reach(inputs))
     field = f"error of the {moment} of {responses[place]!r} after {fit.n_runs} runs"
     allowed = f"at most {accuracy:g} of the scatter"
-    return field, float(errors[which, place]), allowed, region
+    return field, float(f"{error:.3g}"), allowed, region
+
+
+def random(
+    inputs: Inputs,
+    fit: AdaptiveFit,
+    accuracy: float,
+    responses: tuple[str, ...],
+    again: Callable[[tuple[float, ...]], Sequence[float] | None],
+) -> InvalidInput | None:
+    """Return the error of a simulator that gives two values for the same inputs, or None.
+
+    Looked at where a surrogate is refused, by three runs at one point: what differs by less than a
+    tenth of the accuracy asked for, as a share of what the surrogate spreads, is not the cause.
+    """
+    if not len(fit.held_out_points):
+        return None
+    point = tuple(inputs.values(fit.held_out_points[:1])[0].tolist())
+    runs = [gave for _ in range(_REPEATED) if (gave := again(point)) is not None]
+    if not runs:
+        return None
+    spread = np.std(fit.polynomial(fit.held_out_points), axis=0)
+    for name, low, high, size in zip(
+        responses, np.min(runs, axis=0), np.max(runs, axis=0), spread, strict=True
+    ):
+        if high - low > _OF_ACCURACY * accuracy * size:
+            return InvalidInput(
+                f"{name!r} of runs with the same inputs",
+                f"{low:.6g} to {high:.6g}",
+                "one value: the simulator must not be random; fix its seed, or return "
+                "the mean of enough runs",
+            )
+    return None
 
 
 def positive_places(positive: Sequence[str] | bool, responses: tuple[str, ...]) -> list[int]:

@@ -90,6 +90,8 @@ class AdaptiveFit:
     failed: Array
     held_out_points: Array
     held_out_error: Array
+    confirmed: bool = True
+    """Whether as many judgements as are asked for have passed before the budget was spent."""
 
     @property
     def largest_error(self) -> float:
@@ -168,12 +170,15 @@ class _Growth:
             left_out / np.maximum(std, least),
         )
 
-    def with_tails(self, fit: AdaptiveFit) -> AdaptiveFit:
-        """Return the fit with the scatter beyond all runs, or with the error of leaving it out."""
+    def with_tails(self, fit: AdaptiveFit, inside: float) -> AdaptiveFit:
+        """Return the fit with the scatter beyond all runs, or with the error of leaving it out.
+
+        ``inside`` is the error without it.
+        """
         if not any(axis.is_unbounded for axis in self.axes):
             return fit
         moments, (of_mean, of_std) = beyond_all_runs(
-            fit.polynomial, self.axes, self.designs, self.scale, fit.largest_error
+            fit.polynomial, self.axes, self.designs, self.scale, inside
         )
         of_mean, of_std = fit.mean_error + of_mean, fit.std_error + of_std
         return replace(fit, moments=moments, mean_error=of_mean, std_error=of_std)
@@ -198,6 +203,7 @@ def fit_adaptively(
     random_state: np.random.Generator,
     acceptable: Callable[[AdaptiveFit], bool] = lambda fit: True,
     at_once: int = 1,
+    error_of: Callable[[AdaptiveFit], float] = lambda fit: fit.largest_error,
 ) -> AdaptiveFit:
     """Grow a surrogate until mean and standard deviation are accurate, or the budget is spent.
 
@@ -216,6 +222,8 @@ def fit_adaptively(
         A further condition to stop.
     at_once : int
         Least number of runs to add together.
+    error_of : callable
+        What is to be as small as asked for, of a fit; by default the errors of all responses.
 
     Returns
     -------
@@ -227,16 +235,16 @@ def fit_adaptively(
     passed, goal = 0, min(accuracy, LOOSEST)
     while True:
         fit = growth.judge()
-        inside = fit.largest_error
+        inside = error_of(fit)
         if inside <= accuracy:
-            fit = growth.with_tails(fit)
-        good = fit.largest_error <= accuracy and acceptable(fit)
+            fit = growth.with_tails(fit, inside)
+        good = error_of(fit) <= accuracy and acceptable(fit)
         passed = passed + 1 if good and inside <= goal else 0
         if passed >= IN_A_ROW and growth.n_runs >= least_runs(len(axes)):
             return fit
         count = min(max(at_once, int(BATCH * growth.n_runs)), budget - growth.n_runs)
         if count <= 0:
-            return fit
+            return replace(fit, confirmed=False)
         growth.run(count)
 
 

@@ -245,3 +245,57 @@ def test_a_problem_of_pymoo_gets_its_robust_counterpart():
     whole.vtype = int
     with pytest.raises(InvalidInput, match="variables of the problem"):
         Robust(whole, scatter=0.1)
+
+
+def test_a_response_that_nothing_asks_for_takes_no_runs():
+    def simulate(x):
+        return {"wanted": x**2, "beside": np.sin(60.0 * x) * np.abs(x - 1.5) ** 0.3}
+
+    design = {"x": Design(1.0, 2.0, tolerance=0.1)}
+    goals = [Mean(response="wanted")]
+    problem = robust_problem(simulate, design, objectives=goals, budget=300, progress=False)
+    assert problem.n_runs < 60
+    assert problem.response_errors["wanted"] <= 0.01 < problem.response_errors["beside"]
+    goals = [Mean(response="beside")]
+    with pytest.raises(UntrustedSurrogate, match="beside"):
+        robust_problem(simulate, design, objectives=goals, budget=60, progress=False)
+
+
+def test_a_goal_without_its_response_is_told_before_the_budget_is_spent():
+    calls = []
+
+    def simulate(x):
+        calls.append(x)
+        return {"rough": np.sin(1e4 * x)}
+
+    with pytest.raises(InvalidInput, match="response of a statistic"):
+        robust_problem(
+            simulate,
+            {"x": Design(1.0, 2.0, tolerance=0.1)},
+            objectives=[Mean(response="smooth")],
+            budget=300,
+            progress=False,
+        )
+    assert len(calls) < 30
+
+
+def test_a_random_simulator_is_told_to_be_one():
+    noise = np.random.default_rng(5)
+
+    def simulate(x):
+        return x**2 + 0.1 * noise.standard_normal()
+
+    with pytest.raises(InvalidInput, match="fix its seed"):
+        robust_problem(simulate, {"x": Design(1.0, 2.0, tolerance=0.1)}, budget=60, progress=False)
+
+
+def test_a_budget_that_ends_before_the_error_is_confirmed_is_announced():
+    def rough(x):
+        return 1.0 / (1.0 + 100.0 * (x - 1.5) ** 2)
+
+    design = {"x": Design(1.0, 2.0, tolerance=0.1)}
+    with pytest.raises(UntrustedSurrogate) as refused:
+        robust_problem(rough, design, accuracy=1e-6, budget=60, progress=False)
+    just_met = 1.01 * refused.value.value
+    with pytest.warns(RuntimeWarning, match="budget of 60 runs is used up"):
+        robust_problem(rough, design, accuracy=just_met, budget=60, progress=False)
