@@ -17,6 +17,8 @@ from pymoo_hdte.checks import InvalidInput
 PAGE = "index.html"
 COMPARISONS = "comparisons.html"
 MODELS = "models.html"
+ROBUST = "robust"
+"""Experiment that comes first in what is new."""
 _TITLE = "Robust design of a harmonic drive: results"
 _VERDICTS = {
     "Agrees": ("Agrees with the paper", "yes"),
@@ -106,8 +108,12 @@ def _environment() -> Environment:
 
 
 def _parts(results: Sequence[StoredResult], about: str) -> list[tuple[StoredResult, str]]:
-    """Return what the results have to say about one of the first page's sentences."""
-    return [(one, one.first_page[about]) for one in results if about in one.first_page]
+    """Return what the results have to say about one column of the first page, robust design first.
+
+    It is what the package is for.
+    """
+    parts = [(one, one.first_page[about]) for one in results if about in one.first_page]
+    return sorted(parts, key=lambda part: part[0].name != ROBUST)
 
 
 def _shown_first(results: Sequence[StoredResult]) -> list[tuple[StoredResult, StoredPicture]]:
