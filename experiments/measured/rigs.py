@@ -26,6 +26,7 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
     quantities,
     remainder,
 )
+from pymoo_hdte.discrepancy.report.balance_units import unit_of
 from pymoo_hdte.discrepancy.report.mechanism_figures import misfit_over_motion, overlay
 
 MEASURED = Path(__file__).resolve().parents[3] / "shared" / "measured"
@@ -214,9 +215,9 @@ def pictures(one: Study) -> tuple[Picture, ...]:
     ]
     if drawn:
         worst = max(drawn, key=lambda gap: gap.before)
-        found.append(
-            Picture("overlay", f"Held-out record {worst.record}, simulated.", overlay(worst))
-        )
+        unit = unit_of(one.finding.mechanism, worst.quantity, "position")
+        caption = f"Held-out record {worst.record}, simulated."
+        found.append(Picture("overlay", caption, overlay(worst, unit)))
     return tuple(found)
 
 
