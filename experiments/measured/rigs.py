@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
+from pymoo_hdte.discrepancy.report.balance_units import unit_of
 from pymoo_hdte.discrepancy.report.mechanism import extent_sentence, proof_sentence
 from pymoo_hdte.discrepancy.report.mechanism_document import (
     effects,
@@ -26,7 +27,6 @@ from pymoo_hdte.discrepancy.report.mechanism_document import (
     quantities,
     remainder,
 )
-from pymoo_hdte.discrepancy.report.balance_units import unit_of
 from pymoo_hdte.discrepancy.report.mechanism_figures import misfit_over_motion, overlay
 
 MEASURED = Path(__file__).resolve().parents[3] / "shared" / "measured"
