@@ -18,7 +18,6 @@ from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_
 from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
-from pymoo_hdte.discrepancy.report.balance_units import unit_of
 from pymoo_hdte.discrepancy.report.mechanism import extent_sentence, proof_sentence
 from pymoo_hdte.discrepancy.report.mechanism_document import (
     effects,
@@ -215,9 +214,8 @@ def pictures(one: Study) -> tuple[Picture, ...]:
     ]
     if drawn:
         worst = max(drawn, key=lambda gap: gap.before)
-        unit = unit_of(one.finding.mechanism, worst.quantity, "position")
         caption = f"Held-out record {worst.record}, simulated."
-        found.append(Picture("overlay", caption, overlay(worst, unit)))
+        found.append(Picture("overlay", caption, overlay(one.finding, worst)))
     return tuple(found)
 
 

@@ -17,9 +17,9 @@ from pymoo_hdte.checks import InvalidInput
 PAGE = "index.html"
 COMPARISONS = "comparisons.html"
 MODELS = "models.html"
-ROBUST = "robust"
-"""Experiment that comes first in what is new."""
 _TITLE = "Robust design of a harmonic drive: results"
+_FIRST = "robust"
+"""Experiment that comes first in each column of the first page: what the package is for."""
 _VERDICTS = {
     "Agrees": ("Agrees with the paper", "yes"),
     "Differs": ("Does not agree with the paper", "no"),
@@ -108,12 +108,9 @@ def _environment() -> Environment:
 
 
 def _parts(results: Sequence[StoredResult], about: str) -> list[tuple[StoredResult, str]]:
-    """Return what the results have to say about one column of the first page, robust design first.
-
-    It is what the package is for.
-    """
+    """Return what the results have to say in one column of the first page."""
     parts = [(one, one.first_page[about]) for one in results if about in one.first_page]
-    return sorted(parts, key=lambda part: part[0].name != ROBUST)
+    return sorted(parts, key=lambda part: part[0].name != _FIRST)
 
 
 def _shown_first(results: Sequence[StoredResult]) -> list[tuple[StoredResult, StoredPicture]]:

@@ -53,7 +53,7 @@ def of_names(
     }.get(status)
     if experience is None:
         return None
-    return experience * _share(chosen, equivalent, found, degrees_of_freedom)
+    return experience * _share((chosen, *equivalent), found, degrees_of_freedom)
 
 
 def likelier(
@@ -67,32 +67,23 @@ def likelier(
     Of a plain name it must be more probable than not that it is true. Sets that contain the chosen
     names, or those of an equivalent one, speak for them and do not count.
 
-    Parameters
-    ----------
-    chosen : Hypothesis
-    equivalent : sequence of Hypothesis
-        Others of its class.
-    found : sequence of Hypothesis
-        All compared sets.
-    degrees_of_freedom : int
+    Parameters as of `of_names`.
     """
-    if _share(chosen, equivalent, found, degrees_of_freedom) >= 0.5:
+    named = chosen, *equivalent
+    if _share(named, found, degrees_of_freedom) >= 0.5:
         return []
-    others = (one for one in found if not _says(one, (chosen, *equivalent)))
+    others = (one for one in found if not _says(one, named))
     return [one for one in others if one.fit.evidence < chosen.fit.evidence]
 
 
 def _share(
-    chosen: Hypothesis,
-    equivalent: Sequence[Hypothesis],
-    found: Sequence[Hypothesis],
-    degrees_of_freedom: int,
+    named: Sequence[Hypothesis], found: Sequence[Hypothesis], degrees_of_freedom: int
 ) -> float:
-    """Return the share of the evidence of all compared sets that speaks for a class."""
-    misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
+    """Return the share of the evidence of all compared sets for a class, the chosen set first."""
+    misfit = max(named[0].fit.chi_square / degrees_of_freedom, 1.0)
     evidence = np.array([one.fit.evidence for one in found])
     weights = np.exp(-(evidence - evidence.min()) / (2.0 * misfit))
-    says = [_says(one, (chosen, *equivalent)) for one in found]
+    says = [_says(one, named) for one in found]
     return float(weights[says].sum() / weights.sum())
 
 

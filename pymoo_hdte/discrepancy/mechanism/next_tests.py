@@ -115,7 +115,7 @@ def _reversed(finding: MechanismFinding) -> list[str]:
     verdict = finding.verdict
     best = verdict.base if verdict.chosen is None else verdict.chosen.fit
     left = root_mean_square(finding.data, best.residuals)
-    train = [record for record in finding.records if record.role == "train"]
+    train = [one.record for one in finding.data.spectra]
     found = []
     for one in finding.mechanism.inputs:
         if one.scaled:

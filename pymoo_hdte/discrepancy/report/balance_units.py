@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.mechanism import Mechanism
+from pymoo_hdte.units import si_unit
 
-_TURNING = {"force": "N.m", "position": "rad", "speed": "rad/s"}
-_SLIDING = {"force": "N", "position": "m", "speed": "m/s"}
+_TURNING = {"force": "torque", "position": "angle", "speed": "speed"}
+_SLIDING = {"force": "force", "position": "length", "speed": "linear speed"}
+"""Names of these quantities in `pymoo_hdte.units.UNITS`."""
 
 
 def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
@@ -33,5 +36,10 @@ def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
         moved = [one for one, share in port.motion.items() if share] + [*port.followed]
     turning = [one in mechanism.angles for one in moved]
     if all(turning):
-        return _TURNING[quantity]
-    return "SI" if any(turning) else _SLIDING[quantity]
+        return si_unit(_TURNING[quantity])
+    return "SI" if any(turning) else si_unit(_SLIDING[quantity])
+
+
+def unit_of_gap(mechanism: Mechanism, gap: MeasuredGap) -> str:
+    """Return the unit of a gap: of the position of a coordinate, or of a force."""
+    return unit_of(mechanism, gap.quantity, "position" if gap.kind == "simulation" else "force")

@@ -63,13 +63,7 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
             "That something is missing is certain; what it is, is not. The nearest known effect, "
             f"{in_words(chosen.label)}, explains {share} of what known effects can explain."
         )
-    others = [
-        one
-        for one in verdict.alternatives
-        if one not in verdict.equivalent
-        and _names(one) != _names(chosen)
-        and len(one.candidates) == len(chosen.candidates)
-    ]
+    others = _others(verdict, chosen)
     words = [f"It explains {share} of what known effects can explain."]
     if verdict.equivalent:
         shares = ", ".join(percent(one.explained) for one in verdict.equivalent)
@@ -115,17 +109,12 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
             "That is more than noise: its form is not quite right or more is missing, and values "
             "may be off by more than their intervals say."
         )
-    hypotheses = [
-        hypothesis
-        for hypothesis in verdict.alternatives
-        if _names(hypothesis) != _names(chosen)
-        and len(hypothesis.candidates) == len(chosen.candidates)
-    ]
+    others = _others(verdict, chosen)
     if verdict.equivalent:
         shares = ", ".join(percent(hypothesis.explained) for hypothesis in verdict.equivalent)
         words.append(f"What these data cannot tell from it explains {shares}.")
-    elif hypotheses:
-        best = min(hypotheses, key=lambda hypothesis: hypothesis.bic)
+    elif others:
+        best = min(others, key=lambda hypothesis: hypothesis.bic)
         words.append(f"The next best, {in_words(best.label)}, explains {percent(best.explained)}.")
     if chosen.fit.at_bounds:
         orders = finding.campaign.believed.error_orders
@@ -147,6 +136,15 @@ def _probably(verdict: Verdict) -> str:
         "everything that was compared and by how often such verdicts were right on campaigns with "
         "a known truth."
     )
+
+
+def _others(verdict: Verdict, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return the sets of as many effects as the chosen one, with other names."""
+    return [
+        one
+        for one in verdict.alternatives
+        if _names(one) != _names(chosen) and len(one.candidates) == len(chosen.candidates)
+    ]
 
 
 def _names(hypothesis: Hypothesis) -> set[str]:

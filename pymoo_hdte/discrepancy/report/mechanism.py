@@ -14,7 +14,7 @@ from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechanism
-from pymoo_hdte.discrepancy.report.balance_units import unit_of
+from pymoo_hdte.discrepancy.report.balance_units import unit_of_gap
 from pymoo_hdte.discrepancy.report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy.report.document import believed_in_words
 from pymoo_hdte.discrepancy.report.gap_words import percent
@@ -104,7 +104,7 @@ def _page(
     rows = _effect_rows(document["effects"])
     sizes = [row for row in rows if not row["parameter"].endswith("phase")]
     shown = _shown(gaps)
-    pictures["overlay"] = data_uri(overlay(shown, _unit(finding, shown))) if shown else ""
+    pictures["overlay"] = data_uri(overlay(finding, shown)) if shown else ""
     chosen = finding.verdict.chosen
     compared = [evidence(finding, chosen)] if chosen else []
     return page(
@@ -122,7 +122,6 @@ def _page(
         pictures=pictures,
         certainty=how_sure_of_records(finding),
         compared=[*compared, *document["alternatives"]],
-        proof_sentence=document["gap_sentence"],
         extent_sentence=extent_sentence(gaps),
         believed_effects=believed_in_words(document),
         believed={name: one.value for name, one in finding.mechanism.quantities.items()},
@@ -141,7 +140,8 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
         return "No record was held out, so that nothing can be proved."
     if not finding.accepted.candidates:
         words = [
-            f"{gap.quantity} by {gap.kind}: {gap.after:.3g} {_unit(finding, gap)}" for gap in gaps
+            f"{gap.quantity} by {gap.kind}: {gap.after:.3g} {unit_of_gap(finding.mechanism, gap)}"
+            for gap in gaps
         ]
         return f"Nothing was added; the model is off by {', '.join(words)}. {extent_sentence(gaps)}"
     words = []
@@ -152,15 +152,9 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
                 float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in of_it])))
                 for one in ("before", "after")
             )
-            change, unit = _change(before, after), _unit(finding, of_it[0])
+            change, unit = _change(before, after), unit_of_gap(finding.mechanism, of_it[0])
             words.append(f"{quantity} by {kind} {change} from {before:.3g} to {after:.3g} {unit}")
     return f"Root mean square errors, before and after: {'; '.join(words)}. {extent_sentence(gaps)}"
-
-
-def _unit(finding: MechanismFinding, gap: MeasuredGap) -> str:
-    """Return the unit of a gap: of the position of a coordinate, or of a force."""
-    what = "position" if gap.kind == "simulation" else "force"
-    return unit_of(finding.mechanism, gap.quantity, what)
 
 
 def extent_sentence(gaps: Sequence[MeasuredGap]) -> str:

@@ -139,8 +139,7 @@ def remainder(finding: MechanismFinding) -> dict[str, Any]:
     after, noise = finding.remainder, finding.sensor_noise
     size = ", ".join(
         f"{one:.3g} {unit_of(finding.mechanism, name)} in the {finding.data.what(name)} "
-        f"({one / max(floor, 1e-300):.2g} times the "
-        "sensors' noise)"
+        f"({one / max(floor, 1e-300):.2g} times the sensors' noise)"
         for name, one, floor in zip(finding.data.names, after, noise, strict=True)
     )
     named = bool(finding.accepted.candidates)

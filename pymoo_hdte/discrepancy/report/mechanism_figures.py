@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
-from pymoo_hdte.discrepancy.report.balance_units import unit_of
+from pymoo_hdte.discrepancy.report.balance_units import unit_of, unit_of_gap
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY
 
 Values = NDArray[np.float64]
@@ -91,7 +91,7 @@ def misfit_over_frequency(finding: MechanismFinding) -> Figure:
     return figure
 
 
-def overlay(gap: MeasuredGap, unit: str) -> Figure:
+def overlay(finding: MechanismFinding, gap: MeasuredGap) -> Figure:
     """Draw a held-out record: measured, before and after; below, the differences."""
     figure = Figure(figsize=(8.4, 3.8), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
@@ -100,7 +100,7 @@ def overlay(gap: MeasuredGap, unit: str) -> Figure:
     upper.plot(time, gap.measured[stride], color=GREY, lw=2.5, label="measured")
     upper.plot(time, gap.predicted_before[stride], "--", color=BEFORE, label="before")
     upper.plot(time, gap.predicted_after[stride], "-", color=AFTER, lw=1.0, label="after")
-    upper.set_ylabel(f"{gap.quantity} [{unit}]")
+    upper.set_ylabel(f"{gap.quantity} [{unit_of_gap(finding.mechanism, gap)}]")
     upper.legend(frameon=False, ncols=3)
     lower.plot(time, (gap.measured - gap.predicted_before)[stride], "--", color=BEFORE)
     lower.plot(time, (gap.measured - gap.predicted_after)[stride], "-", color=AFTER)

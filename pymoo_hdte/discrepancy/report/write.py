@@ -165,7 +165,6 @@ def _page(
         status=STATUSES[finding.verdict.status],
         effects=effect_rows(document["effects"]),
         certainty=how_sure(finding),
-        gap=document["gap_sentence"],
         next_test=in_words(document["next_experiment"]["description"]),
         pictures=pictures,
         hypotheses=hypothesis_rows(finding.verdict),

@@ -107,7 +107,7 @@ class SimulatorProblem(Problem):
         self._common = CommonSamples(fit.moments, seed=1)
         self.failed = inputs.values(fit.failed) if len(fit.failed) else fit.failed
         self.accuracy = self._accuracy()
-        errors = np.maximum(fit.mean_error, fit.std_error).tolist()
+        errors = fit.errors.max(axis=0).tolist()
         self.response_errors = dict(zip(responses, errors, strict=True))
 
     @property
@@ -125,8 +125,8 @@ class SimulatorProblem(Problem):
         OSError
             If the file cannot be written.
         """
-        asked = self.objectives, self.constraints
-        write_problem(path, self._inputs, self._fit, self.responses, *asked, self.n_runs)
+        parts = self.responses, self.objectives, self.constraints, self.n_runs
+        write_problem(path, self._inputs, self._fit, *parts)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> SimulatorProblem:

@@ -40,7 +40,7 @@ def failing(inputs: Inputs, fit: AdaptiveFit) -> Refusal | None:
 
 def largest_error(fit: AdaptiveFit, places: Sequence[int]) -> tuple[float, int, int]:
     """Return the largest error of some responses, whether of mean (0) or std (1), and of which."""
-    errors = np.array([fit.mean_error, fit.std_error])[:, list(places)]
+    errors = fit.errors[:, list(places)]
     which, place = np.unravel_index(np.argmax(errors), errors.shape)
     return float(errors[which, place]), int(which), places[int(place)]
 

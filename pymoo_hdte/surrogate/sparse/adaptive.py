@@ -79,6 +79,8 @@ class AdaptiveFit:
         Runs that did not fail.
     held_out_error : ndarray, shape (v, r)
         Each of them minus what the others predict, as a share of the scatter.
+    confirmed : bool
+        Whether as many judgements as are asked for have passed before the budget was spent.
     """
 
     polynomial: SparsePolynomial
@@ -91,12 +93,16 @@ class AdaptiveFit:
     held_out_points: Array
     held_out_error: Array
     confirmed: bool = True
-    """Whether as many judgements as are asked for have passed before the budget was spent."""
+
+    @property
+    def errors(self) -> Array:
+        """Those of the mean above those of the standard deviation, shape (2, r)."""
+        return np.array([self.mean_error, self.std_error])
 
     @property
     def largest_error(self) -> float:
         """Of mean and standard deviation of all responses, as a share of the scatter."""
-        return float(max(self.mean_error.max(), self.std_error.max()))
+        return float(self.errors.max())
 
 
 class _Growth:

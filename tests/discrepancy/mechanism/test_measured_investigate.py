@@ -22,7 +22,7 @@ from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
-from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
+from pymoo_hdte.discrepancy.mechanism.next_tests import _how, next_test
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_scale, usual_cutoff
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
 from pymoo_hdte.discrepancy.report.mechanism_document import (
@@ -238,6 +238,7 @@ def test_a_repetition_is_told_by_its_travel_its_rate_and_the_speed_that_they_mak
     test = next_test(finding_on(dry, 4))
     if (test.size, test.rate) != (1.0, 1.0) and test.separation >= 1.0:
         assert f"({test.size * test.rate:.2g} times its speed)" in test.description
+    assert _how(0.3, 0.3) == "with 0.3 times its travel, 3.3 times slower (0.09 times its speed)"
     alone = cubic_analysis()[0].next_experiment()
     assert "with 3 times its travel (3 times its speed)" in alone.description
 
