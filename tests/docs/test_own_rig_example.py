@@ -132,9 +132,9 @@ def test_a_folder_with_files_is_left_alone(rig):
     assert before == {path: path.stat().st_mtime_ns for path in rig[0].rglob("*")}
 
 
-@pytest.mark.parametrize("place", [0, 1], ids=[TABLE, JOINT])
+@pytest.mark.parametrize("place", [0, 1], ids=[JOINT, TABLE])
 def test_page_shows_what_the_example_prints(place, rig, joint):
-    texts = blocks("text")[place], (rig, joint)[place][1]
+    texts = blocks("text")[place], (joint, rig)[place][1]
     shown, printed = (text.strip().split("\n") for text in texts)
     assert len(shown) == len(printed)
     for here, there in zip(shown, printed, strict=True):
@@ -157,7 +157,7 @@ def test_lines_are_compared_by_their_numbers():
 
 def test_page_prints_the_rigs_of_the_examples(rig, joint):
     assert len(joint[2]["RIG"].splitlines()) <= 25
-    for block, (folder, _, names, _) in zip(blocks("toml"), (rig, joint), strict=True):
+    for block, (folder, _, names, _) in zip(blocks("toml"), (joint, rig), strict=True):
         assert block == names["RIG"] == (folder / "rig.toml").read_text(encoding="utf-8")
 
 
@@ -210,7 +210,7 @@ def test_page_lists_the_library():
 def test_every_block_is_checked_here():
     languages = re.findall(r"^```(\w+)\n", PAGE, flags=re.MULTILINE)
     assert sorted(languages) == ["python", *["sh"] * 3, *["text"] * 2, *["toml"] * 2]
-    table, command, joint = (shlex.split(block) for block in blocks("sh"))
+    table, joint, command = (shlex.split(block) for block in blocks("sh"))
     assert table == ["python", "docs/examples/own_rig.py", "my_rig"]
     assert joint == ["python", "docs/examples/own_joint.py", "my_joint"]
     options = cli._parser().parse_args(command[1:])
