@@ -10,7 +10,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pymoo_hdte.effects.unknowns import Family, Parameter, Values, harmonics_among
+from pymoo_hdte.effects.unknowns import (
+    HARMONIC_NAMES,
+    Family,
+    Parameter,
+    Values,
+    harmonics_among,
+    is_among,
+)
 
 
 @dataclass(frozen=True)
@@ -84,9 +91,17 @@ class Sizes:
     between: bool = False
 
     def family(self, order: float, most: int = 2) -> Family:
-        """Return an order of the port with those of its first ``most`` harmonics in ``shown``."""
-        count = harmonics_among(self.shown, order / self.slower, most)
-        return Family(tuple(multiple * order for multiple in range(1, count + 1)))
+        """Return an order of the port with its harmonics: what varies with an angle is no cosine.
+
+        Those of its first ``most`` in ``shown``, and further ones up to the fifth that are seen: a
+        rounded trapezoid has the third and the fifth.
+        """
+        first = order / self.slower
+        count = harmonics_among(self.shown, first, most)
+        further = range(count + 1, len(HARMONIC_NAMES) + 1)
+        clear = set(self.shown) & set(self.seen)
+        multiples = [*range(1, count + 1), *(k for k in further if is_among(clear, k * first))]
+        return Family(tuple(multiple * order for multiple in multiples))
 
     @property
     def varying(self) -> list[Family]:

@@ -7,7 +7,7 @@ order 12 is one effect and not two.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 Values = Sequence[float]
 
-HARMONIC_NAMES = ("", "second_", "third_")
-"""Prefixes of the parameters of a line's harmonics."""
+HARMONIC_NAMES = ("", "second_", "third_", "fourth_", "fifth_")
+"""Prefixes of the parameters of a line's harmonics; higher ones are lines of their own."""
 _HARMONIC_SHARE = 0.2
 """Typical size of a further harmonic, as a share of the first."""
 
@@ -54,7 +54,9 @@ def unknown(
     return Parameter(name, typical, lower, upper, abs(typical), linear=linear)
 
 
-def wave(name: str, largest: float, typical: float, harmonics: int = 1) -> tuple[Parameter, ...]:
+def wave(
+    name: str, largest: float, typical: float, harmonics: Sequence[int] = (1,)
+) -> tuple[Parameter, ...]:
     """Return the cosine and sine parts of a line and of its harmonics.
 
     Parameters
@@ -63,14 +65,14 @@ def wave(name: str, largest: float, typical: float, harmonics: int = 1) -> tuple
         Of the amplitude.
     largest, typical : float
         Amplitudes.
-    harmonics : int
-        1 for the line alone.
+    harmonics : sequence of int
+        Multiples of its order from 1, the line alone, to 5.
     """
     found = []
-    for place, prefix in enumerate(HARMONIC_NAMES[:harmonics]):
-        size = typical if place == 0 else _HARMONIC_SHARE * typical
-        start = typical if place == 0 else 0.0
-        found += _parts(f"{prefix}{name}", start, largest, size)
+    for multiple in harmonics:
+        size = typical if multiple == 1 else _HARMONIC_SHARE * typical
+        start = typical if multiple == 1 else 0.0
+        found += _parts(f"{HARMONIC_NAMES[multiple - 1]}{name}", start, largest, size)
     return tuple(found)
 
 
@@ -88,10 +90,9 @@ def starts_along_each(parameters: Sequence[Parameter]) -> tuple[tuple[float, ...
     return tuple(tuple(row) for row in sizes.tolist())
 
 
-def lines_of(values: Values) -> list[tuple[int, float, float]]:
-    """Return (multiple of the order, amplitude, phase) for the values of a `wave`."""
-    parts = np.reshape(values, (-1, 2))
-    return [(place + 1, *polar(cosine, sine)) for place, (cosine, sine) in enumerate(parts)]
+def lines_of(values: Values) -> list[tuple[float, float]]:
+    """Return (amplitude, phase) of each line for the values of a `wave`."""
+    return [polar(cosine, sine) for cosine, sine in np.reshape(values, (-1, 2))]
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,8 @@ class Family:
     def waves(self, name: str, largest: float, typical: float) -> tuple[Parameter, ...]:
         """Return cosine and sine parts of a line at each order; the arguments as of `wave`."""
         if self.harmonic:
-            return wave(name, largest, typical, len(self.orders))
+            multiples = [round(order / self.orders[0]) for order in self.orders]
+            return wave(name, largest, typical, multiples)
         return tuple(
             part
             for order in self.orders
@@ -138,16 +140,21 @@ class Family:
         """Return (order, amplitude, phase) for the values of `waves`, or of the first of them."""
         return [
             (order, amplitude, phase)
-            for order, (_, amplitude, phase) in zip(self.orders, lines_of(values), strict=False)
+            for order, (amplitude, phase) in zip(self.orders, lines_of(values), strict=False)
         ]
 
 
 def harmonics_among(orders: Sequence[float], order: float, most: int) -> int:
     """Return how many of order, 2 order, 3 order, ... the ``orders`` hold; at least 1."""
     count = 1
-    while count < most and any(abs((count + 1) * order - one) < 1e-6 for one in orders):
+    while count < most and is_among(orders, (count + 1) * order):
         count += 1
     return count
+
+
+def is_among(orders: Iterable[float], order: float) -> bool:
+    """Tell whether ``orders`` hold one, to within rounding."""
+    return any(abs(order - one) < 1e-6 for one in orders)
 
 
 def line_with_variance(

@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.drive import preset
 from pymoo_hdte.drive.effects import effect_from_fields
 from pymoo_hdte.drive.toml_text import model_toml
+from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.effects.unknowns import line_with_variance, lines_of, polar, starts_along_each, wave
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.units import ARCSEC
@@ -125,21 +126,21 @@ def test_of_a_line_that_is_not_there_the_phase_is_anywhere_in_a_turn(part):
 @given(st.lists(st.tuples(parts, parts), min_size=1, max_size=3))
 def test_lines_of_a_wave_come_back(pairs):
     lines = lines_of(list(chain(*pairs)))
-    assert [multiple for multiple, _, _ in lines] == list(range(1, len(pairs) + 1))
-    for (_, amplitude, phase), (cosine, sine) in zip(lines, pairs, strict=True):
+    for (amplitude, phase), (cosine, sine) in zip(lines, pairs, strict=True):
         phasor = amplitude * np.exp(1j * phase)
         assert phasor == pytest.approx(cosine + 1j * sine, abs=1e-12 * (1.0 + amplitude))
 
 
-@given(st.floats(1e-6, 1e3), st.integers(1, 3))
-def test_starts_of_a_wave_span_its_parts(typical, harmonics):
+@given(st.floats(1e-6, 1e3), st.sets(st.integers(2, 5)))
+def test_starts_of_a_wave_span_its_parts(typical, further):
+    harmonics = [1, *sorted(further)]
     unknowns = wave("amplitude", 2.0 * typical, typical, harmonics)
     starts = np.array(starts_along_each(unknowns))
-    assert len(unknowns) == 2 * harmonics
-    assert np.linalg.matrix_rank(starts / typical) == 2 * harmonics
-    assert np.count_nonzero(starts) == 2 * harmonics
+    assert len(unknowns) == 2 * len(harmonics)
+    assert np.linalg.matrix_rank(starts / typical) == 2 * len(harmonics)
+    assert np.count_nonzero(starts) == 2 * len(harmonics)
     assert np.max(starts) == typical
-    assert len({parameter.name for parameter in unknowns}) == 2 * harmonics
+    assert len({parameter.name for parameter in unknowns}) == 2 * len(harmonics)
 
 
 def test_cosine_and_sine_are_real_and_imaginary_part_of_the_static_error():
@@ -167,6 +168,27 @@ def test_lines_have_harmonics_only_where_the_features_look(seen):
             held = [order for order in held if order not in BELIEVED.error_orders]
         assert further == pytest.approx(held, rel=1e-9)
         assert len(candidate.parameters) == 2 * (1 + len(held))
+
+
+@pytest.mark.parametrize(
+    ("seen", "expected"),
+    [
+        ([2.0], (2.0, 4.0)),
+        ([2.0, 6.0, 10.0], (2.0, 4.0, 6.0, 10.0)),
+        ([2.0, 10.0, 12.0], (2.0, 4.0, 10.0)),
+        ([2.0, 6.0, 8.0], (2.0, 4.0, 6.0)),
+    ],
+)
+def test_a_line_has_further_harmonics_up_to_the_fifth_where_they_are_seen(seen, expected):
+    sizes = Sizes(1.0, 1.0, 1.0, 1.0, 1.0, seen=tuple(seen), shown=(2.0, 4.0, 6.0, 10.0, 12.0))
+    family = sizes.family(2.0)
+    assert family.order == 2.0
+    assert family.orders == expected
+    values = np.arange(1.0, 1.0 + len(family.waves("amplitude", 2.0, 1.0)))
+    assert tuple(order for order, _, _ in family.lines(values)) == expected
+    at_output = replace(sizes, slower=100.0, seen=tuple(one / 100.0 for one in seen),
+                        shown=tuple(one / 100.0 for one in sizes.shown))  # fmt: skip
+    assert at_output.family(2.0).orders == expected
 
 
 def test_a_believed_order_of_the_error_is_no_further_line_of_it():

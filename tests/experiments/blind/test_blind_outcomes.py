@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experiments.blind.campaigns import campaign_of, hiding
-from experiments.blind.cases import all_cases
+from experiments.blind.cases import Case, all_cases
 from experiments.blind.data import outcome, read_outcomes
 from experiments.blind.experiment import OUTCOMES, SECONDS
 from experiments.blind.scoring import COLUMNS, verdict_scores
@@ -60,3 +60,14 @@ def test_no_plain_name_against_the_evidence_of_its_own_comparison():
     assert ("clearance_variation", "mesh") in {
         name for one in verdict.equivalent for name in one.names
     }
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("number", [101, 103])
+def test_harmonics_of_a_narrow_crest_are_no_effects_of_their_own(number):
+    # Orders and readings leave open whether the mesh errs or the encoder: a class of two.
+    hidden = hiding(Case("single", number))
+    verdict = examine_drive(campaign_of(hidden, hidden.session)).verdict
+    answers = verdict.chosen, *verdict.equivalent
+    assert Case("single", number).names[0] in {name for one in answers for name, _ in one.names}
+    assert [len(one.candidates) for one in answers] == [1, 1]
