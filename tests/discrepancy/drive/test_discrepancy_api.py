@@ -15,10 +15,10 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import (
     MeasuredMechanism,
     analyse,
+    drive_analysis,
     read_drive_model,
     read_mechanism_model,
 )
-from pymoo_hdte.discrepancy import drive_analysis
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.drive import load_datasheet, load_model
 from pymoo_hdte.effects import Effect, effect_named, registered
