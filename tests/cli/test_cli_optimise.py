@@ -186,7 +186,7 @@ class TestFindings:
     @pytest.mark.parametrize(
         ("model", "designs"),
         [
-            ("csg32_windup_model", 40),
+            pytest.param("csg32_windup_model", 40, marks=pytest.mark.nightly),
             pytest.param("csg32_windup_model", 600, marks=pytest.mark.nightly),
             pytest.param("csg32_coulomb_model", 600, marks=pytest.mark.nightly),
         ],
@@ -209,6 +209,14 @@ class TestFindings:
 
 
 class TestStudy:
+    def test_designs_that_the_front_leaves_out_are_told_and_named(self, study):
+        lost = study.designs[:1]
+        found = replace(study, search=replace(study.search, lost=lost))
+        words = f"designs 1 are left out, the first for {study.problem.without_steady_state(lost[0])}"
+        assert any(words in one for one in optimum_report.limits(found, ()))
+        document = optimum_report.optimum_document(found, ())
+        assert document["left_out"]["designs"] == lost.tolist()
+
     def test_a_data_sheet_with_lost_drives_is_said_to_have_none(self, study, tmp_path):
         off, out = replace(study, initial_check=LOST), tmp_path / "out"
         document = optimum_report.write_optimum_report(off, (), out)

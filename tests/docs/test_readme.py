@@ -416,21 +416,32 @@ class TestNumbersBesideThePaper:
         fits = inference.read_fits(DATA / "inference.csv")
         refitted, best = (named.fit for named in chosen_fits(fits)[1:3])
         common = [one for one in fits if one.target == "common"]
-        meeting = [one for one in common if gives_trade_off(one)]
-        assert best is min(meeting, key=lambda one: one.bic)
-        assert not any(gives_trade_off(one) and undominated(one) for one in fits)
+        assert gives_trade_off(best)
+        assert not undominated(best)
         ours = steps_of(best.evaluation.predicted)
         alone = step_errors(best.evaluation, sampling_alone=True)
         for words in (
-            f"of {len(common)} models searched, {len(meeting)} give the nine numbers",
+            f"of {len(common)} models searched, ",
             f"(chi-square {best.evaluation.chi_square('common'):.1f}, and "
             f"{ours[1]:+.2f} and {ours[3]:+.2f} arcsec for that step",
             f"{refitted.evaluation.chi_square('common'):.0f} where it is read at ±5 %",
             f"{best.reached} of {best.starts} starts",
-            f"by {min(one.evaluation.depths.max() for one in meeting):.2f} widths",
             f"with {READING} arcsec beside sampling in each number",
             f"likeliest misses a step by {np.abs(alone).max():.1f} standard errors",
             f"{len(above_a_special_case(common))} of the searches ended above a special case",
+        ):
+            assert words in WORDS
+
+    @pytest.mark.nightly
+    def test_what_the_covariance_says_of_all_models(self):
+        fits = inference.read_fits(DATA / "inference.csv")
+        common = [one for one in fits if one.target == "common"]
+        meeting = [one for one in common if gives_trade_off(one)]
+        assert chosen_fits(fits)[2].fit is min(meeting, key=lambda one: one.bic)
+        assert not any(gives_trade_off(one) and undominated(one) for one in fits)
+        for words in (
+            f"of {len(common)} models searched, {len(meeting)} give the nine numbers",
+            f"by {min(one.evaluation.depths.max() for one in meeting):.2f} widths",
         ):
             assert words in WORDS
 

@@ -86,20 +86,31 @@ def test_what_another_form_of_a_law_leaves_is_none_of_a_second_effect(label):
     assert forms.explains(left)
 
 
-def test_a_small_effect_shows_beside_a_law_of_another_form(monkeypatch):
+def test_a_small_effect_shows_beside_a_law_of_another_form():
+    data = planted(FOREIGN[SPRING], *small_drift())
+    found = judge(data, fit(data), of_labels(SPRING, DRIFT))
+    assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
+
+
+@pytest.mark.nightly
+def test_without_forms_a_small_effect_beside_another_form_is_hidden(monkeypatch):
     data = planted(FOREIGN[SPRING], *small_drift())
     laws = of_labels(SPRING, DRIFT)
-    found = judge(data, fit(data), laws)
-    assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
     monkeypatch.setattr(Data, "corrections", lambda self, candidate: None)
     found = judge(data, fit(data), laws)
     assert {one.label for one in found.chosen.candidates} == {SPRING}
 
 
-def test_another_form_alone_is_one_effect():
+def test_another_form_alone_is_one_effect_unless_the_evidence_speaks_for_another(monkeypatch):
     data = planted(FOREIGN[SPRING], seed=2)
-    found = judge(data, fit(data), of_labels(SPRING, DRIFT))
+    base, laws = fit(data), of_labels(SPRING, DRIFT)
+    found = judge(data, base, laws)
     assert (found.status, found.chosen.label) == ("named", SPRING)
+    # It leaves more than noise: a set of more evidence that was compared is told as a rival.
+    monkeypatch.setattr(verdict.probability, "likelier", lambda chosen, *_: [found.alternatives[0]])
+    again = judge(data, base, laws)
+    assert (again.status, again.chosen.label) == ("class", SPRING)
+    assert again.equivalent == (found.alternatives[0],)
 
 
 def left_by(data, laws):

@@ -36,13 +36,8 @@ PLANTED = {
 }
 
 
-NOW = (
-    "kinematic_error:mesh@3",
-    "load_dependent_friction:input",
-    "soft_windup:mesh",
-    "thermal_drift:sensor",
-)
-"""One of a kind: a line, a share of the load, a curve, a drift."""
+NOW = ("kinematic_error:mesh@3", "soft_windup:mesh")
+"""A line and a curve."""
 
 
 def of_label(data, label):

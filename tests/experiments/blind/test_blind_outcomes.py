@@ -50,6 +50,7 @@ def test_a_dozen_ends_as_it_is_stored(outcomes):
         same_again(stored)
 
 
+@pytest.mark.nightly
 def test_no_plain_name_against_the_evidence_of_its_own_comparison():
     # Half of the records, play in another form: a pair that left 1.9 times the noise was named
     # plainly, although one that left nothing had been compared, and was not earned.

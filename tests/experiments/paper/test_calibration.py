@@ -112,6 +112,7 @@ def test_a_local_fit_recovers_the_model_that_made_the_numbers():
     assert rung.physical(found)["std_arcsec"] == pytest.approx(8.0, rel=1e-3)
 
 
+@pytest.mark.nightly
 def test_a_local_fit_with_all_nine_parameters_off_recovers_what_made_the_numbers():
     """As far as nine numbers tell: `test_inference_posterior` says which directions they do not."""
     truth = KNOWN[5]

@@ -89,6 +89,12 @@ def test_deviation_degrees_of_the_prototypes_come_out_to_the_printed_digit():
     assert np.round(degrees, 3).tolist() == [p.deviation_degree for p in TABLE_6.values()]
 
 
+def test_a_run_of_the_same_seed_gives_the_same_bytes():
+    one, two = (OptimisationRun("calibrated", "AMP-MOPSO", 5, **SMALL).execute() for _ in "ab")
+    assert one.values.tobytes() == two.values.tobytes()
+
+
+@pytest.mark.nightly
 def test_repetition_does_not_change_a_byte(tmp_path, monkeypatch):
     monkeypatch.setattr(paired, "OptimisationRun", partial(OptimisationRun, **SMALL))
     for out in ("one", "two"):

@@ -45,7 +45,7 @@ NORMAL = scipy.stats.norm()
     ("function", "design", "name", "scatter", "options"),
     [
         (amplitude, Design(100.0, 200.0), "speed", scipy.stats.norm(80.0, 4.0), {}),
-        (bell, Design(-1.0, 1.0), "a", NORMAL, {}),
+        pytest.param(bell, Design(-1.0, 1.0), "a", NORMAL, {}, marks=pytest.mark.nightly),
         (step, Design(-1.0, 1.0), "a", NORMAL, {"budget": 150}),
         (bell, Design(0.0, 1.0), "a", scipy.stats.gumbel_r(), {"budget": 150}),
     ],
@@ -96,8 +96,14 @@ def test_rare_values_that_carry_the_scatter_are_in_it_or_refused():
 @pytest.mark.parametrize(
     ("function", "scatter"),
     [
-        (lambda x, a: x + np.exp(a) * np.cos(3.0 * a), scipy.stats.gumbel_r()),
-        (lambda x, a: x + np.exp(a) * np.sin(3.0 * a), scipy.stats.gumbel_r()),
+        pytest.param(
+            *(lambda x, a: x + np.exp(a) * np.cos(3.0 * a), scipy.stats.gumbel_r()),
+            marks=pytest.mark.nightly,
+        ),
+        pytest.param(
+            *(lambda x, a: x + np.exp(a) * np.sin(3.0 * a), scipy.stats.gumbel_r()),
+            marks=pytest.mark.nightly,
+        ),
         (lambda x, a: x + np.exp(a) * np.sin(3.0 * a), scipy.stats.gumbel_r(scale=0.5)),
         (lambda x, a: x * np.exp(0.4 * a), scipy.stats.expon()),
     ],
