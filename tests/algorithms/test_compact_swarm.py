@@ -6,6 +6,7 @@ import pickle
 import numpy as np
 import pytest
 from moocore import is_nondominated
+from night import others_at_night
 from pymoo.core.problem import Problem
 from pymoo.core.variable import Integer, Real
 from pymoo.indicators.hv import HV
@@ -120,7 +121,7 @@ def test_the_size_of_the_swarm_follows_from_the_budget(termination, kwargs, size
 # --- constraints ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["mw9", "mw12", pytest.param("mw1", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("name", others_at_night(["mw9", "mw12", "mw1"], "mw9"))
 def test_gaps_between_feasible_regions_are_crossed(name):
     """Where one leader and nobody infeasible left a part of the front, or all of it, unfound."""
     problem = get_problem(name)

@@ -16,7 +16,7 @@ from pymoo_hdte.cli.design_study import AGREEMENT, Settings, run_design_study
 from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
-from pymoo_hdte.problems import RobustDTEDirect
+from pymoo_hdte.problems import RobustDTEDirect, load_conditions
 
 CASES = Path(__file__).parents[3] / "shared" / "cases"
 BOX = 0.03
@@ -97,13 +97,17 @@ def test_limits_to_order_enclose_the_design_by_the_tolerance(document):
 
 
 def test_the_command_writes_what_the_study_says_and_prints_it(tmp_path, capsys):
-    out, again = tmp_path / "out", tmp_path / "again"
-    assert optimise("hs_20_100", "--model", "published", "--out", out, "--json", *QUICK) == 0
+    out, again, cycle = tmp_path / "out", tmp_path / "again", tmp_path / "cycle.csv"
+    cycle.write_text("speed_rpm,load_Nm,weight\n200,40,1\n2000,40,3\n")
+    arguments = ("--cycle", cycle, "--model", "published", "--out", out, "--json")
+    assert optimise("hs_20_100", *arguments, *QUICK) == 0
     document = json.loads(capsys.readouterr().out)
+    assert [row["share"] for row in document["settings"]["conditions"]] == [0.25, 0.75]
     assert document == json.loads((out / "optimum.json").read_text())
     # As printed the model has no trade-off.
     assert any("next to nothing to gain" in one for one in document["limits"])
-    study = run_design_study(preset("published"), "balanced", SETTINGS)
+    settings = replace(SETTINGS, conditions=load_conditions(cycle))
+    study = run_design_study(preset("published"), "balanced", settings)
     optimum_report.write_optimum_report(study, (), again)
     for name in optimum_report.FOLDER.files:
         assert (again / name).read_bytes() == (out / name).read_bytes()
@@ -212,7 +216,8 @@ class TestStudy:
     def test_designs_that_the_front_leaves_out_are_told_and_named(self, study):
         lost = study.designs[:1]
         found = replace(study, search=replace(study.search, lost=lost))
-        words = f"designs 1 are left out, the first for {study.problem.without_steady_state(lost[0])}"
+        reason = study.problem.without_steady_state(lost[0])
+        words = f"designs 1 are left out, the first for {reason}"
         assert any(words in one for one in optimum_report.limits(found, ()))
         document = optimum_report.optimum_document(found, ())
         assert document["left_out"]["designs"] == lost.tolist()
@@ -285,15 +290,6 @@ def test_a_preset_on_another_drive_is_said_to_be_borrowed(tmp_path, capsys):
     arguments = ("--model", tmp_path / "model.toml", "--out", tmp_path / "out2")
     assert optimise(tmp_path / "mine.toml", *arguments, *QUICK) == 0
     assert "need not hold" not in capsys.readouterr().out
-
-
-def test_a_duty_cycle_is_averaged_over(tmp_path, capsys):
-    cycle = tmp_path / "cycle.csv"
-    cycle.write_text("speed_rpm,load_Nm,weight\n200,40,1\n2000,40,3\n")
-    arguments = ("--cycle", cycle, "--model", "published", "--out", tmp_path / "out", "--json")
-    assert optimise("hs_20_100", *arguments, *QUICK) == 0
-    shares = [row["share"] for row in json.loads(capsys.readouterr().out)["settings"]["conditions"]]
-    assert shares == [0.25, 0.75]
 
 
 @pytest.mark.parametrize(

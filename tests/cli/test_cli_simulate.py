@@ -79,7 +79,7 @@ def test_without_options_the_rated_condition(tmp_path, capsys):
     assert any("differs" in one for one in found["limits"]) is False
 
 
-@pytest.mark.parametrize("speed", others_at_night([300, 100, 20], 300))
+@pytest.mark.parametrize("speed", others_at_night([300, 100, 20]))
 def test_slow_motion_has_its_turn_too(speed, tmp_path, capsys):
     assert simulate("hs_20_100", "--speed", speed, "--out", tmp_path / "out", "--json") == 0
     dte = json.loads(capsys.readouterr().out)["dte_arcsec"]

@@ -108,7 +108,7 @@ def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
         (SOFT, (0.3, 3e-4, 3.0), FEW),
         pytest.param(SOFT, (0.3, 3e-4, 3.0), None, marks=pytest.mark.nightly),
         pytest.param(REACTION, (1.0,), FEW, marks=pytest.mark.nightly),
-        (INERTIA, (0.03,), FEW),
+        pytest.param(INERTIA, (0.03,), FEW, marks=pytest.mark.nightly),
     ],
 )
 def test_a_planted_effect_is_named_with_its_values(label, values, rivals):
