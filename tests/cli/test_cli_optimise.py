@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from kept_results import put_files
+from quick_campaigns import BOX, SETTINGS, study_and_report
 
 from pymoo_hdte.cli import command_line as cli
 from pymoo_hdte.cli import optimum_report
@@ -19,11 +21,8 @@ from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.problems import RobustDTEDirect, load_conditions
 
 CASES = Path(__file__).parents[3] / "shared" / "cases"
-BOX = 0.03
-"""Half-width of a box in which the front is found at once."""
 QUICK = ("--box", str(BOX), "--designs", "60")
 LOST = Check(np.full(8, np.nan), np.full(8, np.nan))
-SETTINGS = Settings(0.05, BOX, None, 60, 1)
 
 
 def optimise(*arguments):
@@ -39,13 +38,13 @@ def size_32(name):
 
 @pytest.fixture(scope="module")
 def study():
-    return run_design_study(preset("calibrated"), "balanced", SETTINGS)
+    return study_and_report()[0]
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory, study):
-    out = tmp_path_factory.mktemp("optimise") / "report"
-    optimum_report.write_optimum_report(study, (), out)
+def written(tmp_path_factory):
+    out = tmp_path_factory.mktemp("optimise")
+    put_files(study_and_report()[1], out)
     return out
 
 

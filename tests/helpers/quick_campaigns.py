@@ -1,4 +1,4 @@
-"""Virtual campaigns that are simulated and analysed in a second or two."""
+"""Virtual campaigns and a design study that are made and analysed in a few seconds."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -7,6 +7,8 @@ import numpy as np
 from kept_results import kept
 from virtual_rig_cases import BELIEVED, RIG, effect
 
+from pymoo_hdte.cli import optimum_report
+from pymoo_hdte.cli.design_study import DesignStudy, Settings, run_design_study
 from pymoo_hdte.discrepancy import (
     Campaign,
     DriveAnalysis,
@@ -14,6 +16,7 @@ from pymoo_hdte.discrepancy import (
     read_campaign,
     write_campaign,
 )
+from pymoo_hdte.drive import preset
 from pymoo_hdte.virtual.rig import draw_rig, run_campaign
 from pymoo_hdte.virtual.runs import Condition
 
@@ -65,3 +68,18 @@ def ripple_analysis_and_report() -> tuple[DriveAnalysis, dict[str, bytes]]:
         analysis.report(Path(top) / "report")
         files = {path.name: path.read_bytes() for path in (Path(top) / "report").iterdir()}
     return analysis, files
+
+
+BOX = 0.03
+"""Half-width of a box in which the front of the drive is found at once."""
+SETTINGS = Settings(0.05, BOX, None, 60, 1)
+
+
+@kept
+def study_and_report() -> tuple[DesignStudy, dict[str, bytes]]:
+    """Return a study of the preset drive, and the files of its report by name."""
+    study = run_design_study(preset("calibrated"), "balanced", SETTINGS)
+    with TemporaryDirectory() as top:
+        optimum_report.write_optimum_report(study, (), Path(top) / "report")
+        files = {path.name: path.read_bytes() for path in (Path(top) / "report").iterdir()}
+    return study, files

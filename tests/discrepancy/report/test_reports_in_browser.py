@@ -11,7 +11,7 @@ from browser import CHROMIUM, probe
 from example_result import example
 from kept_results import kept, put_files
 from measured_oscillator import cubic_analysis
-from quick_campaigns import ripple_analysis_and_report
+from quick_campaigns import ripple_analysis_and_report, study_and_report
 
 from experiments.runner.report import write_report
 from experiments.runner.store import save
@@ -19,7 +19,6 @@ from pymoo_hdte.cli import command_line as cli
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 WIDE, NARROW = 1280, 500
-QUICK = ("--box", "0.03", "--designs", "60", "--quiet")
 
 
 def looked_at(page, tmp_path, width, script="null"):
@@ -43,9 +42,7 @@ def files_of(name):
     """Return the files of one report of every kind, by their path."""
     with TemporaryDirectory() as top:
         series, out = Path(top) / "series-1", Path(top) / name
-        if name == "optimise":
-            assert cli.main([name, "hs_20_100", "--out", str(out), *QUICK]) == 0
-        elif name == "simulate":
+        if name == "simulate":
             assert cli.main([name, "hs_20_100", "--out", str(out), "--quiet"]) == 0
         elif name == "identify":
             write_series(series)
@@ -65,6 +62,8 @@ def page(name, tmp_path):
         files = ripple_analysis_and_report()[1]
     elif name == "measured":
         files = cubic_analysis()[1]
+    elif name == "optimise":
+        files = study_and_report()[1]
     else:
         files = files_of(name)
     put_files(files, tmp_path / name)
@@ -117,7 +116,7 @@ def test_a_reader_sees_the_pages_around_the_experiments(name, tmp_path):
 
 @pytest.fixture
 def optimum(tmp_path):
-    put_files(files_of("optimise"), tmp_path / "optimise")
+    put_files(study_and_report()[1], tmp_path / "optimise")
     return tmp_path / "optimise" / "report.html"
 
 
