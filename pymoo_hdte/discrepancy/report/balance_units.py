@@ -9,6 +9,8 @@ from pymoo_hdte.units import si_unit
 _TURNING = {"force": "torque", "position": "angle", "speed": "speed"}
 _SLIDING = {"force": "force", "position": "length", "speed": "linear speed"}
 """Names of these quantities in `pymoo_hdte.units.UNITS`."""
+_BASE = ("inertia", "stiffness", "damping")
+"""Kinds of believed values that have such units; a gain has one of its signal."""
 
 
 def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
@@ -28,16 +30,49 @@ def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
         ``"SI"`` where the files do not tell which coordinates are angles, or a port touches some
         that are and some that are not.
     """
-    if mechanism.angles is None or any(not one.scaled for one in mechanism.inputs):
+    turning = _turning(mechanism, name)
+    if turning is None:
         return "SI"
+    return si_unit((_TURNING if turning else _SLIDING)[quantity])
+
+
+def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
+    """Return the unit that a number of an effect has at a coordinate or port.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    name : str
+        Of a coordinate, or of a port.
+    unit : str
+        What it is at a shaft: ``"N.m/rad"`` is ``"N/m"`` where the motion is a length.
+    """
+    turning = _turning(mechanism, name)
+    if turning is None:
+        return unit if unit in ("1", "K") else "SI"
+    return unit if turning else _of_a_length(unit)
+
+
+def base_unit(mechanism: Mechanism, quantity: str) -> str:
+    """Return the unit of a believed value, such as ``"damping of bearing"``."""
+    kind, _, name = quantity.partition(" of ")
+    return unit_at(mechanism, name, si_unit(kind)) if kind in _BASE else "SI"
+
+
+def _of_a_length(unit: str) -> str:
+    return unit.replace("kg.m2", "kg").replace("N.m", "N").replace("rad", "m")
+
+
+def _turning(mechanism: Mechanism, name: str) -> bool | None:
+    """Tell whether a coordinate or port turns; None where its forces or motion have no unit."""
+    if mechanism.angles is None or any(not one.scaled for one in mechanism.inputs):
+        return None
     moved = [name]
     if name in mechanism.port_names:
         port = mechanism.port(name)
         moved = [one for one, share in port.motion.items() if share] + [*port.followed]
     turning = [one in mechanism.angles for one in moved]
-    if all(turning):
-        return si_unit(_TURNING[quantity])
-    return "SI" if any(turning) else si_unit(_SLIDING[quantity])
+    return None if any(turning) != all(turning) else all(turning)
 
 
 def unit_of_gap(mechanism: Mechanism, gap: MeasuredGap) -> str:

@@ -18,12 +18,14 @@ from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, not_proven, rests_told
-from pymoo_hdte.discrepancy.report.balance_units import unit_of
+from pymoo_hdte.discrepancy.report.balance_units import base_unit, unit_at, unit_of
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import line_with_variance
+from pymoo_hdte.mechanism import Mechanism
 from pymoo_hdte.mechanism.resampling import share_beyond
+from pymoo_hdte.reports.html import number
 
 
 def mechanism_verdict_document(
@@ -93,18 +95,31 @@ def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
     found = []
     for candidate, place in fitted.places:
         rows = range(place.start, place.stop)
+        parameters = _parameters(fitted, spread, _rows(fitted, candidate, rows))
+        for name, one in parameters.items():
+            one["unit"] = _unit(finding.mechanism, candidate, name)
         found.append(
             {
                 "name": candidate.name,
                 "port": candidate.port,
                 "sentence": candidate.sentence,
-                "parameters": _parameters(fitted, spread, _rows(fitted, candidate, rows)),
+                "parameters": parameters,
                 "at_bound": [
                     fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0
                 ],
             }
         )
     return found
+
+
+def _unit(mechanism: Mechanism, candidate: Candidate, name: str) -> str:
+    if candidate.frees is not None or candidate.unit is None:
+        return base_unit(mechanism, name)
+    if name.endswith("phase"):
+        return "rad"
+    if name == "order" and unit_of(mechanism, candidate.port, "position") == "m":
+        return "1/m"
+    return unit_at(mechanism, candidate.port, candidate.unit(name))
 
 
 def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
@@ -178,13 +193,17 @@ def band(finding: MechanismFinding) -> dict[str, Any]:
         return max(shares, default=0.0)
 
     motion, force = largest(tuple(mechanism.coordinates)), largest(of_forces)
+
+    def power(share: float) -> str:
+        return "less than 0.01 %" if share < 1e-4 else f"{number(100.0 * share, 2)} %"
+
     much = max(motion, force) > finding.data.rules.band_share
     return {
         "cutoff_Hz": cutoff,
         "share_of_motion_beyond": motion,
         "share_of_force_beyond": force,
         "sentence": f"Model and records are compared up to {cutoff:.3g} Hz; beyond lie "
-        f"{100.0 * motion:.2f} % of the motion's power and {100.0 * force:.2f} % of the forces'"
+        f"{power(motion)} of the motion's power and {power(force)} of the forces'"
         f"{', in which only ripple is looked for' if much else ''}.",
     }
 
@@ -255,7 +274,10 @@ def _role(finding: MechanismFinding, one: Hypothesis) -> str:
 def quantities(finding: MechanismFinding) -> dict[str, Any]:
     """Return the fitted values of the mechanism with 95 % intervals."""
     spread = Spread(finding.data, finding.accepted)
-    return _parameters(finding.accepted, spread, range(len(finding.data.base)))
+    found = _parameters(finding.accepted, spread, range(len(finding.data.base)))
+    for name, one in found.items():
+        one["unit"] = base_unit(finding.mechanism, name)
+    return found
 
 
 def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
@@ -292,4 +314,4 @@ def _with_interval(
 ) -> dict[str, Any]:
     half = reach * float(np.sqrt(max(variance, 0.0)))
     interval = np.clip([value - half, value + half], lower, upper)
-    return {"value": value, "unit": "SI", "interval95": interval.tolist()}
+    return {"value": value, "interval95": interval.tolist()}

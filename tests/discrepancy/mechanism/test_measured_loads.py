@@ -220,7 +220,7 @@ def test_a_value_of_zero_is_no_bound_but_a_part_that_is_not_there():
     ("unit", "said", "angles"),
     [
         ("deg", "", ("q",)),
-        ("mm", "", None),
+        ("mm", "", ()),
         ("mm", "angle = true", ("q",)),
         ("rev", "angle = false", ()),
     ],
