@@ -15,11 +15,10 @@ from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechanism
-from pymoo_hdte.discrepancy.report.balance_units import unit_of_gap
 from pymoo_hdte.discrepancy.report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy.report.document import believed_in_words
 from pymoo_hdte.discrepancy.report.folder import FOLDER
-from pymoo_hdte.discrepancy.report.gap_words import percent
+from pymoo_hdte.discrepancy.report.gap_words import percent, unit_of_gap
 from pymoo_hdte.discrepancy.report.mechanism_document import (
     evidence,
     mechanism_verdict_document,

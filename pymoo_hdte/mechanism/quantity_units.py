@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
-from pymoo_hdte.mechanism import Mechanism
+from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.units import si_unit
 
 _TURNING = {"force": "torque", "position": "angle", "speed": "speed"}
@@ -53,6 +52,18 @@ def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
     return unit if turning else _of_a_length(unit)
 
 
+def unit_of_number(mechanism: Mechanism, name: str, number: str, unit: str) -> str:
+    """Return the unit of a number of an effect by its name: a phase is an angle everywhere.
+
+    The order of a ripple counts its periods in a turn, or in a length.
+    """
+    if number.endswith("phase"):
+        return "rad"
+    if number == "order" and unit_of(mechanism, name, "position") != "rad":
+        return "1/m" if unit_of(mechanism, name, "position") == "m" else "SI"
+    return unit_at(mechanism, name, unit)
+
+
 def base_unit(mechanism: Mechanism, quantity: str) -> str:
     """Return the unit of a believed value, such as ``"damping of bearing"``."""
     kind, _, name = quantity.partition(" of ")
@@ -73,8 +84,3 @@ def _turning(mechanism: Mechanism, name: str) -> bool | None:
         moved = [one for one, share in port.motion.items() if share] + [*port.followed]
     turning = [one in mechanism.angles for one in moved]
     return None if any(turning) != all(turning) else all(turning)
-
-
-def unit_of_gap(mechanism: Mechanism, gap: MeasuredGap) -> str:
-    """Return the unit of a gap: of the position of a coordinate, or of a force."""
-    return unit_of(mechanism, gap.quantity, "position" if gap.kind == "simulation" else "force")
