@@ -19,10 +19,7 @@ from pymoo_hdte.discrepancy.report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy.report.document import believed_in_words
 from pymoo_hdte.discrepancy.report.folder import FOLDER
 from pymoo_hdte.discrepancy.report.gap_words import percent, unit_of_gap
-from pymoo_hdte.discrepancy.report.mechanism_document import (
-    evidence,
-    mechanism_verdict_document,
-)
+from pymoo_hdte.discrepancy.report.mechanism_document import evidence, mechanism_verdict_document
 from pymoo_hdte.discrepancy.report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy.report.mechanism_figures import (
     misfit_over_frequency,
