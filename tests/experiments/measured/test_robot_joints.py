@@ -28,7 +28,7 @@ def verdict_on(name):
     ("name", "dry", "viscous"),
     [
         ("ur10e_joint_1", 13.7, 22.0),
-        ("ur10e_joint_6", 2.30, None),
+        pytest.param("ur10e_joint_6", 2.30, None, marks=pytest.mark.nightly),
         pytest.param("tx40_joint_4", 2.48, 1.11, marks=pytest.mark.nightly),
     ],
 )
