@@ -59,7 +59,7 @@ def kept_table(outcome: Outcome) -> Table:
         whole = sum(all(map(outcome.has, group)) for group in groups)
         if isinstance(part, BbobPart):
             instances = ", ".join(map(str, part.instances))
-            name, budgets = f"bbob-biobj, instances {instances}", part.told
+            name, budgets = f"bbob-biobj, instance {instances}", part.told
         else:
             name, budgets = f"{part.suite}, {part.seeds} seeds", part.budgets
         who = (part.algorithm,) if isinstance(part, BbobPart) else part.algorithms

@@ -17,8 +17,8 @@ with those of Li and Zhang, GDE3 with F = CR = 0.5, COMO-CMA-ES with 10 kernels 
 a fifth of the box of first positions. `CompactSwarm()` as it is, told its budget, so that each
 budget is a run of its own; nothing was chosen for this experiment.
 
-Beside peers: ours and four that move alike whatever their budget on instance 9, which was written
-down, and the peers run, before ours was. All held-out suites together are ranked on all problems
+Beside peers: ours and up to four that move alike whatever their budget on instance 9, which was
+written down, and the peers run, before ours was. All held-out suites together are ranked on all problems
 of IMOP and of that instance, by the hypervolume and by the share of targets, which is a measure of
 hypervolume; IGD+ needs a front, which bbob-biobj has not. The two measures have no common unit, so
 that each rival is tested by the signs of the differences, corrected after Holm.
@@ -130,6 +130,11 @@ SLOW = ("MOEA/D-DE",)
 """Those that take milliseconds an evaluation: budgets up to 2,000 in what is stored."""
 QUICK_ENOUGH = tuple(name for name in WITHOUT_CONSTRAINTS if name not in SLOW)
 
+BESIDE_OURS = ("NSGA-II", "SMS-EMOA", "ElitistSwarm")
+"""Peers on all held-out suites, to 25,000. They move alike whatever their budget."""
+FURTHER = tuple(name for name in QUICK_ENOUGH if name not in (OURS, *BESIDE_OURS))
+"""Those that are run last, as far as the time of the processor goes."""
+
 EARLIER: tuple[SuitePart | BbobPart, ...] = (
     BbobPart(OURS, (10_000, 25_000), instances=(6,)),
     BbobPart(OURS, (10_000,), instances=(7,)),
@@ -139,25 +144,24 @@ EARLIER: tuple[SuitePart | BbobPart, ...] = (
 )
 """What was run first, of ours alone; its instances are known since."""
 
-BESIDE_OURS = ("NSGA-II", "SMS-EMOA", "ElitistSwarm", "CMOPSO")
-"""Peers on bbob-biobj. They move alike whatever their budget, so that one run serves all."""
-
 STORED: tuple[SuitePart | BbobPart, ...] = (
     BbobPart(OURS, BUDGETS, instances=(BESIDE_PEERS,)),
     SuitePart("RE", (OURS, "ElitistSwarm", "NSGA-II", "SMS-EMOA"), BUDGETS, seeds=5),
-    SuitePart("DAS-CMOP", (OURS, "ElitistSwarm", "NSGA-II", "C-TAEA"), (10_000,), seeds=5),
-    SuitePart("MW", (OURS, "ElitistSwarm", "NSGA-II", "C-TAEA"), (10_000,), seeds=5),
-    *(BbobPart(name, BUDGETS[-1:], (BESIDE_PEERS,)) for name in BESIDE_OURS),
+    SuitePart("DAS-CMOP", (OURS, "ElitistSwarm", "NSGA-II", "C-TAEA"), (10_000,), seeds=3),
+    SuitePart("MW", (OURS, "ElitistSwarm", "NSGA-II", "C-TAEA"), (10_000,), seeds=3),
     SuitePart("LZ09", (OURS, "ElitistSwarm", "NSGA-II", "SMS-EMOA"), (10_000,), seeds=3),
     SuitePart("IMOP", QUICK_ENOUGH, (500, 2000, 10_000), seeds=3),
     SuitePart("IMOP", SLOW, (500, 2000), seeds=3),
-    SuitePart("IMOP", QUICK_ENOUGH, (25_000,), seeds=3),
+    SuitePart("IMOP", (OURS, *BESIDE_OURS), (25_000,), seeds=3),
+    *(BbobPart(name, BUDGETS[-1:], (BESIDE_PEERS,)) for name in BESIDE_OURS),
+    SuitePart("IMOP", FURTHER, (25_000,), seeds=3),
+    BbobPart("CMOPSO", BUDGETS[-1:], (BESIDE_PEERS,)),
     *EARLIER,
 )
 """What is run for the stored outcome, in this order; of a run that is stopped, whole ``groups``.
 
 It is smaller than was asked for: one to five seeds in place of 15, 25,000 evaluations on
-bbob-biobj, IMOP and RE only, on bbob-biobj one instance and four algorithms beside ours.
+bbob-biobj, IMOP and RE only, on bbob-biobj one instance and few algorithms beside ours.
 """
 
 FULL: tuple[SuitePart | BbobPart, ...] = (
