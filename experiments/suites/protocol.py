@@ -18,10 +18,10 @@ a fifth of the box of first positions. `CompactSwarm()` as it is, told its budge
 budget is a run of its own; nothing was chosen for this experiment.
 
 Beside peers: ours and up to four that move alike whatever their budget on instance 9, which was
-written down, and the peers run, before ours was. All held-out suites together are ranked on all problems
-of IMOP and of that instance, by the hypervolume and by the share of targets, which is a measure of
-hypervolume; IGD+ needs a front, which bbob-biobj has not. The two measures have no common unit, so
-that each rival is tested by the signs of the differences, corrected after Holm.
+written down, and the peers run, before ours was. All held-out suites together are ranked on all
+problems of IMOP and of that instance, by the hypervolume and by the share of targets, which is a
+measure of hypervolume; IGD+ needs a front, which bbob-biobj has not. The two measures have no
+common unit, so that each rival is tested by the signs of the differences, corrected after Holm.
 
 A run is kept as long as its algorithm does not change, and compared on the seeds that ours ran
 with too.
