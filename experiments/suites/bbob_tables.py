@@ -12,7 +12,7 @@ from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome
 from experiments.suites.peers import BBOB_PEERS, LESS, ON_BBOB, OURS
-from experiments.suites.protocol import BUDGETS, DIMENSIONS, INSTANCES
+from experiments.suites.protocol import BUDGETS, DIMENSIONS
 from experiments.suites.published import curves
 
 
@@ -89,7 +89,7 @@ def shares_table(outcome: Outcome) -> Table:
     for dimension in DIMENSIONS:
         told = tuple(reached(outcome, dimension, budget) for budget in BUDGETS)
         rows.append(
-            (f"{OURS}, told each budget", dimension, f"here{_fewer(outcome, dimension)}", *told)
+            (f"{OURS}, told each budget", dimension, f"here{_instances(outcome, dimension)}", *told)
         )
         for algorithm, budget in _told(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
@@ -106,9 +106,8 @@ def shares_table(outcome: Outcome) -> Table:
             *(Column(f"{budget:,}", "", 3, "evaluations") for budget in BUDGETS),
         ),
         tuple(rows),
-        note="Ours on all 55 functions and instances 6 to 8 but where it says otherwise, one run "
-        "each; published are averages over all functions and instances, read from pictures to some "
-        ".01.",
+        note="On all 55 functions where it does not say otherwise, one run each; published are "
+        "averages over all functions and instances, read from pictures to some .01.",
     )
 
 
@@ -119,19 +118,21 @@ def _told(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
     return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
 
 
-def _fewer(outcome: Outcome, dimension: int) -> str:
-    """Name the budgets for which our swarm did not run on all instances."""
-    fewer = []
+def _instances(outcome: Outcome, dimension: int) -> str:
+    """Name the instances on which our swarm ran, by budget if they differ."""
+    said = {}
     for budget in BUDGETS:
         place = dimension, OURS, budget
         ran = {r.instance for r in outcome.bbob if (r.dimension, r.algorithm, r.told) == place}
-        if ran and len(ran) < len(INSTANCES):
-            fewer.append(f"{budget:,}: instance {' and '.join(map(str, sorted(ran)))}")
-    return f" ({', '.join(fewer)})" if fewer else ""
+        if ran:
+            said[budget] = f"instance {' and '.join(map(str, sorted(ran)))}"
+    if len(set(said.values())) > 1:
+        return f" ({', '.join(f'{budget:,}: {words}' for budget, words in said.items())})"
+    return "".join(f" ({words})" for words in set(said.values()))
 
 
 def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:
-    """Say on how many functions and instances an algorithm ran, if not on all."""
+    """Say on which instances an algorithm ran, and on how many functions if not on all."""
     ran = [
         run
         for run in outcome.bbob
@@ -140,9 +141,8 @@ def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:
     functions = {run.function for run in ran}
     instances = sorted({run.instance for run in ran})
     said = [f"{len(functions)} functions"] if len(functions) < 55 else []
-    if len(instances) < len(INSTANCES):
-        said.append(f"instance {' and '.join(map(str, instances))}")
-    return f" ({', '.join(said)})" if said else ""
+    said.append(f"instance {' and '.join(map(str, instances))}")
+    return f" ({', '.join(said)})"
 
 
 def duels_table(outcome: Outcome) -> Table:
