@@ -17,8 +17,11 @@ from experiments.suites.published import curves
 
 
 def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
-    """Return the mean share of our swarm that was told a budget, at its end; None if not run."""
-    return outcome.shares(dimension, OURS, evaluations).get(evaluations)
+    """Return the mean share of our swarm after so many evaluations; None if it was not run.
+
+    It moves alike whatever its budget, so that its longest runs tell of shorter ones.
+    """
+    return outcome.shares(dimension, OURS, BUDGETS[-1]).get(evaluations)
 
 
 class Duel(NamedTuple):
@@ -37,7 +40,7 @@ def duels(
 ) -> list[Duel]:
     """Return the duels after so many evaluations, p corrected over the rivals that ran.
 
-    Ours is told this budget; a rival that moves alike whatever its budget may have been told more.
+    Ours and a rival that move alike whatever their budget may have been told more.
     """
     found = []
     for rival in rivals:
@@ -71,7 +74,7 @@ def _pairs(outcome: Outcome, rival: str, evaluations: int) -> NDArray[np.float64
     ours = {
         (run.dimension, run.function, run.instance, run.seed): shares[evaluations]
         for run, shares in outcome.bbob.items()
-        if run.algorithm == OURS and run.told == evaluations
+        if run.algorithm == OURS and evaluations in shares
     }
     anew = ON_BBOB[rival].starts_anew
     pairs = []
@@ -87,10 +90,6 @@ def shares_table(outcome: Outcome) -> Table:
     """Mean shares of targets by dimension and evaluations, ours before the published ones."""
     rows: list[tuple[Cell, ...]] = []
     for dimension in DIMENSIONS:
-        told = tuple(reached(outcome, dimension, budget) for budget in BUDGETS)
-        rows.append(
-            (f"{OURS}, told each budget", dimension, f"here{_instances(outcome, dimension)}", *told)
-        )
         for algorithm, budget in _told(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
             name = f"{algorithm}, told {budget:,}" if algorithm == OURS else algorithm

@@ -92,13 +92,16 @@ PEERS: dict[str, Contestant] = {
     "COMO-CMA-ES": Contestant("comocma", _como, takes_constraints=False, two_objectives_only=True),
     "C-TAEA": Contestant("pymoo", partial(run_pymoo, MADE["C-TAEA"])),
 }
-"""On problems whose first positions may lie anywhere in the box."""
+"""On problems whose first positions may lie anywhere in the box.
+
+Ours starts anew for each budget because its size follows from it where there are constraints.
+"""
 
 BBOB_PEERS: dict[str, Contestant] = {
     name: Contestant(
         PEERS[name].library,
         partial(run_pymoo, partial(_started, make)),
-        starts_anew=PEERS[name].starts_anew,
+        starts_anew=PEERS[name].starts_anew and name != OURS,
     )
     for name, make in MADE.items()
 } | {"COMO-CMA-ES": PEERS["COMO-CMA-ES"]}
@@ -126,11 +129,12 @@ LESS: dict[str, Callable[[Problem], Algorithm]] = {
     "without mutation": lambda _: CompactSwarm(mutation=NoMutation()),
     "with equal shares of moves": lambda _: _EqualSwarm(),
     "with quality=spread": lambda _: CompactSwarm(quality="spread"),
+    "with 50 particles": lambda _: CompactSwarm(50),
 }
-"""Our swarm with a part left out, told its budget, for the ablation on bbob-biobj."""
+"""Our swarm with a part left out, for the ablation on bbob-biobj; 50 is its size at the end."""
 
 ON_BBOB: dict[str, Contestant] = BBOB_PEERS | {
-    name: Contestant("pymoo_hdte", partial(run_pymoo, partial(_started, make)), starts_anew=True)
+    name: Contestant("pymoo_hdte", partial(run_pymoo, partial(_started, make)))
     for name, make in LESS.items()
 }
 """Peers and the swarms with a part left out."""
