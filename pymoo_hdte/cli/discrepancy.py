@@ -53,7 +53,7 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
-    from pymoo_hdte.discrepancy.report.write import FOLDER
+    from pymoo_hdte.discrepancy.report.folder import FOLDER
     from pymoo_hdte.effects import register, registered
 
     believed = options.believed, options.sheet

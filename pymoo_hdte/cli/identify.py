@@ -31,12 +31,18 @@ def _add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace, say: Say) -> Outcome:
     from pymoo_hdte.cli.identification import identify_drive
-    from pymoo_hdte.cli.identification_report import FOLDER, write_identification_report
+    from pymoo_hdte.cli.identification_report import (
+        FOLDER,
+        check_filled_in,
+        write_identification_report,
+    )
 
     with FOLDER.held(options.out):
         sheet = read_sheet(options.datasheet) if options.datasheet is not None else None
         say("reading the records and fitting")
         found = identify_drive(options.records)
+        if sheet is not None:
+            check_filled_in(found, sheet)
         return outcome_of(write_identification_report(found, sheet, options.out), options.out)
 
 

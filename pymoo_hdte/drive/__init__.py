@@ -16,14 +16,8 @@ from pymoo_hdte.drive.effects import (
 )
 from pymoo_hdte.drive.kinematic_error import KinematicError
 from pymoo_hdte.drive.measurement import low_pass, measured_dte
-from pymoo_hdte.drive.model import (
-    PARAMETER_UNITS,
-    PARAMETERS,
-    PRESETS,
-    DriveModel,
-    load_model,
-    preset,
-)
+from pymoo_hdte.drive.model import PRESETS, DriveModel, load_model, preset
+from pymoo_hdte.drive.parameters import PARAMETER_UNITS, PARAMETERS
 from pymoo_hdte.drive.simulation import Run, simulate_drive
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance

@@ -20,9 +20,15 @@ from pymoo_hdte.drive.datasheet import (
 )
 from pymoo_hdte.effects.quantities import with_unit
 from pymoo_hdte.io.fields import Fields
-from pymoo_hdte.io.toml import read_toml
+from pymoo_hdte.io.toml import toml_with_lines
 
 Arrangement = tuple[str, str | None]
+_PLACES = {
+    "circular_spline_teeth": "teeth.circular_spline",
+    "pressure_angle": "mesh.pressure_angle",
+    "stiffness": "nominal.stiffness",
+}
+"""Where a file has what the classes of a data sheet refuse, by its name there."""
 
 USUAL_ARRANGEMENT: Arrangement = ("circular_spline", None)
 """``held`` and ``orders_as_held`` of a data sheet that does not say them."""
@@ -45,7 +51,8 @@ def load_datasheet(path: str | Path) -> DataSheet:
     Raises
     ------
     InvalidInput
-        For a wrong, missing, superfluous, negative, non-finite or unit-less field.
+        With file and line, for a wrong, missing, superfluous, negative, non-finite or unit-less
+        field.
     OSError
         If the file cannot be read.
 
@@ -54,8 +61,18 @@ def load_datasheet(path: str | Path) -> DataSheet:
     >>> load_datasheet("my_drive.toml").ratio
     80.0
     """
-    sheet = datasheet_from_fields(read_toml(Path(path)))
-    _check_twist(sheet, Path(path).name)
+    file = Path(path).name
+    with toml_with_lines(Path(path)) as top:
+        try:
+            sheet = datasheet_from_fields(top)
+            _check_twist(sheet)
+        except InvalidInput as error:
+            if error.field.startswith(f"{file}."):
+                raise
+            # What the data sheet itself refuses is named as it stands in the file.
+            known = _PLACES.get(error.field)
+            place = f"{file}.{known}" if known else f"{file}: {error.field}"
+            raise InvalidInput(place, error.value, error.allowed) from None
     return sheet
 
 
@@ -111,7 +128,7 @@ def hs_20_100() -> DataSheet:
         return load_datasheet(path)
 
 
-def _check_twist(sheet: DataSheet, file: str) -> None:
+def _check_twist(sheet: DataSheet) -> None:
     """Refuse a stiffness that the rated load would twist as no drive can bear."""
     stiffness = sheet.nominal.stiffness
     if sheet.load_torque > LARGEST_TWIST * stiffness:
@@ -119,7 +136,7 @@ def _check_twist(sheet: DataSheet, file: str) -> None:
             f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load would "
             f"twist the drive by more than {LARGEST_TWIST:g} rad; {LOST_POWER}"
         )
-        raise InvalidInput(f"{file}: nominal.stiffness", stiffness, allowed)
+        raise InvalidInput("stiffness", stiffness, allowed)
 
 
 def _nominal(table: Fields) -> Nominal:

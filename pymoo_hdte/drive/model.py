@@ -3,52 +3,25 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pymoo_hdte.checks import InvalidInput, finite_array, one_of
-from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, DataSheet, unit_of
-from pymoo_hdte.drive.datasheet_file import (
-    EARLIER_ARRANGEMENT,
-    datasheet_from_fields,
-    hs_20_100,
-    sheet_table,
-)
-from pymoo_hdte.drive.effects import DriveEffect, effect_from_fields
-from pymoo_hdte.drive.kinematic_error import KinematicError
+from pymoo_hdte.checks import InvalidInput, one_of
+from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, DataSheet
+from pymoo_hdte.drive.datasheet_file import hs_20_100
+from pymoo_hdte.drive.model_values import ModelValues, model_tables, parts_of, values_of
+from pymoo_hdte.drive.parameters import PARAMETERS, checked
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.hill import found_steady_states, hill_steady_state
 from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
-from pymoo_hdte.effects.effect import place_of
-from pymoo_hdte.effects.quantities import with_unit
 from pymoo_hdte.io.archive import FileFormat
-from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.io.toml import read_toml
 from pymoo_hdte.units import ARCSEC
-
-PARAMETERS = ("theta_s", "K", "J_in", "B_in", "B_fc")
-"""The uncertain parameters xi of Section 2.3, in this order.
-
-Examples
---------
->>> dict(zip(PARAMETERS, PARAMETER_UNITS))["K"]
-'N.m/rad'
-"""
-
-PARAMETER_UNITS = tuple(unit_of(name) for name in PARAMETERS)
-"""Units of `PARAMETERS`, one for each.
-
-Examples
---------
->>> PARAMETER_UNITS[PARAMETERS.index("J_in")]
-'kg.m2'
-"""
 
 FORMAT = FileFormat("pymoo_hdte drive model", version=1, fields=("data_sheet", "model"))
 
@@ -61,12 +34,9 @@ Examples
 ['published', 'calibrated', 'resonant']
 """
 
-LARGEST_STATIC_ERROR = 0.1
-"""rad; any larger theta_s must be an angle in other units."""
-
 
 @dataclass(frozen=True)
-class DriveModel:
+class DriveModel(ModelValues):
     """The equations of motion, Eq. (9), of one drive under rated conditions, and its effects.
 
     Attributes
@@ -92,19 +62,6 @@ class DriveModel:
     >>> print(f"{model.dte_arcsec(model.nominal[np.newaxis])[0]:.1f} arcsec")
     86.7 arcsec
     """
-
-    name: str
-    description: str
-    provenance: str
-    sheet: DataSheet
-    kinematic_error: KinematicError
-    effects: tuple[DriveEffect, ...] = ()
-
-    def __post_init__(self) -> None:
-        places = [place_of(effect) for effect in self.effects]
-        if len(set(places)) != len(places):
-            names = [effect.name for effect in self.effects]
-            raise InvalidInput("effects", names, "each effect once, at each port and order")
 
     @property
     def nominal(self) -> NDArray[np.float64]:
@@ -133,14 +90,7 @@ class DriveModel:
         InvalidInput
             If the shape is wrong, a value is not finite or not above 0, or theta_s is 0.1 or more.
         """
-        values = finite_array("parameters", parameters, (None, len(PARAMETERS)))
-        for name, column in zip(PARAMETERS, values.T, strict=True):
-            if np.any(column <= 0.0):
-                raise InvalidInput(name, float(column.min()), "above 0")
-        theta_s, stiffness, input_inertia, input_damping, mesh_damping = values.T
-        if np.any(theta_s >= LARGEST_STATIC_ERROR):
-            limit = f"below {LARGEST_STATIC_ERROR} rad; it is not given in arcsec"
-            raise InvalidInput("theta_s", float(theta_s.max()), limit)
+        theta_s, stiffness, input_inertia, input_damping, mesh_damping = checked(parameters).T
         coefficients = Coefficients(
             ratio=self.sheet.ratio,
             input_speed=self.sheet.input_speed,
@@ -232,32 +182,6 @@ class DriveModel:
         sheet = replace(self.sheet, input_speed=input_speed, load_torque=load_torque)
         return replace(self, sheet=sheet)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what makes the model, JSON-able, as a record beside results.
-
-        Units stand in the keys; ``nominal`` is in SI.
-        """
-        error = self.kinematic_error
-        return {
-            "name": self.name,
-            "description": self.description,
-            "provenance": self.provenance,
-            "data_sheet": self.sheet.name,
-            "flexspline_teeth": self.sheet.flexspline_teeth,
-            "circular_spline_teeth": self.sheet.circular_spline_teeth,
-            "nominal": asdict(self.sheet.nominal),
-            "input_speed_rad_s": self.sheet.input_speed,
-            "load_torque_Nm": self.sheet.load_torque,
-            "kinematic_error": {
-                "orders": list(error.orders),
-                "amplitudes": list(error.amplitudes),
-                "phases_rad": list(error.phases),
-                "reading": error.reading,
-                "std_arcsec": error.std / ARCSEC,
-            },
-            "effects": [effect.to_dict() for effect in self.effects],
-        }
-
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the whole model to ``path``, replacing it in one step (``docs/file_format.md``).
 
@@ -270,7 +194,7 @@ class DriveModel:
             If the file cannot be written.
         """
         tables = model_tables(self)
-        if _from_fields(*parts_of(tables)).effects != tuple(self.effects):
+        if values_of(*parts_of(tables))["effects"] != tuple(self.effects):
             raise InvalidInput("effects", self.effects, "those that `effect_from_fields` builds")
         FORMAT.write(path, tables)
 
@@ -292,7 +216,7 @@ class DriveModel:
         InvalidInput, OSError
             As `FileFormat.read`, and for a field that `load_datasheet` or `load_model` refuses.
         """
-        return _from_fields(*parts_of(FORMAT.read(path)[0]))
+        return cls(**values_of(*parts_of(FORMAT.read(path)[0])))
 
 
 def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
@@ -322,29 +246,7 @@ def load_model(path: str | Path, sheet: DataSheet) -> DriveModel:
     >>> load_model("my_drive_model.toml", sheet).name
     'my_drive'
     """
-    return _from_fields(read_toml(Path(path)), sheet)
-
-
-def _from_fields(fields: Fields, sheet: DataSheet) -> DriveModel:
-    error = fields.table("kinematic_error")
-    effects = fields.tables("effect") if fields.has("effect") else []
-    model = DriveModel(
-        name=fields.text("name"),
-        description=fields.text("description"),
-        provenance=fields.text("provenance"),
-        sheet=sheet,
-        kinematic_error=KinematicError(
-            orders=error.numbers("orders"),
-            amplitudes=error.numbers("amplitudes"),
-            phases=error.numbers("phases"),
-            reading=error.text("reading"),
-            std=error.quantity("std", "angle"),
-        ),
-        effects=tuple(effect_from_fields(table) for table in effects),
-    )
-    error.finish()
-    fields.finish()
-    return model
+    return DriveModel(**values_of(read_toml(Path(path)), sheet))
 
 
 def preset(name: str) -> DriveModel:
@@ -375,44 +277,3 @@ def preset(name: str) -> DriveModel:
     one_of("model", name, PRESETS)
     with as_file(files("pymoo_hdte.drive") / "data" / f"{name}.toml") as path:
         return load_model(path, hs_20_100())
-
-
-def model_tables(model: DriveModel) -> dict[str, Any]:
-    """Return the header's tables: ``data_sheet`` and ``model``, as in the files of ``drive/data``.
-
-    Quantities are in the SI unit of `units.UNITS` whose factor is 1, so no bit is lost.
-    """
-    error = model.kinematic_error
-    table = {
-        "name": model.name,
-        "description": model.description,
-        "provenance": model.provenance,
-        "kinematic_error": {
-            "orders": list(error.orders),
-            "amplitudes": list(error.amplitudes),
-            "phases": list(error.phases),
-            "reading": error.reading,
-            "std": with_unit(error.std, "angle"),
-        },
-    }
-    # TOML has no empty array of tables.
-    effects = {"effect": [effect.to_dict() for effect in model.effects]} if model.effects else {}
-    sheet = sheet_table(model.sheet)
-    if (model.sheet.held, model.sheet.orders_as_held) == EARLIER_ARRANGEMENT:
-        # Files keep the bytes that they had when there was no other arrangement.
-        for name in ("held", "orders_as_held"):
-            del sheet["teeth"][name]
-    return {"data_sheet": sheet, "model": table | effects}
-
-
-def parts_of(tables: dict[str, Any]) -> tuple[Fields, DataSheet]:
-    """Return the fields of the model and the data sheet that `model_tables` were made from.
-
-    Raises
-    ------
-    InvalidInput
-        For a wrong, missing or superfluous field of the data sheet.
-    """
-    table = Fields(tables["data_sheet"], "data_sheet")
-    sheet = datasheet_from_fields(table, EARLIER_ARRANGEMENT)
-    return Fields(tables["model"], "model"), sheet

@@ -11,7 +11,8 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import InvalidInput, finite_array, one_of, real_number
-from pymoo_hdte.drive.model import PARAMETERS, DriveModel
+from pymoo_hdte.drive.model import DriveModel
+from pymoo_hdte.drive.parameters import PARAMETERS
 from pymoo_hdte.drive.solve.time_domain import StartUp, equations_of_motion, memories
 from pymoo_hdte.units import ARCSEC
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pymoo_hdte.drive.datasheet import DataSheet
 from pymoo_hdte.drive.datasheet_file import sheet_table
-from pymoo_hdte.drive.model import DriveModel, model_tables
+from pymoo_hdte.drive.model import DriveModel
+from pymoo_hdte.drive.model_values import model_tables
 from pymoo_hdte.io.toml import toml_text
 
 

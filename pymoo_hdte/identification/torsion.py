@@ -62,12 +62,15 @@ class TorsionLoop:
         object.__setattr__(self, "torque", finite_array("torque", self.torque, (None,)))
         shape = (len(self.torque),)
         object.__setattr__(self, "torsion", finite_array("torsion", self.torsion, shape))
+        self._check_twist()
         loop_branches(self.torque)
-        self._check_sense()
+        self._check_work()
 
-    def _check_sense(self) -> None:
-        """Refuse a loop without twist, or that turns the wrong way: its torsion, or around it."""
+    def _check_twist(self) -> None:
+        """Refuse a torsion that does not follow the torque, or that runs against it."""
         torque, torsion = self.torque, self.torsion
+        if np.ptp(torque) == 0.0:
+            return  # No loop, as `loop_branches` says.
         compliance = float(
             (torque - torque.mean()) @ torsion / np.sum((torque - torque.mean()) ** 2)
         )
@@ -80,6 +83,10 @@ class TorsionLoop:
                 "count in opposite senses; change the sign of one of the columns"
             )
             raise InvalidInput("slope of torsion over torque", float(f"{compliance:.3g}"), allowed)
+
+    def _check_work(self) -> None:
+        """Refuse a loop that is run around the wrong way, which would give work."""
+        torque, torsion = self.torque, self.torsion
         given = -lost_energy(self) / (np.ptp(torque) * np.ptp(torsion))
         if given > GIVEN_WORK:
             allowed = (
@@ -133,7 +140,10 @@ def loop_branches(torque: NDArray[np.float64]) -> dict[str, slice]:
     _check_ends(torque, peak, slack)
     top, bottom = _turning_point(torque), _turning_point(-torque)
     if bottom < top:
-        allowed = "after the highest torque: load forward first"
+        allowed = (
+            "after the highest torque: load forward first. Likely the rows stand in reverse, or "
+            "torque and angle both count in the opposite sense"
+        )
         raise InvalidInput("sample of the lowest torque", bottom, allowed)
     zero = top + int(np.count_nonzero(torque[top:bottom] > 0.0))
     cuts = (0, top + 1, zero, bottom + 1, len(torque))

@@ -8,7 +8,8 @@ import math
 from numpy.typing import ArrayLike
 
 from pymoo_hdte.checks import InvalidInput, finite_array
-from pymoo_hdte.drive.model import PARAMETERS, DriveModel
+from pymoo_hdte.drive.model import DriveModel
+from pymoo_hdte.drive.parameters import PARAMETERS
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.mechanism.believed import BelievedValue
 from pymoo_hdte.mechanism.error_line import ErrorLine

@@ -1,6 +1,7 @@
 """``pymoo-hdte identify``: the truth of a virtual bench comes back from its CSV files."""
 
 import json
+import re
 import shutil
 
 import numpy as np
@@ -122,6 +123,29 @@ def test_intervals_by_hand(copied, tmp_path, capsys):
         half = student.ppf(0.975, freedom) * error
         expected = [slopes.mean() - half, slopes.mean() + half]
         assert found["interval95"] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("torque", "torsion", "told"),
+    [
+        (1e-4, 1.0, r"^torsion_loops\.csv: stiffness is 2\..*at least 400 N\.m/rad.*another unit"),
+        (-1.0, 1.0, "torsion_loops.csv, lines .*opposite senses"),
+        (1.0, -1.0, "torsion_loops.csv, lines .*opposite senses"),
+    ],
+)
+def test_a_wrong_unit_or_sign_in_a_loop_is_told(copied, tmp_path, capsys, torque, torsion, told):
+    keep(copied, "torsion_loops.csv")
+    path = copied / "torsion_loops.csv"
+    header, *rows = path.read_text().splitlines()
+    numbers = [[float(one) for one in row.split(",")[2:]] for row in rows]
+    keys = [row.rsplit(",", 2)[0] for row in rows]
+    changed = [
+        f"{key},{t * torque!r},{a * torsion!r}" for key, (t, a) in zip(keys, numbers, strict=True)
+    ]
+    path.write_text("\n".join([header, *changed]) + "\n")
+    assert identify(copied, "--datasheet", "hs_20_100", "--out", tmp_path / "out") == cli.MISTAKE
+    assert re.search(told, capsys.readouterr().err.removeprefix("pymoo-hdte: error: "))
+    assert not (tmp_path / "out").exists()
 
 
 def test_hysteresis_of_a_loop_by_hand(copied, tmp_path, capsys):

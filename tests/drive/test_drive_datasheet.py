@@ -116,9 +116,9 @@ STIFFNESS = 'stiffness = { value = 2.583e4, unit = "N.m/rad" }'
         (STIFFNESS, 'stiffness = { value = "2", unit = "N.m/rad" }', "stiffness.value", "number"),
         (STIFFNESS, 'stiffness = { value = true, unit = "N.m/rad" }', "stiffness.value", "number"),
         (STIFFNESS, STIFFNESS + "\nstifness = 1", "nominal.stifness", "no such field"),
-        ("flexspline = 200", "flexspline = 203", "circular_spline_teeth", "204"),
+        ("flexspline = 200", "flexspline = 203", "teeth.circular_spline", "204"),
         ("flexspline = 200", "flexspline = 200.5", "teeth.flexspline", "whole number"),
-        ("flexspline = 200", "flexspline = 201", "circular_spline_teeth", "likely a tooth number"),
+        ("flexspline = 200", "flexspline = 201", "teeth.circular_spline", "likely a tooth number"),
         ('held = "flexspline"', 'held = "housing"', "teeth.held", "'circular_spline'"),
         ('as_held = "circ', 'as_held = "c', "teeth.orders_as_held", "'circular_spline'"),
         ('class = "e_h"', 'class = "e_x"', "error class of dfi1", "'e_m'"),
@@ -148,3 +148,14 @@ def test_bad_fields_are_named_with_what_is_allowed(tmp_path, old, new, field, al
         load_datasheet(path)
     assert field in str(caught.value)
     assert allowed in str(caught.value)
+    assert caught.value.field.startswith("hs.toml")
+
+
+def test_the_line_of_a_bad_field_is_told(tmp_path):
+    path = tmp_path / "hs.toml"
+    path.write_text(TEXT.replace("circular_spline = 202", "circular_spline = 201", 1))
+    line = 1 + path.read_text().splitlines().index("circular_spline = 201")
+    with pytest.raises(
+        InvalidInput, match=rf"hs\.toml, line {line}: teeth\.circular_spline is 201"
+    ):
+        load_datasheet(path)

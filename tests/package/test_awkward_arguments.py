@@ -19,8 +19,7 @@ from pymoo_hdte.algorithms import (
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.decision import WeightedUtopia
 from pymoo_hdte.discrepancy import BelievedDrive, Rig, RunningRecord, TorsionRecord
-from pymoo_hdte.drive import hs_20_100, preset
-from pymoo_hdte.drive.model import KinematicError
+from pymoo_hdte.drive import KinematicError, hs_20_100, preset
 from pymoo_hdte.identification import NoLoadRun, TorsionLoop
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Gear, Record
 from pymoo_hdte.problems import Design, Quantile, RobustDTE

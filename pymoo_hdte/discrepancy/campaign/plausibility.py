@@ -177,10 +177,14 @@ def check_torsion(record: TorsionRecord, believed: BelievedDrive, rules: Rules) 
         relative = slope * believed.stiffness
     factor = rules.slope_mismatch
     if not 1.0 / factor < relative < factor:
-        cause = "the unit of either" if relative > 0.0 else "a positive torque turns it backwards"
+        cause = (
+            "the unit of either, or the power of ten of the stiffness"
+            if relative > 0.0
+            else "the sign of one of the columns: here a positive torque turns the output backwards"
+        )
         allowed = (
             f"{1.0 / believed.stiffness:.3g} rad/(N.m), as of the believed stiffness of "
-            f"{believed.stiffness:.4g} N.m/rad, within a factor of {factor:g} ({cause})"
+            f"{believed.stiffness:.4g} N.m/rad, within a factor of {factor:g}. Likely {cause}"
         )
         raise InvalidInput(
             "slope of -output_angle over output_torque", float(f"{slope:.3g}"), allowed

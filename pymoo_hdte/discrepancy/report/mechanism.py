@@ -17,6 +17,7 @@ from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechan
 from pymoo_hdte.discrepancy.report.balance_units import unit_of_gap
 from pymoo_hdte.discrepancy.report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy.report.document import believed_in_words
+from pymoo_hdte.discrepancy.report.folder import FOLDER
 from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.discrepancy.report.mechanism_document import (
     evidence,
@@ -31,7 +32,6 @@ from pymoo_hdte.discrepancy.report.mechanism_figures import (
 from pymoo_hdte.discrepancy.report.tables import STATUSES
 from pymoo_hdte.discrepancy.report.torsion import torsion_document
 from pymoo_hdte.discrepancy.report.torsion_figure import torsion_picture
-from pymoo_hdte.discrepancy.report.write import FOLDER
 from pymoo_hdte.reports.figures import data_uri
 from pymoo_hdte.reports.html import page
 

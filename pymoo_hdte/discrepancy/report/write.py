@@ -28,6 +28,7 @@ from pymoo_hdte.discrepancy.report.figures import (
     optimum_fronts,
     overlay,
 )
+from pymoo_hdte.discrepancy.report.folder import FOLDER
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
 from pymoo_hdte.discrepancy.report.row_words import fault_rows, noise_rows, rows_sentence
@@ -43,7 +44,6 @@ from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.reports.figures import data_uri
-from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.html import page
 
 OptimumOf = Callable[[DriveModel, DriveModel], OptimumShift]
@@ -177,6 +177,3 @@ def _page(
         shift=shift,
         believed_effects=believed_in_words(document),
     )
-
-
-FOLDER = ReportFolder("verdict.json", optional=(MODEL_FILE, SHEET_FILE))

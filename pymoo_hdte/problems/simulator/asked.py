@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic
+from pymoo_hdte.surrogate.sparse.moments import SparseMoments
+from pymoo_hdte.surrogate.threads import MANY
+
+Asked = tuple[Statistic, float, float, int]
+"""Statistic, factor, bound and place of the response."""
 
 
 def place_of(statistic: Statistic, responses: tuple[str, ...]) -> int:
@@ -27,7 +35,7 @@ def asked_of(
     objectives: Sequence[Statistic],
     constraints: Sequence[RobustConstraint],
     responses: tuple[str, ...],
-) -> list[tuple[Statistic, float, float, int]]:
+) -> list[Asked]:
     """Return objectives and constraints as statistic, factor, bound and place of the response.
 
     What is to be small is the factor times the statistic's value, less the bound.
@@ -42,3 +50,22 @@ def asked_of(
         one, side = limit.statistic, limit.side
         asked.append((one, side * one.sign, side * limit.bound))
     return [(*one, place_of(one[0], responses)) for one in asked]
+
+
+def by_moments(
+    asked: Sequence[Asked], moments: SparseMoments, x: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Return what is asked for at very many designs, shape (n, n_asked).
+
+    None if there are few designs, or if mean and deviation do not suffice.
+    """
+    weights = [found for one, *_ in asked if (found := one.weights) is not None]
+    if len(x) < MANY or len(weights) < len(asked):
+        return None
+    mean, std = moments(x)
+    values = np.empty((len(x), len(asked)))
+    each = zip(values.T, weights, asked, strict=True)
+    for column, (of_mean, of_std), (_, sign, bound, place) in each:
+        value = of_mean * mean[:, place] + of_std * std[:, place]
+        np.subtract(sign * value, bound, out=column)
+    return values

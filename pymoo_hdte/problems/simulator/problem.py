@@ -12,7 +12,7 @@ from pymoo.core.problem import Problem
 
 from pymoo_hdte.checks import InvalidInput, finite_array
 from pymoo_hdte.problems.simulator.around import Around, CommonSamples
-from pymoo_hdte.problems.simulator.asked import asked_of, place_of
+from pymoo_hdte.problems.simulator.asked import asked_of, by_moments, place_of
 from pymoo_hdte.problems.simulator.inputs import Inputs
 from pymoo_hdte.problems.simulator.statistics import RobustConstraint, Statistic
 from pymoo_hdte.problems.simulator.stored import read_problem, write_problem
@@ -20,7 +20,6 @@ from pymoo_hdte.surrogate.box import Box
 from pymoo_hdte.surrogate.sensitivity import SobolIndices
 from pymoo_hdte.surrogate.sparse.adaptive import AdaptiveFit
 from pymoo_hdte.surrogate.sparse.draws import draw_designs
-from pymoo_hdte.surrogate.threads import MANY
 
 Array = NDArray[np.float64]
 
@@ -259,26 +258,16 @@ class SimulatorProblem(Problem):
         self.design_box.check_inside(x)
         slopes: list[str] = [key for key in ("dF", "dG") if key in out]
         blocks = range(0, len(x), _AT_ONCE)
-        parts = [] if slopes else self._by_moments(x)
-        parts = parts or [self._block(x[start : start + _AT_ONCE], slopes) for start in blocks]
+        quick = None if slopes else by_moments(self._asked, self._fit.moments, x)
+        if quick is not None:
+            parts = [{"F": quick[:, : self.n_obj], "G": quick[:, self.n_obj :]}]
+        else:
+            parts = [self._block(x[start : start + _AT_ONCE], slopes) for start in blocks]
         for key in ["F", "G", *slopes]:
             if key[-1] == "F" or self.n_ieq_constr:
                 out[key] = np.concatenate([part[key] for part in parts])
         if "F_band" in out:
             out["F_band"] = self.band(x)
-
-    def _by_moments(self, x: Array) -> list[dict[str, Array]]:
-        """Return F and G of very many designs, or nothing if they need more than moments."""
-        weights = [found for one, *_ in self._asked if (found := one.weights) is not None]
-        if len(x) < MANY or len(weights) < len(self._asked):
-            return []
-        mean, std = self._fit.moments(x)
-        values = np.empty((len(x), len(self._asked)))
-        each = zip(values.T, weights, self._asked, strict=True)
-        for column, (of_mean, of_std), (_, sign, bound, place) in each:
-            value = of_mean * mean[:, place] + of_std * std[:, place]
-            np.subtract(sign * value, bound, out=column)
-        return [{"F": values[:, : self.n_obj], "G": values[:, self.n_obj :]}]
 
     def _block(self, x: Array, slopes: list[str]) -> dict[str, Array]:
         around = self._around(x)

@@ -18,10 +18,11 @@ from pymoo_hdte.discrepancy.drive.proof import prove
 from pymoo_hdte.discrepancy.drive.revision import drive_model, revised_model
 from pymoo_hdte.discrepancy.report import write as report
 from pymoo_hdte.discrepancy.report.certainty import how_sure
+from pymoo_hdte.discrepancy.report.folder import FOLDER
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
 from pymoo_hdte.discrepancy.report.optimum import OptimumShift
 from pymoo_hdte.discrepancy.report.tables import parameter_rows
-from pymoo_hdte.discrepancy.report.write import FOLDER, write_report
+from pymoo_hdte.discrepancy.report.write import write_report
 from pymoo_hdte.discrepancy.robust_optimum import optimum_shift
 from pymoo_hdte.drive import (
     LawAtPort,
