@@ -174,7 +174,8 @@ class CompactSwarm(ElitistSwarm):
     def _remember(self, population: Population, points: Points) -> None:
         front = best_front(points)
         self._offered.update(population[front], points[front], self._points)
-        self._waiting.append(population[front])
+        if len(front):
+            self._waiting.append(population[front])
         if len(self._waiting) == _AT_ONCE:
             self._enter(self._found)
             self._waiting = []

@@ -109,13 +109,18 @@ def read(population):
     return Points.of(population, False)
 
 
+def offer(archive, F):
+    population = evaluated(F)
+    archive.update(population, read(population), read)
+
+
 def test_the_archive_has_the_front_of_all_it_was_given(rng):
     archive, everything = FrontArchive(1000, most_spread), []
     for _ in range(12):
         F = rng.random((30, 2))
         F[3] = F[4]
         everything.append(F)
-        archive.update(evaluated(F), read)
+        offer(archive, F)
     everything = np.concatenate(everything)
     np.testing.assert_array_equal(archive.members.get("F"), everything[is_nondominated(everything)])
 
@@ -124,7 +129,7 @@ def test_the_archive_is_bounded_and_thinned_out_evenly():
     archive = FrontArchive(40, most_spread, left=30)
     line = np.random.default_rng(2).random(2000)
     for some in line.reshape(100, 20):
-        archive.update(evaluated(np.column_stack([some, 1.0 - some])), read)
+        offer(archive, np.column_stack([some, 1.0 - some]))
         assert len(archive) <= 40
     kept = np.sort(archive.members.get("F")[:, 0])
     assert kept[0] == line.min()
@@ -135,7 +140,7 @@ def test_the_archive_is_bounded_and_thinned_out_evenly():
 def test_the_archive_forgets_what_is_no_longer_feasible():
     """As constraint handling that grows stricter needs."""
     archive = FrontArchive(10, most_spread)
-    archive.update(evaluated(np.array([[0.0, 1.0], [1.0, 0.0]])), read)
+    offer(archive, np.array([[0.0, 1.0], [1.0, 0.0]]))
     allowed = {"least": 0.0}
 
     def stricter(population):
@@ -143,7 +148,7 @@ def test_the_archive_forgets_what_is_no_longer_feasible():
         return points(F, np.where(F[:, 0] < allowed["least"], 1.0, 0.0))
 
     allowed["least"] = 0.5
-    archive.update(Population.empty(), stricter)
+    archive.update(Population.empty(), Points.none(1, 2), stricter)
     np.testing.assert_array_equal(archive.members.get("F"), [[1.0, 0.0]])
 
 
