@@ -18,7 +18,7 @@ SUITE_RUNS = (
     SuiteRun("IMOP3", "ElitistSwarm", 1, (500,)),
     SuiteRun("IMOP2", "NSGA-II", 1, (500,)),
 )
-BBOB_RUNS = (BbobRun(1, 10, 6, OURS, 500), BbobRun(28, 10, 6, OURS, 500))
+BBOB_RUNS = (BbobRun(1, 10, 10, OURS, 10_000), BbobRun(28, 10, 10, OURS, 10_000))
 SAME = 2e-5
 """Relative difference that digits of the table leave open."""
 

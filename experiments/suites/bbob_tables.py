@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome
-from experiments.suites.peers import BBOB_PEERS, LESS, ON_BBOB, OURS
+from experiments.suites.peers import BBOB_PEERS, ON_BBOB, OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS
 from experiments.suites.published import curves
 
@@ -117,19 +117,6 @@ def _told(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
     return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
 
 
-def _instances(outcome: Outcome, dimension: int) -> str:
-    """Name the instances on which our swarm ran, by budget if they differ."""
-    said = {}
-    for budget in BUDGETS:
-        place = dimension, OURS, budget
-        ran = {r.instance for r in outcome.bbob if (r.dimension, r.algorithm, r.told) == place}
-        if ran:
-            said[budget] = f"instance {' and '.join(map(str, sorted(ran)))}"
-    if len(set(said.values())) > 1:
-        return f" ({', '.join(f'{budget:,}: {words}' for budget, words in said.items())})"
-    return "".join(f" ({words})" for words in set(said.values()))
-
-
 def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:
     """Say on which instances an algorithm ran, and on how many functions if not on all."""
     ran = [
@@ -165,35 +152,4 @@ def duels_table(outcome: Outcome) -> Table:
         tuple(rows),
         note="Better and worse count problems; p is Wilcoxon's over them, after Holm over the "
         "rivals of a row's budget.",
-    )
-
-
-def parts_table(outcome: Outcome) -> Table:
-    """Our swarm beside itself with a part left out."""
-    rows = [
-        (
-            *(duel.rival, duel.evaluations, duel.problems, duel.ours, duel.theirs),
-            *(duel.test.better, duel.test.worse, duel.test.p),
-            "yes" if duel.test.beaten else "no",
-        )
-        for budget in BUDGETS
-        for duel in duels(outcome, budget, LESS)
-    ]
-    return Table(
-        "parts",
-        f"bbob-biobj, held out: {OURS} with a part left out",
-        (
-            *(Column("left out"), Column("evaluations"), Column("problems")),
-            *(Column(name, "", 3, "mean share") for name in ("whole", "less")),
-            *(Column("whole better"), Column("worse"), Column("p", digits=2)),
-            Column("shown to help"),
-        ),
-        tuple(rows),
-        note="After 10,000 every second function of instance 7 in ten dimensions, as written "
-        "before; after fewer all functions of instance 6 in both dimensions, decided once the "
-        "former had come out for the models. p "
-        "is Wilcoxon's over the problems, after Holm over the parts. Moves that are not shown to "
-        "help here alone were kept together: in tuning (functions 1 to 20, instance 1, 2,000 "
-        "evaluations) the swarm reached .366 of the targets in 10 dimensions and .295 in 20, "
-        "without attraction, exchange and difference .330 and .264.",
     )

@@ -15,7 +15,7 @@ from pathlib import Path
 from experiments.runner.campaign import Campaign
 from experiments.suites.data import Outcome, stored
 from experiments.suites.jobs import BbobRun, SuiteRun
-from experiments.suites.peers import ON_BBOB, PEERS
+from experiments.suites.peers import ON_SUITES
 from experiments.suites.protocol import STORED
 from pymoo_hdte.checks import one_of
 
@@ -29,7 +29,7 @@ def groups_of(names: Sequence[str]) -> Iterable[list[SuiteRun] | list[BbobRun]]:
         For a name that is none of an algorithm.
     """
     for name in names:
-        one_of("NAME", name, [*(PEERS | ON_BBOB)])
+        one_of("NAME", name, [*ON_SUITES])
     for part in STORED:
         for group in part.groups():
             if group[0].algorithm in names:
