@@ -92,9 +92,8 @@ def shares_table(outcome: Outcome) -> Table:
     for dimension in DIMENSIONS:
         for algorithm, budget in _told(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
-            name = f"{algorithm}, told {budget:,}" if algorithm == OURS else algorithm
             where = f"here{_extent(outcome, dimension, algorithm, budget)}"
-            rows.append((name, dimension, where, *(shares.get(one) for one in BUDGETS)))
+            rows.append((algorithm, dimension, where, *(shares.get(one) for one in BUDGETS)))
         for name, curve in curves(dimension).items():
             rows.append((name, dimension, "published", *(curve.get(one) for one in BUDGETS)))
     return Table(

@@ -14,9 +14,10 @@ from experiments.suites.coco import MARKS
 from experiments.suites.data import Outcome, bbob_text, outcome_for, read_outcome, suites_text
 from experiments.suites.demands import demands, in_one_sentence
 from experiments.suites.jobs import BbobRun
+from experiments.suites.parts import part_tests, parts_table
 from experiments.suites.peers import OURS
 from experiments.suites.problems import SUITES
-from experiments.suites.protocol import BESIDE_PEERS, FULL, SHARES, STORED
+from experiments.suites.protocol import BESIDE_PEERS, FULL, OF_PARTS, SHARES, STORED
 from experiments.suites.published import BEST, CITED, curves
 from experiments.suites.suite_tables import feasible_beside, feasible_runs, ranks
 from experiments.suites.together import ranks_together, signs_together
@@ -34,10 +35,9 @@ def planted(gain):
             row = (10_000.0, round(value, 4), round(1.0 - value, 4), solutions)
             outcome.suites[one.name, name, 10_000, seed] = row
     for dimension, function, name in product((10, 20), range(1, 56), (OURS, "NSGA-II")):
-        for told in (10_000, 25_000) if name == OURS else (25_000,):
-            share = 0.35 + 0.01 * rng.random() + gain * (name == OURS)
-            run = BbobRun(function, dimension, BESIDE_PEERS, name, told)
-            outcome.bbob[run] = {mark: round(share, 4) for mark in MARKS if mark <= told}
+        share = 0.35 + 0.01 * rng.random() + gain * (name == OURS)
+        run = BbobRun(function, dimension, BESIDE_PEERS, name, 25_000)
+        outcome.bbob[run] = {mark: round(share, 4) for mark in MARKS if mark <= 25_000}
     return outcome
 
 
@@ -154,7 +154,7 @@ def test_all_held_out_suites_together():
     assert (test.better, test.worse, test.beaten) == (118, 0, True)
     (test,) = signs_together(planted(-0.2), 10_000)
     assert (test.better, test.worse, test.beaten) == (0, 118, False)
-    # Ours was told 500 nowhere, and its share on the way to more is no run of its own.
+    # IMOP was not run there.
     assert signs_together(outcome, 500) == []
     # One that lacks a problem of either suite is not ranked over the others.
     del outcome.bbob[BbobRun(7, 10, BESIDE_PEERS, "NSGA-II", 25_000)]
@@ -168,9 +168,32 @@ def test_one_that_was_not_run_on_a_problem_is_not_ranked_last_there():
     assert "NSGA-II" not in ranks(outcome, "IMOP", 10_000, "hypervolume")
 
 
+def test_parts_that_help_are_told_from_those_that_do_not(rng):
+    outcome = Outcome()
+    for dimension, function in product((10, 20), range(1, 56)):
+        whole = dict.fromkeys((500, 2000, 10_000), rng.random())
+        less = {mark: share - 0.1 * (mark == 500) for mark, share in whole.items()}
+        other = {mark: share + 0.1 * rng.standard_normal() for mark, share in whole.items()}
+        for name, shares in (
+            (OURS, whole),
+            ("without ModelStep", less),
+            ("without mutation", other),
+        ):
+            outcome.bbob[BbobRun(function, dimension, OF_PARTS, name, 10_000)] = shares
+    for one, name in product(SUITES["MW"], (OURS, "without guests")):
+        outcome.suites[one.name, name, 10_000, 1] = 10_000.0, 0.5 + 0.1 * (name == OURS), 0.1, 9.0
+    helps = {(one.part, one.evaluations): one.helps for one in part_tests(outcome)}
+    assert helps == {
+        **{("without ModelStep", n): n == 500 for n in (500, 2000, 10_000)},
+        **{("without mutation", n): False for n in (500, 2000, 10_000)},
+        ("without guests", 10_000): True,
+    }
+    assert len(parts_table(outcome).rows) == len(helps)
+
+
 def test_the_whole_has_what_is_stored_and_more():
     stored, whole = ({job.key for part in parts for job in part.jobs()} for parts in (STORED, FULL))
-    assert len(whole) > 10 * len(stored)
+    assert len(whole) > 5 * len(stored)
     assert all(run.key in stored for run in BBOB_RUNS)
 
 
@@ -186,9 +209,9 @@ def test_the_stored_outcome_gives_the_report_and_repeats(tmp_path):
 
 def test_shares_of_the_stored_outcome_are_of_all_functions():
     outcome = outcome_for(Context(1, None, None))
-    problems = set(product(range(1, 56), (6,)))
+    problems = set(product(range(1, 56), (BESIDE_PEERS,)))
     for dimension in (10, 20):
-        place = dimension, OURS, 10_000
+        place = dimension, OURS, 25_000
         ran = [run for run in outcome.bbob if (run.dimension, run.algorithm, run.told) == place]
         assert {(run.function, run.instance) for run in ran} >= problems
         assert 0.0 < reached(outcome, dimension, 10_000) < 1.0
