@@ -36,7 +36,10 @@ class Duel(NamedTuple):
 
 
 def duels(
-    outcome: Outcome, evaluations: int, rivals: Iterable[str] = tuple(BBOB_PEERS)
+    outcome: Outcome,
+    evaluations: int,
+    rivals: Iterable[str] = tuple(BBOB_PEERS),
+    control: str = OURS,
 ) -> list[Duel]:
     """Return the duels after so many evaluations, p corrected over the rivals that ran.
 
@@ -44,8 +47,8 @@ def duels(
     """
     found = []
     for rival in rivals:
-        pairs = _pairs(outcome, rival, evaluations)
-        if rival != OURS and len(pairs):
+        pairs = _pairs(outcome, control, rival, evaluations)
+        if rival != control and len(pairs):
             found.append((rival, pairs))
     # Each rival has problems of its own: its differences are padded with problems without any.
     most = max((len(pairs) for _, pairs in found), default=0)
@@ -54,8 +57,8 @@ def duels(
         values[: len(pairs), column] = pairs[:, 1] - pairs[:, 0]
     if not found:
         return []
-    names = [OURS, *(rival for rival, _ in found)]
-    tests = holm_against(OURS, names, values, smaller_is_better=False)
+    names = [control, *(rival for rival, _ in found)]
+    tests = holm_against(control, names, values, smaller_is_better=False)
     return [
         Duel(
             rival,
@@ -69,12 +72,12 @@ def duels(
     ]
 
 
-def _pairs(outcome: Outcome, rival: str, evaluations: int) -> NDArray[np.float64]:
+def _pairs(outcome: Outcome, control: str, rival: str, evaluations: int) -> NDArray[np.float64]:
     """Return our share and the rival's on the problems that both ran, shape (problems, 2)."""
     ours = {
         (run.dimension, run.function, run.instance, run.seed): shares[evaluations]
         for run, shares in outcome.bbob.items()
-        if run.algorithm == OURS and evaluations in shares
+        if run.algorithm == control and evaluations in shares
     }
     anew = ON_BBOB[rival].starts_anew
     pairs = []

@@ -1,4 +1,4 @@
-"""Our swarm beside itself with a part left out: which parts are shown to help, and where."""
+"""Our swarm with all parts beside itself with one left out: which are shown to help, and where."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from experiments.suites.bbob_tables import duels
 from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, CONSTRAINED, OF_PARTS, PLAIN
-from experiments.suites.reduced import LESS, ON_CONSTRAINED, ON_PLAIN
+from experiments.suites.reduced import LESS, ON_CONSTRAINED, ON_PLAIN, WHOLE
 
 JUDGED_AT = BUDGETS[2]
 """Evaluations after which suites are judged, and the most on bbob-biobj."""
@@ -40,7 +40,12 @@ class PartTest(NamedTuple):
 
 def part_tests(outcome: Outcome) -> list[PartTest]:
     """Return the tests of all parts that were left out, on bbob-biobj and on the other suites."""
-    found = [one for part in LESS for one in (*_on_bbob(outcome, part), *_on_suites(outcome, part))]
+    found = [
+        one
+        for part in LESS
+        if part != WHOLE
+        for one in (*_on_bbob(outcome, part), *_on_suites(outcome, part))
+    ]
     corrected = holm([one.test.p for one in found])
     return [
         one._replace(test=one.test._replace(p=float(p)))
@@ -51,12 +56,12 @@ def part_tests(outcome: Outcome) -> list[PartTest]:
 def _on_bbob(outcome: Outcome, part: str) -> Iterable[PartTest]:
     where = f"bbob-biobj, instance {OF_PARTS}"
     for budget in BUDGETS[: 1 + BUDGETS.index(JUDGED_AT)]:
-        for duel in duels(outcome, budget, [part]):
+        for duel in duels(outcome, budget, [part], WHOLE):
             yield PartTest(part, where, budget, duel.problems, duel.ours, duel.theirs, duel.test)
 
 
 def _on_suites(outcome: Outcome, part: str) -> Iterable[PartTest]:
-    names = [OURS, part]
+    names = [WHOLE, part]
     for suites, parts in ((PLAIN, ON_PLAIN), (CONSTRAINED, ON_CONSTRAINED)):
         if part not in parts:
             continue
@@ -64,7 +69,7 @@ def _on_suites(outcome: Outcome, part: str) -> Iterable[PartTest]:
         values = np.concatenate(medians)
         values = values[~np.isnan(values).any(axis=1)]
         if len(values):
-            (test,) = holm_against(OURS, names, values, smaller_is_better=False)
+            (test,) = holm_against(WHOLE, names, values, smaller_is_better=False)
             whole, less = values.mean(axis=0).tolist()
             yield PartTest(part, " and ".join(suites), JUDGED_AT, len(values), whole, less, test)
 

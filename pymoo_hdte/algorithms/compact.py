@@ -16,11 +16,11 @@ from pymoo_hdte.algorithms.archive import FrontArchive
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.horizon import evaluation_limit
-from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
+from pymoo_hdte.algorithms.moves import Difference, Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.algorithms.survival import Quality, guests, survivors, tolerant
+from pymoo_hdte.algorithms.survival import Quality, guests, survivors
 from pymoo_hdte.checks import whole_number
 
 SMALLEST, LARGEST = 10, 100
@@ -45,9 +45,9 @@ class CompactSwarm(ElitistSwarm):
     size follows from the evaluations made so far, no budget has to be known: a run may be stopped
     or continued at any time. All that it finds is offered to two archives: the result, which
     `quality` thins out in every generation, and `archive_all`. Moves and mutation are those of
-    `ElitistSwarm`; added are a move among neighbours, `NeighbourDifference`, and one by quadratic
-    models of the objectives, `ModelStep`, for variables that depend on each other, and infeasible
-    particles that stay beside the feasible ones.
+    `ElitistSwarm`, but for `Attraction`; added are a move among neighbours, `NeighbourDifference`,
+    and one by quadratic models of the objectives, `ModelStep`, for variables that depend on each
+    other, and infeasible particles that stay beside the feasible ones.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class CompactSwarm(ElitistSwarm):
     quality : "spread", "hypervolume" or callable
         As of `ElitistSwarm`, for the swarm and for the result.
     sampling, moves, **kwargs
-        As of `ElitistSwarm`; by default the three moves there, `NeighbourDifference` and
+        As of `ElitistSwarm`; by default `Exchange`, `Difference`, `NeighbourDifference` and
         `ModelStep`.
 
     Raises
@@ -87,10 +87,7 @@ class CompactSwarm(ElitistSwarm):
       best in objectives and violation together (Singh, Isaacs, Ray, Smith 2008), who may cross a
       gap between feasible regions;
     - as long as nothing is feasible, the less infeasible half of the swarm leads;
-    - for the others, violations up to 0.9 of the swarm's median count as none, which shrinks to
-      nothing as the swarm follows: an epsilon level (Takahama, Sakai 2006) without a schedule, for
-      regions as thin as equality constraints make them. The result is feasible as pymoo defines it,
-      with equalities met to 1e-4;
+    - the result is feasible as pymoo defines it, with equalities met to 1e-4;
     - the models know objectives only: with constraints they led away from feasible regions (MW:
       feasible in 26 of 29 runs in place of 29), so that `ModelStep` is not among the moves there
       unless ``moves`` names it;
@@ -111,8 +108,6 @@ class CompactSwarm(ElitistSwarm):
 
     GUESTS = 0.2
     """Share of the swarm's places for infeasible particles."""
-    TOLERATED = 0.9
-    """Share of the swarm's median violation that counts as none: it shrinks along with it."""
 
     def __init__(
         self,
@@ -129,7 +124,7 @@ class CompactSwarm(ElitistSwarm):
             pop_size = len(sampling)
         self._by_problem = moves is None
         if moves is None:
-            moves = (Attraction(), Exchange(), Difference(), NeighbourDifference(), ModelStep())
+            moves = (Exchange(), Difference(), NeighbourDifference(), ModelStep())
         size = LARGEST if pop_size is None else pop_size
         super().__init__(size, sampling=sampling, moves=moves, quality=quality, **kwargs)
         self._by_budget, self._grows, self._spent = pop_size is None, False, 0
@@ -188,24 +183,16 @@ class CompactSwarm(ElitistSwarm):
 
     def _front(self, swarm: Points) -> Points:
         if np.any(swarm.violation == 0.0):
-            return super()._front(tolerant(swarm, self._level(swarm)))
+            return super()._front(swarm)
         judged = swarm[np.flatnonzero(np.isfinite(swarm.violation))]
         return judged[np.argsort(judged.violation, kind="stable")[: max(1, len(judged) // 2)]]
 
     def _survivors(self, points: Points) -> NDArray[np.int_]:
-        points = tolerant(points, self._level(points[np.arange(len(points) - len(self.chosen))]))
         # A callback may have left few particles: not all of them are guests.
         invited = guests(points, min(int(self.GUESTS * self.pop_size), len(points) - 1))
         others = np.delete(np.arange(len(points)), invited)
         kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
         return np.sort(np.concatenate([invited, others[kept]]))
-
-    def _level(self, swarm: Points) -> float:
-        """Return the violation that is tolerated: none once half of the swarm is feasible."""
-        if 2 * np.count_nonzero(swarm.violation) < len(swarm):
-            return 0.0
-        level = self.TOLERATED * float(np.median(swarm.violation))
-        return level if np.isfinite(level) else 0.0
 
     def archive_all(self) -> Population:
         """Return all non-dominated feasible solutions found, at most ``n_archive``, thinned out."""
