@@ -17,7 +17,7 @@ from pymoo_hdte.algorithms.moves import NeighbourDifference, nearest_in_objectiv
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep, Quadratic, fitted, lowest_within
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.algorithms.survival import guests, tolerant
+from pymoo_hdte.algorithms.survival import guests
 
 D = 5
 
@@ -88,12 +88,6 @@ def test_whoever_cannot_be_judged_is_no_guest():
     swarm = points([[0, 0], [1, 1], [np.nan, 0]], [np.inf, 1.0, np.inf])
     np.testing.assert_array_equal(guests(swarm, 3), [1])
     assert len(guests(points([[0, 0]], [np.inf]), 1)) == 0
-
-
-def test_small_violations_may_be_tolerated():
-    swarm = points(np.zeros((4, 2)), [0.0, 1.0, 2.0, np.inf])
-    np.testing.assert_array_equal(tolerant(swarm, 1.0).violation, [0.0, 0.0, 2.0, np.inf])
-    np.testing.assert_array_equal(swarm.violation, [0.0, 1.0, 2.0, np.inf])
 
 
 # --- archive --------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from experiments.suites.peers import OURS
 from experiments.suites.problems import SUITES
 from experiments.suites.protocol import BESIDE_PEERS, FULL, OF_PARTS, SHARES, STORED
 from experiments.suites.published import BEST, CITED, curves
+from experiments.suites.reduced import WHOLE
 from experiments.suites.suite_tables import feasible_beside, feasible_runs, ranks
 from experiments.suites.together import ranks_together, signs_together
 
@@ -175,13 +176,13 @@ def test_parts_that_help_are_told_from_those_that_do_not(rng):
         less = {mark: share - 0.1 * (mark == 500) for mark, share in whole.items()}
         other = {mark: share + 0.1 * rng.standard_normal() for mark, share in whole.items()}
         for name, shares in (
-            (OURS, whole),
+            (WHOLE, whole),
             ("without ModelStep", less),
             ("without mutation", other),
         ):
             outcome.bbob[BbobRun(function, dimension, OF_PARTS, name, 10_000)] = shares
-    for one, name in product(SUITES["MW"], (OURS, "without guests")):
-        outcome.suites[one.name, name, 10_000, 1] = 10_000.0, 0.5 + 0.1 * (name == OURS), 0.1, 9.0
+    for one, name in product(SUITES["MW"], (OURS, WHOLE, "without guests")):
+        outcome.suites[one.name, name, 10_000, 1] = 10_000.0, 0.5 + 0.1 * (name == WHOLE), 0.1, 9.0
     helps = {(one.part, one.evaluations): one.helps for one in part_tests(outcome)}
     assert helps == {
         **{("without ModelStep", n): n == 500 for n in (500, 2000, 10_000)},
