@@ -42,7 +42,7 @@ SETTING = (
 )
 SETS = (
     "Held out, and run once after the protocol had been committed: all 55 functions of bbob-biobj "
-    "in 10 and 20 dimensions, instances 9 to 12 (10 for the parts), and IMOP, on which earlier "
+    "in 10 and 20 dimensions, instances 9 and 10 (10 for the parts), and IMOP, on which earlier "
     "swarms had been run. Validation, whose outcomes had led to the demands: RE, MW, DAS-CMOP, "
     "LZ09."
 )
