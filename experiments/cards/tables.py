@@ -95,16 +95,22 @@ def separation_table(numbers: Numbers) -> Table:
 
 def summary(found: list[Separation]) -> Finding:
     """Say which problems separate algorithms at which budgets."""
-    parts = []
+    counts, parts = [], []
     for budget in sorted({entry.evaluations for entry in found}):
         names = [
             entry.problem for entry in found if entry.evaluations == budget and entry.separates
         ]
-        parts.append(f"at {budget:,} evaluations {', '.join(names) if names else 'none'}")
+        counts.append(f"{len(names)} after {budget:,}")
+        if names:
+            parts.append(f"After {budget:,}: {', '.join(names)}.")
     largest = max(entry.evaluations for entry in found)
     some = any(entry.separates for entry in found if entry.evaluations == largest)
     return Finding(
-        some, f"Problems that separate algorithms: {'; '.join(parts)}.", check=True, answers=True
+        some,
+        f"Robust problems that separate the algorithms: {', '.join(counts)} evaluations. "
+        + " ".join(parts),
+        check=True,
+        answers=True,
     )
 
 

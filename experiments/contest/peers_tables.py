@@ -47,15 +47,17 @@ def in_one_sentence(scores: Scores) -> str:
     """Say who ranks best on the held-out problems, at every budget, by each indicator."""
     parts = []
     for evaluations in scores.budgets:
-        best = []
+        best = dict[str, list[str]]()
         for indicator in ("igd", "igd_plus", "hypervolume"):
             ranks = median_ranks(scores, indicator, evaluations, tuning=False)
             first = int(np.argmin(ranks))
-            best.append(f"{scores.algorithms[first]} by {NAMES[indicator]} ({ranks[first]:.2f})")
-        parts.append(f"after {evaluations:,} evaluations {', '.join(best)}")
+            words = f"{NAMES[indicator]} ({ranks[first]:.2f})"
+            best.setdefault(scores.algorithms[first], []).append(words)
+        told = ", ".join(f"{name} by {' and '.join(words)}" for name, words in best.items())
+        parts.append(f"after {evaluations:,} evaluations {told}")
     return (
-        f"The best average rank of {len(scores.algorithms)} on the {len(scores.rows(False))} "
-        f"held-out problems has {'; '.join(parts)}."
+        f"Best of {len(scores.algorithms)} algorithms in average rank on the "
+        f"{len(scores.rows(False))} held-out problems: {'; '.join(parts)}."
     )
 
 

@@ -37,8 +37,8 @@ def run(context: Context) -> Result:
     return Result(
         title="What each part of the elitist swarm is worth",
         command=context.command("swarm_parts"),
-        answer="Worse than the whole beyond chance on the held-out problems, so that the part is "
-        f"shown to help: {', '.join(harmful) or 'none'}.",
+        answer="Changes that make the swarm worse beyond chance on the held-out problems, which "
+        f"shows that the part helps: {', '.join(harmful) or 'none'}.",
         paragraphs=(*stored_outcome(context, "swarm_parts"), SETTING),
         tables=(parts, _problems_table(scores)),
         notes=(f"{len(scores.seeds)} seeds, {scores.budgets[-1]:,} evaluations.",),

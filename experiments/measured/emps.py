@@ -56,8 +56,9 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
         Finding(first == "coulomb_friction", f"The first name is {first}.", check=True),
         Finding(
             near,
-            "Mass, viscous and Coulomb friction lie within 5 % of the published values, and their "
-            f"intervals cover them: {'yes' if near else 'no'}.",
+            f"{'Mass' if near else 'Not all of mass'}, viscous and Coulomb friction lie within 5 % "
+            f"of the published values{', which' if near else ' with'} their intervals "
+            f"{'cover' if near else 'covering them'}.",
             check=True,
             answers=True,
         ),

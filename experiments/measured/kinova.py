@@ -61,14 +61,16 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
     findings = (
         Finding(
             bool(dry),
-            f"Dry friction is named: {', '.join(sorted(dry)) or 'no'}.",
+            f"Dry friction is found: {', '.join(sorted(dry)).replace('_', ' ')}."
+            if dry
+            else "No dry friction is found.",
             check=True,
             answers=True,
         ),
         Finding(
             set(ORDERS) <= seen,
-            f"A kinematic ripple is named with the orders {shown or 'none'}; "
-            f"{' and '.join(f'{order:g}' for order in ORDERS)} must be among them.",
+            f"A kinematic ripple is found at the orders {shown or 'none'}; "
+            f"{' and '.join(f'{order:g}' for order in ORDERS)} were to be among them.",
             check=True,
             answers=True,
         ),

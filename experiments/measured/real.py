@@ -190,7 +190,7 @@ def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
     counts = [(one, sum(row[1] == one for row in rows)) for one in FALLS_SHORT]
     told = ", ".join(f"{count} {word}" for word, count in counts if count)
     none = "" if counts[0][1] else f", none {CONFIDENT}"
-    return f"Of {len(rows)} machines: {told}{none}."
+    return f"Verdicts on {len(rows)} machines that others measured: {told}{none}."
 
 
 def _said(rig: KnownRig, one: Study) -> tuple[str, str]:

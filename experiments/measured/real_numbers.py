@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from experiments.measured.known_answers import KnownRig
 from experiments.measured.other_tools import terms_of
 from experiments.measured.rigs import Study, fitted_values
-from pymoo_hdte.discrepancy.report.mechanism_document import effects
+from pymoo_hdte.discrepancy.report.mechanism_values import effects
 from pymoo_hdte.discrepancy.report.torsion import torsion_document
 from pymoo_hdte.effects.effect import place_of
 from pymoo_hdte.mechanism.motion import SmoothedMotion

@@ -19,14 +19,9 @@ from pymoo_hdte.discrepancy.mechanism.files import MeasuredMechanism, read_rig
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, prove_measured
 from pymoo_hdte.discrepancy.report.mechanism import extent_sentence, proof_sentence
-from pymoo_hdte.discrepancy.report.mechanism_document import (
-    effects,
-    limits,
-    offered,
-    quantities,
-    remainder,
-)
+from pymoo_hdte.discrepancy.report.mechanism_document import limits, offered, remainder
 from pymoo_hdte.discrepancy.report.mechanism_figures import misfit_over_motion, overlay
+from pymoo_hdte.discrepancy.report.mechanism_values import effects, quantities
 
 MEASURED = Path(__file__).resolve().parents[3] / "shared" / "measured"
 """Folder of the measurements, which are not part of the project."""

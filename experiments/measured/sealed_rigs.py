@@ -25,6 +25,7 @@ from experiments.runner.result import Cell, Column, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.report.tables import STATUSES as SHOWN
 from pymoo_hdte.io.text_table import csv_text
 
 NAME = "sealed_rigs"
@@ -86,7 +87,8 @@ def run(context: Context) -> Result:
 def _counted(statuses: Sequence[str]) -> str:
     """Say how many rigs end with each status."""
     counts = Counter(statuses).most_common()
-    return f"Of {len(statuses)} rigs " + ", ".join(f"{n} are {one}" for one, n in counts) + "."
+    told = ", ".join(f"{SHOWN[one]} in {n}" for one, n in counts)
+    return f"Verdicts on {len(statuses)} rigs: {told}."
 
 
 def verdict_row(name: str, analysis: DriveAnalysis) -> list[str]:

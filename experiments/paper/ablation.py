@@ -52,7 +52,7 @@ def run(context: Context) -> Result:
         title=f"Fig. 17: ablation of AMP-MOPSO{'' if stated else ', open'}, "
         f"{context.seeds_in_words}",
         command=context.comparison_command("ablation"),
-        answer="" if any(found) else least_igd(comparisons),
+        answer=_answer([*found[0], *found[1]]) if any(found) else least_igd(comparisons),
         paragraphs=(SETTING, FLOWCHART) if stated else open_paragraphs(context, comparisons),
         models=models_compared(comparisons),
         tables=(
@@ -71,6 +71,16 @@ def run(context: Context) -> Result:
         ),
         notes=too_few_seeds(comparisons) if stated else (),
     )
+
+
+def _answer(findings: Sequence[Finding]) -> str:
+    """Say how many parts make the difference that the paper shows, then the findings."""
+    shown = sum(one.agrees for one in findings)
+    first = (
+        f"Of the {len(findings)} differences that the paper shows, {shown or 'none'} came out "
+        "when the pyramid or the entropy weight was left out."
+    )
+    return " ".join([first, *(one.sentence for one in findings)])
 
 
 def _gaps(comparisons: Sequence[Comparison]) -> Iterator[Finding]:

@@ -241,8 +241,8 @@ def _resolution_table() -> Table:
         enough,
         f"B_out raises the torque by {significant(rows[-1][1], 2)} mN.m from 2 to 20 r/min. The "
         f"scatter that Table 3 prints leaves no more than {significant(rows[-1][2], 2)} mN.m of "
-        f"noise, {share:.1e} of the rated {rated:g} N.m: a sensor for the rated torque resolves "
-        f"about {SENSOR_SHARE:g}, {meaning}.",
+        f"noise, {significant(1e6 * share, 2)} millionths of the rated {rated:g} N.m: a sensor for "
+        f"the rated torque resolves about {1e6 * SENSOR_SHARE:g} millionths, {meaning}.",
         answers=True,
     )
     columns = (

@@ -185,8 +185,8 @@ def _inputs_table(tallies: list[Tally]) -> Table:
         findings=(
             Finding(
                 failed == 0,
-                f"Of {inputs:,} mutated inputs {failed} raised anything but a clear error, hung, "
-                "crashed or left anything half-done.",
+                f"Of {inputs:,} wrong inputs {failed or 'none'} raised anything but a clear error, "
+                "hung, crashed or left anything half-done.",
                 check=True,
                 answers=True,
             ),
@@ -211,8 +211,8 @@ def _kills_table(tallies: list[Tally]) -> Table:
         findings=(
             Finding(
                 failed == 0,
-                f"After {kills} kills, {failed} files or runs were partial, different from those "
-                "of an undisturbed run, failed to resume, or left workers behind.",
+                f"After {kills} kills, {failed or 'no'} files or runs were partial, different from "
+                "those of an undisturbed run, failed to resume, or left workers behind.",
                 check=True,
                 answers=True,
             ),

@@ -145,7 +145,7 @@ class Result:
     command
         What makes it anew.
     answer
-        The sentence with which its page begins and that stands on its card: what came out. Without
+        What came out, with which its page begins; the first sentence stands on its card. Without
         one, the findings that answer are joined.
     paragraphs
         What was done.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from pymoo_hdte.io.whole_file import write_whole
 RESULT = "result.json"
 TIMES = "times"
 """Folder of wall times: the only results that differ from run to run."""
+_SENTENCES = re.compile(r"(?<=[^.]\.)(?<!\bNo\.)(?<!\bFig\.) (?=[A-Z0-9])")
 _INFINITE = {significant(value, 1): value for value in (math.inf, -math.inf)}
 
 
@@ -46,6 +48,16 @@ class StoredResult:
     shown_first: str
     versions: dict[str, str]
     made_by: str
+
+    @property
+    def first_sentence(self) -> str:
+        """The first sentence of the answer, which stands on the card."""
+        return _SENTENCES.split(self.answer, maxsplit=1)[0]
+
+    @property
+    def further_sentences(self) -> str:
+        """What the answer says beyond its first sentence."""
+        return self.answer[len(self.first_sentence) :].strip()
 
 
 def write_atomically(path: Path, content: bytes) -> None:

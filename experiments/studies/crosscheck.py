@@ -82,7 +82,8 @@ def _distributions_table() -> Table:
         columns += [Column(by, "", 8, name) for by in ("ours", "chaospy")]
     finding = Finding(
         worst <= AGREEMENT,
-        f"Standard deviation and kurtosis of our distributions are chaospy's to {worst:.1e}.",
+        "Standard deviation and kurtosis of our distributions are chaospy's to "
+        f"{significant(worst, 2)}.",
         check=True,
     )
     title = "Distributions of the inputs"
@@ -129,7 +130,8 @@ def _moments_table() -> Table:
     worst = max(max(found.moments, found.indices) for *_, found in comparisons)
     agreement = Finding(
         worst <= AGREEMENT,
-        f"Exact moments and Sobol indices of the surrogate are chaospy's to {worst:.1e}.",
+        "Exact moments and Sobol indices of the surrogate are chaospy's to "
+        f"{significant(worst, 2)}.",
         check=True,
         answers=True,
     )

@@ -49,7 +49,7 @@ def run(context: Context) -> Result:
         title="DTE over input speed and load",
         command="python -m experiments dte_map",
         paragraphs=(SETTING,),
-        answer=" ".join(map(_resonances, maps)),
+        answer=" ".join(_resonances(entry) for entry in reversed(maps)),
         models=models_of(*PRESETS),
         tables=(_modes_table(maps), _peaks_table(maps)),
         pictures=(
@@ -67,10 +67,11 @@ def run(context: Context) -> Result:
 def _resonances(entry: SpeedLoadMap) -> str:
     """Say where a drive model resonates."""
     mode = torsional_mode(entry.model)
-    met = [f"{one} r/min" for one in _met(entry)]
-    return f"{entry.model.name} has its torsional mode at {significant(mode.frequency, 4)} Hz, " + (
-        f"met by {', '.join(met)}." if met else "met by no excited order in the range."
-    )
+    met = _met(entry)
+    where = f"torsional mode at {significant(mode.frequency, 4)} Hz"
+    if not met:
+        return f"The model {entry.model.name} resonates at no input speed ({where})."
+    return f"The model {entry.model.name} resonates at the input speeds {', '.join(met)} ({where})."
 
 
 def _met(entry: SpeedLoadMap) -> list[str]:

@@ -164,9 +164,14 @@ def in_one_sentence(outcome: Outcome) -> str:
     met = [words for words, met in short if met]
     parts = []
     if missed:
-        parts.append(f"on bbob-biobj it falls short of what was demanded {'; '.join(missed)}")
+        parts.append(
+            f"On the held-out bbob-biobj {OURS} falls short of what was demanded in {len(missed)} "
+            f"of {len(missed) + len(met)} cases: {'; '.join(missed)}"
+        )
     if met:
-        parts.append(f"on bbob-biobj it reaches what was demanded {'; '.join(met)}")
+        parts.append(
+            f"On the held-out bbob-biobj {OURS} reaches what was demanded {'; '.join(met)}"
+        )
     for suite in HELD_OUT:
         budgets = outcome.budgets(suite)
         places = []
@@ -180,10 +185,9 @@ def in_one_sentence(outcome: Outcome) -> str:
         if places:
             count = len(outcome.algorithms(suite, budgets[0]))
             parts.append(
-                f"on {named(outcome, suite)} its place among up to {count} is {', '.join(places)}"
+                f"On {named(outcome, suite)} its place among up to {count} is {', '.join(places)}"
             )
-    text = "; ".join(parts)
-    return f"{OURS}, on suites held out: {text}." if text else "Nothing was run."
+    return f"{'. '.join(parts)}." if parts else "Nothing was run."
 
 
 def _short(outcome: Outcome, dimension: int, evaluations: int) -> tuple[str, bool | None]:

@@ -19,7 +19,7 @@ from pymoo_hdte.drive.toml_text import sheet_toml
 from pymoo_hdte.identification import ErrorStatistics, hysteresis_width, lost_energy
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
 from pymoo_hdte.reports.folder import ReportFolder
-from pymoo_hdte.reports.html import number, page
+from pymoo_hdte.reports.html import digits, number, page
 from pymoo_hdte.units import ARCSEC, UNITS
 
 SHEET_FILE = "identified_sheet.toml"
@@ -166,6 +166,20 @@ def sentences(found: Identification) -> list[str]:
     return said
 
 
+def headline(found: Identification) -> str:
+    """Say in one sentence what was identified and how well; the rest stands in tables."""
+    said = []
+    for one in found.parameters:
+        low, high = one.interval
+        unit, half = unit_of(one.name), 50.0 * (high - low)
+        words = f"{one.name} {number(one.value, digits(low, high))} {unit}"
+        said.append(f"{words} ± {number(half / abs(one.value), 2)} %" if one.value else words)
+    if found.errors is not None:
+        symbols = ", ".join(found.errors.symbols)
+        said.append(f"mean and scatter of the component errors {symbols}")
+    return f"Identified: {'; '.join(said)}."
+
+
 def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
     """Say what these records do not tell."""
     said = [
@@ -189,7 +203,8 @@ def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
         if sheet is not None:
             said.append(
                 "The errors go into the list of the data sheet. Its theta_s, and the DTE with it, "
-                "stay as they were: sample_static_error tells what theta_s would be."
+                "stay as they were; the Python function sample_static_error tells what theta_s "
+                "would be."
             )
         samples = zip(found.errors.symbols, found.errors.samples, strict=True)
         negative = [symbol for symbol, sample in samples if sample.mean < 0.0]
@@ -199,7 +214,8 @@ def limits(found: Identification, sheet: DataSheet | None) -> list[str]:
             known = {source.symbol for source in sheet.error_sources}
             strange = [symbol for symbol in found.errors.symbols if symbol not in known]
             if strange:
-                said.append(f"The data sheet has no error source {', '.join(strange)}.")
+                names = ", ".join(f"'{one}'" for one in strange)
+                said.append(f"The data sheet has no error source called {names}.")
     return said
 
 
@@ -212,6 +228,7 @@ def _page(found: Identification, document: dict[str, Any]) -> str:
         "identification.html.j2",
         found=found,
         document=document,
+        headline=headline(found),
         pictures={**pictures, **_strips(found)},
     )
 

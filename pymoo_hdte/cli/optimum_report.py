@@ -20,11 +20,13 @@ from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.io.text_table import csv_text
 from pymoo_hdte.reports.folder import ReportFolder
 from pymoo_hdte.reports.front import Front, design_rows, front_svg
-from pymoo_hdte.reports.html import number, page
+from pymoo_hdte.reports.html import change, number, page, with_error
 
 FRONT_FILE = "front.csv"
 SHEET_FILE = "optimum_sheet.toml"
 MODEL_FILE = "optimum_model.toml"
+_LITTLE_SHARE = 5e-4
+"""Share of the variance that would be shown as 0.0 %."""
 FOLDER = ReportFolder("optimum.json", (FRONT_FILE,), optional=(SHEET_FILE, MODEL_FILE))
 
 
@@ -161,8 +163,8 @@ def _design_in_words(study: DesignStudy) -> str:
     problem = study.problem
     changes = 100.0 * (study.design / problem.nominal - 1.0)
     parts = [
-        f"{name} {number(float(value), 4)} {problem.units[name]} ({change:+.1f} %)"
-        for name, value, change in zip(problem.var_names, study.design, changes, strict=True)
+        f"{name} {number(float(value), 4)} {problem.units[name]} ({change(float(off))})"
+        for name, value, off in zip(problem.var_names, study.design, changes, strict=True)
         if name not in study.free
     ]
     if study.free:
@@ -202,22 +204,22 @@ def _agreement(study: DesignStudy) -> str:
     search = study.search
     mean, std = (number(float(one)) for one in search.width)
     parts = [
-        f"Its values are the model's own, at {math.prod(study.problem.moments.nodes)} nodes a "
-        "design."
+        f"Its values are the model's own, from {math.prod(study.problem.moments.nodes)} drives a "
+        "design, the nodes of a quadrature."
     ]
     if np.isfinite(search.difference):
         parts.append(
-            f"Those asked last, of {study.evaluated} designs, were predicted to "
+            f"The last of the {study.evaluated} designs computed had been predicted to "
             f"{100.0 * search.difference:.1f} %."
         )
     if np.isfinite(study.quadrature):
         parts.append(
-            f"On {SETS * DRIVES} other drives each, {len(study.checks)} designs differ by "
-            f"{100.0 * study.quadrature:.1f} % at most, two standard errors included."
+            f"On {SETS * DRIVES} other drives each, {len(study.checks)} designs differ by at most "
+            f"{100.0 * study.quadrature:.1f} %, two standard errors included."
         )
     parts.append(
-        f"The width counts as {mean} arcsec in the mean and {std} in the standard deviation, "
-        f"{100.0 * HARDLY_WORTH:g} % of the least value if it is less."
+        f"The width is {mean} arcsec in the mean and {std} in the standard deviation, "
+        f"{100.0 * HARDLY_WORTH:g} % of the least value being the least that counts."
     )
     return " ".join(parts)
 
@@ -227,7 +229,7 @@ def _moved(what: str, before: float, after: float) -> str:
 
 
 def _by(gain: Gain) -> str:
-    return f"by {abs(gain.found):.2f} ± {2.0 * gain.error:.2f}"
+    return f"by {with_error(abs(gain.found), 2.0 * gain.error)}"
 
 
 def limits(study: DesignStudy, notes: Sequence[str]) -> list[str]:
@@ -246,7 +248,7 @@ def limits(study: DesignStudy, notes: Sequence[str]) -> list[str]:
         )
     shares = {what: gain.share for what, gain in study.gains.items()}
     if max(shares.values()) < HARDLY_WORTH:
-        changes = ", ".join(f"{what} {-100.0 * share:+.1f} %" for what, share in shares.items())
+        changes = ", ".join(f"{what} {change(-100.0 * share)}" for what, share in shares.items())
         found.append(
             f"Neither falls by {100.0 * HARDLY_WORTH:g} % ({changes}): this model has next to "
             "nothing to gain by these design variables."
@@ -263,6 +265,7 @@ def _front_csv(study: DesignStudy) -> str:
 
 def _page(study: DesignStudy, document: dict[str, Any]) -> str:
     problem = study.problem
+    sources = sorted(document["sources_of_scatter"].items(), key=lambda one: -one[1])
     values = design_rows(study.designs, problem.nominal)
     # Without agreement no design is pointed at.
     chosen = study.chosen if study.recommended else {}
@@ -291,6 +294,7 @@ def _page(study: DesignStudy, document: dict[str, Any]) -> str:
             ),
         ],
         variables=[(name, problem.units[name]) for name in problem.var_names],
-        sources=sorted(document["sources_of_scatter"].items(), key=lambda one: -one[1]),
+        sources=[(name, share) for name, share in sources if share >= _LITTLE_SHARE],
+        others=len(sources) - sum(share >= _LITTLE_SHARE for _, share in sources),
         checked_drives=SETS * DRIVES,
     )

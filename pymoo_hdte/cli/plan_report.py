@@ -13,6 +13,7 @@ from pymoo_hdte.reports.html import page
 
 PLAN_FILE = "plan.toml"
 FOLDER = ReportFolder("plan.json", (PLAN_FILE,))
+_USE = {"train": "fit", "held_out": "hold out"}
 
 
 def write_plan(plan: Plan, model: str, out: Path) -> dict[str, Any]:
@@ -26,16 +27,28 @@ def write_plan(plan: Plan, model: str, out: Path) -> dict[str, Any]:
     reached = sum(one["power"] >= plan.wanted for one in found["effect"])
     apart = sum(one["power"] >= plan.wanted for one in found["pair"])
     sentences = [
-        f"{fitted} tests to fit and {held_out} to hold out: with a power of {plan.wanted:g} or "
-        f"more they show {reached} of {len(found['effect'])} effects and separate {apart} of "
-        f"{len(found['pair'])} pairs."
+        f"{fitted} tests to fit and {held_out} to hold out: each with a chance of at least "
+        f"{100.0 * plan.wanted:g} %, they show {reached} of {len(found['effect'])} effects and "
+        f"tell {apart} of {len(found['pair'])} pairs of effects apart."
     ]
     document = heading("plan", sentences, plan.missed) | {"model": model} | found
     del document["not_reached"]
-    rows = {"weakest": weakest(document), "document": document}
+    words = {"use": _USE, "at_port": _at_port, "chance": _chance}
+    rows = {"weakest": weakest(document), "document": document, **words}
     FOLDER.write(out, page("pymoo_hdte.cli", "plan.html.j2", **rows), document,
                  {PLAN_FILE: toml_text(document)})  # fmt: skip
     return document
+
+
+def _at_port(effect: str) -> str:
+    name, _, port = effect.replace("_", " ").partition(":")
+    return f"{name} ({port})" if port else name
+
+
+def _chance(power: float | None) -> str:
+    if power is None:
+        return ""
+    return "over 99 %" if power > 0.99 else f"{100.0 * power:.0f} %"
 
 
 def weakest(document: dict[str, Any]) -> list[dict[str, Any]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 DRIVE = {
     "DTE": "dynamic transmission error: how far the output of a drive is from where the input, "
     "divided by the ratio, would have it. Here the peak-to-peak over one output turn, in arcsec.",
@@ -90,3 +92,30 @@ def terms_of(*chapters: str) -> dict[str, str]:
     """Return the terms of some chapters with their meanings, in the order of the alphabet."""
     found = {term: said for chapter in chapters for term, said in GLOSSARY[chapter].items()}
     return dict(sorted(found.items(), key=lambda one: one[0].lower()))
+
+
+def terms_in(text: str, *chapters: str) -> dict[str, str]:
+    """Return the terms of some chapters that a text needs: its own, and those of their meanings.
+
+    A verdict stands in a text by the words that reports show for it.
+
+    >>> [*terms_in("The gap is at the noise floor.", "Verdicts on a model")]
+    ['gap', 'noise floor']
+    """
+    found, texts = dict[str, str](), [text]
+    every = terms_of(*chapters)
+    while texts:
+        new = {
+            term: said
+            for term, said in every.items()
+            if term not in found and any(_stands(term, said, one) for one in texts)
+        }
+        found |= new
+        texts = [*new.values()]
+    return {term: said for term, said in every.items() if term in found}
+
+
+def _stands(term: str, said: str, text: str) -> bool:
+    shown = re.match("a verdict, shown as '(.*?)'", said)
+    word = re.escape(shown[1] if shown else term)
+    return re.search(rf"(?<![\w-]){word}(s|es|ed)?(?![\w-])", text, re.IGNORECASE) is not None

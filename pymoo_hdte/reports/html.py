@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-from pymoo_hdte.reports.glossary import terms_of
+from pymoo_hdte.reports.glossary import terms_in
 
 
 def page(package: str, template: str, **values: Any) -> str:
@@ -19,8 +19,8 @@ def page(package: str, template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["number"] = number
-    environment.globals |= {"digits": digits, "terms_of": terms_of}
+    environment.filters |= {"change": change, "number": number, "with_error": with_error}
+    environment.globals |= {"digits": digits, "terms_in": terms_in}
     return environment.get_template(template).render(**values)
 
 
@@ -35,6 +35,24 @@ def number(value: float | None, digits: int = 3) -> str:
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     power = str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{mantissa}·10{power}".replace("-", "\N{MINUS SIGN}")
+
+
+def change(percent: float) -> str:
+    """Return a relative change with its sign, in per cent: ``-25.0`` is "−25.0 %"."""
+    return f"{percent:+.1f} %".replace("-", "\N{MINUS SIGN}")
+
+
+def with_error(value: float, half_width: float) -> str:
+    """Return a value and the half of its interval, both to the first digit of that half.
+
+    >>> with_error(6.04123, 0.00268), with_error(6.04123, 0.0)
+    ('6.041 ± 0.003', '6.041')
+    """
+    if not np.isfinite(half_width) or half_width <= 0.0:
+        return number(value, 4)
+    places = max(0, -int(np.floor(np.log10(half_width))))
+    shown = f"{value:.{places}f} ± {half_width:.{places}f}"
+    return shown.replace("-", "\N{MINUS SIGN}")
 
 
 def digits(lower: float | None, upper: float | None) -> int:

@@ -71,7 +71,7 @@ def test_the_sheet_has_the_identified_values_and_keeps_the_rest(written, documen
 
 
 def test_what_the_data_sheet_does_not_know_is_said(document):
-    assert any("no error source mine" in one for one in document["limits"])
+    assert any("no error source called 'mine'" in one for one in document["limits"])
 
 
 def keep(folder, *names):

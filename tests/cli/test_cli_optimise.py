@@ -17,6 +17,7 @@ from pymoo_hdte.decision import PREFERENCES, WeightedUtopia
 from pymoo_hdte.drive import hs_20_100, load_datasheet, load_model, preset
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.problems import RobustDTEDirect
+from pymoo_hdte.reports.html import with_error
 
 CASES = Path(__file__).parents[3] / "shared" / "cases"
 BOX = 0.03
@@ -221,7 +222,7 @@ class TestStudy:
         words = optimum_report.sentences(study)[1]
         assert f"falls from {before.mean:.2f} to {after.mean:.2f} arcsec" in words
         for gain in study.gains.values():
-            assert f"by {gain.found:.2f} ± {2.0 * gain.error:.2f}" in words
+            assert f"by {with_error(gain.found, 2.0 * gain.error)}" in words
 
     def test_what_moves_neither_moment_is_said_to_carry_no_information(self, study):
         problem = study.problem
@@ -238,7 +239,7 @@ class TestStudy:
         found = replace(study)
         vars(found)["free"] = free
         words, *_ = optimum_report.sentences(found)
-        stated = set(re.findall(r"(\w+) \d\S* \S+ \([-+]", words))
+        stated = set(re.findall(r"(\w+) \d\S* \S+ \([\N{MINUS SIGN}+]", words))
         assert stated == {*study.problem.var_names} - {*free}
         for name in free:
             assert re.search(rf"\b{name}\b(?! \d)", words)

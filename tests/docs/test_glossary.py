@@ -48,6 +48,25 @@ def test_every_report_ends_with_a_glossary():
 
 
 @pytest.mark.parametrize("chapter", GLOSSARY)
-def test_the_list_is_drawn_with_every_term(chapter):
-    drawn = page("pymoo_hdte.reports", "glossary.html.j2", chapters=[chapter])
+def test_a_page_that_says_everything_has_every_term(chapter):
+    said = " ".join([*terms_of(chapter), *tables.STATUSES.values()])
+    drawn = page("pymoo_hdte.reports", "glossary.html.j2", chapters=[chapter], body=said)
     assert re.findall("<dt>(.*?)</dt>", drawn) == list(terms_of(chapter))
+
+
+@pytest.mark.parametrize(
+    ("text", "terms"),
+    [
+        ("Nothing.", []),
+        ("It is found.", ["effect", "law", "named", "port", "record"]),
+        ("Named.", []),
+        ("<i class='gap'>Records</i>", ["record"]),
+        ("recording", []),
+    ],
+)
+def test_a_page_has_the_terms_it_uses_and_those_of_their_meanings(text, terms):
+    chapters = ["Drives and mechanisms", "Verdicts on a model"]
+    drawn = page("pymoo_hdte.reports", "glossary.html.j2", chapters=chapters, body=text)
+    found = re.findall("<dt>(.*?)</dt>", drawn)
+    assert [one for one in found if one in terms] == terms
+    assert terms or not found

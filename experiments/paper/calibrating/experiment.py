@@ -50,12 +50,15 @@ def run(context: Context) -> Result:
         else read_outcomes(committed_file(OUTCOMES, "calibration"))
     )
     best = best_rungs(outcomes, "table8")[0]
+    first, numbers = of_the_first_page(best), numbers_table(best)
+    told = " ".join(one.sentence for one in numbers.findings if one.answers)
     return Result(
         title="Calibration: what the printed equations lack",
         command=context.command("calibration"),
+        answer=f"{first[0].upper()}{first[1:]}. {told}",
         paragraphs=(*stored_outcome(context, "calibration"), SETTING),
         tables=(
-            numbers_table(best),
+            numbers,
             ladder_table(outcomes, "table8", "fitted to Table 8 and the box scatter"),
             ladder_table(outcomes, "table5", "fitted to Table 5 and the prototypes"),
             parameter_table(best, outcomes),
@@ -69,7 +72,7 @@ def run(context: Context) -> Result:
             ),
         ),
         notes=tuple(unexplained(best)),
-        first_page={HOLDS: of_the_first_page(best)},
+        first_page={HOLDS: first},
     )
 
 

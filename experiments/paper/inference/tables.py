@@ -35,8 +35,8 @@ def of_the_first_page(fits: Sequence[Fit]) -> str:
     """Say whether its trade-off and its optima go together, as part of a longer sentence."""
     both = len(gives_both(fits))
     return (
-        f"{both} of {len(fits)} fitted models give its trade-off between mean and scatter and "
-        "leave its optima optimal"
+        f"{both or 'none'} of {len(fits)} fitted models {_give(both or 1)} its trade-off between "
+        f"mean and scatter and {'leave' if both > 1 else 'leaves'} its optima optimal"
     )
 
 
@@ -53,29 +53,29 @@ def opening(fits: Sequence[Fit]) -> str:
             f"{describe(both[0].rung)}."
         )
     last = (
-        "unless its search ended far from the front, the paper optimised another model than any "
+        "Unless its search ended far from the front, the paper optimised another model than any "
         f"found here; {len(above_a_special_case(common))} of the searches ended above a special "
-        "case of their model, so that more models may give the numbers"
+        "case of their model, so that more models may give the numbers."
     )
     if not meeting:
         return (
             f"None of {searched} drive models gives the paper's trade-off between mean and "
-            f"standard deviation within the errors that common random numbers leave: {last}."
+            f"standard deviation within the errors that common random numbers leave. {last}"
         )
     first = min(meeting, key=lambda one: one.bic)
     return (
-        f"Of {searched} drive models searched, {len(meeting)} {_give(len(meeting))} the paper's "
-        "nine numbers with the steps between its optima, but in "
-        f"{'each' if len(meeting) > 1 else 'it'} other designs of the box dominate the published "
+        f"None of {searched} drive models gives both the paper's numbers and its optima. "
+        f"{len(meeting)} {_give(len(meeting))} the nine numbers with the steps between the optima, "
+        f"but in {'each' if len(meeting) > 1 else 'it'} other designs of the box dominate the "
         f"optima, in the likeliest by {significant(first.evaluation.depths.max(), 2)} widths of "
-        f"the published front, and no model gives both ({_nearest(fits)}): {last}."
+        f"the published front. {_nearest(fits)}. {last}"
     )
 
 
 def _nearest(fits: Sequence[Fit]) -> str:
     nearest = chosen_fits(fits)[-1].fit.evaluation
     return (
-        "fitted to both, the nearest has a chi-square of "
+        "Fitted to both, the nearest has a chi-square of "
         f"{significant(nearest.chi_square('common'), 2)} and a depth of "
         f"{significant(nearest.depths.max(), 2)}"
     )

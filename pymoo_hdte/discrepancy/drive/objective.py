@@ -80,7 +80,8 @@ class Objective(Unknowns):
         here = self._features(base, effects)[0]
         for place in range(n_base, len(values)):
             base, effects = self._parts(moved[place])
-            features.append((self._features(base, effects)[0] - here) / steps[place])
+            there = self._features(base, effects, for_slopes=True)[0]
+            features.append((there - here) / steps[place])
             sweeps.append((self._torsion(base, effects)[0] - torsion[0]) / steps[place])
         priors = np.diag(self.scale / self.prior)[:, self.bounded]
         return np.array(features), np.concatenate([np.array(sweeps), priors], axis=1)
@@ -97,12 +98,14 @@ class Objective(Unknowns):
         steps = self.steps(values)[:n_base]
         moving = [k for k, one in enumerate(self.data.base) if one.name not in _READ_ONLY]
         moved = base + np.diag(steps * self.scale[:n_base])
-        features = self._features(np.vstack([base, moved[moving]]), effects)
-        found = np.empty((n_base, *features.shape[1:]))
-        found[moving] = (features[1:] - features[0]) / steps[moving, None, None]
+        self._features(base, effects)  # Which records have no steady state stays as it is here.
+        # Solved together, so that what Newton's method leaves cancels in the quotients.
+        here, *there = self._features(np.vstack([base, moved[moving]]), effects, for_slopes=True)
+        found = np.empty((n_base, *here.shape))
+        found[moving] = (np.array(there) - here) / steps[moving, None, None]
         for place, one in enumerate(self.data.base):
             if one.name in _READ_ONLY:
-                found[place] = self.scale[place] * self._reading(one.name, base[0], features[0])
+                found[place] = self.scale[place] * self._reading(one.name, base[0], here)
         return found
 
     def _reading(
@@ -130,9 +133,16 @@ class Objective(Unknowns):
         return values[None, :n_base], tuple(effect for part in parts for effect in part)
 
     def _features(
-        self, vectors: NDArray[np.float64], effects: tuple[DriveEffect, ...]
+        self,
+        vectors: NDArray[np.float64],
+        effects: tuple[DriveEffect, ...],
+        for_slopes: bool = False,
     ) -> NDArray[np.float64]:
-        """Return predicted features; the steady states of the first vector are kept as a start."""
-        prediction = self.data.prediction(vectors, effects, self.nearby)
-        self.nearby = prediction.balance.rows(slice(len(self.data.features.records)))
+        """Return predicted features; the first vector's steady states are kept as a start.
+
+        Unless they are ``for_slopes``, the quotients of which belong to the last ones kept.
+        """
+        prediction = self.data.prediction(vectors, effects, self.nearby, for_slopes=for_slopes)
+        if not for_slopes:
+            self.nearby = prediction.balance.rows(slice(len(self.data.features.records)))
         return self.data.features.of_prediction(prediction)

@@ -100,13 +100,15 @@ class Observations:
         effects: Sequence[DriveEffect],
         start: SteadyMotion | None = None,
         steps: int = STEPS,
+        for_slopes: bool = False,
     ) -> Prediction:
         """Return the prediction behind `predict`, steady states included."""
         values = self._named(vectors)
         believed, rig = self.campaign.believed, self.campaign.rig
         features = self.features
         orders = features.orders.tolist()
-        return predict(believed, rig, features.conditions, orders, values, effects, start, steps)
+        how = (start, steps, for_slopes)
+        return predict(believed, rig, features.conditions, orders, values, effects, *how)
 
     def _named(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}

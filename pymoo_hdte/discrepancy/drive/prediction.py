@@ -87,6 +87,7 @@ def predict(
     effects: Sequence[DriveEffect] = (),
     start: SteadyMotion | None = None,
     steps: int = STEPS,
+    for_slopes: bool = False,
 ) -> Prediction:
     """Return the predicted readings of the sensors.
 
@@ -106,13 +107,16 @@ def predict(
         Steady states of the records for nearby values, to begin from.
     steps : int
         Most steps of Newton's method for a steady state.
+    for_slopes : bool
+        Whether records without a steady state in ``start`` are to be predicted as such.
     """
     parts = []
     groups = of_equal_numbers(believed.effects, values)
     for rows, known in groups:
         some = {name: column[rows] for name, column in values.items()}
         present = (*known, *effects)
-        parts.append(_predict_group(believed, rig, conditions, orders, some, present, start, steps))
+        how = (start, steps, for_slopes)
+        parts.append(_predict_group(believed, rig, conditions, orders, some, present, *how))
     if len(parts) == 1:
         return parts[0]
     return _joined(parts, [rows for rows, _ in groups], len(conditions))
@@ -127,6 +131,7 @@ def _predict_group(
     present: Sequence[DriveEffect],
     start: SteadyMotion | None,
     steps: int,
+    for_slopes: bool,
 ) -> Prediction:
     """Return the prediction of vectors that share all effects ``present``."""
     count, records = len(values["offset"]), len(conditions)
@@ -137,7 +142,7 @@ def _predict_group(
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     near = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
-    balance = steady_motions(coefficients, speed, load.ravel(), rig, near, steps)
+    balance = steady_motions(coefficients, speed, load.ravel(), rig, near, steps, for_slopes)
     channels = [
         balance.transmission_error,
         balance.motor_torque + _driving(balance, coefficients),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.believed import Rig
 from pymoo_hdte.drive import Coefficients, SpeedLoop, SteadyMotion, harmonic_balance
 from pymoo_hdte.drive.solve.free_angle import STEPS, torus_of
-from pymoo_hdte.drive.solve.steady_motion import BY_CASE
+from pymoo_hdte.drive.solve.steady_motion import BY_CASE, Tangents
 from pymoo_hdte.drive.solve.torus import Torus
 
 TOLERANCE = 1e-7
@@ -25,12 +25,15 @@ def steady_motions(
     rig: Rig,
     start: SteadyMotion | None = None,
     steps: int = STEPS,
+    for_slopes: bool = False,
 ) -> SteadyMotion:
     """Return the steady state of all rows.
 
     Where a clearance would open because the load does not hold the flanks together, the drive
     rattles and has no steady state. Such a record, or one for which none is found, is no evidence
-    for or against the laws: it is predicted without them, and marked as not converged.
+    for or against the laws: it is predicted without them, and marked as not converged. So it is
+    ``for_slopes`` by differences from ``start`` where that has none: a case that had a steady state
+    on one side of a difference only would make a slope of the jump.
     """
     motor = SpeedLoop(rig.proportional, rig.integral)
 
@@ -48,8 +51,11 @@ def steady_motions(
         )
 
     bare, torus = replace(coefficients, laws=()), torus_of(coefficients)
-    rattles = any(law.rattles for _, law in coefficients.laws)
-    held = np.ones(len(speed), dtype=bool)
+    rattles, held = False, np.ones(len(speed), dtype=bool)
+    if for_slopes and start is not None:
+        held = start.converged.copy()
+    else:
+        rattles = any(law.rattles for _, law in coefficients.laws)
     if rattles:
         plain = solve(bare, np.arange(len(speed)), torus)
         held = np.abs(plain.torsion[:, 0]) > np.abs(plain.torsion[:, 1:]).sum(axis=1)
@@ -69,4 +75,6 @@ def merged(motions: Sequence[SteadyMotion], places: Sequence[NDArray[np.int_]]) 
     joined = [
         np.concatenate([getattr(motion, name) for motion in motions])[order] for name in BY_CASE
     ]
-    return SteadyMotion(motions[0].torus, *joined)
+    each = [motion.tangents for motion in motions if motion.tangents is not None]
+    tangents = Tangents.joined(each).rows(order) if len(each) == len(motions) else None
+    return SteadyMotion(motions[0].torus, *joined, tangents=tangents)

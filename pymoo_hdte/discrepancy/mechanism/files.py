@@ -222,13 +222,19 @@ def _with_angles(mechanism: Mechanism, listed: Sequence[ListedRecord]) -> Mechan
     if mechanism.angles is not None:
         return mechanism
     turning = {COUNTS, *UNITS["angle"], *UNITS["speed"]}
+    sliding = {*UNITS["length"], *UNITS["linear speed"]}
     tables = [one.layout.channels for one in listed]
-    angles = [
-        name
-        for name in mechanism.coordinates
-        if all(name in table and table[name].unit in turning for table in tables)
-    ]
-    return replace(mechanism, angles=angles or None)
+
+    def all_in(units: set[str]) -> list[str]:
+        return [
+            name
+            for name in mechanism.coordinates
+            if all(name in table and table[name].unit in units for table in tables)
+        ]
+
+    angles = all_in(turning)
+    told = len(angles) + len(all_in(sliding)) == len(mechanism.coordinates)
+    return replace(mechanism, angles=angles if angles or told else None)
 
 
 def _check_names(listed: Sequence[ListedRecord]) -> None:

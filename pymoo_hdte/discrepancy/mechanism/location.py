@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
+from pymoo_hdte.mechanism.quantity_units import unit_of
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ def locate_in_mechanism(finding: MechanismFinding) -> MechanismLocation:
         words = "Nowhere up to the cutoff, but in the forces beyond it."
     else:
         parts = [
-            f"the {finding.data.what(name)} (off by {misfit[name]:.3g}, sensors {noise[name]:.2g})"
+            f"the {finding.data.what(name)} (off by {misfit[name]:.3g} "
+            f"{unit_of(finding.mechanism, name)}, sensors {noise[name]:.2g})"
             for name in names
             if misfit[name] ** 2 > finding.data.rules.noise_power_ratio * noise[name] ** 2
         ]

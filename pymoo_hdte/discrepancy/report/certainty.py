@@ -15,6 +15,7 @@ from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.reports.html import number
 
 
 def how_sure(finding: DriveFinding) -> str:
@@ -71,8 +72,8 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
     elif others:
         best = max(others, key=lambda one: one.explained)
         words.append(
-            f"The next best, {in_words(best.label)}, explains {percent(best.explained)}, at a BIC "
-            f"of {best.bic - chosen.bic:+.2g}."
+            f"The next best, {in_words(best.label)}, explains {percent(best.explained)}, and its "
+            f"BIC is {_apart(best.bic - chosen.bic)}."
         )
     else:
         words.append("No other set of as many effects came near enough to be compared.")
@@ -80,6 +81,10 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
         words.append("The records kept out of the fit do not show it.")
     words.append("Real records leave more than noise, so that no probability is given.")
     return " ".join(words)
+
+
+def _apart(gap: float) -> str:
+    return f"{number(abs(gap), 2)} {'above' if gap > 0.0 else 'below'}"
 
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:

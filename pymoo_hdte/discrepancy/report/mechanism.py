@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +15,11 @@ from pymoo_hdte.discrepancy.mechanism.models import model_text
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
 from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechanism
-from pymoo_hdte.discrepancy.report.balance_units import unit_of_gap
 from pymoo_hdte.discrepancy.report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy.report.document import believed_in_words
 from pymoo_hdte.discrepancy.report.folder import FOLDER
-from pymoo_hdte.discrepancy.report.gap_words import percent
-from pymoo_hdte.discrepancy.report.mechanism_document import (
-    evidence,
-    mechanism_verdict_document,
-)
+from pymoo_hdte.discrepancy.report.gap_words import percent, unit_of_gap
+from pymoo_hdte.discrepancy.report.mechanism_document import evidence, mechanism_verdict_document
 from pymoo_hdte.discrepancy.report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy.report.mechanism_figures import (
     misfit_over_frequency,
@@ -33,7 +30,7 @@ from pymoo_hdte.discrepancy.report.tables import STATUSES
 from pymoo_hdte.discrepancy.report.torsion import torsion_document
 from pymoo_hdte.discrepancy.report.torsion_figure import torsion_picture
 from pymoo_hdte.reports.figures import data_uri
-from pymoo_hdte.reports.html import page
+from pymoo_hdte.reports.html import number, page
 
 _SIZES = 5
 """Parameters on the first screen."""
@@ -123,6 +120,7 @@ def _page(
         certainty=how_sure_of_records(finding),
         compared=[*compared, *document["alternatives"]],
         extent_sentence=extent_sentence(gaps),
+        unit_of_gap=partial(unit_of_gap, finding.mechanism),
         believed_effects=believed_in_words(document),
         believed={name: one.value for name, one in finding.mechanism.quantities.items()},
     )
@@ -153,7 +151,9 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
                 for one in ("before", "after")
             )
             change, unit = _change(before, after), unit_of_gap(finding.mechanism, of_it[0])
-            words.append(f"{quantity} by {kind} {change} from {before:.3g} to {after:.3g} {unit}")
+            words.append(
+                f"{quantity} by {kind} {change} from {number(before)} to {number(after)} {unit}"
+            )
     return f"Root mean square errors, before and after: {'; '.join(words)}. {extent_sentence(gaps)}"
 
 
@@ -182,7 +182,7 @@ def _effect_rows(effects: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             "lower": parameter["interval95"][0],
             "upper": parameter["interval95"][1],
             "at_bound": parameter["at_bound"],
-            "unit": parameter.get("unit", "SI"),
+            "unit": "" if parameter["unit"] == "1" else parameter["unit"],
         }
         for one in effects
         for name, parameter in one["parameters"].items()

@@ -9,21 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, label_of
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.candidates import turns_back
-from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, not_proven, rests_told
-from pymoo_hdte.discrepancy.report.balance_units import unit_of
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
+from pymoo_hdte.discrepancy.report.gap_words import percent
+from pymoo_hdte.discrepancy.report.mechanism_values import effects, quantities, ripples
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import in_words
-from pymoo_hdte.effects.unknowns import line_with_variance
+from pymoo_hdte.mechanism.quantity_units import unit_of
 from pymoo_hdte.mechanism.resampling import share_beyond
+from pymoo_hdte.reports.html import number
 
 
 def mechanism_verdict_document(
@@ -45,10 +44,7 @@ def mechanism_verdict_document(
         "campaign": title,
         "status": verdict.status,
         "sentence": _sentence(finding),
-        "effects": [
-            *effects(finding),
-            *(effect for one in finding.ripples.found for effect in one.as_dicts()),
-        ],
+        "effects": [*effects(finding), *ripples(finding)],
         "offered": offered(finding),
         "alternatives": [
             evidence(finding, one) for one in sorted(verdict.alternatives, key=_by_bic)
@@ -86,35 +82,6 @@ def _sentence(finding: MechanismFinding) -> str:
     return f"{sentence(verdict)} {beyond}".strip()
 
 
-def effects(finding: MechanismFinding) -> list[dict[str, Any]]:
-    """Return the accepted effects with values and 95 % intervals."""
-    fitted = finding.accepted
-    spread = Spread(finding.data, fitted)
-    found = []
-    for candidate, place in fitted.places:
-        rows = range(place.start, place.stop)
-        found.append(
-            {
-                "name": candidate.name,
-                "port": candidate.port,
-                "sentence": candidate.sentence,
-                "parameters": _parameters(fitted, spread, _rows(fitted, candidate, rows)),
-                "at_bound": [
-                    fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0
-                ],
-            }
-        )
-    return found
-
-
-def _rows(fitted: Fit, candidate: Candidate, rows: range) -> range:
-    """Return the rows of a candidate's parameters, or of the quantity that it frees."""
-    if candidate.frees is None:
-        return rows
-    place = [one.name for one in fitted.parameters].index(candidate.frees)
-    return range(place, place + 1)
-
-
 def offered(finding: MechanismFinding) -> list[dict[str, Any]]:
     """Return further effects beside the named ones for which the data are weak evidence.
 
@@ -148,7 +115,7 @@ def remainder(finding: MechanismFinding) -> dict[str, Any]:
     if named:
         residual = "What is left is" if np.all(after <= noise) else "What nobody explains is"
         words = (
-            f"It removes {100.0 * removed:.3g} % of the power of the misfit beyond the sensors' "
+            f"It removes {percent(removed)} of the power of the misfit beyond the sensors' "
             f"noise. {residual} {size}."
         )
     return {
@@ -178,13 +145,17 @@ def band(finding: MechanismFinding) -> dict[str, Any]:
         return max(shares, default=0.0)
 
     motion, force = largest(tuple(mechanism.coordinates)), largest(of_forces)
+
+    def power(share: float) -> str:
+        return "less than 0.01 %" if share < 1e-4 else f"{number(100.0 * share, 2)} %"
+
     much = max(motion, force) > finding.data.rules.band_share
     return {
         "cutoff_Hz": cutoff,
         "share_of_motion_beyond": motion,
         "share_of_force_beyond": force,
         "sentence": f"Model and records are compared up to {cutoff:.3g} Hz; beyond lie "
-        f"{100.0 * motion:.2f} % of the motion's power and {100.0 * force:.2f} % of the forces'"
+        f"{power(motion)} of the motion's power and {power(force)} of the forces'"
         f"{', in which only ripple is looked for' if much else ''}.",
     }
 
@@ -250,46 +221,3 @@ def _role(finding: MechanismFinding, one: Hypothesis) -> str:
     if one in finding.verdict.equivalent:
         return "as good"
     return "richer, hardly better" if chosen and one.bic < chosen.bic else "rejected"
-
-
-def quantities(finding: MechanismFinding) -> dict[str, Any]:
-    """Return the fitted values of the mechanism with 95 % intervals."""
-    spread = Spread(finding.data, finding.accepted)
-    return _parameters(finding.accepted, spread, range(len(finding.data.base)))
-
-
-def _parameters(fitted: Fit, spread: Spread, rows: range) -> dict[str, Any]:
-    """Return values with intervals, SI; cosine and sine parts as amplitude and phase.
-
-    The interval of a value that ended at a bound ends there too, and does not hold: it says so.
-    """
-    found: dict[str, Any] = {}
-    for row in rows:
-        parameter, value = fitted.parameters[row], float(fitted.values[row])
-        name, reach = parameter.name, float(spread.reach[row])
-        if name.endswith("_sine"):
-            continue
-        if not name.endswith("_cosine"):
-            # The fit could not exceed its bounds.
-            bounds = parameter.lower, parameter.upper
-            found[name] = _with_interval(value, spread.covariance[row, row], reach, *bounds)
-            found[name]["at_bound"] = bool(fitted.bound_sides[row])
-            continue
-        pair = slice(row, row + 2)
-        cosine, sine = fitted.values[pair]
-        amplitude, phase = line_with_variance(cosine, sine, spread.covariance[pair, pair])
-        reach = float(spread.reach[pair].max())
-        name = name.removesuffix("_cosine")
-        found[name] = _with_interval(*amplitude, reach, lower=0.0)
-        found[f"{name}_phase"] = _with_interval(*phase, reach)
-        for one in (name, f"{name}_phase"):
-            found[one]["at_bound"] = bool(np.any(fitted.bound_sides[pair]))
-    return found
-
-
-def _with_interval(
-    value: float, variance: float, reach: float, lower: float = -np.inf, upper: float = np.inf
-) -> dict[str, Any]:
-    half = reach * float(np.sqrt(max(variance, 0.0)))
-    interval = np.clip([value - half, value + half], lower, upper)
-    return {"value": value, "unit": "SI", "interval95": interval.tolist()}

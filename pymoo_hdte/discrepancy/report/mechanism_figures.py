@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
-from pymoo_hdte.discrepancy.report.balance_units import unit_of, unit_of_gap
+from pymoo_hdte.discrepancy.report.gap_words import unit_of_gap
+from pymoo_hdte.mechanism.quantity_units import unit_of
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY
 
 Values = NDArray[np.float64]

@@ -12,12 +12,8 @@ from pymoo_hdte.discrepancy.joint.analysis import JointFinding
 from pymoo_hdte.discrepancy.joint.open_questions import near_by, torsion_limits, torsion_test
 from pymoo_hdte.discrepancy.joint.torsion import KINEMATIC, errors_of
 from pymoo_hdte.discrepancy.report.document import sentence
-from pymoo_hdte.discrepancy.report.mechanism_document import (
-    effects,
-    evidence,
-    offered,
-    quantities,
-)
+from pymoo_hdte.discrepancy.report.mechanism_document import evidence, offered
+from pymoo_hdte.discrepancy.report.mechanism_values import effects, quantities
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import LawAt
 from pymoo_hdte.units import ARCSEC

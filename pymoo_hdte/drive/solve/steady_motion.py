@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -52,13 +52,13 @@ class Tangents:
     Attributes
     ----------
     inverted : callable
-        From places (m,) of solved cases to their inverses (m, 2 H, 2 H); None where the step needs
-        no matrix.
+        From places (m,) of solved cases to the inverse (2 H, 2 H) of each; None where the step
+        needs no matrix.
     places : ndarray of int, shape (n,)
         Of each row among the solved cases.
     """
 
-    inverted: Callable[[NDArray[np.int_]], NDArray[np.float64] | None]
+    inverted: Callable[[NDArray[np.int_]], Sequence[NDArray[np.float64] | None]]
     places: NDArray[np.int_]
     _known: dict[int, NDArray[np.float64] | None] = field(default_factory=dict)
 
@@ -70,10 +70,23 @@ class Tangents:
         """Return the inverse (2 H, 2 H) of each row."""
         new = np.array(sorted({*self.places.tolist()} - self._known.keys()), dtype=int)
         if new.size:
-            found = self.inverted(new)
-            each = [None] * len(new) if found is None else list(found)
-            self._known.update(zip(new.tolist(), each, strict=True))
+            self._known.update(zip(new.tolist(), self.inverted(new), strict=True))
         return [self._known[place] for place in self.places.tolist()]
+
+    @classmethod
+    def joined(cls, parts: Sequence[Tangents]) -> Tangents:
+        """Return the rows of several, one after the other."""
+        ends = np.cumsum([0, *(len(part.places) for part in parts)])
+
+        def inverted(places: NDArray[np.int_]) -> list[NDArray[np.float64] | None]:
+            """Ask each part for its own; places rise."""
+            found: list[NDArray[np.float64] | None] = []
+            for part, first, last in zip(parts, ends[:-1], ends[1:], strict=True):
+                own = places[(first <= places) & (places < last)] - first
+                found += part.rows(own).inverses()
+            return found
+
+        return cls(inverted, np.arange(ends[-1]))
 
 
 @dataclass(frozen=True)

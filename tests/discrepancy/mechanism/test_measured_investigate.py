@@ -25,14 +25,8 @@ from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import _how, next_test
 from pymoo_hdte.discrepancy.mechanism.preconditions import check_scale, usual_cutoff
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
-from pymoo_hdte.discrepancy.report.mechanism_document import (
-    _parameters,
-    effects,
-    limits,
-    quantities,
-    record_remarks,
-    remainder,
-)
+from pymoo_hdte.discrepancy.report.mechanism_document import limits, record_remarks, remainder
+from pymoo_hdte.discrepancy.report.mechanism_values import _parameters, effects, quantities
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 

@@ -12,7 +12,7 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.mechanism.analysis import examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.files import read_rig
 from pymoo_hdte.discrepancy.mechanism.models import model_text, read_mechanism_model
-from pymoo_hdte.discrepancy.report.mechanism_document import effects, quantities
+from pymoo_hdte.discrepancy.report.mechanism_values import effects, quantities
 from pymoo_hdte.effects.gravity import Gravity
 from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
@@ -220,7 +220,7 @@ def test_a_value_of_zero_is_no_bound_but_a_part_that_is_not_there():
     ("unit", "said", "angles"),
     [
         ("deg", "", ("q",)),
-        ("mm", "", None),
+        ("mm", "", ()),
         ("mm", "angle = true", ("q",)),
         ("rev", "angle = false", ()),
     ],

@@ -16,7 +16,8 @@ from pymoo_hdte.discrepancy.mechanism.evidence import measured_data
 from pymoo_hdte.discrepancy.mechanism.intervals import Spread
 from pymoo_hdte.discrepancy.mechanism.next_tests import next_test
 from pymoo_hdte.discrepancy.mechanism.orders import position_orders
-from pymoo_hdte.discrepancy.report.mechanism_document import effects, limits
+from pymoo_hdte.discrepancy.report.mechanism_document import limits
+from pymoo_hdte.discrepancy.report.mechanism_values import effects
 from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.motion import motion_of

@@ -16,12 +16,8 @@ from pymoo_hdte.discrepancy.mechanism.preconditions import (
 )
 from pymoo_hdte.discrepancy.mechanism.record_files import ListedRecord, _with_positions
 from pymoo_hdte.discrepancy.mechanism.revision import revised_mechanism
-from pymoo_hdte.discrepancy.report.mechanism_document import (
-    effects,
-    limits,
-    quantities,
-    record_remarks,
-)
+from pymoo_hdte.discrepancy.report.mechanism_document import limits, record_remarks
+from pymoo_hdte.discrepancy.report.mechanism_values import effects, quantities
 from pymoo_hdte.io.layout import Channel, TableLayout
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 from pymoo_hdte.mechanism.motion import highest_share

@@ -89,8 +89,12 @@ def test_shortfalls_are_told_and_what_is_right_is_counted():
     assert "two" not in told
     assert real.shortfalls(rows[1:]) == ("Right: 1 of 1 whose answer is known.",)
     counted = "1 no answer known, 1 right"
-    assert real._in_one_sentence(rows) == f"Of 3 machines: 1 confidently wrong, {counted}."
-    assert real._in_one_sentence(rows[1:]) == f"Of 2 machines: {counted}, none confidently wrong."
+    assert f"3 machines that others measured: 1 confidently wrong, {counted}." in (
+        real._in_one_sentence(rows)
+    )
+    assert f"2 machines that others measured: {counted}, none confidently wrong." in (
+        real._in_one_sentence(rows[1:])
+    )
 
 
 def examined(name, **options):

@@ -55,9 +55,9 @@ def test_the_report_says_what_the_fits_say(tmp_path, fits):
     meeting = [one for one in fits if one.target == "common" and gives_trade_off(one)]
     both = [one for one in fits if gives_trade_off(one) and undominated(one)]
     searched = sum(one.target == "common" for one in fits)
-    assert f"{searched} drive models searched" in result.answer
+    assert f"of {searched} drive models" in result.answer
     assert f"{len(meeting)} give" in result.answer
-    assert (not both) == ("no model gives both" in result.answer)
+    assert (not both) == (f"None of {searched} drive models gives both" in result.answer)
     least = min(meeting, key=lambda one: one.bic)
     assert f"by {significant(least.evaluation.depths.max(), 2)} widths" in result.answer
     ladder = result.tables[1]

@@ -70,7 +70,7 @@ def test_what_did_not_run_is_neither_met_nor_missed():
 
 def test_what_falls_short_comes_first():
     said = in_one_sentence(planted(-0.2))
-    assert said.startswith(f"{OURS}, on suites held out: on bbob-biobj it falls short")
+    assert said.startswith(f"On the held-out bbob-biobj {OURS} falls short")
     assert "falls short" not in in_one_sentence(planted(0.2))
 
 

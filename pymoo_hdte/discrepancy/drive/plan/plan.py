@@ -235,12 +235,13 @@ def _missed(ones: Sequence[Chance], wanted: float) -> str:
     if max(one.possible for one in ones) < wanted:
         asked = f"tells {effect} from {rivals}" if rivals else f"shows {effect}"
         best = max(one.possible for one in ones)
-        return f"No test within the limits {asked} at this size: the power is at most {best:.2f}."
+        most = f"the chance is at most {100.0 * best:.0f} %"
+        return f"No test within the limits {asked} at this size: {most}."
     least = min(one.power for one in ones)
     asked = f"tell {effect} from {rivals.replace(', nor', ' and')}" if rivals else f"show {effect}"
     return (
-        f"To {asked} at this size takes more records than the limits allow: these give a power of "
-        f"{least:.2f}."
+        f"To {asked} at this size takes more records than the limits allow: these give a chance "
+        f"of {100.0 * least:.0f} %."
     )
 
 

@@ -119,9 +119,9 @@ class Ripple:
                 "port": self.port,
                 "sentence": self.sentence,
                 "parameters": {
-                    "order": _value(self.order, _CENTRAL * self.variance**0.5),
+                    "order": _value(self.order, self.variance),
                     **{
-                        name: _value(value, _CENTRAL * variance**0.5)
+                        name: _value(value, variance)
                         for name, (value, variance) in part.values.items()
                     },
                 },
@@ -293,6 +293,6 @@ def _share(gap: Pair) -> float:
     return 1.0 - (after / before) ** 2 if before > 0.0 else 0.0
 
 
-def _value(value: float, half: float) -> dict[str, Any]:
-    interval = [value - half, value + half]
-    return {"value": value, "unit": "SI", "interval95": interval, "at_bound": False}
+def _value(value: float, variance: float) -> dict[str, Any]:
+    half = _CENTRAL * variance**0.5
+    return {"value": value, "interval95": [value - half, value + half], "at_bound": False}
