@@ -11,6 +11,7 @@ from experiments.runner.result import Cell, Column, Finding, Table
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import MEASURES, BbobRun, SuiteRun
 from experiments.suites.peers import OURS
+from experiments.suites.reduced import WHOLE
 
 SUITE_RUNS = (
     SuiteRun("IMOP1", OURS, 1, (500,)),
@@ -18,7 +19,7 @@ SUITE_RUNS = (
     SuiteRun("IMOP3", "ElitistSwarm", 1, (500,)),
     SuiteRun("IMOP2", "NSGA-II", 1, (500,)),
 )
-BBOB_RUNS = (BbobRun(1, 10, 6, OURS, 500), BbobRun(28, 10, 6, OURS, 500))
+BBOB_RUNS = (BbobRun(1, 10, 10, WHOLE, 10_000), BbobRun(28, 10, 9, OURS, 25_000))
 SAME = 2e-5
 """Relative difference that digits of the table leave open."""
 

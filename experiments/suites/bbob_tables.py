@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome
-from experiments.suites.peers import BBOB_PEERS, LESS, ON_BBOB, OURS
-from experiments.suites.protocol import BUDGETS, DIMENSIONS, INSTANCES
+from experiments.suites.peers import BBOB_PEERS, ON_BBOB, OURS
+from experiments.suites.protocol import BUDGETS, DIMENSIONS
 from experiments.suites.published import curves
 
 
 def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
-    """Return the mean share of our swarm that was told a budget, at its end; None if not run."""
-    return outcome.shares(dimension, OURS, evaluations).get(evaluations)
+    """Return the mean share of our swarm after so many evaluations; None if it was not run.
+
+    It moves alike whatever its budget, so that its longest runs tell of shorter ones.
+    """
+    return outcome.shares(dimension, OURS, BUDGETS[-1]).get(evaluations)
 
 
 class Duel(NamedTuple):
@@ -33,16 +36,19 @@ class Duel(NamedTuple):
 
 
 def duels(
-    outcome: Outcome, evaluations: int, rivals: Iterable[str] = tuple(BBOB_PEERS)
+    outcome: Outcome,
+    evaluations: int,
+    rivals: Iterable[str] = tuple(BBOB_PEERS),
+    control: str = OURS,
 ) -> list[Duel]:
     """Return the duels after so many evaluations, p corrected over the rivals that ran.
 
-    Ours is told this budget; a rival that moves alike whatever its budget may have been told more.
+    Ours and a rival that move alike whatever their budget may have been told more.
     """
     found = []
     for rival in rivals:
-        pairs = _pairs(outcome, rival, evaluations)
-        if rival != OURS and len(pairs):
+        pairs = _pairs(outcome, control, rival, evaluations)
+        if rival != control and len(pairs):
             found.append((rival, pairs))
     # Each rival has problems of its own: its differences are padded with problems without any.
     most = max((len(pairs) for _, pairs in found), default=0)
@@ -51,8 +57,8 @@ def duels(
         values[: len(pairs), column] = pairs[:, 1] - pairs[:, 0]
     if not found:
         return []
-    names = [OURS, *(rival for rival, _ in found)]
-    tests = holm_against(OURS, names, values, smaller_is_better=False)
+    names = [control, *(rival for rival, _ in found)]
+    tests = holm_against(control, names, values, smaller_is_better=False)
     return [
         Duel(
             rival,
@@ -66,12 +72,12 @@ def duels(
     ]
 
 
-def _pairs(outcome: Outcome, rival: str, evaluations: int) -> NDArray[np.float64]:
+def _pairs(outcome: Outcome, control: str, rival: str, evaluations: int) -> NDArray[np.float64]:
     """Return our share and the rival's on the problems that both ran, shape (problems, 2)."""
     ours = {
         (run.dimension, run.function, run.instance, run.seed): shares[evaluations]
         for run, shares in outcome.bbob.items()
-        if run.algorithm == OURS and run.told == evaluations
+        if run.algorithm == control and evaluations in shares
     }
     anew = ON_BBOB[rival].starts_anew
     pairs = []
@@ -87,15 +93,10 @@ def shares_table(outcome: Outcome) -> Table:
     """Mean shares of targets by dimension and evaluations, ours before the published ones."""
     rows: list[tuple[Cell, ...]] = []
     for dimension in DIMENSIONS:
-        told = tuple(reached(outcome, dimension, budget) for budget in BUDGETS)
-        rows.append(
-            (f"{OURS}, told each budget", dimension, f"here{_fewer(outcome, dimension)}", *told)
-        )
         for algorithm, budget in _told(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
-            name = f"{algorithm}, told {budget:,}" if algorithm == OURS else algorithm
             where = f"here{_extent(outcome, dimension, algorithm, budget)}"
-            rows.append((name, dimension, where, *(shares.get(one) for one in BUDGETS)))
+            rows.append((algorithm, dimension, where, *(shares.get(one) for one in BUDGETS)))
         for name, curve in curves(dimension).items():
             rows.append((name, dimension, "published", *(curve.get(one) for one in BUDGETS)))
     return Table(
@@ -106,9 +107,8 @@ def shares_table(outcome: Outcome) -> Table:
             *(Column(f"{budget:,}", "", 3, "evaluations") for budget in BUDGETS),
         ),
         tuple(rows),
-        note="Ours on all 55 functions and instances 6 to 8 but where it says otherwise, one run "
-        "each; published are averages over all functions and instances, read from pictures to some "
-        ".01.",
+        note="On all 55 functions where it does not say otherwise, one run each; published are "
+        "averages over all functions and instances, read from pictures to some .01.",
     )
 
 
@@ -119,19 +119,8 @@ def _told(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
     return [(name, largest[name]) for name in BBOB_PEERS if name in largest]
 
 
-def _fewer(outcome: Outcome, dimension: int) -> str:
-    """Name the budgets for which our swarm did not run on all instances."""
-    fewer = []
-    for budget in BUDGETS:
-        place = dimension, OURS, budget
-        ran = {r.instance for r in outcome.bbob if (r.dimension, r.algorithm, r.told) == place}
-        if ran and len(ran) < len(INSTANCES):
-            fewer.append(f"{budget:,}: instance {' and '.join(map(str, sorted(ran)))}")
-    return f" ({', '.join(fewer)})" if fewer else ""
-
-
 def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:
-    """Say on how many functions and instances an algorithm ran, if not on all."""
+    """Say on which instances an algorithm ran, and on how many functions if not on all."""
     ran = [
         run
         for run in outcome.bbob
@@ -140,9 +129,8 @@ def _extent(outcome: Outcome, dimension: int, algorithm: str, told: int) -> str:
     functions = {run.function for run in ran}
     instances = sorted({run.instance for run in ran})
     said = [f"{len(functions)} functions"] if len(functions) < 55 else []
-    if len(instances) < len(INSTANCES):
-        said.append(f"instance {' and '.join(map(str, instances))}")
-    return f" ({', '.join(said)})" if said else ""
+    said.append(f"instance {' and '.join(map(str, instances))}")
+    return f" ({', '.join(said)})"
 
 
 def duels_table(outcome: Outcome) -> Table:
@@ -166,35 +154,4 @@ def duels_table(outcome: Outcome) -> Table:
         tuple(rows),
         note="Better and worse count problems; p is Wilcoxon's over them, after Holm over the "
         "rivals of a row's budget.",
-    )
-
-
-def parts_table(outcome: Outcome) -> Table:
-    """Our swarm beside itself with a part left out."""
-    rows = [
-        (
-            *(duel.rival, duel.evaluations, duel.problems, duel.ours, duel.theirs),
-            *(duel.test.better, duel.test.worse, duel.test.p),
-            "yes" if duel.test.beaten else "no",
-        )
-        for budget in BUDGETS
-        for duel in duels(outcome, budget, LESS)
-    ]
-    return Table(
-        "parts",
-        f"bbob-biobj, held out: {OURS} with a part left out",
-        (
-            *(Column("left out"), Column("evaluations"), Column("problems")),
-            *(Column(name, "", 3, "mean share") for name in ("whole", "less")),
-            *(Column("whole better"), Column("worse"), Column("p", digits=2)),
-            Column("shown to help"),
-        ),
-        tuple(rows),
-        note="After 10,000 every second function of instance 7 in ten dimensions, as written "
-        "before; after fewer all functions of instance 6 in both dimensions, decided once the "
-        "former had come out for the models. p "
-        "is Wilcoxon's over the problems, after Holm over the parts. Moves that are not shown to "
-        "help here alone were kept together: in tuning (functions 1 to 20, instance 1, 2,000 "
-        "evaluations) the swarm reached .366 of the targets in 10 dimensions and .295 in 20, "
-        "without attraction, exchange and difference .330 and .264.",
     )

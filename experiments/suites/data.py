@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -36,6 +36,9 @@ BBOB_COLUMNS = (
     "evaluations",
     "share",
 )
+
+SEEDS = range(1, 1 + max(part.seeds for part in (*STORED, *FULL)))
+"""All seeds that any part has."""
 
 SuiteKey = tuple[str, str, int, int]
 """Problem, algorithm, budget and seed."""
@@ -73,17 +76,38 @@ class Outcome:
         keys = ((job.problem, job.algorithm, budget, job.seed) for budget in job.budgets)
         return all(key in self.suites for key in keys)
 
+    def take(self, job: SuiteRun | BbobRun, other: Outcome) -> None:
+        """Take over what another outcome has of a job."""
+        if isinstance(job, BbobRun):
+            self.bbob[job] = other.bbob[job]
+            return
+        for budget in job.budgets:
+            key = job.problem, job.algorithm, budget, job.seed
+            self.suites[key] = other.suites[key]
+
+    def without(self, algorithms: Collection[str]) -> Outcome:
+        """Return the outcome without the runs of some algorithms."""
+        return Outcome(
+            {key: row for key, row in self.suites.items() if key[1] not in algorithms},
+            {run: row for run, row in self.bbob.items() if run.algorithm not in algorithms},
+        )
+
     def budgets(self, suite: str) -> list[int]:
-        """Return the budgets at which a suite was judged, rising."""
-        return sorted({key[2] for key in self.suites if PROBLEMS[key[0]].suite == suite})
+        """Return the budgets at which ours and another were judged on a suite, rising."""
+        ran = {key[2] for key in self.suites if PROBLEMS[key[0]].suite == suite}
+        return sorted(budget for budget in ran if len(self.algorithms(suite, budget)) > 1)
 
     def seeds(self, suite: str) -> int:
-        """Return how many seeds ran on each problem of a suite that ran at all, or more."""
-        ran: dict[str, set[int]] = defaultdict(set)
-        for problem, _, _, seed in self.suites:
-            if PROBLEMS[problem].suite == suite:
-                ran[problem].add(seed)
-        return min(map(len, ran.values()), default=0)
+        """Return with how many seeds ours ran on each problem of a suite that it ran on, or more.
+
+        The fewest of all budgets at which it was judged there beside another.
+        """
+        counts = [
+            len(self.runs(problem, OURS, budget, 0))
+            for budget in self.budgets(suite)
+            for problem in self.problems(suite, budget)
+        ]
+        return min(counts, default=0)
 
     def algorithms(self, suite: str, budget: int) -> list[str]:
         """Return who ran on a suite at a budget, in the order of `PEERS`.
@@ -91,7 +115,7 @@ class Outcome:
         One that could take a problem, but was not run on it, is left out: it would rank last there.
         """
         problems = self.problems(suite, budget)
-        ran = {key[:2] for key in self.suites if key[2] == budget}
+        ran = {(one, name) for one in problems for name in PEERS if self.runs(one, name, budget, 0)}
         return [
             name
             for name in PEERS
@@ -119,13 +143,17 @@ class Outcome:
         return values
 
     def runs(self, problem: str, algorithm: str, budget: int, place: int) -> list[float]:
-        """Return one number of all runs of an algorithm on a problem, by rising seed."""
-        found = {
-            key[3]: numbers[place]
-            for key, numbers in self.suites.items()
-            if key[:3] == (problem, algorithm, budget)
-        }
-        return [found[seed] for seed in sorted(found)]
+        """Return one number of the runs of an algorithm on a problem, by rising seed.
+
+        Only of seeds with which ours ran there as well: with more, a rival would be compared
+        otherwise than ours.
+        """
+        keys = (
+            (problem, algorithm, budget, seed)
+            for seed in SEEDS
+            if (problem, OURS, budget, seed) in self.suites
+        )
+        return [self.suites[key][place] for key in keys if key in self.suites]
 
     def shares(
         self, dimension: int, algorithm: str, told: int, *, instance: int | None = None
@@ -146,7 +174,7 @@ def outcome_for(context: Context) -> Outcome:
     Files are written after every part, so that an interrupted run leaves what is done.
     """
     if not (context.full or context.quick):
-        return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, BBOB)))
+        return stored()
     for package, extra in (("cocoex", EXTRA), ("comocma", EXTRA), ("jmetal", EXTRA)):
         require(package, extra)
     parts: Iterable[SuitePart | BbobPart] = FULL if context.full else STORED
@@ -157,6 +185,11 @@ def outcome_for(context: Context) -> Outcome:
         outcome.add(jobs, context.campaign.run(jobs, name))
         write_outcome(outcome, context.out / NAME)
     return outcome
+
+
+def stored() -> Outcome:
+    """Return the outcome that the repository keeps."""
+    return read_outcome(*(committed_file(f"{name}.csv", NAME) for name in (NAME, BBOB)))
 
 
 def write_outcome(outcome: Outcome, folder: Path, command: str = COMMAND) -> None:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experiments.comparison.rivals import RivalTest
 from experiments.runner.result import Cell, Column, Table, significant
 from experiments.suites.bbob_tables import reached
 from experiments.suites.data import Outcome
@@ -22,12 +23,13 @@ from experiments.suites.published import BEST, CITED
 from experiments.suites.suite_tables import (
     NAMES,
     can_show,
-    feasible_runs,
+    feasible_beside,
     indicators,
     named,
     ranks,
     tests,
 )
+from experiments.suites.together import ranks_together, signs_together
 
 CONSTRAINED = ("MW", "DAS-CMOP")
 
@@ -84,73 +86,75 @@ def _shares(outcome: Outcome) -> Iterable[Demand]:
 
 
 def _first_of_all(outcome: Outcome) -> Iterable[Demand]:
+    for evaluations in BUDGETS:
+        found = ranks_together(outcome, evaluations)
+        beaten = signs_together(outcome, evaluations)
+        where = "all held-out suites together"
+        yield _first(found, evaluations, f"{where}: lowest average rank, hypervolume")
+        yield _better_than_each(beaten, evaluations, where, "hypervolume")
     for suite in HELD_OUT:
+        where = named(outcome, suite)
         for evaluations in BUDGETS:
+            ran = evaluations in outcome.budgets(suite)
             for measure, name in NAMES.items():
-                asked = f"{named(outcome, suite)}: lowest average rank, {name}"
-                if evaluations not in outcome.budgets(suite):
-                    yield Demand(asked, evaluations, "not run", "", None)
-                    continue
-                yield _first(outcome, suite, evaluations, measure, asked)
-                beaten = tests(outcome, suite, evaluations, measure)
-                shown = sum(test.beaten for test in beaten)
+                found = ranks(outcome, suite, evaluations, measure) if ran else {}
+                beaten = tests(outcome, suite, evaluations, measure) if ran else []
+                yield _first(found, evaluations, f"{where}: lowest average rank, {name}")
                 problems = len(outcome.problems(suite, evaluations))
                 too_few = "" if can_show(problems, len(beaten)) else "; too few problems to show it"
-                yield Demand(
-                    f"{named(outcome, suite)}: better than each beyond chance (Holm), {name}",
-                    evaluations,
-                    f"{shown} of {len(beaten)}{too_few}",
-                    "",
-                    shown == len(beaten),
-                )
+                yield _better_than_each(beaten, evaluations, where, name, too_few)
 
 
-def _first(outcome: Outcome, suite: str, evaluations: int, measure: str, asked: str) -> Demand:
-    found = ranks(outcome, suite, evaluations, measure)
-    ours = found.pop(OURS)
-    best = min(found, key=lambda name: found[name])
-    place = 1 + sum(rank < ours for rank in found.values())
-    measured = f"place {place} of {1 + len(found)}, rank {ours:.2f}"
-    return Demand(asked, evaluations, measured, f"{best} {found[best]:.2f}", place == 1)
+def _first(found: dict[str, float], evaluations: int, asked: str) -> Demand:
+    """Ask for the lowest of average ranks by algorithm, which are empty if it was not run."""
+    if not found:
+        return Demand(asked, evaluations, "not run", "", None)
+    ours = found[OURS]
+    others = {name: rank for name, rank in found.items() if name != OURS}
+    best = min(others, key=lambda name: others[name])
+    place = 1 + sum(rank < ours for rank in others.values())
+    measured = f"place {place} of {len(found)}, rank {ours:.2f}"
+    return Demand(asked, evaluations, measured, f"{best} {others[best]:.2f}", place == 1)
+
+
+def _better_than_each(
+    beaten: list[RivalTest], evaluations: int, where: str, name: str, further: str = ""
+) -> Demand:
+    asked = f"{where}: better than each beyond chance (Holm), {name}"
+    if not beaten:
+        return Demand(asked, evaluations, "not run", "", None)
+    shown = sum(test.beaten for test in beaten)
+    measured = f"{shown} of {len(beaten)}{further}"
+    return Demand(asked, evaluations, measured, "", shown == len(beaten))
 
 
 def _on_engineering(outcome: Outcome) -> Iterable[Demand]:
     asked = f"RE: no worse than {RIVAL_ON_RE}, hypervolume"
-    budgets = outcome.budgets("RE")
-    if not budgets:
-        yield Demand(asked, BUDGETS[2], "not run", "", None)
-    for budget in budgets:
-        (test,) = (
-            one for one in tests(outcome, "RE", budget, "hypervolume") if one.rival == RIVAL_ON_RE
-        )
+    for budget in outcome.budgets("RE") or BUDGETS[2:3]:
+        if RIVAL_ON_RE not in outcome.algorithms("RE", budget):
+            yield Demand(asked, budget, "not run", "", None)
+            continue
+        found = tests(outcome, "RE", budget, "hypervolume")
+        test = next(one for one in found if one.rival == RIVAL_ON_RE)
         measured = f"{test.better} better, {test.worse} worse, p = {significant(test.p, 2)}"
         yield Demand(asked, budget, measured, "", test.better >= test.worse)
 
 
 def _constrained(outcome: Outcome) -> Iterable[Demand]:
     for suite in CONSTRAINED:
-        budgets = outcome.budgets(suite)
-        if not budgets:
-            yield Demand(
-                f"{suite}: feasible runs, first by hypervolume", BUDGETS[2], "not run", "", None
-            )
-        for budget in budgets:
-            ours, runs = feasible_runs(outcome, suite, budget, OURS)
-            theirs = {
-                name: feasible_runs(outcome, suite, budget, name)[0]
-                for name in FEASIBLE_RIVALS
-                if name in outcome.algorithms(suite, budget)
-            }
-            yield Demand(
-                f"{suite}: feasible in as many runs as {' and '.join(FEASIBLE_RIVALS)}",
-                budget,
-                f"{ours} of {runs}",
-                ", ".join(f"{name} {theirs.get(name, 'not run')}" for name in FEASIBLE_RIVALS),
-                all(ours >= count for count in theirs.values()),
-            )
-            yield _first(
-                outcome, suite, budget, indicators(suite)[0], f"{suite}: first by hypervolume"
-            )
+        for budget in outcome.budgets(suite) or BUDGETS[2:3]:
+            for rival in FEASIBLE_RIVALS:
+                asked = f"{suite}: feasible in as many runs as {rival}"
+                if rival not in outcome.algorithms(suite, budget):
+                    yield Demand(asked, budget, "not run", "", None)
+                    continue
+                ours, theirs, runs = feasible_beside(outcome, suite, budget, rival)
+                yield Demand(
+                    asked, budget, f"{ours} of {runs}", f"{rival} {theirs}", ours >= theirs
+                )
+            ran = budget in outcome.budgets(suite)
+            found = ranks(outcome, suite, budget, indicators(suite)[0]) if ran else {}
+            yield _first(found, budget, f"{suite}: first by hypervolume")
 
 
 def in_one_sentence(outcome: Outcome) -> str:

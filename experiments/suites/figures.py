@@ -6,7 +6,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
-from experiments.suites.bbob_tables import reached
 from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
@@ -26,7 +25,7 @@ def runtime_profiles(outcome: Outcome) -> Figure:
             shares = {n: share for n, share in curve.items() if n <= BUDGETS[-1]}
             colour, style = PUBLISHED.get(name, GREY), ("--", ":", "-.")[place % 3]
             axis.plot(*_line(shares), style, color=colour, lw=1.2, label=f"{name}, published")
-        _ours(axis, outcome, dimension)
+        _run_here(axis, outcome, dimension)
         axis.set_title(f"bbob-biobj, {dimension} dimensions", fontsize=10)
         axis.set_xscale("log")
         axis.set_xlabel("evaluations")
@@ -35,8 +34,8 @@ def runtime_profiles(outcome: Outcome) -> Figure:
     return figure
 
 
-def _ours(axis: Axes, outcome: Outcome, dimension: int) -> None:
-    """Draw what ran here: lines of the largest budgets, and our swarm told each budget."""
+def _run_here(axis: Axes, outcome: Outcome, dimension: int) -> None:
+    """Draw what ran here, each algorithm's run of the largest budget."""
     for name, colour in LINES.items():
         told = max(
             (r.told for r in outcome.bbob if (r.algorithm, r.dimension) == (name, dimension)),
@@ -44,11 +43,8 @@ def _ours(axis: Axes, outcome: Outcome, dimension: int) -> None:
         )
         shares = outcome.shares(dimension, name, told)
         if shares:
-            label = f"{name}, told {told:,}" if name == OURS else f"{name}, here"
-            axis.plot(*_line(shares), color=colour, lw=2.2 if name == OURS else 1.3, label=label)
-    ends = {budget: reached(outcome, dimension, budget) for budget in BUDGETS}
-    points = {budget: share for budget, share in ends.items() if share is not None}
-    axis.plot(*_line(points), "o", color=BLUE, markersize=6, label=f"{OURS}, told each budget")
+            width = 2.2 if name == OURS else 1.3
+            axis.plot(*_line(shares), color=colour, lw=width, label=f"{name}, here")
 
 
 def _line(shares: dict[int, float]) -> tuple[list[int], list[float]]:
@@ -75,7 +71,7 @@ def how_to_choose(outcome: Outcome) -> Figure:
         _over_evaluations(axis)
     axes[0, 0].legend(fontsize=7, frameon=False, loc="lower right")
     axis = axes[0, 2]
-    _ours(axis, outcome, DIMENSIONS[0])
+    _run_here(axis, outcome, DIMENSIONS[0])
     cited = {n: share for (d, n), share in CITED.items() if d == DIMENSIONS[0]}
     axis.plot(*_line(cited), "s", color=ORANGE, markersize=5, label=f"{BEST}, published")
     axis.set_title(f"bbob-biobj, {DIMENSIONS[0]} dimensions", fontsize=10)

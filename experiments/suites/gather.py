@@ -1,33 +1,54 @@
-"""The stored outcome from a run of the protocol that was stopped before its end.
+"""The stored outcome from runs of the protocol, some of which were made earlier than others.
 
-``python -m experiments.suites.gather FOLDER`` takes every finished run in a folder of a campaign
-(``OUT/runs/ORIGIN``) that belongs to a whole group of the protocol (``groups`` of its parts), and
-writes the CSV files that the repository keeps. No other choice is made.
+``python -m experiments.suites.gather FOLDER...`` takes every finished run in folders of campaigns
+(``OUT/runs/ORIGIN``), and what is stored already, as far as it belongs to a whole group of the
+protocol (``groups`` of its parts), and writes the CSV files that the repository keeps. No other
+choice is made. After a change of an algorithm, ``--anew NAME,NAME`` leaves out what is stored of
+it; `only` runs some algorithms.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from experiments.runner.campaign import read_run
 from experiments.runner.committed import DATA
 from experiments.runner.result import Cell, Column, Table
-from experiments.suites.data import COMMAND, Outcome, write_outcome
+from experiments.suites.data import Outcome, stored, write_outcome
+from experiments.suites.jobs import BbobRun, SuiteRun
 from experiments.suites.protocol import STORED, BbobPart
 
-STOPPED = f"{COMMAND}, stopped before its end; whole groups of runs only"
+COMMAND = (
+    "python -m experiments.suites.gather; whole groups of runs only, those of algorithms that did "
+    "not change kept from before"
+)
 
 
-def gathered(folder: Path) -> Outcome:
-    """Return the outcome of all whole groups among the runs that lie in a folder."""
+def gathered(folders: Sequence[Path], before: Outcome) -> Outcome:
+    """Return the outcome of all whole groups among the runs in folders and in another outcome.
+
+    A run that lies in several places is taken from the first folder that has it.
+    """
     outcome = Outcome()
     for part in STORED:
-        for group in part.groups():
-            paths = [folder / f"{job.key}.csv" for job in group]
-            if all(path.is_file() for path in paths):
-                outcome.add(group, [read_run(path) for path in paths])
+        groups: Iterable[Sequence[SuiteRun | BbobRun]] = part.groups()
+        for group in groups:
+            found = [_path(folders, job.key) for job in group]
+            if not all(path or before.has(job) for job, path in zip(group, found, strict=True)):
+                continue
+            for job, path in zip(group, found, strict=True):
+                if path:
+                    outcome.add([job], [read_run(path)])
+                else:
+                    outcome.take(job, before)
     return outcome
+
+
+def _path(folders: Sequence[Path], key: str) -> Path | None:
+    paths = (folder / f"{key}.csv" for folder in folders)
+    return next((path for path in paths if path.is_file()), None)
 
 
 def kept_table(outcome: Outcome) -> Table:
@@ -38,7 +59,7 @@ def kept_table(outcome: Outcome) -> Table:
         whole = sum(all(map(outcome.has, group)) for group in groups)
         if isinstance(part, BbobPart):
             instances = ", ".join(map(str, part.instances))
-            name, budgets = f"bbob-biobj, instances {instances}", part.told
+            name, budgets = f"bbob-biobj, instance {instances}", part.told
         else:
             name, budgets = f"{part.suite}, {part.seeds} seeds", part.budgets
         who = (part.algorithm,) if isinstance(part, BbobPart) else part.algorithms
@@ -51,18 +72,23 @@ def kept_table(outcome: Outcome) -> Table:
         "What was run of the stored protocol",
         tuple(Column(name) for name in columns),
         tuple(rows),
-        note="A group is all functions of bbob-biobj of one dimension, instance and budget, or all "
-        "algorithms of the part on one problem with one seed. The run was stopped before its end, "
-        "because the time of the processor was over; every group that was whole is kept, no other "
-        "choice was made.",
+        note="A group is one algorithm with one seed on all functions of bbob-biobj of one "
+        "dimension, instance and budget, or on all problems of a suite. What is missing was not "
+        "run, because the time of the processor was over; every group that was whole is kept, no "
+        "other choice was made. Runs of algorithms that did not change are kept from before.",
         folded=True,
     )
 
 
-def main(folder: Path) -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Write what was gathered over the stored outcome."""
-    write_outcome(gathered(folder), DATA, STOPPED)
+    parser = argparse.ArgumentParser(prog="python -m experiments.suites.gather")
+    parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="OUT/runs/ORIGIN")
+    parser.add_argument("--anew", default="", metavar="NAME,NAME", help="keep nothing stored of it")
+    options = parser.parse_args(arguments)
+    before = stored().without(options.anew.split(","))
+    write_outcome(gathered(options.folders, before), DATA, COMMAND)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

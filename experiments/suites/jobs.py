@@ -13,7 +13,7 @@ from pymoo.indicators.igd_plus import IGDPlus
 from experiments.comparison.indicators import CORNER, front_among
 from experiments.runner.campaign import Run
 from experiments.suites.coco import MARKS, BbobProblem, shares_of_run
-from experiments.suites.peers import ON_BBOB, PEERS
+from experiments.suites.peers import ON_BBOB, ON_SUITES
 from experiments.suites.problems import box_of, front_of, problem_of
 from pymoo_hdte.algorithms.hypervolume import most_hypervolume
 
@@ -42,7 +42,7 @@ class SuiteRun:
         """Run; columns are the budget, the evaluations spent and `MEASURES`, a row a budget."""
         problem = problem_of(self.problem)
         started = time.perf_counter()
-        offers = PEERS[self.algorithm].run(problem, self.budgets, self.seed)
+        offers = ON_SUITES[self.algorithm].run(problem, self.budgets, self.seed)
         seconds = time.perf_counter() - started
         rows = [
             [budget, offer.spent, *measured(self.problem, offer.F)]

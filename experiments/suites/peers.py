@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache, partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pymoo.algorithms.moo.ctaea import CTAEA
 from pymoo.core.algorithm import Algorithm
-from pymoo.core.population import Population
 from pymoo.core.problem import Problem
 from pymoo.util.ref_dirs import get_reference_directions
 
@@ -18,11 +16,9 @@ from experiments.comparison.indicators import front_among
 from experiments.contest.contestants import CONTESTANTS, Contestant, of_jmetal
 from experiments.contest.offer import POPULATION, Offer
 from experiments.contest.peers_pymoo import OWN, PYMOO, run_pymoo
-from experiments.contest.reduced_swarms import EqualShares, NoMutation
 from experiments.suites.coco import StartBox
+from experiments.suites.reduced import LESS
 from pymoo_hdte.algorithms import CompactSwarm
-from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
-from pymoo_hdte.algorithms.quadratic import ModelStep
 
 OURS = "CompactSwarm"
 
@@ -92,53 +88,37 @@ PEERS: dict[str, Contestant] = {
     "COMO-CMA-ES": Contestant("comocma", _como, takes_constraints=False, two_objectives_only=True),
     "C-TAEA": Contestant("pymoo", partial(run_pymoo, MADE["C-TAEA"])),
 }
-"""On problems whose first positions may lie anywhere in the box."""
+"""On problems whose first positions may lie anywhere in the box.
+
+Ours starts anew for each budget, because its size follows from that where there are constraints;
+without them the shorter run is the beginning of the longer one.
+"""
 
 BBOB_PEERS: dict[str, Contestant] = {
     name: Contestant(
         PEERS[name].library,
         partial(run_pymoo, partial(_started, make)),
-        starts_anew=PEERS[name].starts_anew,
+        starts_anew=PEERS[name].starts_anew and name != OURS,
     )
     for name, make in MADE.items()
 } | {"COMO-CMA-ES": PEERS["COMO-CMA-ES"]}
 """On bbob-biobj, where first positions lie in a part of the box: those that can be told so."""
 
-
-MOVES: tuple[type[Move], ...] = (Attraction, Exchange, Difference, NeighbourDifference, ModelStep)
-
-
-class _EqualSwarm(CompactSwarm):
-    """Without learning which move succeeds."""
-
-    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        super()._initialize_advance(infills, **kwargs)
-        self.success = EqualShares(len(self.moves))
-
-
-def _without(left_out: type[Move]) -> Callable[[Problem], Algorithm]:
-    """Return what makes the swarm without a move."""
-    return lambda _: CompactSwarm(moves=tuple(move() for move in MOVES if move is not left_out))
-
-
-LESS: dict[str, Callable[[Problem], Algorithm]] = {
-    **{f"without {move.__name__}": _without(move) for move in MOVES},
-    "without mutation": lambda _: CompactSwarm(mutation=NoMutation()),
-    "with equal shares of moves": lambda _: _EqualSwarm(),
-    "with quality=spread": lambda _: CompactSwarm(quality="spread"),
-}
-"""Our swarm with a part left out, told its budget, for the ablation on bbob-biobj."""
-
 ON_BBOB: dict[str, Contestant] = BBOB_PEERS | {
-    name: Contestant("pymoo_hdte", partial(run_pymoo, partial(_started, make)), starts_anew=True)
+    name: Contestant("pymoo_hdte", partial(run_pymoo, partial(_started, make)))
     for name, make in LESS.items()
 }
-"""Peers and the swarms with a part left out."""
+"""Peers on bbob-biobj, and our swarm with a part left out."""
+ON_SUITES: dict[str, Contestant] = PEERS | {
+    name: Contestant("pymoo_hdte", partial(run_pymoo, make), starts_anew=True)
+    for name, make in LESS.items()
+}
+"""The same on the other suites."""
 
 
 def takes(algorithm: str, problem: Problem) -> bool:
     """Say whether an algorithm takes the problem at all."""
-    peer = PEERS[algorithm]
+    peer = ON_SUITES[algorithm]
     return (peer.takes_constraints or not problem.has_constraints()) and (
         problem.n_obj == 2 or not peer.two_objectives_only
     )

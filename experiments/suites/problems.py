@@ -13,9 +13,9 @@ from pymoo.problems import get_problem
 
 from experiments.comparison.indicators import CORNER
 from experiments.runner.committed import committed_file, read_rows
-from experiments.suites.engineering import MEMBERS, make_engineering
-from experiments.suites.imop import imop_front, make_imop
-from experiments.suites.lz09 import lz09_front, make_lz09
+from experiments.suites.formulas.engineering import MEMBERS, make_engineering
+from experiments.suites.formulas.imop import imop_front, make_imop
+from experiments.suites.formulas.lz09 import lz09_front, make_lz09
 
 DIFFICULTY = 5
 """Of DAS-CMOP: the fifth triplet of pymoo's sixteen, which are those of its authors."""

@@ -15,7 +15,7 @@ from experiments.suites.bbob_tables import reached
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import MEASURES
 from experiments.suites.peers import OURS
-from experiments.suites.problems import SUITES
+from experiments.suites.problems import PROBLEMS, SUITES
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT, VALIDATION
 from experiments.suites.published import BEST, CITED
 
@@ -56,7 +56,7 @@ def tests(outcome: Outcome, suite: str, budget: int, measure: str) -> list[Rival
         # Ratios of distances mean the same on all problems, differences of hypervolumes do as well.
         values = np.log(values)
     return holm_against(
-        OURS, algorithms, _missing_as_ours(values, algorithms), smaller_is_better=SMALLER[measure]
+        OURS, algorithms, missing_as_ours(values, algorithms), smaller_is_better=SMALLER[measure]
     )
 
 
@@ -69,7 +69,7 @@ def can_show(problems: int, rivals: int) -> bool:
     return rivals * 2.0 ** (1 - problems) < SIGNIFICANT
 
 
-def _missing_as_ours(values: NDArray[np.float64], algorithms: Sequence[str]) -> NDArray[np.float64]:
+def missing_as_ours(values: NDArray[np.float64], algorithms: Sequence[str]) -> NDArray[np.float64]:
     """Return the values with ours in the place of those of a problem that a rival cannot take."""
     ours = values[:, [list(algorithms).index(OURS)]]
     return np.where(np.isnan(values), ours, values)
@@ -84,6 +84,23 @@ def feasible_runs(outcome: Outcome, suite: str, budget: int, algorithm: str) -> 
         for count in outcome.runs(problem, algorithm, budget, place)
     ]
     return sum(count > 0 for count in counts), len(counts)
+
+
+def feasible_beside(outcome: Outcome, suite: str, budget: int, rival: str) -> tuple[int, int, int]:
+    """Return in how many runs ours and a rival found feasible solutions, and of how many.
+
+    Of the pairs of problem and seed with which both ran.
+    """
+    place = 1 + MEASURES.index("solutions")
+    pairs = [
+        (row[place], outcome.suites[problem, rival, budget, seed][place])
+        for (problem, name, spent, seed), row in outcome.suites.items()
+        if (name, spent) == (OURS, budget)
+        and PROBLEMS[problem].suite == suite
+        and (problem, rival, budget, seed) in outcome.suites
+    ]
+    ours, theirs = (sum(count > 0 for count in counts) for counts in zip(*pairs, strict=True))
+    return ours, theirs, len(pairs)
 
 
 def ranks_tables(outcome: Outcome) -> list[Table]:

@@ -90,8 +90,8 @@ class FrontArchive:
     """Feasible, mutually non-dominated solutions of different objectives, in order of arrival.
 
     It keeps individuals, some kilobytes each, and judges them again at every update, since
-    callbacks may evaluate them again and constraint handling may grow stricter. An update reads N
-    individuals, half a microsecond each, and compares them in O(N log N) for two and three
+    callbacks may evaluate them again and constraint handling may grow stricter. An update reads the
+    members, half a microsecond each, and compares N points in O(N log N) for two and three
     objectives, N being the members and the newcomers together.
 
     Parameters
@@ -117,12 +117,15 @@ class FrontArchive:
     def __len__(self) -> int:
         return len(self.members)
 
-    def update(self, population: Population, points_of: Callable[[Population], Points]) -> None:
-        """Add an evaluated population, whose points and those of members are read by a function."""
+    def update(
+        self, population: Population, points: Points, points_of: Callable[[Population], Points]
+    ) -> None:
+        """Add an evaluated population with its points; a function reads those of the members."""
         everyone = Population.merge(self.members, population)
         if not len(everyone):
             return
-        points = points_of(everyone)
+        if len(self.members):
+            points = points_of(self.members).followed_by(points)
         kept = np.flatnonzero(points.violation == 0.0)
         if len(kept):
             kept = kept[is_nondominated(points.F[kept])]

@@ -1,4 +1,4 @@
-"""The swarm for few evaluations: small, beside an archive of all that it has found."""
+"""The swarm for few evaluations: it starts small and grows, beside an archive of all it found."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ from pymoo.core.result import Result
 from pymoo.core.sampling import Sampling
 
 from pymoo_hdte.algorithms.archive import FrontArchive
+from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.horizon import evaluation_limit
-from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
+from pymoo_hdte.algorithms.moves import Difference, Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.algorithms.survival import Quality, guests, survivors, tolerant
+from pymoo_hdte.algorithms.survival import Quality, guests, survivors
 from pymoo_hdte.checks import whole_number
 
 SMALLEST, LARGEST = 10, 100
-"""Particles of a swarm whose size follows from the budget."""
+"""Particles of a swarm that grows."""
 _AT_ONCE = 10
 """Generations after which what they found enters the archive of all."""
 
@@ -31,28 +32,31 @@ _AT_ONCE = 10
 def size_for(evaluations: float) -> int:
     """Return half the square root of a number of evaluations, within 10 and 100 particles.
 
-    Particles and generations then grow alike: 11 particles for 500 evaluations, 22 for 2,000, 50
-    for 10,000 and 79 for 25,000.
+    Particles and generations then grow alike: 11 particles after 500 evaluations, 22 after 2,000,
+    50 after 10,000 and 79 after 25,000.
     """
     return int(np.clip(np.sqrt(min(evaluations, 1e9)) / 2.0, SMALLEST, LARGEST).round())
 
 
 class CompactSwarm(ElitistSwarm):
-    """An `ElitistSwarm` whose size follows from the budget, and whose result does not.
+    """An `ElitistSwarm` that starts small and grows, and whose result does not depend on its size.
 
-    With few evaluations a small swarm has more generations than a large one. All that it finds is
-    offered to two archives: the result, which `quality` thins out in every generation, and
-    `archive_all`. Moves and mutation are those of `ElitistSwarm`; added are a move among
-    neighbours, `NeighbourDifference`, and one by quadratic models of the objectives, `ModelStep`,
-    for variables that depend on each other, and infeasible particles that stay beside the feasible
-    ones.
+    A small swarm comes near the front with few evaluations, a large one spreads along it. As the
+    size follows from the evaluations made so far, no budget has to be known: a run may be stopped
+    or continued at any time. All that it finds is offered to two archives: the result, which
+    `quality` thins out in every generation, and `archive_all`. Moves and mutation are those of
+    `ElitistSwarm`, but for `Attraction`; added are a move among neighbours, `NeighbourDifference`,
+    and one by quadratic models of the objectives, `ModelStep`, for variables that depend on each
+    other, and infeasible particles that stay beside the feasible ones.
 
     Parameters
     ----------
     pop_size : int, optional
-        Number of particles, at least 2. By default half the square root of the number of
-        evaluations that the termination allows, within 10 and 100; 100 if it names none, and as
-        many as ``sampling`` has where that is an array or a Population.
+        Number of particles, at least 2, which stays if it is given here or by an array or a
+        Population as ``sampling``. By default half the square root of the number of evaluations
+        made so far, within 10 and 100; with constraints, of the number that the termination
+        allows, from the beginning (100 if it names none), because a few particles would settle on
+        one side of an infeasible gap.
     n_result : int
         Largest number of solutions in the result, at least 1.
     n_archive : int
@@ -61,7 +65,7 @@ class CompactSwarm(ElitistSwarm):
     quality : "spread", "hypervolume" or callable
         As of `ElitistSwarm`, for the swarm and for the result.
     sampling, moves, **kwargs
-        As of `ElitistSwarm`; by default the three moves there, `NeighbourDifference` and
+        As of `ElitistSwarm`; by default `Exchange`, `Difference`, `NeighbourDifference` and
         `ModelStep`.
 
     Raises
@@ -83,10 +87,7 @@ class CompactSwarm(ElitistSwarm):
       best in objectives and violation together (Singh, Isaacs, Ray, Smith 2008), who may cross a
       gap between feasible regions;
     - as long as nothing is feasible, the less infeasible half of the swarm leads;
-    - for the others, violations up to 0.9 of the swarm's median count as none, which shrinks to
-      nothing as the swarm follows: an epsilon level (Takahama, Sakai 2006) without a schedule, for
-      regions as thin as equality constraints make them. The result is feasible as pymoo defines it,
-      with equalities met to 1e-4;
+    - the result is feasible as pymoo defines it, with equalities met to 1e-4;
     - the models know objectives only: with constraints they led away from feasible regions (MW:
       feasible in 26 of 29 runs in place of 29), so that `ModelStep` is not among the moves there
       unless ``moves`` names it;
@@ -107,8 +108,6 @@ class CompactSwarm(ElitistSwarm):
 
     GUESTS = 0.2
     """Share of the swarm's places for infeasible particles."""
-    TOLERATED = 0.9
-    """Share of the swarm's median violation that counts as none: it shrinks along with it."""
 
     def __init__(
         self,
@@ -125,10 +124,10 @@ class CompactSwarm(ElitistSwarm):
             pop_size = len(sampling)
         self._by_problem = moves is None
         if moves is None:
-            moves = (Attraction(), Exchange(), Difference(), NeighbourDifference(), ModelStep())
+            moves = (Exchange(), Difference(), NeighbourDifference(), ModelStep())
         size = LARGEST if pop_size is None else pop_size
         super().__init__(size, sampling=sampling, moves=moves, quality=quality, **kwargs)
-        self._by_budget = pop_size is None
+        self._by_budget, self._grows, self._spent = pop_size is None, False, 0
         self.n_result = whole_number("n_result", n_result, at_least=1)
         self.n_archive = whole_number("n_archive", n_archive, at_least=self.n_result)
         # Thinning out a thousand takes longer than a generation: a quarter at once makes it rare.
@@ -137,62 +136,68 @@ class CompactSwarm(ElitistSwarm):
         self._waiting: list[Population] = []
 
     def _plan(self) -> None:
-        # A running swarm goes on as it is when it is given more evaluations.
-        if self._by_budget and not self.is_initialized:
-            self.pop_size = size_for(evaluation_limit(self.termination))
-        if self._by_problem and not self.is_initialized and self.problem.has_constraints():
+        if self.is_initialized:
+            return
+        constrained = self.problem.has_constraints()
+        self._grows = self._by_budget and not constrained
+        if self._by_budget:
+            allowed = evaluation_limit(self.termination) if constrained else 0.0
+            self.pop_size = size_for(allowed)
+        if self._by_problem and constrained:
             self.moves = tuple(move for move in self.moves if not isinstance(move, ModelStep))
 
     def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         super()._initialize_advance(infills, **kwargs)
         self._learners = [move for move in self.moves if isinstance(move, ModelStep)]
         lowest, highest = self.problem.bounds()
+        points = self._points(self.pop)
         for move in self._learners:
             move.forget(highest - lowest)
-            move.learn(self._points(self.pop))
-        self._remember(self.pop)
+            move.learn(points)
+        self._spent = len(points)
+        self._remember(self.pop, points)
 
-    def _remember(self, population: Population) -> None:
-        self._offered.update(population, self._points)
-        self._waiting.append(population)
+    def _note(self, everyone: Population, points: Points) -> None:
+        self._spent += len(self.chosen)
+        if self._grows:
+            self.pop_size = size_for(self._spent)
+        for move in self._learners:
+            move.learn(points[-len(self.chosen) :])
+        # Callbacks may have put in individuals that nobody asked for.
+        self._remember(everyone, points)
+
+    def _remember(self, population: Population, points: Points) -> None:
+        front = best_front(points)
+        self._offered.update(population[front], points[front], self._points)
+        if len(front):
+            self._waiting.append(population[front])
         if len(self._waiting) == _AT_ONCE:
-            self._found.update(self._not_yet_found(), self._points)
+            self._enter(self._found)
             self._waiting = []
 
-    def _not_yet_found(self) -> Population:
-        return Population.merge(Population.empty(), Population.empty(), *self._waiting)
-
-    def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        former = self.pop
-        super()._advance(infills, **kwargs)
-        for move in self._learners:
-            move.learn(self._points(infills))
-        # Callbacks may have put in individuals that nobody asked for.
-        self._remember(Population.merge(former, infills))
+    def _enter(self, archive: FrontArchive) -> None:
+        """Offer to an archive what waits for it."""
+        if self._waiting:
+            waiting = Population.merge(Population.empty(), Population.empty(), *self._waiting)
+            archive.update(waiting, self._points(waiting), self._points)
 
     def _front(self, swarm: Points) -> Points:
         if np.any(swarm.violation == 0.0):
-            return super()._front(tolerant(swarm, self._level(swarm)))
+            return super()._front(swarm)
         judged = swarm[np.flatnonzero(np.isfinite(swarm.violation))]
         return judged[np.argsort(judged.violation, kind="stable")[: max(1, len(judged) // 2)]]
 
     def _survivors(self, points: Points) -> NDArray[np.int_]:
-        points = tolerant(points, self._level(points[np.arange(len(points) - len(self.chosen))]))
         # A callback may have left few particles: not all of them are guests.
         invited = guests(points, min(int(self.GUESTS * self.pop_size), len(points) - 1))
-        others = np.setdiff1d(np.arange(len(points)), invited)
+        others = np.delete(np.arange(len(points)), invited)
         kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
         return np.sort(np.concatenate([invited, others[kept]]))
-
-    def _level(self, swarm: Points) -> float:
-        """Return the violation that is tolerated: none once half of the swarm is feasible."""
-        level = self.TOLERATED * float(np.median(swarm.violation))
-        return level if np.isfinite(level) else 0.0
 
     def archive_all(self) -> Population:
         """Return all non-dominated feasible solutions found, at most ``n_archive``, thinned out."""
         found = copy(self._found)
-        found.update(self._not_yet_found(), self._points)
+        self._enter(found)
         return found.members.copy()
 
     def _set_optimum(self) -> None:

@@ -179,11 +179,16 @@ class ElitistSwarm(Swarm):
 
     def _advance(self, infills: Population | None = None, **kwargs: Any) -> None:
         points = self._points(self.pop).followed_by(self._evaluated(infills))
+        everyone = Population.merge(self.pop, infills)
+        self._note(everyone, points)
         kept = self._survivors(points)
         survived = np.zeros(len(points), dtype=bool)
         survived[kept] = True
         self.success.learn(self.chosen, survived[-len(self.chosen) :])
-        self.pop = Population.merge(self.pop, infills)[kept]
+        self.pop = everyone[kept]
+
+    def _note(self, everyone: Population, points: Points) -> None:
+        """Take down what a swarm needs of old and new particles, before it chooses."""
 
     def _set_optimum(self) -> None:
         # pymoo reads the optimum in every generation, even if nothing could be judged so far.

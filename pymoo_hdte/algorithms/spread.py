@@ -25,8 +25,13 @@ def most_spread(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
         return np.arange(n)
     span = np.ptp(F, axis=0)
     scaled = (F - F.min(axis=0)) / np.where(span > 0, span, 1.0)
-    kept = _kept if COMPILES else _kept_in_numpy
-    return np.flatnonzero(kept(scaled, size))
+    if not COMPILES:
+        return np.flatnonzero(_kept_in_numpy(scaled, size))
+    if F.shape[1] == 2:
+        order = np.lexsort(scaled.T[::-1])
+        if np.all(np.diff(scaled[order, 1]) <= 0.0):
+            return np.sort(order[_kept_of_chain(scaled[order], order, size)])
+    return np.flatnonzero(_kept(scaled, size))
 
 
 @compiled
@@ -48,6 +53,70 @@ def _kept(scaled: NDArray[np.float64], size: int) -> NDArray[np.bool_]:
             if stays[row] and (neighbours[row, 0] == leaving or neighbours[row, 1] == leaving):
                 _find_neighbours(scaled, stays, neighbours, gaps, row)
     return stays
+
+
+@compiled
+def _kept_of_chain(
+    scaled: NDArray[np.float64], number: NDArray[np.int_], size: int
+) -> NDArray[np.bool_]:
+    """Say the same of rows that ascend in one objective and descend in the other.
+
+    There the nearest of all are the nearest along the chain. Rows are called ``number``.
+    """
+    n = len(scaled)
+    stays = np.ones(n, dtype=np.bool_)
+    before, after = np.arange(-1, n - 1), np.arange(1, n + 1)
+    gaps = np.empty((n, 2))
+    for row in range(n):
+        _measure(scaled, before, after, gaps, row)
+    for _ in range(n - size):
+        leaving = -1
+        for row in range(n):
+            if stays[row] and (
+                leaving < 0
+                or _closer(gaps, row, leaving)
+                or (not _closer(gaps, leaving, row) and number[row] < number[leaving])
+            ):
+                leaving = row
+        stays[leaving] = False
+        lower, upper = before[leaving], after[leaving]
+        if lower >= 0:
+            after[lower] = upper
+        if upper < n:
+            before[upper] = lower
+        for _ in range(2):
+            if lower >= 0:
+                _measure(scaled, before, after, gaps, lower)
+                lower = before[lower]
+            if upper < n:
+                _measure(scaled, before, after, gaps, upper)
+                upper = after[upper]
+    return stays
+
+
+@compiled
+def _measure(
+    scaled: NDArray[np.float64],
+    before: NDArray[np.int_],
+    after: NDArray[np.int_],
+    gaps: NDArray[np.float64],
+    row: int,
+) -> None:
+    """Write the two least squared distances of a row to two rows on either side."""
+    least, second = np.inf, np.inf
+    lower, upper = row, row
+    for _ in range(2):
+        lower = before[lower] if lower >= 0 else lower
+        upper = after[upper] if upper < len(scaled) else upper
+        for other in (lower, upper):
+            if 0 <= other < len(scaled):
+                distance = (scaled[row, 0] - scaled[other, 0]) ** 2
+                distance += (scaled[row, 1] - scaled[other, 1]) ** 2
+                if distance < least:
+                    least, second = distance, least
+                elif distance < second:
+                    second = distance
+    gaps[row, 0], gaps[row, 1] = least, second
 
 
 @compiled

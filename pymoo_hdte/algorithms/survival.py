@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -73,11 +72,6 @@ def guests(points: Points, size: int) -> NDArray[np.int_]:
     keys = np.column_stack([points.F[rows], points.violation[rows]])
     free = Points(points.X[rows], keys, np.zeros(len(rows)))
     return rows[survivors(free, size)]
-
-
-def tolerant(points: Points, level: float) -> Points:
-    """Return the points with violations up to a level counted as none."""
-    return replace(points, violation=np.where(points.violation <= level, 0.0, points.violation))
 
 
 def _copies(points: Points) -> NDArray[np.bool_]:

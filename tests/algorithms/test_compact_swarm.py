@@ -18,6 +18,7 @@ from swarm_problems import Cliff, Parabolas, Unreachable, assert_clean_front, di
 
 from experiments.contest.moved_zdt import MovedZDT
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
+from pymoo_hdte.algorithms.compact import size_for
 from pymoo_hdte.algorithms.moves import Attraction
 from pymoo_hdte.algorithms.quadratic import ModelStep
 from pymoo_hdte.checks import InvalidInput
@@ -61,7 +62,9 @@ def test_few_evaluations_are_spent_better_than_by_a_large_swarm():
 def test_the_result_comes_from_all_that_was_found(name):
     result = run(name, 3000)
     swarm, everything = result.algorithm, result.algorithm.archive_all()
-    assert len(swarm.pop) == swarm.pop_size == 27
+    # With constraints the size stays, of the 3,000 evaluations that the termination allows.
+    size = size_for(3000 if name == "tnk" else swarm.evaluator.n_eval)
+    assert len(swarm.pop) == swarm.pop_size == size
     assert len(result.F) == min(100, len(everything))
     assert_clean_front(result)
     F = everything.get("F")
@@ -104,18 +107,39 @@ def test_quality_decides_what_is_offered():
 
 
 @pytest.mark.parametrize(
-    ("termination", "kwargs", "size"),
+    ("kwargs", "first", "last"),
     [
-        (("n_eval", 2000), {}, 22),
-        (("n_eval", 2000), {"pop_size": 40}, 40),
-        (("n_gen", 4), {}, 100),
-        (("n_gen", 4), {"sampling": np.zeros((7, 3))}, 7),
+        ({}, 10, 22),
+        ({"n_offsprings": 1}, 10, 22),
+        ({"pop_size": 40}, 40, 40),
+        ({"sampling": np.zeros((7, 3))}, 7, 7),
     ],
 )
-def test_the_size_of_the_swarm_follows_from_the_budget(termination, kwargs, size):
-    swarm = CompactSwarm(**kwargs).setup(Parabolas(), termination=termination, seed=1)
+def test_the_swarm_grows_unless_its_size_is_given(kwargs, first, last):
+    swarm = CompactSwarm(**kwargs).setup(Parabolas(), termination=("n_eval", 2000), seed=1)
     swarm.next()
-    assert len(swarm.pop) == swarm.pop_size == size
+    assert len(swarm.pop) == first
+    swarm.run()
+    assert len(swarm.pop) == swarm.pop_size == last
+
+
+@pytest.mark.parametrize(("termination", "size"), [(("n_eval", 2000), 22), (("n_gen", 4), 100)])
+def test_with_constraints_the_size_follows_from_the_budget(termination, size):
+    swarm = CompactSwarm().setup(get_problem("tnk"), termination=termination, seed=1)
+    for _ in range(3):
+        swarm.next()
+        assert len(swarm.pop) == swarm.pop_size == size
+
+
+def test_a_run_does_not_depend_on_the_budget_it_was_told():
+    short, long = (
+        CompactSwarm().setup(get_problem("zdt1"), termination=("n_eval", told), seed=1)
+        for told in (400, 4000)
+    )
+    short.run()
+    while long.evaluator.n_eval < short.evaluator.n_eval:
+        long.next()
+    assert digest(short.result()) == digest(long.result())
 
 
 # --- constraints ----------------------------------------------------------------------------------
@@ -268,12 +292,12 @@ def test_a_copy_taken_anywhere_goes_on_alike(problem, clone):
     assert digest(swarm.result()) == digest(uninterrupted)
 
 
-def test_more_evaluations_go_on_with_the_swarm_as_it_is():
+def test_with_more_evaluations_the_swarm_goes_on_growing():
     first = run("zdt1", 500).algorithm
     first.setup(first.problem, termination=("n_eval", 2000), seed=1)
     first.run()
-    assert first.pop_size == 11
     assert first.evaluator.n_eval >= 2000
+    assert first.pop_size == size_for(first.evaluator.n_eval)
 
 
 @pytest.mark.parametrize("argument", ["n_result", "n_archive", "n_offsprings"])

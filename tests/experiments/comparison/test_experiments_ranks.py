@@ -22,7 +22,7 @@ from experiments.comparison.ranks import (
     rank_intervals,
 )
 from experiments.comparison.ranks_figures import critical_difference_plot, rank_heatmap
-from experiments.comparison.rivals import holm_against, outcomes, win_tie_loss
+from experiments.comparison.rivals import holm_against, outcomes, signs_against, win_tie_loss
 from pymoo_hdte.checks import InvalidInput
 
 # Areas under the curve, J. Mach. Learn. Res. 7 (2006), Table 6. The last row but one is printed as
@@ -248,6 +248,21 @@ class TestAgainstAControl:
         assert holm_against("a", NAMES[:2], with_failures, smaller_is_better=True) == holm_against(
             "a", NAMES[:2], values, smaller_is_better=True
         )
+
+    def test_signs_count_problems_and_not_how_far_apart_they_are(self):
+        """Of nine problems that differ eight are won: p = 2 (1 + 9) / 2^9; the second is lost."""
+        gains = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, -100.0, 0.0])
+        values = np.column_stack([0 * gains, gains, -np.abs(gains)])
+        first, second = signs_against("a", NAMES[:3], values, smaller_is_better=True)
+        assert first.p == pytest.approx(2 * 10 / 2**9)
+        assert second.p == pytest.approx(2 * 2 / 2**9)
+        assert (first[2:], second[2:]) == ((8, 1, True), (0, 9, False))
+        scaled = np.column_stack([0 * gains, gains**3, -np.abs(gains)])
+        assert signs_against("a", NAMES[:3], scaled, smaller_is_better=True) == [first, second]
+
+    def test_without_a_difference_signs_show_nothing(self):
+        (test,) = signs_against("a", NAMES[:2], np.ones((5, 2)), smaller_is_better=True)
+        assert test[1:] == (1.0, 0, 0, False)
 
     @pytest.mark.parametrize(
         ("control", "names"), [("z", NAMES[:3]), ("a", NAMES[:2]), ("a", ("a", "a", "b"))]

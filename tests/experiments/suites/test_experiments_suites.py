@@ -13,13 +13,15 @@ from experiments.suites.bbob_tables import duels, reached
 from experiments.suites.coco import MARKS
 from experiments.suites.data import Outcome, bbob_text, outcome_for, read_outcome, suites_text
 from experiments.suites.demands import demands, in_one_sentence
-from experiments.suites.gather import gathered
 from experiments.suites.jobs import BbobRun
+from experiments.suites.parts import part_tests, parts_table
 from experiments.suites.peers import OURS
 from experiments.suites.problems import SUITES
-from experiments.suites.protocol import FULL, SHARES, STORED
+from experiments.suites.protocol import BESIDE_PEERS, FULL, OF_PARTS, SHARES, STORED
 from experiments.suites.published import BEST, CITED, curves
-from experiments.suites.suite_tables import feasible_runs, ranks
+from experiments.suites.reduced import WHOLE
+from experiments.suites.suite_tables import feasible_beside, feasible_runs, ranks
+from experiments.suites.together import ranks_together, signs_together
 
 RIVALS = ("NSGA-II", "SMS-EMOA", "C-TAEA")
 
@@ -34,10 +36,9 @@ def planted(gain):
             row = (10_000.0, round(value, 4), round(1.0 - value, 4), solutions)
             outcome.suites[one.name, name, 10_000, seed] = row
     for dimension, function, name in product((10, 20), range(1, 56), (OURS, "NSGA-II")):
-        for told in (10_000, 25_000) if name == OURS else (25_000,):
-            share = 0.35 + 0.01 * rng.random() + gain * (name == OURS)
-            run = BbobRun(function, dimension, 3, name, told)
-            outcome.bbob[run] = {mark: round(share, 4) for mark in MARKS if mark <= told}
+        share = 0.35 + 0.01 * rng.random() + gain * (name == OURS)
+        run = BbobRun(function, dimension, BESIDE_PEERS, name, 25_000)
+        outcome.bbob[run] = {mark: round(share, 4) for mark in MARKS if mark <= 25_000}
     return outcome
 
 
@@ -75,7 +76,7 @@ def test_what_falls_short_comes_first():
 
 def test_duels_compare_the_same_problems():
     outcome = planted(0.2)
-    del outcome.bbob[BbobRun(7, 10, 3, "NSGA-II", 25_000)]
+    del outcome.bbob[BbobRun(7, 10, BESIDE_PEERS, "NSGA-II", 25_000)]
     (duel,) = duels(outcome, 10_000)
     assert (duel.rival, duel.problems, duel.test.better, duel.test.worse) == (
         "NSGA-II",
@@ -117,11 +118,48 @@ def test_published_curves_are_read(tmp_path):
     }
 
 
-def test_only_whole_groups_are_gathered(tmp_path):
-    first, second = [*STORED[1].groups()]
-    for job in [*first, *second[1:]]:
-        (tmp_path / f"{job.key}.csv").write_text("evaluations,share\n100,0.5\n")
-    assert set(gathered(tmp_path).bbob) == set(first)
+def test_a_rival_with_more_seeds_is_compared_on_those_of_ours():
+    outcome = planted(0.2)
+    before = outcome.medians("MW", 10_000, "hypervolume", RIVALS)
+    for one in SUITES["MW"]:
+        outcome.suites[one.name, "NSGA-II", 10_000, 3] = 10_000.0, 9.0, 0.0, 100.0
+        outcome.suites[one.name, "NSGA-II", 25_000, 3] = 25_000.0, 9.0, 0.0, 100.0
+    np.testing.assert_array_equal(outcome.medians("MW", 10_000, "hypervolume", RIVALS), before)
+    assert feasible_beside(outcome, "MW", 10_000, "NSGA-II") == (28, 28, 28)
+    # Nobody is compared where ours was not run.
+    assert outcome.budgets("MW") == [10_000]
+    assert outcome.seeds("MW") == 2
+
+
+def test_ours_is_counted_on_the_seeds_of_a_rival_that_has_fewer():
+    outcome = planted(-0.2)
+    for one in SUITES["MW"]:
+        del outcome.suites[one.name, "C-TAEA", 10_000, 2]
+    assert feasible_beside(outcome, "MW", 10_000, "C-TAEA") == (0, 14, 14)
+
+
+def test_a_rival_that_was_not_run_is_neither_beaten_nor_not():
+    outcome = planted(0.2).without(["SMS-EMOA", "C-TAEA"])
+    found = {demand.asked: demand.met for demand in demands(outcome)}
+    assert found["RE: no worse than SMS-EMOA, hypervolume"] is None
+    assert found["MW: feasible in as many runs as C-TAEA"] is None
+    assert found["MW: feasible in as many runs as NSGA-II"] is True
+    alone = {demand.asked: demand.met for demand in demands(outcome.without(["NSGA-II"]))}
+    assert alone["MW: first by hypervolume"] is None
+
+
+def test_all_held_out_suites_together():
+    outcome = planted(0.2)
+    assert ranks_together(outcome, 10_000) == {OURS: 1.0, "NSGA-II": 2.0}
+    (test,) = signs_together(outcome, 10_000)
+    assert (test.better, test.worse, test.beaten) == (118, 0, True)
+    (test,) = signs_together(planted(-0.2), 10_000)
+    assert (test.better, test.worse, test.beaten) == (0, 118, False)
+    # IMOP was not run there.
+    assert signs_together(outcome, 500) == []
+    # One that lacks a problem of either suite is not ranked over the others.
+    del outcome.bbob[BbobRun(7, 10, BESIDE_PEERS, "NSGA-II", 25_000)]
+    assert ranks_together(outcome, 10_000) == {}
 
 
 def test_one_that_was_not_run_on_a_problem_is_not_ranked_last_there():
@@ -131,9 +169,32 @@ def test_one_that_was_not_run_on_a_problem_is_not_ranked_last_there():
     assert "NSGA-II" not in ranks(outcome, "IMOP", 10_000, "hypervolume")
 
 
+def test_parts_that_help_are_told_from_those_that_do_not(rng):
+    outcome = Outcome()
+    for dimension, function in product((10, 20), range(1, 56)):
+        whole = dict.fromkeys((500, 2000, 10_000), rng.random())
+        less = {mark: share - 0.1 * (mark == 500) for mark, share in whole.items()}
+        other = {mark: share + 0.1 * rng.standard_normal() for mark, share in whole.items()}
+        for name, shares in (
+            (WHOLE, whole),
+            ("without ModelStep", less),
+            ("without mutation", other),
+        ):
+            outcome.bbob[BbobRun(function, dimension, OF_PARTS, name, 10_000)] = shares
+    for one, name in product(SUITES["MW"], (OURS, WHOLE, "without guests")):
+        outcome.suites[one.name, name, 10_000, 1] = 10_000.0, 0.5 + 0.1 * (name == WHOLE), 0.1, 9.0
+    helps = {(one.part, one.evaluations): one.helps for one in part_tests(outcome)}
+    assert helps == {
+        **{("without ModelStep", n): n == 500 for n in (500, 2000, 10_000)},
+        **{("without mutation", n): False for n in (500, 2000, 10_000)},
+        ("without guests", 10_000): True,
+    }
+    assert len(parts_table(outcome).rows) == len(helps)
+
+
 def test_the_whole_has_what_is_stored_and_more():
     stored, whole = ({job.key for part in parts for job in part.jobs()} for parts in (STORED, FULL))
-    assert len(whole) > 10 * len(stored)
+    assert len(whole) > 5 * len(stored)
     assert all(run.key in stored for run in BBOB_RUNS)
 
 
@@ -149,9 +210,9 @@ def test_the_stored_outcome_gives_the_report_and_repeats(tmp_path):
 
 def test_shares_of_the_stored_outcome_are_of_all_functions():
     outcome = outcome_for(Context(1, None, None))
-    problems = set(product(range(1, 56), (6,)))
+    problems = set(product(range(1, 56), (BESIDE_PEERS,)))
     for dimension in (10, 20):
-        place = dimension, OURS, 10_000
+        place = dimension, OURS, 25_000
         ran = [run for run in outcome.bbob if (run.dimension, run.algorithm, run.told) == place]
         assert {(run.function, run.instance) for run in ran} >= problems
         assert 0.0 < reached(outcome, dimension, 10_000) < 1.0

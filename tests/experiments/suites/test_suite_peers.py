@@ -10,6 +10,7 @@ from experiments.suites.coco import MARKS, TARGETS, shares
 from experiments.suites.jobs import BbobRun, SuiteRun, measured
 from experiments.suites.peers import BBOB_PEERS, OURS, PEERS, takes
 from experiments.suites.problems import front_of, problem_of
+from pymoo_hdte.checks import InvalidInput
 
 
 @pytest.fixture(
@@ -95,3 +96,9 @@ def test_a_run_is_judged_at_each_of_its_budgets():
     assert run.columns[:2] == ("evaluations", "spent")
     assert run.values[:, :2].tolist() == [[200, 200], [400, 400]]
     assert run.values[1, 2] >= run.values[0, 2]
+
+
+def test_an_instance_without_targets_is_refused():
+    pytest.importorskip("cocoex")
+    with pytest.raises(InvalidInput, match="instance is 11"):
+        coco.shares_of_run(1, 5, 11, lambda problem: None)

@@ -5,10 +5,10 @@ import pytest
 from moocore import is_nondominated
 
 from experiments.runner.committed import DATA, read_rows
-from experiments.suites import lz09
-from experiments.suites.engineering import MEMBERS, make_engineering
-from experiments.suites.imop import N_PLACES, imop_front, make_imop
-from experiments.suites.lz09 import lz09_front, make_lz09
+from experiments.suites.formulas import lz09
+from experiments.suites.formulas.engineering import MEMBERS, make_engineering
+from experiments.suites.formulas.imop import N_PLACES, imop_front, make_imop
+from experiments.suites.formulas.lz09 import lz09_front, make_lz09
 
 
 def optimal_imop(number, n):

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.suites.plain_problem import PlainProblem
+from experiments.suites.formulas.plain_problem import PlainProblem
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pymoo.util.ref_dirs import get_reference_directions
 
 from experiments.comparison.quality import N_POINTS, even_curve
-from experiments.suites.plain_problem import PlainProblem
+from experiments.suites.formulas.plain_problem import PlainProblem
 
 Array = NDArray[np.float64]
 

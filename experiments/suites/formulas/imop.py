@@ -17,7 +17,7 @@ from moocore import is_nondominated
 from numpy.typing import NDArray
 
 from experiments.comparison.quality import N_POINTS, even_curve
-from experiments.suites.plain_problem import PlainProblem
+from experiments.suites.formulas.plain_problem import PlainProblem
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Problems of suites, written from the formulas of their papers."""
