@@ -35,10 +35,10 @@ SETTING = (
     f"{OURS} runs as it is, all others as their users run them, with a population of 100; those "
     "that move alike whatever their budget are read on the way to the largest, on bbob-biobj "
     f"{OURS} among them. There COCO's logger counts every evaluated point; first positions are "
-    "drawn from -5 to 5. Elsewhere at most 100 solutions are judged, more are thinned out by what they "
-    "add to the hypervolume, which counts up to 1.1 in objectives normalised by the true front, "
-    "or, where that has no closed form (RE, MW, DAS-CMOP), by the ends of the best found in long "
-    "runs. Ranks are those of medians over the seeds."
+    "drawn from -5 to 5. Elsewhere at most 100 solutions are judged, more are thinned out by what "
+    "they add to the hypervolume, which counts up to 1.1 in objectives normalised by the true "
+    "front, or, where that has no closed form (RE, MW, DAS-CMOP), by the ends of the best found in "
+    "long runs. Ranks are those of medians over the seeds."
 )
 SETS = (
     "Held out, and run once after the protocol had been committed: all 55 functions of bbob-biobj "
