@@ -55,12 +55,13 @@ def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
 def unit_of_number(mechanism: Mechanism, name: str, number: str, unit: str) -> str:
     """Return the unit of a number of an effect by its name: a phase is an angle everywhere.
 
-    The order of a ripple counts its periods in a turn, or in a length.
+    A ripple is ``cos(order * position + phase)``: over an angle its order is a pure number, the
+    periods in a turn; over a length it is the phase per length, 2 pi over the period.
     """
     if number.endswith("phase"):
         return "rad"
     if number == "order" and unit_of(mechanism, name, "position") != "rad":
-        return "1/m" if unit_of(mechanism, name, "position") == "m" else "SI"
+        return "rad/m" if unit_of(mechanism, name, "position") == "m" else "SI"
     return unit_at(mechanism, name, unit)
 
 

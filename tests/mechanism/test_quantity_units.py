@@ -21,7 +21,7 @@ def one_coordinate(angles):
     ("angles", "units"),
     [
         (("q",), {"order": "1", "amplitude": "N.m", "phase": "rad"}),
-        ((), {"order": "1/m", "amplitude": "N", "phase": "rad"}),
+        ((), {"order": "rad/m", "amplitude": "N", "phase": "rad"}),
         (None, {"order": "SI", "amplitude": "SI", "phase": "rad"}),
     ],
 )
