@@ -77,11 +77,13 @@ def _of_a_length(unit: str) -> str:
 
 def _turning(mechanism: Mechanism, name: str) -> bool | None:
     """Tell whether a coordinate or port turns; None where its forces or motion have no unit."""
-    if mechanism.angles is None or any(not one.scaled for one in mechanism.inputs):
+    angles, lengths = mechanism.angles or (), mechanism.lengths or ()
+    if any(not one.scaled for one in mechanism.inputs):
         return None
     moved = [name]
     if name in mechanism.port_names:
         port = mechanism.port(name)
         moved = [one for one, share in port.motion.items() if share] + [*port.followed]
-    turning = [one in mechanism.angles for one in moved]
-    return None if any(turning) != all(turning) else all(turning)
+    if all(one in angles for one in moved):
+        return True
+    return False if all(one in lengths for one in moved) else None
