@@ -173,7 +173,9 @@ def headline(found: Identification) -> str:
         low, high = one.interval
         unit, half = unit_of(one.name), 50.0 * (high - low)
         words = f"{one.name} {number(one.value, digits(low, high))} {unit}"
-        said.append(f"{words} ± {number(half / abs(one.value), 2)} %" if one.value else words)
+        said.append(
+            f"{words} ± {number(half / abs(one.value), 2)} % (95 %)" if one.value else words
+        )
     if found.errors is not None:
         symbols = ", ".join(found.errors.symbols)
         said.append(f"mean and scatter of the component errors {symbols}")
