@@ -39,7 +39,18 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def change(percent: float) -> str:
-    """Return a relative change with its sign, in per cent: ``-25.0`` is "−25.0 %"."""
+    """Return a relative change with its sign.
+
+    Parameters
+    ----------
+    percent : float
+        100 times the relative change.
+
+    Examples
+    --------
+    >>> change(-25.0), change(3.14)
+    ('−25.0 %', '+3.1 %')
+    """
     return f"{percent:+.1f} %".replace("-", "\N{MINUS SIGN}")
 
 
