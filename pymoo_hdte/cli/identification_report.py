@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.cli.identification import LOOPS, Identification, Parameter
 from pymoo_hdte.drive import DataSheet
-from pymoo_hdte.drive.datasheet import LARGEST_TWIST, NOMINAL_FIELDS, unit_of
+from pymoo_hdte.drive.datasheet import NOMINAL_FIELDS, unit_of
+from pymoo_hdte.drive.datasheet_file import check_twist
 from pymoo_hdte.drive.toml_text import sheet_toml
 from pymoo_hdte.identification import ErrorStatistics, hysteresis_width, lost_energy
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
@@ -84,16 +84,10 @@ def check_filled_in(found: Identification, sheet: DataSheet) -> None:
     Raises
     ------
     InvalidInput
-        If it is twisted by more than `LARGEST_TWIST`.
+        As `check_twist`.
     """
-    stiffness = identified_sheet(found, sheet).nominal.stiffness
-    if sheet.load_torque > LARGEST_TWIST * stiffness:
-        allowed = (
-            f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load of the "
-            f"data sheet would twist the drive by more than {LARGEST_TWIST:g} rad. Likely "
-            "torque_Nm or torsion_arcsec is in another unit"
-        )
-        raise InvalidInput(f"{LOOPS}: stiffness", float(f"{stiffness:.4g}"), allowed)
+    cause = "likely torque_Nm or torsion_arcsec is in another unit"
+    check_twist(identified_sheet(found, sheet), f"{LOOPS}: stiffness", cause)
 
 
 def identification_document(found: Identification, sheet: DataSheet | None) -> dict[str, Any]:
@@ -173,7 +167,9 @@ def headline(found: Identification) -> str:
         low, high = one.interval
         unit, half = unit_of(one.name), 50.0 * (high - low)
         words = f"{one.name} {number(one.value, digits(low, high))} {unit}"
-        said.append(f"{words} ± {number(half / abs(one.value), 2)} %" if one.value else words)
+        said.append(
+            f"{words} ± {number(half / abs(one.value), 2)} % (95 %)" if one.value else words
+        )
     if found.errors is not None:
         symbols = ", ".join(found.errors.symbols)
         said.append(f"mean and scatter of the component errors {symbols}")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pymoo_hdte.cli.command import heading
-from pymoo_hdte.discrepancy.drive.plan.plan import Plan
+from pymoo_hdte.discrepancy.drive.plan.plan import Plan, chance_words
 from pymoo_hdte.io.toml import toml_text
 from pymoo_hdte.reports.folder import PAGE_FILE, ReportFolder
 from pymoo_hdte.reports.html import page
@@ -46,9 +46,7 @@ def _at_port(effect: str) -> str:
 
 
 def _chance(power: float | None) -> str:
-    if power is None:
-        return ""
-    return "over 99 %" if power > 0.99 else f"{100.0 * power:.0f} %"
+    return "" if power is None else chance_words(power)
 
 
 def weakest(document: dict[str, Any]) -> list[dict[str, Any]]:
@@ -77,8 +75,8 @@ def plan_table(document: dict[str, Any], out: Path) -> list[str]:
             torque = one["largest_torque_Nm"]
             lines.append(f"{one['role']:9} {'':8} {torque:8.4g} {'':7}  torsion sweep")
     widest = max((len(one["effect"]) for one in document["effect"]), default=6)
-    lines += ["", f"{'effect':{widest}}  shown  apart  from"]
+    lines += ["", f"{'effect':{widest}}  {'shown':>13}  {'apart':>13}  from"]
     for row in weakest(document):
-        apart = f"{'':5}" if row["apart"] is None else f"{row['apart']:5.2f}"
-        lines.append(f"{row['effect']:{widest}}  {row['power']:5.2f}  {apart}  {row['rival']}")
+        shown, apart = _chance(row["power"]), _chance(row["apart"])
+        lines.append(f"{row['effect']:{widest}}  {shown:>13}  {apart:>13}  {row['rival']}")
     return [*lines, "", *document["limits"], f"Report: {out / PAGE_FILE}"]

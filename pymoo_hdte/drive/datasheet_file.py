@@ -65,7 +65,7 @@ def load_datasheet(path: str | Path) -> DataSheet:
     with toml_with_lines(Path(path)) as top:
         try:
             sheet = datasheet_from_fields(top)
-            _check_twist(sheet)
+            check_twist(sheet)
         except InvalidInput as error:
             if error.field.startswith(f"{file}."):
                 raise
@@ -128,15 +128,33 @@ def hs_20_100() -> DataSheet:
         return load_datasheet(path)
 
 
-def _check_twist(sheet: DataSheet) -> None:
-    """Refuse a stiffness that the rated load would twist as no drive can bear."""
+def check_twist(sheet: DataSheet, field: str = "stiffness", cause: str = LOST_POWER) -> None:
+    """Refuse a stiffness that the rated load would twist as no drive can bear.
+
+    Parameters
+    ----------
+    sheet : DataSheet
+    field : str
+        What the error names.
+    cause : str
+        What is likely wrong, as the end of a sentence.
+
+    Raises
+    ------
+    InvalidInput
+        If the rated load twists the drive by more than `LARGEST_TWIST`.
+
+    Examples
+    --------
+    >>> check_twist(hs_20_100())
+    """
     stiffness = sheet.nominal.stiffness
     if sheet.load_torque > LARGEST_TWIST * stiffness:
         allowed = (
-            f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load would "
-            f"twist the drive by more than {LARGEST_TWIST:g} rad; {LOST_POWER}"
+            f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load of the "
+            f"data sheet would twist the drive by more than {LARGEST_TWIST:g} rad; {cause}"
         )
-        raise InvalidInput("stiffness", stiffness, allowed)
+        raise InvalidInput(field, stiffness, allowed)
 
 
 def _nominal(table: Fields) -> Nominal:

@@ -22,7 +22,27 @@ from pymoo_hdte.units import ARCSEC
 
 @dataclass(frozen=True)
 class ModelValues:
-    """What `DriveModel` holds, by its attributes; the equations of motion are not needed for it."""
+    """What `DriveModel` holds; the equations of motion are not needed for it.
+
+    Attributes
+    ----------
+    name, description, provenance : str
+    sheet : DataSheet
+    kinematic_error : KinematicError
+    effects : tuple of DriveEffect
+
+    Raises
+    ------
+    InvalidInput
+        For two effects of one name at the same port and order.
+
+    Examples
+    --------
+    >>> from pymoo_hdte.drive import hs_20_100
+    >>> error = KinematicError((2.0,), (1.0,), (0.0,), "peak_to_peak", std=60.0 * ARCSEC)
+    >>> ModelValues("mine", "a joint", "a catalogue", hs_20_100(), error).effects
+    ()
+    """
 
     name: str
     description: str

@@ -36,6 +36,9 @@ class Mechanism:
     angles : sequence of str or None
         Coordinates that are angles of a shaft, rad, at which gravity may pull; those of a linear
         axis are not. None if it is not known, which counts as none; the units of files tell.
+    lengths : sequence of str or None
+        Coordinates that are lengths, m. By default all that are no angles, where ``angles`` are
+        given; a coordinate in neither is one of which nothing tells.
 
     Raises
     ------
@@ -61,6 +64,7 @@ class Mechanism:
     inputs: Sequence[Input] = ()
     loops: Sequence[Loop] = ()
     angles: Sequence[str] | None = None
+    lengths: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         for name, value in (
@@ -69,6 +73,7 @@ class Mechanism:
             ("inputs", tuple(self.inputs)),
             ("loops", tuple(self.loops)),
             ("angles", None if self.angles is None else tuple(self.angles)),
+            ("lengths", self._lengths()),
         ):
             object.__setattr__(self, name, value)
         if not self.inertias:
@@ -99,6 +104,9 @@ class Mechanism:
             self._check_shares(f"acts of {one.name}", one.acts)
         for name in self.angles or ():
             one_of("mechanism.angles", name, self.coordinates)
+        for name in self.lengths or ():
+            others = [one for one in self.coordinates if one not in (self.angles or ())]
+            one_of("mechanism.lengths", name, others)
         self._check_scales()
         for loop in self.loops:
             one_of("loop.input", loop.input, [one.name for one in self.inputs])
@@ -174,7 +182,14 @@ class Mechanism:
             for port in self.ports
         ]
         inputs = [replace(one, gain=known(f"gain of {one.name}", one.gain)) for one in self.inputs]
-        return Mechanism(inertias, ports, inputs, self.loops, self.angles)
+        return replace(self, inertias=inertias, ports=ports, inputs=inputs)
+
+    def _lengths(self) -> tuple[str, ...] | None:
+        if self.lengths is not None:
+            return tuple(self.lengths)
+        if self.angles is None:
+            return None
+        return tuple(name for name in self.inertias if name not in self.angles)
 
     def _check_scales(self) -> None:
         """Refuse an input without a gain beside anything that is not in units of its signal."""

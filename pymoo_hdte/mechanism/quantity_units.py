@@ -9,7 +9,7 @@ _TURNING = {"force": "torque", "position": "angle", "speed": "speed"}
 _SLIDING = {"force": "force", "position": "length", "speed": "linear speed"}
 """Names of these quantities in `pymoo_hdte.units.UNITS`."""
 _BASE = ("inertia", "stiffness", "damping")
-"""Kinds of believed values that have such units; a gain has one of its signal."""
+"""Kinds of values with a unit of `UNITS` at a shaft; a zero has that of a force."""
 
 
 def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
@@ -26,8 +26,8 @@ def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
     Returns
     -------
     str
-        ``"SI"`` where the files do not tell which coordinates are angles, or a port touches some
-        that are and some that are not.
+        ``"SI"`` where the files tell of a coordinate neither that it is an angle nor that it is a
+        length, where a port touches both kinds, and where an input has no known scale.
     """
     turning = _turning(mechanism, name)
     if turning is None:
@@ -44,7 +44,19 @@ def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
     name : str
         Of a coordinate, or of a port.
     unit : str
-        What it is at a shaft: ``"N.m/rad"`` is ``"N/m"`` where the motion is a length.
+        What it is at a shaft.
+
+    Returns
+    -------
+    str
+        The same at an angle; ``"N/m"`` for ``"N.m/rad"`` at a length; ``"SI"`` as `unit_of`, but
+        for pure numbers and temperatures, which are the same everywhere.
+
+    Examples
+    --------
+    >>> from pymoo_hdte.mechanism import BelievedValue, Mechanism
+    >>> unit_at(Mechanism({"x": BelievedValue(2.0)}, angles=[]), "x", "N.m.s/rad")
+    'N.s/m'
     """
     turning = _turning(mechanism, name)
     if turning is None:
@@ -55,18 +67,60 @@ def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
 def unit_of_number(mechanism: Mechanism, name: str, number: str, unit: str) -> str:
     """Return the unit of a number of an effect by its name: a phase is an angle everywhere.
 
-    The order of a ripple counts its periods in a turn, or in a length.
+    A ripple is ``cos(order * position + phase)``: over an angle its order is a pure number, the
+    periods in a turn; over a length it is the phase per length, 2 pi over the period.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    name : str
+        Of a coordinate, or of a port.
+    number : str
+        Such as ``"order"`` or ``"amplitude"``.
+    unit : str
+        What it is at a shaft.
+
+    Returns
+    -------
+    str
+        As `unit_at` of a number that is neither a phase nor an order.
+
+    Examples
+    --------
+    >>> from pymoo_hdte.mechanism import BelievedValue, Mechanism
+    >>> unit_of_number(Mechanism({"x": BelievedValue(2.0)}, angles=[]), "x", "order", "1")
+    'rad/m'
     """
     if number.endswith("phase"):
         return "rad"
     if number == "order" and unit_of(mechanism, name, "position") != "rad":
-        return "1/m" if unit_of(mechanism, name, "position") == "m" else "SI"
+        return "rad/m" if unit_of(mechanism, name, "position") == "m" else "SI"
     return unit_at(mechanism, name, unit)
 
 
 def base_unit(mechanism: Mechanism, quantity: str) -> str:
-    """Return the unit of a believed value, such as ``"damping of bearing"``."""
+    """Return the unit of a fitted value of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+    quantity : str
+        One of `Mechanism.quantities`, or ``"zero of bearing"``: a force that is added at a port.
+
+    Returns
+    -------
+    str
+        ``"SI"`` as `unit_of`, and for a gain: the unit of its signal is not known here.
+
+    Examples
+    --------
+    >>> from pymoo_hdte.mechanism import BelievedValue, Mechanism
+    >>> base_unit(Mechanism({"x": BelievedValue(2.0)}, angles=[]), "inertia of x")
+    'kg'
+    """
     kind, _, name = quantity.partition(" of ")
+    if kind == "zero":
+        return unit_of(mechanism, name)
     return unit_at(mechanism, name, si_unit(kind)) if kind in _BASE else "SI"
 
 
@@ -76,11 +130,13 @@ def _of_a_length(unit: str) -> str:
 
 def _turning(mechanism: Mechanism, name: str) -> bool | None:
     """Tell whether a coordinate or port turns; None where its forces or motion have no unit."""
-    if mechanism.angles is None or any(not one.scaled for one in mechanism.inputs):
+    angles, lengths = mechanism.angles or (), mechanism.lengths or ()
+    if any(not one.scaled for one in mechanism.inputs):
         return None
     moved = [name]
     if name in mechanism.port_names:
         port = mechanism.port(name)
         moved = [one for one, share in port.motion.items() if share] + [*port.followed]
-    turning = [one in mechanism.angles for one in moved]
-    return None if any(turning) != all(turning) else all(turning)
+    if all(one in angles for one in moved):
+        return True
+    return False if all(one in lengths for one in moved) else None

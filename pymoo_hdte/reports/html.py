@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import ROUND_CEILING, Decimal
 from typing import Any
 
 import numpy as np
@@ -38,20 +39,36 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def change(percent: float) -> str:
-    """Return a relative change with its sign, in per cent: ``-25.0`` is "−25.0 %"."""
+    """Return a relative change with its sign.
+
+    Parameters
+    ----------
+    percent : float
+        100 times the relative change.
+
+    Examples
+    --------
+    >>> change(-25.0), change(3.14)
+    ('−25.0 %', '+3.1 %')
+    """
     return f"{percent:+.1f} %".replace("-", "\N{MINUS SIGN}")
 
 
 def with_error(value: float, half_width: float) -> str:
-    """Return a value and the half of its interval, both to the first digit of that half.
+    """Return a value and the half of its interval, both to the second digit of that half.
 
-    >>> with_error(6.04123, 0.00268), with_error(6.04123, 0.0)
-    ('6.041 ± 0.003', '6.041')
+    The half is rounded up: an interval is never shown narrower than it is. Above 100 both are to
+    the unit.
+
+    >>> with_error(6.04123, 0.00261), with_error(6.04123, 0.0)
+    ('6.0412 ± 0.0027', '6.041')
     """
     if not np.isfinite(half_width) or half_width <= 0.0:
         return number(value, 4)
-    places = max(0, -int(np.floor(np.log10(half_width))))
-    shown = f"{value:.{places}f} ± {half_width:.{places}f}"
+    half = Decimal(repr(float(half_width)))
+    places = max(0, 1 - half.adjusted())
+    half = half.quantize(Decimal(1).scaleb(-places), ROUND_CEILING)
+    shown = f"{value:.{places}f} ± {half:f}"
     return shown.replace("-", "\N{MINUS SIGN}")
 
 

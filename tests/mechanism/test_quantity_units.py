@@ -21,7 +21,7 @@ def one_coordinate(angles):
     ("angles", "units"),
     [
         (("q",), {"order": "1", "amplitude": "N.m", "phase": "rad"}),
-        ((), {"order": "1/m", "amplitude": "N", "phase": "rad"}),
+        ((), {"order": "rad/m", "amplitude": "N", "phase": "rad"}),
         (None, {"order": "SI", "amplitude": "SI", "phase": "rad"}),
     ],
 )
@@ -42,6 +42,7 @@ def test_a_ripple_beyond_the_band_has_the_units_of_its_port(angles, units):
         ("inertia of q", "kg.m2", "kg"),
         ("damping of bearing", "N.m.s/rad", "N.s/m"),
         ("stiffness of bearing", "N.m/rad", "N/m"),
+        ("zero of bearing", "N.m", "N"),
     ],
 )
 def test_a_force_over_a_length_is_no_torque_over_an_angle(quantity, shaft, slide):

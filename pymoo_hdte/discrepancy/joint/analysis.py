@@ -149,7 +149,7 @@ def revised_joint(title: str, finding: JointFinding) -> MechanismModel:
 
 
 def _with_ports(one: Mechanism, ports: Sequence[Port]) -> Mechanism:
-    return Mechanism(one.inertias, ports, one.inputs, one.loops, one.angles)
+    return replace(one, ports=ports)
 
 
 def _values(

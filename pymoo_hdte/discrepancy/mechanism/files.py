@@ -218,9 +218,11 @@ def _model(top: Fields, path: Path) -> MechanismModel:
 
 
 def _with_angles(mechanism: Mechanism, listed: Sequence[ListedRecord]) -> Mechanism:
-    """Return a mechanism that knows its angles: as its file says, or else by units of columns."""
-    if mechanism.angles is not None:
-        return mechanism
+    """Return a mechanism that knows its angles: as its file says, or else by units of columns.
+
+    A coordinate of which neither tells is no angle and no length.
+    """
+    told = [*(mechanism.angles or ()), *(mechanism.lengths or ())]
     turning = {COUNTS, *UNITS["angle"], *UNITS["speed"]}
     sliding = {*UNITS["length"], *UNITS["linear speed"]}
     tables = [one.layout.channels for one in listed]
@@ -229,12 +231,13 @@ def _with_angles(mechanism: Mechanism, listed: Sequence[ListedRecord]) -> Mechan
         return [
             name
             for name in mechanism.coordinates
-            if all(name in table and table[name].unit in units for table in tables)
+            if name not in told
+            and all(name in table and table[name].unit in units for table in tables)
         ]
 
-    angles = all_in(turning)
-    told = len(angles) + len(all_in(sliding)) == len(mechanism.coordinates)
-    return replace(mechanism, angles=angles if angles or told else None)
+    angles = [*(mechanism.angles or ()), *all_in(turning)]
+    lengths = [*(mechanism.lengths or ()), *all_in(sliding)]
+    return replace(mechanism, angles=angles, lengths=lengths) if angles or lengths else mechanism
 
 
 def _check_names(listed: Sequence[ListedRecord]) -> None:

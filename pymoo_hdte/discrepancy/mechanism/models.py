@@ -84,7 +84,8 @@ def model_text(model: MechanismModel) -> str:
         top["cutoff"] = model.cutoff
     top["coordinates"] = {
         name: {"inertia": _believed_table(inertia)}
-        | ({} if mechanism.angles is None else {"angle": name in mechanism.angles})
+        | ({"angle": True} if name in (mechanism.angles or ()) else {})
+        | ({"angle": False} if name in (mechanism.lengths or ()) else {})
         for name, inertia in mechanism.inertias.items()
     }
     top["ports"] = {port.name: _port_table(port) for port in mechanism.ports}
@@ -161,8 +162,9 @@ def _mechanism(top: Fields, file: str) -> Mechanism:
     rows = top.tables("loops") if top.has("loops") else []
     loops = [_loop(row, [one.name for one in inputs], inertias) for row in rows]
     turning = [name for name, turns in angles.items() if turns] if angles else None
+    sliding = [name for name, turns in angles.items() if not turns] if angles else None
     try:
-        return Mechanism(inertias, ports, inputs, loops, turning)
+        return Mechanism(inertias, ports, inputs, loops, turning, sliding)
     except InvalidInput as error:
         gains = {f"gain of {one.name}": f"{file}.inputs.{one.name}.gain" for one in inputs}
         place = gains.get(error.field, f"{file}: {error.field}")

@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy.drive.plan.imagined import (
     possible_tests,
 )
 from pymoo_hdte.discrepancy.drive.plan.limits import PlanLimits, read_limits
-from pymoo_hdte.discrepancy.drive.plan.plan import plan_tests
+from pymoo_hdte.discrepancy.drive.plan.plan import chance_words, plan_tests
 from pymoo_hdte.discrepancy.drive.plan.signatures import Signatures, is_rival
 from pymoo_hdte.discrepancy.drive.separation import noncentrality_for, power, unimitated
 from pymoo_hdte.discrepancy.engine.rules import RULES
@@ -267,3 +267,15 @@ def test_a_file_of_limits_is_read(tmp_path):
         with pytest.raises(InvalidInput, match=r"limits\.toml") as refused:
             read_limits(path)
         assert field in str(refused.value)
+
+
+@given(st.integers(1, 99), st.floats(0.0, 1.0))
+def test_a_chance_is_shown_as_what_it_reaches_and_no_more(percent, chance):
+    shown = chance_words(chance)
+    if shown == "less than 1 %":
+        assert chance < 0.01
+    elif shown != "over 99 %":
+        assert int(shown.removesuffix(" %")) == pytest.approx(100.0 * chance - 0.5, abs=0.5 + 1e-6)
+        assert int(shown.removesuffix(" %")) <= 100.0 * chance + 1e-6
+    # What a plan asks for is itself shown in full.
+    assert chance_words(percent / 100.0) == f"{percent} %"

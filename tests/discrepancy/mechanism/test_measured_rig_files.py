@@ -19,6 +19,7 @@ from pymoo_hdte.mechanism import (
     Mechanism,
     Port,
 )
+from pymoo_hdte.mechanism.quantity_units import unit_of
 
 MODEL = """\
 title = "A rig"
@@ -139,6 +140,29 @@ def test_rig_is_read_as_described(folder):
     assert set(first.channels) == {"q"}
     assert set(second.channels) == {"w"}
     np.testing.assert_allclose(first.time, second.time, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "position", "force"), [("deg", "rad", "N.m"), ("mm", "m", "N"), ("A", "SI", "SI")]
+)
+def test_a_coordinate_of_which_no_file_tells_is_neither_angle_nor_length(
+    unit, position, force, tmp_path
+):
+    (tmp_path / "one.csv").write_text(ROWS)
+    record = '[[records]]\nfile = "one.csv"\nrole = "train"\n'
+    text = MODEL + TABLE.replace("mm", unit) + record
+    (tmp_path / RIG_FILE).write_text(text)
+    model = read_rig(tmp_path).model
+    for mechanism in (model.mechanism, model_from_text(model_text(model), tmp_path)):
+        assert unit_of(mechanism, "q", "position") == position
+        assert unit_of(mechanism, "q") == force
+        # Of `w` there is no column, and the joint moves with both.
+        assert {unit_of(mechanism, name) for name in ("w", "cell", "joint")} == {"SI"}
+
+
+def model_from_text(text, folder):
+    (folder / "model.toml").write_text(text)
+    return read_mechanism_model(folder / "model.toml").mechanism
 
 
 def test_path_of_the_file_and_another_folder_of_data(folder, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -228,6 +229,19 @@ def _ordered(tests: Sequence[PlannedTest]) -> tuple[PlannedTest, ...]:
     return tuple(sorted(tests, key=place))
 
 
+def chance_words(chance: float) -> str:
+    """Return a chance in per cent, rounded down: what falls short of 80 % is not shown as 80 %.
+
+    >>> chance_words(0.796), chance_words(0.004), chance_words(0.9999)
+    ('79 %', 'less than 1 %', 'over 99 %')
+    """
+    if chance > 0.99:
+        return "over 99 %"
+    # The small term is for products such as 100 * 0.29, which end just below a whole number.
+    whole = int(100.0 * chance + 1e-9)
+    return f"{whole} %" if whole else "less than 1 %"
+
+
 def _missed(ones: Sequence[Chance], wanted: float) -> str:
     """Say what tests do not tell of one effect, of which all ``ones`` are."""
     effect = ones[0].effect
@@ -235,13 +249,13 @@ def _missed(ones: Sequence[Chance], wanted: float) -> str:
     if max(one.possible for one in ones) < wanted:
         asked = f"tells {effect} from {rivals}" if rivals else f"shows {effect}"
         best = max(one.possible for one in ones)
-        most = f"the chance is at most {100.0 * best:.0f} %"
+        most = f"the chance is {chance_words(best)} at best"
         return f"No test within the limits {asked} at this size: {most}."
     least = min(one.power for one in ones)
     asked = f"tell {effect} from {rivals.replace(', nor', ' and')}" if rivals else f"show {effect}"
     return (
         f"To {asked} at this size takes more records than the limits allow: these give a chance "
-        f"of {100.0 * least:.0f} %."
+        f"of {chance_words(least)}."
     )
 
 
@@ -259,4 +273,5 @@ def _test(role: str, one: PlannedTest) -> dict[str, Any]:
 
 
 def _rounded(power: float) -> float:
-    return round(power, 4)
+    # Down, so that a power that is written reaches what is wanted only where the power does.
+    return math.floor(1e4 * power + 1e-9) / 1e4
