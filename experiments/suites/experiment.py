@@ -65,7 +65,7 @@ def run(context: Context) -> Result:
             in_short(outcome),
             demands_table(outcome),
             shares_table(outcome),
-            duels_table(outcome),
+            *(one for one in (duels_table(outcome),) if one.rows),
             parts_table(outcome),
             *ranks_tables(outcome),
             rivals_table(outcome),
