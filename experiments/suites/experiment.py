@@ -69,7 +69,7 @@ def run(context: Context) -> Result:
             demands_table(outcome),
             together_table(outcome),
             shares_table(outcome),
-            duels_table(outcome),
+            *(one for one in (duels_table(outcome),) if one.rows),
             parts_table(outcome),
             *ranks_tables(outcome),
             rivals_table(outcome),
