@@ -69,7 +69,8 @@ def how_to_choose(outcome: Outcome) -> Figure:
         axis.set_ylabel("average rank, 1 is best")
         axis.invert_yaxis()
         _over_evaluations(axis)
-    axes[0, 0].legend(fontsize=7, frameon=False, loc="lower right")
+    # Between the two swarms and the others, where no line runs.
+    axes[0, 0].legend(fontsize=7, frameon=False, ncols=2, loc="center", bbox_to_anchor=(0.5, 0.58))
     axis = axes[0, 2]
     _run_here(axis, outcome, DIMENSIONS[0])
     cited = {n: share for (d, n), share in CITED.items() if d == DIMENSIONS[0]}
