@@ -17,6 +17,7 @@ version = release = pymoo_hdte.__version__
 
 extensions = [
     "mathml",
+    "pictures",
     "problem_cards",
     "glossary",
     "readme_code",

@@ -41,4 +41,4 @@ def _found(outcomes: Sequence[Outcome]) -> str:
         of_kind = select(outcomes, kind)
         shares.append(f"{sum(one.right_answer for one in of_kind)} of {len(of_kind)} {what}")
     how = f"alone, in part or in a class of at most {MOST_IN_CLASS}"
-    return f"{shares[0]} and both of {shares[1]} were named, {how}"
+    return f"{shares[0]}, and both effects in {shares[1]}, were named, {how}"

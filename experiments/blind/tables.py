@@ -205,14 +205,14 @@ def tools_table(outcomes: Sequence[Outcome]) -> Table:
 def wrong_table(outcomes: Sequence[Outcome]) -> Table:
     """Return every wrong answer that is given with confidence."""
     wrong = [one for one in outcomes if one.wrong_confident]
-    title = f"All {len(wrong)} wrong answers that are given with confidence"
+    title = f"Wrong answers that are given with confidence: {len(wrong)}"
     return _cases_table("wrong", title, wrong, folded=False)
 
 
 def misses_table(outcomes: Sequence[Outcome]) -> Table:
     """Return every case whose verdict is not what it must be."""
     missed = [one for one in outcomes if not one.right_answer]
-    title = f"All {len(missed)} cases whose verdict is not what it must be"
+    title = f"Cases whose verdict is not what it must be: {len(missed)}"
     return _cases_table("misses", title, missed, folded=True)
 
 

@@ -36,7 +36,7 @@ SEPARATION_NOTE = (
     f"median IGD is at most {REACHES:g} times the floor. With fewer than {FEWEST} algorithms "
     "nothing is said. This rule was chosen after the runs were seen. An earlier one asked that at "
     "least a quarter of the algorithms reach the front and as many do not; by it no problem "
-    "separates algorithms at the largest budget. `calibrated_grades` was added in order to "
+    "separates algorithms at the largest budget. RobustDTE-calibrated_grades was added in order to "
     "separate them: its verdict shows that such a problem exists, not how frequent it is."
 )
 _SAID = {True: "yes", False: "no", None: "too few to say"}

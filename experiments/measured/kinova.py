@@ -61,7 +61,7 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
     findings = (
         Finding(
             bool(dry),
-            f"Dry friction is found: {', '.join(sorted(dry)).replace('_', ' ')}."
+            f"Dry friction is found, as {' and '.join(sorted(dry)).replace('_', ' ')}."
             if dry
             else "No dry friction is found.",
             check=True,

@@ -188,7 +188,11 @@ def shortfalls(rows: Sequence[Sequence[str]]) -> tuple[str, ...]:
 def _in_one_sentence(rows: Sequence[Sequence[str]]) -> str:
     """Count the judgements, those that fall short first."""
     counts = [(one, sum(row[1] == one for row in rows)) for one in FALLS_SHORT]
-    told = ", ".join(f"{count} {word}" for word, count in counts if count)
+    told = ", ".join(
+        f"{count} with {word}" if word == UNKNOWN else f"{count} {word}"
+        for word, count in counts
+        if count
+    )
     none = "" if counts[0][1] else f", none {CONFIDENT}"
     return f"Verdicts on {len(rows)} machines that others measured: {told}{none}."
 

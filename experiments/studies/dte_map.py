@@ -67,11 +67,14 @@ def run(context: Context) -> Result:
 def _resonances(entry: SpeedLoadMap) -> str:
     """Say where a drive model resonates."""
     mode = torsional_mode(entry.model)
-    met = _met(entry)
+    met = [
+        f"{significant(speed, 4)} r/min by order {order:g}"
+        for order, speed in critical_speeds(entry.model)
+    ]
     where = f"torsional mode at {significant(mode.frequency, 4)} Hz"
     if not met:
         return f"The model {entry.model.name} resonates at no input speed ({where})."
-    return f"The model {entry.model.name} resonates at the input speeds {', '.join(met)} ({where})."
+    return f"The model {entry.model.name} resonates at {' and '.join(met)} ({where})."
 
 
 def _met(entry: SpeedLoadMap) -> list[str]:

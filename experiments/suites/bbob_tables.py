@@ -12,16 +12,18 @@ from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome
 from experiments.suites.peers import BBOB_PEERS, ON_BBOB, OURS
-from experiments.suites.protocol import BUDGETS, DIMENSIONS
+from experiments.suites.protocol import BESIDE_PEERS, BUDGETS, DIMENSIONS
 from experiments.suites.published import curves
 
 
 def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:
     """Return the mean share of our swarm after so many evaluations; None if it was not run.
 
-    It moves alike whatever its budget, so that its longest runs tell of shorter ones.
+    It moves alike whatever its budget, so that its longest runs tell of shorter ones. Only the
+    held-out instance counts.
     """
-    return outcome.shares(dimension, OURS, BUDGETS[-1]).get(evaluations)
+    found = outcome.shares(dimension, OURS, BUDGETS[-1], instance=BESIDE_PEERS)
+    return found.get(evaluations)
 
 
 class Duel(NamedTuple):

@@ -68,8 +68,8 @@ def demands_table(outcome: Outcome) -> Table:
             *(Column("beside"), Column("met")),
         ),
         tuple(rows),
-        note="Demands were written before the runs. That own time per generation is at most half "
-        "of NSGA-II's, python -m experiments benchmark measures.",
+        note="Demands were written before the runs. Own time per generation of at most half of "
+        "NSGA-II's was demanded too and is missed; python -m experiments benchmark measures it.",
     )
 
 

@@ -1,7 +1,7 @@
 """The swarms on suites of others, held-out ones first; see `protocol` for what is run.
 
 Without an option the report is made from the stored outcome, and a few of its runs are made anew;
-``--quick`` runs what the stored outcome took (an hour of one core), ``--full`` the whole of what
+``--quick`` runs what the stored outcome took (some hours of one core), ``--full`` the whole of what
 was asked for (days). Both need the extra ``suites``, and go on where they were interrupted.
 """
 
@@ -33,18 +33,18 @@ from experiments.suites.together import together_table
 
 SETTING = (
     f"{OURS} runs as it is, all others as their users run them, with a population of 100; those "
-    f"that move alike whatever their budget, {OURS} among them, are read on the way to the "
-    "largest. On bbob-biobj COCO's logger counts every evaluated point; first positions are drawn "
-    "from -5 to 5. Elsewhere at most 100 solutions are judged, more are thinned out by what they "
-    "add to the hypervolume, which counts up to 1.1 in objectives normalised by the true front, "
-    "or, where that has no closed form (RE, MW, DAS-CMOP), by the ends of the best found in long "
-    "runs. Ranks are those of medians over the seeds."
+    "that move alike whatever their budget are read on the way to the largest, on bbob-biobj "
+    f"{OURS} among them. There COCO's logger counts every evaluated point; first positions are "
+    "drawn from -5 to 5. Elsewhere at most 100 solutions are judged, more are thinned out by what "
+    "they add to the hypervolume, which counts up to 1.1 in objectives normalised by the true "
+    "front, or, where that has no closed form (RE, MW, DAS-CMOP), by the ends of the best found in "
+    "long runs. Ranks are those of medians over the seeds."
 )
 SETS = (
     "Held out, and run once after the protocol had been committed: all 55 functions of bbob-biobj "
-    "in 10 and 20 dimensions, instances 9 and 10 (10 for the parts), and IMOP, on which earlier "
-    "swarms had been run. Validation, whose outcomes had led to the demands: RE, MW, DAS-CMOP, "
-    "LZ09."
+    "in 10 and 20 dimensions, instance 9, and IMOP, on which earlier swarms had been run. "
+    "Validation: RE, MW, DAS-CMOP and LZ09, whose outcomes had led to the demands, and instance 10 "
+    "of bbob-biobj, on which it was decided which parts stay."
 )
 PEERS_NOTE = (
     "GDE3 and MOEA/D-DE are jMetalPy's (pymoode's GDE3 wants an older pymoo); MOEA/D-DE, "
@@ -69,7 +69,7 @@ def run(context: Context) -> Result:
             demands_table(outcome),
             together_table(outcome),
             shares_table(outcome),
-            duels_table(outcome),
+            *(one for one in (duels_table(outcome),) if one.rows),
             parts_table(outcome),
             *ranks_tables(outcome),
             rivals_table(outcome),

@@ -18,7 +18,9 @@ from experiments.runner.committed import DATA
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome, stored, write_outcome
 from experiments.suites.jobs import BbobRun, SuiteRun
+from experiments.suites.peers import ON_BBOB, ON_SUITES
 from experiments.suites.protocol import STORED, BbobPart
+from pymoo_hdte.checks import one_of
 
 COMMAND = (
     "python -m experiments.suites.gather; whole groups of runs only, those of algorithms that did "
@@ -74,8 +76,9 @@ def kept_table(outcome: Outcome) -> Table:
         tuple(rows),
         note="A group is one algorithm with one seed on all functions of bbob-biobj of one "
         "dimension, instance and budget, or on all problems of a suite. What is missing was not "
-        "run, because the time of the processor was over; every group that was whole is kept, no "
-        "other choice was made. Runs of algorithms that did not change are kept from before.",
+        "run to its end: COMO-CMA-ES took all memory on IMOP3 after 25,000 evaluations. Every "
+        "group that was whole is kept, no other choice was made. Runs of algorithms that did not "
+        "change are kept from before.",
         folded=True,
     )
 
@@ -86,7 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="OUT/runs/ORIGIN")
     parser.add_argument("--anew", default="", metavar="NAME,NAME", help="keep nothing stored of it")
     options = parser.parse_args(arguments)
-    before = stored().without(options.anew.split(","))
+    anew = [name for name in options.anew.split(",") if name]
+    for name in anew:
+        one_of("--anew", name, [*ON_SUITES, *ON_BBOB])
+    before = stored().without(anew)
     write_outcome(gathered(options.folders, before), DATA, COMMAND)
 
 

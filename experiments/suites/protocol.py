@@ -5,9 +5,10 @@ Sets of problems:
 - tuning, on which settings may be chosen: ZDT, moved ZDT and DTLZ2 of ``peers``, and functions 1 to
   20 of bbob-biobj, instances 1 and 2, in 5, 10 and 20 dimensions, on which `ModelStep` was chosen;
 - validation, whose outcomes led to the demands: RE, MW, DAS-CMOP, LZ09; on MW it was chosen, after
-  the first run of this protocol, that `ModelStep` takes no part with constraints;
-- held out: bbob-biobj, all 55 functions, instances 9 and 10, in 10 and 20 dimensions; IMOP. They
-  are run once, and what comes out is shown as it is. Functions 1 to 20 are those of tuning in other
+  the first run of this protocol, that `ModelStep` takes no part with constraints; and instance 10
+  of bbob-biobj, on which the parts were chosen;
+- held out: bbob-biobj, all 55 functions, instance 9, in 10 and 20 dimensions; IMOP. They are run
+  once, and what comes out is shown as it is. Functions 1 to 20 are those of tuning in other
   instances, 21 to 55 were never used. Earlier swarms had been looked at on instances 3 to 8 and on
   IMOP; nothing was chosen on them, and instances 9 and 10 were fresh.
 

@@ -217,7 +217,7 @@ def _ranks_in_short(outcome: Outcome, suite: str, measure: str) -> tuple[str | N
     budgets = outcome.budgets(suite)
     count = max((len(outcome.algorithms(suite, budget)) for budget in budgets), default=0)
     cells: list[str | None] = [
-        f"{named(outcome, suite)}: average rank of {count} by {NAMES[measure]}"
+        f"{named(outcome, suite)}: average rank of up to {count} by {NAMES[measure]}"
     ]
     for budget in BUDGETS:
         if budget not in budgets:

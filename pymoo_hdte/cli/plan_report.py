@@ -26,10 +26,11 @@ def write_plan(plan: Plan, model: str, out: Path) -> dict[str, Any]:
     held_out = len(found["test"]) - fitted
     reached = sum(one["power"] >= plan.wanted for one in found["effect"])
     apart = sum(one["power"] >= plan.wanted for one in found["pair"])
+    shown = _share(reached, len(found["effect"]), "effect", "effects")
+    told = _share(apart, len(found["pair"]), "pair of effects", "pairs of effects")
     sentences = [
         f"{fitted} tests to fit and {held_out} to hold out: each with a chance of at least "
-        f"{100.0 * plan.wanted:g} %, they show {reached} of {len(found['effect'])} effects and "
-        f"tell {apart} of {len(found['pair'])} pairs of effects apart."
+        f"{100.0 * plan.wanted:g} %, they show {shown} and tell {told} apart."
     ]
     document = heading("plan", sentences, plan.missed) | {"model": model} | found
     del document["not_reached"]
@@ -38,6 +39,14 @@ def write_plan(plan: Plan, model: str, out: Path) -> dict[str, Any]:
     FOLDER.write(out, page("pymoo_hdte.cli", "plan.html.j2", **rows), document,
                  {PLAN_FILE: toml_text(document)})  # fmt: skip
     return document
+
+
+def _share(count: int, total: int, what: str, more: str) -> str:
+    """Return such as ``2 of 3 effects``, ``all 3 effects`` or ``the only effect``."""
+    if total < 2:
+        return f"the only {what}" if count else f"no {what}"
+    first = {0: "none of", total: "all"}.get(count, f"{count} of")
+    return f"{first} {total} {more}"
 
 
 def _at_port(effect: str) -> str:

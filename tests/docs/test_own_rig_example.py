@@ -120,6 +120,7 @@ def test_gap_of_the_held_out_record_is_gone(rig):
     assert {gap["kind"] for gap in gaps} == {"simulation", "balance"}
     for gap in gaps:
         assert gap["record"] == "sweep"
+        assert gap["unit"] == {"simulation": "m", "balance": "N"}[gap["kind"]]
         assert gap["before"] > 10.0 * gap["noise_floor"]
         assert gap["after"] < 0.2 * gap["before"]
         assert gap["shrinkage"] > 0.8

@@ -79,6 +79,17 @@ def test_lost_designs_start_from_their_neighbours(soft):
     assert np.array_equal(found.torsion[kept], alone.torsion[kept])
 
 
+@pytest.mark.parametrize("patience", [1, 2])
+def test_a_lost_design_is_lost_in_any_company(soft, monkeypatch, patience):
+    """Whether a design has a steady state does not depend on what is solved beside it."""
+    monkeypatch.setattr("pymoo_hdte.drive.solve.free_angle._PATIENCE", patience)
+    coefficients = soft.at(280.0, 2.0).coefficients(around(soft, 40))
+    together = harmonic_balance(coefficients).converged
+    alone = [harmonic_balance(coefficients.rows([row])).converged[0] for row in range(40)]
+    assert together.tolist() == alone
+    assert 0 < together.sum() < 40
+
+
 def test_the_dte_of_a_drive_uses_them(soft, monkeypatch):
     designs = around(soft, 200)
     few = partial(harmonic_balance, steps=6)

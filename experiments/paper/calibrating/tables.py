@@ -110,7 +110,7 @@ def of_the_first_page(best: Outcome) -> str:
     )
     return (
         f"with {len(best.candidate.effects)} effects added and fitted to the moments of Table 8, "
-        f"the printed equations give these back to {seen} %, and numbers held out to {unseen} %"
+        f"the printed equations give these within {seen} %, and numbers held out within {unseen} %"
     )
 
 

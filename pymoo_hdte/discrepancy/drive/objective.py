@@ -98,11 +98,13 @@ class Objective(Unknowns):
         steps = self.steps(values)[:n_base]
         moving = [k for k, one in enumerate(self.data.base) if one.name not in _READ_ONLY]
         moved = base + np.diag(steps * self.scale[:n_base])
-        self._features(base, effects)  # Which records have no steady state stays as it is here.
+        # The steady states here are kept, as slopes leave out the records that have none here.
+        self._features(base, effects)
         # Solved together, so that what Newton's method leaves cancels in the quotients.
-        here, *there = self._features(np.vstack([base, moved[moving]]), effects, for_slopes=True)
+        both = self._features(np.vstack([base, moved[moving]]), effects, for_slopes=True)
+        here = both[0]
         found = np.empty((n_base, *here.shape))
-        found[moving] = (np.array(there) - here) / steps[moving, None, None]
+        found[moving] = (both[1:] - here) / steps[moving, None, None]
         for place, one in enumerate(self.data.base):
             if one.name in _READ_ONLY:
                 found[place] = self.scale[place] * self._reading(one.name, base[0], here)

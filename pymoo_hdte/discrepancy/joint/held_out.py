@@ -58,6 +58,7 @@ def torsion_gaps(finding: MechanismFinding) -> tuple[MeasuredGap, ...]:
                 _size(measured - before),
                 _size(measured - after),
                 torsion_noise(gear, record),
+                "rad",
                 balance.time[rows],
                 measured,
                 before,

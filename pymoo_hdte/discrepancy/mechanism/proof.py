@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy.mechanism.held_out import (
 )
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism import Record
+from pymoo_hdte.mechanism.quantity_units import unit_of
 
 Values = NDArray[np.float64]
 
@@ -42,11 +43,13 @@ class MeasuredGap:
     kind : str
         ``simulation``, ``balance`` or ``torsion``.
     before, after : float
-        Of the fitted base and of the revised model, SI; nan where the model diverges.
+        Of the fitted base and of the revised model, in ``unit``; nan where the model diverges.
     noise_floor : float
         Of the sensors.
+    unit : str
+        Of the position of a coordinate, or of a force; ``"SI"`` where the files do not tell it.
     time, measured : ndarray, shape (n,)
-        s and SI; zero for a balance.
+        s and ``unit``; zero for a balance.
     predicted_before, predicted_after : ndarray, shape (n,)
         Predictions of the models; minus their residual for a balance.
     least_share : float
@@ -61,6 +64,7 @@ class MeasuredGap:
     before: float
     after: float
     noise_floor: float
+    unit: str
     time: Values
     measured: Values
     predicted_before: Values
@@ -97,7 +101,7 @@ class MeasuredGap:
             "after": _finite(self.after),
             "noise_floor": self.noise_floor,
             "shrinkage": None if self.shrinkage is None else _finite(self.shrinkage),
-            "unit": "SI",
+            "unit": self.unit,
             **self._of_simulation(),
         }
 
@@ -151,6 +155,7 @@ def _simulated(finding: MechanismFinding, one: SimulatedRecord) -> list[Measured
             _size(measured - one.before[name]),
             _size(measured - after[name]),
             one.noise[name],
+            unit_of(finding.mechanism, name, "position"),
             one.time,
             measured,
             one.before[name],
@@ -179,6 +184,7 @@ def _balanced(finding: MechanismFinding, record: Record) -> list[MeasuredGap]:
             float(residual[0][0][place]),
             float(residual[1][0][place]),
             float(floor[place]),
+            unit_of(finding.mechanism, name),
             balance.time,
             np.zeros(len(balance.time)),
             -balance.in_time(residual[0][1][place]),

@@ -6,9 +6,6 @@ import numpy as np
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.proof import Proof
-from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
-from pymoo_hdte.mechanism import Mechanism
-from pymoo_hdte.mechanism.quantity_units import unit_of
 
 _SHOWN = 3
 """Most records that a sentence names."""
@@ -51,11 +48,6 @@ def _worse(proof: Proof) -> str:
     elif records:
         parts.append(f"transmission error of {', '.join(records)}")
     return f" Worse than before: {'; '.join(parts)}." if parts else ""
-
-
-def unit_of_gap(mechanism: Mechanism, gap: MeasuredGap) -> str:
-    """Return the unit of a gap: of the position of a coordinate, or of a force."""
-    return unit_of(mechanism, gap.quantity, "position" if gap.kind == "simulation" else "force")
 
 
 def percent(share: float) -> str:

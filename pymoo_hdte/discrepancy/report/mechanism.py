@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechan
 from pymoo_hdte.discrepancy.report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy.report.document import believed_in_words
 from pymoo_hdte.discrepancy.report.folder import FOLDER
-from pymoo_hdte.discrepancy.report.gap_words import percent, unit_of_gap
+from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.discrepancy.report.mechanism_document import evidence, mechanism_verdict_document
 from pymoo_hdte.discrepancy.report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy.report.mechanism_figures import (
@@ -120,7 +119,6 @@ def _page(
         certainty=how_sure_of_records(finding),
         compared=[*compared, *document["alternatives"]],
         extent_sentence=extent_sentence(gaps),
-        unit_of_gap=partial(unit_of_gap, finding.mechanism),
         believed_effects=believed_in_words(document),
         believed={name: one.value for name, one in finding.mechanism.quantities.items()},
     )
@@ -137,10 +135,7 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
     if not gaps:
         return "No record was held out, so that nothing can be proved."
     if not finding.accepted.candidates:
-        words = [
-            f"{gap.quantity} by {gap.kind}: {gap.after:.3g} {unit_of_gap(finding.mechanism, gap)}"
-            for gap in gaps
-        ]
+        words = [f"{gap.quantity} by {gap.kind}: {gap.after:.3g} {gap.unit}" for gap in gaps]
         return f"Nothing was added; the model is off by {', '.join(words)}. {extent_sentence(gaps)}"
     words = []
     for kind in ("simulation", "balance"):
@@ -150,7 +145,7 @@ def proof_sentence(finding: MechanismFinding, gaps: Sequence[MeasuredGap]) -> st
                 float(np.sqrt(np.mean([getattr(gap, one) ** 2 for gap in of_it])))
                 for one in ("before", "after")
             )
-            change, unit = _change(before, after), unit_of_gap(finding.mechanism, of_it[0])
+            change, unit = _change(before, after), of_it[0].unit
             words.append(
                 f"{quantity} by {kind} {change} from {number(before)} to {number(after)} {unit}"
             )

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap
-from pymoo_hdte.discrepancy.report.gap_words import unit_of_gap
 from pymoo_hdte.mechanism.quantity_units import unit_of
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY
 
@@ -101,7 +100,7 @@ def overlay(finding: MechanismFinding, gap: MeasuredGap) -> Figure:
     upper.plot(time, gap.measured[stride], color=GREY, lw=2.5, label="measured")
     upper.plot(time, gap.predicted_before[stride], "--", color=BEFORE, label="before")
     upper.plot(time, gap.predicted_after[stride], "-", color=AFTER, lw=1.0, label="after")
-    upper.set_ylabel(f"{gap.quantity} [{unit_of_gap(finding.mechanism, gap)}]")
+    upper.set_ylabel(f"{gap.quantity} [{gap.unit}]")
     upper.legend(frameon=False, ncols=3)
     lower.plot(time, (gap.measured - gap.predicted_before)[stride], "--", color=BEFORE)
     lower.plot(time, (gap.measured - gap.predicted_after)[stride], "-", color=AFTER)

@@ -97,7 +97,8 @@ def harmonic_balance(
     start : SteadyMotion, optional
         Nearby cases, a row each, to begin from; ignored if their torus is another.
     steps : int
-        Most steps of Newton's method; a row that would need more has not converged.
+        Most steps of Newton's method; a row that would need more, or that does not halve what is
+        left in fifteen of them, has not converged.
     tangents : bool
         Whether the result is to serve as ``start`` of cases so near that its matrices are good
         enough for them, as for difference quotients; it then holds all that it was found from.
@@ -233,12 +234,13 @@ class _Solver:
             halved = distance <= least / 2.0
             least = np.where(halved, distance, least)
             waited = np.where(halved, 0, waited + 1)
-            ended = settled | (waited >= _PATIENCE)
-            if np.all(ended):
+            lost = ~settled & (waited >= _PATIENCE)
+            if np.all(settled | lost):
                 break
-            # Once half of the rows have ended, only the others are iterated further.
-            if 2 * np.sum(ended) >= len(left):
-                kept = np.flatnonzero(~ended)
+            # A lost row leaves at once, so that none is found for the company that it is in. Once
+            # half of the rows have settled, only the others are iterated further.
+            if np.any(lost) or 2 * np.sum(settled) >= len(left):
+                kept = np.flatnonzero(~(settled | lost))
                 left, before, inverses = left[kept], before[kept], [inverses[one] for one in kept]
                 least, waited = least[kept], waited[kept]
                 equations = self.equations.rows(left)

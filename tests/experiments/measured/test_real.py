@@ -88,7 +88,7 @@ def test_shortfalls_are_told_and_what_is_right_is_counted():
     assert "one (confidently wrong): backlash, where gravity is known. Right: 1 of 2" in told
     assert "two" not in told
     assert real.shortfalls(rows[1:]) == ("Right: 1 of 1 whose answer is known.",)
-    counted = "1 no answer known, 1 right"
+    counted = "1 with no answer known, 1 right"
     assert f"3 machines that others measured: 1 confidently wrong, {counted}." in (
         real._in_one_sentence(rows)
     )
