@@ -154,7 +154,7 @@ def check_twist(sheet: DataSheet, field: str = "stiffness", cause: str = LOST_PO
             f"at least {sheet.load_torque / LARGEST_TWIST:.3g} N.m/rad, or the rated load of the "
             f"data sheet would twist the drive by more than {LARGEST_TWIST:g} rad; {cause}"
         )
-        raise InvalidInput(field, stiffness, allowed)
+        raise InvalidInput(field, float(f"{stiffness:.6g}"), allowed)
 
 
 def _nominal(table: Fields) -> Nominal:
