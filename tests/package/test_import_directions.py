@@ -41,6 +41,7 @@ LOWEST_EXPERIMENTS_FIRST = (
     *("paper.static_error", "paper.prototypes", "paper", "paper.calibrating", "paper.inference"),
     *(
         "contest",
+        "suites.formulas",
         "suites",
         "cards",
         "robust",
