@@ -24,8 +24,8 @@ def of_the_first_page(outcomes: Sequence[Outcome]) -> str:
     """Say the same as part of a longer sentence."""
     plain, wrong = _plain_answers(outcomes)
     return (
-        "a workflow that says what a drive model lacks beside measurements, wrong in "
-        f"{wrong} of {plain} plain answers on blind campaigns, where {_found(outcomes)}"
+        "a workflow that says what a drive model lacks beside measurements: on simulated campaigns "
+        f"that it had not seen, {wrong} of {plain} plain answers were wrong, and {_found(outcomes)}"
     )
 
 
