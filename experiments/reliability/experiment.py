@@ -185,8 +185,8 @@ def _inputs_table(tallies: list[Tally]) -> Table:
         findings=(
             Finding(
                 failed == 0,
-                f"Of {inputs:,} wrong inputs {failed or 'none'} raised anything but a clear error, "
-                "hung, crashed or left anything half-done.",
+                f"Of {inputs:,} inputs with a planted mistake {failed or 'none'} raised anything "
+                "but a clear error, hung, crashed or left anything half-done.",
                 check=True,
                 answers=True,
             ),

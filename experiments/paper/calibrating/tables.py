@@ -193,7 +193,7 @@ def parameter_table(best: Outcome, outcomes: Sequence[Outcome]) -> Table:
         ),
         Finding(
             not idle,
-            f"Next to no influence has {', '.join(idle)}."
+            f"Not all four design variables matter; next to no influence: {', '.join(idle)}."
             if idle
             else "All four design variables matter.",
             check=True,
