@@ -120,7 +120,17 @@ class FrontArchive:
     def update(
         self, population: Population, points: Points, points_of: Callable[[Population], Points]
     ) -> None:
-        """Add an evaluated population with its points; a function reads those of the members."""
+        """Add an evaluated population and keep what is feasible and non-dominated.
+
+        Parameters
+        ----------
+        population : Population
+            n evaluated individuals.
+        points : Points
+            The same as arrays, row for row.
+        points_of : callable
+            Reads the members anew, since what counts as feasible may have changed.
+        """
         everyone = Population.merge(self.members, population)
         if not len(everyone):
             return

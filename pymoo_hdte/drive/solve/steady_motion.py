@@ -75,7 +75,18 @@ class Tangents:
 
     @classmethod
     def joined(cls, parts: Sequence[Tangents]) -> Tangents:
-        """Return the rows of several, one after the other."""
+        """Return the rows of several, one after the other.
+
+        Parameters
+        ----------
+        parts : sequence of Tangents
+            Of n_1, n_2, ... rows.
+
+        Returns
+        -------
+        Tangents
+            Of n_1 + n_2 + ... rows; each part computes its own inverses.
+        """
         ends = np.cumsum([0, *(len(part.places) for part in parts)])
 
         def inverted(places: NDArray[np.int_]) -> list[NDArray[np.float64] | None]:
