@@ -11,7 +11,7 @@ import numpy as np
 from moocore import hv_contributions
 from numpy.typing import NDArray
 
-from pymoo_hdte.algorithms.spread import most_spread
+from pymoo_hdte.algorithms.spread import most_spread, unlinked
 from pymoo_hdte.compilation import COMPILES, compiled
 
 _REFERENCE = 1.1
@@ -66,11 +66,7 @@ def _kept_of_two(
             ):
                 leaving = row
         stays[leaving] = False
-        lower, upper = before[leaving], after[leaving]
-        if lower >= 0:
-            after[lower] = upper
-        if upper < n:
-            before[upper] = lower
+        lower, upper = unlinked(before, after, leaving)
         for row in (lower, upper):
             if 0 <= row < n and before[row] >= 0 and after[row] < n:
                 added[row] = _rectangle(scaled, before[row], row, after[row])

@@ -79,11 +79,7 @@ def _kept_of_chain(
             ):
                 leaving = row
         stays[leaving] = False
-        lower, upper = before[leaving], after[leaving]
-        if lower >= 0:
-            after[lower] = upper
-        if upper < n:
-            before[upper] = lower
+        lower, upper = unlinked(before, after, leaving)
         for _ in range(2):
             if lower >= 0:
                 _measure(scaled, before, after, gaps, lower)
@@ -92,6 +88,17 @@ def _kept_of_chain(
                 _measure(scaled, before, after, gaps, upper)
                 upper = after[upper]
     return stays
+
+
+@compiled
+def unlinked(before: NDArray[np.int_], after: NDArray[np.int_], row: int) -> tuple[int, int]:
+    """Take a row out of a chain of n; return its neighbours, -1 and n beyond the ends."""
+    lower, upper = int(before[row]), int(after[row])
+    if lower >= 0:
+        after[lower] = upper
+    if upper < len(before):
+        before[upper] = lower
+    return lower, upper
 
 
 @compiled
