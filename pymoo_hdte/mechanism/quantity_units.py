@@ -5,8 +5,7 @@ from __future__ import annotations
 from pymoo_hdte.mechanism.mechanism import Mechanism
 from pymoo_hdte.units import si_unit
 
-_TURNING = {"force": "torque", "position": "angle", "speed": "speed"}
-_SLIDING = {"force": "force", "position": "length", "speed": "linear speed"}
+_AT_A_SHAFT = {"force": "torque", "position": "angle", "speed": "speed"}
 """Names of these quantities in `pymoo_hdte.units.UNITS`."""
 _BASE = ("inertia", "stiffness", "damping")
 """Kinds of values with a unit of `UNITS` at a shaft; a zero has that of a force."""
@@ -29,10 +28,7 @@ def unit_of(mechanism: Mechanism, name: str, quantity: str = "force") -> str:
         ``"SI"`` where the files tell of a coordinate neither that it is an angle nor that it is a
         length, where a port touches both kinds, and where an input has no known scale.
     """
-    turning = _turning(mechanism, name)
-    if turning is None:
-        return "SI"
-    return si_unit((_TURNING if turning else _SLIDING)[quantity])
+    return unit_at(mechanism, name, si_unit(_AT_A_SHAFT[quantity]))
 
 
 def unit_at(mechanism: Mechanism, name: str, unit: str) -> str:
@@ -93,8 +89,8 @@ def unit_of_number(mechanism: Mechanism, name: str, number: str, unit: str) -> s
     """
     if number.endswith("phase"):
         return "rad"
-    if number == "order" and unit_of(mechanism, name, "position") != "rad":
-        return "rad/m" if unit_of(mechanism, name, "position") == "m" else "SI"
+    if number == "order":
+        return {"rad": unit, "m": "rad/m"}.get(unit_of(mechanism, name, "position"), "SI")
     return unit_at(mechanism, name, unit)
 
 
