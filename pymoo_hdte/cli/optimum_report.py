@@ -266,6 +266,7 @@ def _front_csv(study: DesignStudy) -> str:
 def _page(study: DesignStudy, document: dict[str, Any]) -> str:
     problem = study.problem
     sources = sorted(document["sources_of_scatter"].items(), key=lambda one: -one[1])
+    shown = [(name, share) for name, share in sources if share >= _LITTLE_SHARE]
     values = design_rows(study.designs, problem.nominal)
     # Without agreement no design is pointed at.
     chosen = study.chosen if study.recommended else {}
@@ -294,7 +295,7 @@ def _page(study: DesignStudy, document: dict[str, Any]) -> str:
             ),
         ],
         variables=[(name, problem.units[name]) for name in problem.var_names],
-        sources=[(name, share) for name, share in sources if share >= _LITTLE_SHARE],
-        others=len(sources) - sum(share >= _LITTLE_SHARE for _, share in sources),
+        sources=shown,
+        others=len(sources) - len(shown),
         checked_drives=SETS * DRIVES,
     )

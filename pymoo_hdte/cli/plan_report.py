@@ -7,6 +7,7 @@ from typing import Any
 
 from pymoo_hdte.cli.command import heading
 from pymoo_hdte.discrepancy.drive.plan.plan import Plan, chance_words
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.io.toml import toml_text
 from pymoo_hdte.reports.folder import PAGE_FILE, ReportFolder
 from pymoo_hdte.reports.html import page
@@ -34,7 +35,7 @@ def write_plan(plan: Plan, model: str, out: Path) -> dict[str, Any]:
     ]
     document = heading("plan", sentences, plan.missed) | {"model": model} | found
     del document["not_reached"]
-    words = {"use": _USE, "at_port": _at_port, "chance": _chance}
+    words = {"use": _USE, "in_words": in_words, "chance": _chance}
     rows = {"weakest": weakest(document), "document": document, **words}
     FOLDER.write(out, page("pymoo_hdte.cli", "plan.html.j2", **rows), document,
                  {PLAN_FILE: toml_text(document)})  # fmt: skip
@@ -47,11 +48,6 @@ def _share(count: int, total: int, what: str, more: str) -> str:
         return f"the only {what}" if count else f"no {what}"
     first = {0: "none of", total: "all"}.get(count, f"{count} of")
     return f"{first} {total} {more}"
-
-
-def _at_port(effect: str) -> str:
-    name, _, port = effect.replace("_", " ").partition(":")
-    return f"{name} ({port})" if port else name
 
 
 def _chance(power: float | None) -> str:
