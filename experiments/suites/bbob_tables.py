@@ -95,7 +95,7 @@ def shares_table(outcome: Outcome) -> Table:
     """Mean shares of targets by dimension and evaluations, ours before the published ones."""
     rows: list[tuple[Cell, ...]] = []
     for dimension in DIMENSIONS:
-        for algorithm, budget in _told(outcome, dimension):
+        for algorithm, budget in told_most(outcome, dimension):
             shares = outcome.shares(dimension, algorithm, budget)
             where = f"here{_extent(outcome, dimension, algorithm, budget)}"
             rows.append((algorithm, dimension, where, *(shares.get(one) for one in BUDGETS)))
@@ -114,8 +114,8 @@ def shares_table(outcome: Outcome) -> Table:
     )
 
 
-def _told(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
-    """Return who ran to which largest budget."""
+def told_most(outcome: Outcome, dimension: int) -> list[tuple[str, int]]:
+    """Return which peers ran in a dimension, each with its largest budget."""
     ran = {(run.algorithm, run.told) for run in outcome.bbob if run.dimension == dimension}
     largest = {name: max(told for one, told in ran if one == name) for name, _ in ran}
     return [(name, largest[name]) for name in BBOB_PEERS if name in largest]

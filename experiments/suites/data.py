@@ -24,7 +24,7 @@ NAME = "suites"
 BBOB = f"{NAME}_bbob"
 DIGITS = 6
 COMMAND = "python -m experiments suites --quick"
-"""What the stored outcome is made by; told in its first line."""
+"""What an outcome is made by, unless `gather` made it; told in its first line."""
 SUITE_COLUMNS = ("problem", "algorithm", "evaluations", "seed", "spent", *MEASURES)
 BBOB_COLUMNS = (
     "dimension",

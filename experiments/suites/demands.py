@@ -14,6 +14,7 @@ from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import (
     BUDGETS,
+    CONSTRAINED,
     FEASIBLE_RIVALS,
     HELD_OUT,
     RIVAL_ON_RE,
@@ -30,8 +31,6 @@ from experiments.suites.suite_tables import (
     tests,
 )
 from experiments.suites.together import ranks_together, signs_together
-
-CONSTRAINED = ("MW", "DAS-CMOP")
 
 
 class Demand(NamedTuple):

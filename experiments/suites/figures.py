@@ -6,6 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
+from experiments.suites.bbob_tables import told_most
 from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
@@ -36,13 +37,10 @@ def runtime_profiles(outcome: Outcome) -> Figure:
 
 def _run_here(axis: Axes, outcome: Outcome, dimension: int) -> None:
     """Draw what ran here, each algorithm's run of the largest budget."""
+    told = dict(told_most(outcome, dimension))
     for name, colour in LINES.items():
-        told = max(
-            (r.told for r in outcome.bbob if (r.algorithm, r.dimension) == (name, dimension)),
-            default=0,
-        )
-        shares = outcome.shares(dimension, name, told)
-        if shares:
+        if name in told:
+            shares = outcome.shares(dimension, name, told[name])
             width = 2.2 if name == OURS else 1.3
             axis.plot(*_line(shares), color=colour, lw=width, label=f"{name}, here")
 

@@ -48,9 +48,7 @@ class _Whole(CompactSwarm):
         return super()._survivors(_tolerant(points, self._level(before)))
 
     def _level(self, swarm: Points) -> float:
-        """Return the violation that is tolerated: none once half of the swarm is feasible."""
-        if 2 * np.count_nonzero(swarm.violation) < len(swarm):
-            return 0.0
+        """Return the violation that is tolerated: none once more than half is feasible."""
         level = self.TOLERATED * float(np.median(swarm.violation))
         return level if np.isfinite(level) else 0.0
 

@@ -16,7 +16,7 @@ from experiments.suites.data import Outcome
 from experiments.suites.jobs import MEASURES
 from experiments.suites.peers import OURS
 from experiments.suites.problems import PROBLEMS, SUITES
-from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT, VALIDATION
+from experiments.suites.protocol import BUDGETS, CONSTRAINED, DIMENSIONS, HELD_OUT, VALIDATION
 from experiments.suites.published import BEST, CITED
 
 NAMES = {"hypervolume": "hypervolume", "igd_plus": "IGD+"}
@@ -117,7 +117,7 @@ def _ranks_table(outcome: Outcome, suite: str) -> Table:
     order = sorted(algorithms, key=lambda name: by_place[budgets[-1], measures[0]].get(name, 99.0))
     columns = [Column("algorithm")]
     columns += [Column(NAMES[m], "", 3, f"{b:,} evaluations") for b, m in by_place]
-    constrained = suite in ("MW", "DAS-CMOP")
+    constrained = suite in CONSTRAINED
     rows: list[tuple[Cell, ...]] = []
     for name in order:
         row: list[Cell] = [name, *(found.get(name) for found in by_place.values())]
