@@ -56,9 +56,11 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
         Finding(first == "coulomb_friction", f"The first name is {first}.", check=True),
         Finding(
             near,
-            f"{'Mass' if near else 'Not all of mass'}, viscous and Coulomb friction lie within 5 % "
-            f"of the published values{', which' if near else ' with'} their intervals "
-            f"{'cover' if near else 'covering them'}.",
+            "Mass, viscous and Coulomb friction lie within 5 % of the published values, which "
+            "their intervals cover."
+            if near
+            else "Not all of mass, viscous and Coulomb friction lie within 5 % of the published "
+            "values with their intervals covering them.",
             check=True,
             answers=True,
         ),

@@ -41,6 +41,11 @@ def _made_once(name: str, make: Callable):
     return pickle.loads(path.read_bytes())
 
 
+def files_in(folder: Path) -> dict[str, bytes]:
+    """Return the files of a folder by name."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
 def put_files(files: Mapping[str | Path, bytes], folder: Path) -> None:
     """Write files, by their path, into a new folder."""
     for name, content in files.items():

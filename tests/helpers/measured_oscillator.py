@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from kept_results import kept
+from kept_results import files_in, kept
 from places import DOCS
 from scipy.integrate import solve_ivp
 
@@ -156,7 +156,7 @@ def reported(analysis):
     """Return an analysis with all its parts worked out, and the files of its report by name."""
     with TemporaryDirectory() as top:
         analysis.report(Path(top) / "report")
-        files = {path.name: path.read_bytes() for path in (Path(top) / "report").iterdir()}
+        files = files_in(Path(top) / "report")
     return analysis, files
 
 

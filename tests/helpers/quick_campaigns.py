@@ -4,7 +4,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from kept_results import kept
+from kept_results import files_in, kept
 from virtual_rig_cases import BELIEVED, RIG, effect
 
 from pymoo_hdte.cli import optimum_report
@@ -66,7 +66,7 @@ def ripple_analysis_and_report() -> tuple[DriveAnalysis, dict[str, bytes]]:
     analysis = analyse(ripple_campaign())
     with TemporaryDirectory() as top:
         analysis.report(Path(top) / "report")
-        files = {path.name: path.read_bytes() for path in (Path(top) / "report").iterdir()}
+        files = files_in(Path(top) / "report")
     return analysis, files
 
 
@@ -81,5 +81,5 @@ def study_and_report() -> tuple[DesignStudy, dict[str, bytes]]:
     study = run_design_study(preset("calibrated"), "balanced", SETTINGS)
     with TemporaryDirectory() as top:
         optimum_report.write_optimum_report(study, (), Path(top) / "report")
-        files = {path.name: path.read_bytes() for path in (Path(top) / "report").iterdir()}
+        files = files_in(Path(top) / "report")
     return study, files
