@@ -73,6 +73,7 @@ class Search:
         promising = [one for one in screened if one.reduction >= least]
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
             self._fit((one.candidate,), np.append(self.base.values, one.start))
+        self._from_other_starts()
         self._parameters()
         self._finish_near(1)
         if not self.enough(self.found[0]):
@@ -145,6 +146,13 @@ class Search:
             trial = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
             self._by_label[label] = hypothesis_of(trial, self.excess)
         return self._by_label[label]
+
+    def _from_other_starts(self) -> None:
+        """Fit single effects from all their starts where none so far explains most of the misfit."""
+        if self._by_label and self.found[0].explained < self.data.rules.explained_share:
+            for one in self._of_size(1):
+                if starts := other_starts(one, self.base.values):
+                    self._finish(one, *starts)
 
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end: from its values, the believed base and other starts.

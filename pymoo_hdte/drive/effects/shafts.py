@@ -71,11 +71,12 @@ class LoadInertia(DriveEffect):
 def _inertia(sizes: DriveSizes) -> list[Guess]:
     """Guess up to ten times the inertia of the load.
 
-    An inertia larger by half moves a resonance past lines, so that fits start on both sides of it.
+    An inertia larger by half moves a resonance past lines, so that fits start on both sides of it,
+    and in steps of 2.5 up to where the load hardly moves any more.
     """
     size = sizes.inertia
     added = unknown("inertia", 0.0, 10.0 * size, 0.3 * size)
-    return [Guess((added,), [(0.15 * size,), (0.4 * size,), (1.0 * size,)])]
+    return [Guess((added,), [(share * size,) for share in (0.15, 0.4, 1.0, 2.5, 6.0)])]
 
 
 register(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from analysed_campaigns import CONDITIONS, LISTED, analysed, ripple_analysis
+from planted_features import known_data, listed, measured
 from quick_campaigns import quick_analysis, ripple_analysis_and_report
 from verdict_cases import case_campaign
 from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
@@ -112,3 +113,17 @@ def hold(data, found, share):
         print(label, np.sort(beyond).round(2))
         assert beyond.min() > -SAME, label
         assert np.mean(beyond < SAME) >= share, label
+
+
+@pytest.mark.parametrize(("inertia", "stiffness"), [(0.08, 0.92), (0.3, 1.0)])
+def test_an_inertia_beyond_the_load_s_is_found_past_the_resonance(inertia, stiffness):
+    """A fit from near the believed load ends at none, and parameters at bounds leave less."""
+    conditions = [(150.0, 5.0), (500.0, 20.0), (1000.0, 30.0), (1500.0, 40.0), (2000.0, 10.0)]
+    empty = known_data(conditions, [1.0, 2.0, 2.02, 3.0])
+    load = listed(empty, "load_inertia")
+    effect = load.build((inertia,))
+    data = measured(effect, np.random.default_rng(1), empty, stiffness=stiffness)[0]
+    verdict = judge(data, fit(data), [load])
+    assert (verdict.status, verdict.chosen.label) == ("named", load.label)
+    # Data leave the share of it open that the believed load inertia may have: a tenth of 0.08.
+    assert verdict.chosen.fit.values[-1] == pytest.approx(inertia, abs=0.02)
