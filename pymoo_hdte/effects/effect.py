@@ -63,8 +63,7 @@ class Effect:
         Its description in a report, which may contain ``{port}``, ``{order}`` and ``{force}``
         (``"torque"`` in a drive).
     guess : callable or None
-        From `Sizes` of a port to a list of `Guess`, empty where the effect is impossible; None for
-        an effect that is never searched for.
+        From `Sizes` of a port to a list of `Guess`, empty where it is impossible; None: not sought.
     sought : tuple of str or None
         Ports of a drive where it is searched for; by default all of ``ports``.
     change : type or None
@@ -118,7 +117,7 @@ class Effect:
             one_of(f"{self.name}.ports", port, DRIVE_PORTS)
         for port in self.sought or ():
             one_of(f"{self.name}.sought", port, self.ports)
-        if getattr(self.law, "states", 0) and set(self.ports) - {"mesh"}:
+        if self.remembers and set(self.ports) - {"mesh"}:
             allowed = '("mesh",): solvers keep inner states of laws at the mesh of a drive only'
             raise InvalidInput(f"{self.name}.ports", self.ports, allowed)
         for number in self.quantities:
@@ -141,6 +140,11 @@ class Effect:
     def rattles(self) -> bool:
         """Whether parts may lose contact: see `Behaviour.rattles`."""
         return bool(getattr(self.law, "rattles", False))
+
+    @property
+    def remembers(self) -> bool:
+        """Whether its law keeps inner states: see `Behaviour.states`."""
+        return bool(getattr(self.law, "states", 0))
 
     @property
     def drives(self) -> bool:
@@ -248,9 +252,7 @@ _EFFECTS: dict[str, Effect] = {}
 
 
 def register(effect: Effect) -> Effect:
-    """Make an effect known to model files, simulation, verdicts and reports, and return it.
-
-    An effect that is already registered is unchanged.
+    """Make an effect known to model files, simulation, verdicts and reports, once, and return it.
 
     Raises
     ------
@@ -266,10 +268,7 @@ def register(effect: Effect) -> Effect:
 
 @contextmanager
 def registered(*more: Effect) -> Iterator[None]:
-    """Make effects known inside a block only; errors as of `register`.
-
-    Effects of the package that are imported in the block stay known.
-    """
+    """Make effects known inside a block only; those of the package that it imports stay known."""
     before = dict(_EFFECTS)
     try:
         for effect in more:

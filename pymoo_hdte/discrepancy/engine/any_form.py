@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, adequate, gains_enough
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, adequate, down_to_noise, gains_enough
 from pymoo_hdte.discrepancy.engine.screening import Screened, reduced, varied
 
 _RANK = 1e-5
@@ -62,7 +62,7 @@ class AnyForm:
 
     def __init__(self, data: Evidence, base: Fit) -> None:
         self.data, self.base = data, base
-        self._degrees_of_freedom = len(base.residuals) - len(base.values)
+        self._freedom = len(base.residuals) - len(base.values)
         self._rests: dict[Fit, Rest | None] = {}
         self._by_place: dict[tuple[str, str, float | None], NDArray[np.float64]] = {}
 
@@ -129,8 +129,10 @@ class AnyForm:
         found = [reduced(each, rest.directions, rest.residual) for each in known]
         found.sort(key=lambda each: -each.reduction)
         asked = [(each, self._least(one, (each.candidate,), rest)) for each in found]
-        ranked = [each for each, least in asked if rest.excess >= least]
-        hopeful = [each for each, least in asked if min(rest.excess, each.reduction) >= least]
+        if not self._quiet(one):
+            asked = [(each, least) for each, least in asked if rest.excess >= least]
+        ranked = [each for each, _ in asked]
+        hopeful = [each for each, least in asked if each.reduction >= least]
         little = one.explained >= rules.explained_share
         if not hopeful and little and not rest.is_noise:
             gains = [self._in_any_form(each, rest) for each in ranked]
@@ -139,17 +141,25 @@ class AnyForm:
         return varied(hopeful, 1)[: rules.most_seconds]
 
     def _least(self, one: Hypothesis, member: Sequence[Candidate], rest: Rest) -> float:
-        """Return what a further member has to remove beyond the forms of a set."""
-        rules = self.data.rules
+        """Return what a further member has to remove beyond the forms of a set.
+
+        Where the listed forms leave no more than noise, so does the model's own error, unless it is
+        that of a law with memory, and what noise alone does not give is enough.
+        """
+        rules, quiet = self.data.rules, self._quiet(one)
         error = rules.exact_model_accuracy**2
         if not one.exact:
             # At one port the corrections of a form need not hold all that a real law does.
             ports = {each.port for each in one.candidates}
-            same_port = any(each.port in ports for each in member)
-            error = rules.second_form_share if same_port else self.data.remainder
-        of_base = self.base.chi_square - self._degrees_of_freedom
-        share = rules.explained_part_share * rest.excess
-        return max(rules.single_effect_gain, error * of_base, share)
+            if any(each.port in ports for each in member):
+                error = rules.second_form_share
+            elif not quiet or any(each.remembers for each in one.candidates):
+                error = self.data.remainder
+        least = max(rules.single_effect_gain, error * (self.base.chi_square - self._freedom))
+        return least if quiet else max(least, rules.explained_part_share * rest.excess)
+
+    def _quiet(self, one: Hypothesis) -> bool:
+        return down_to_noise(one.fit, self._freedom, self.data.rules)
 
     def _rest(self, fitted: Fit) -> Rest | None:
         forms = [self.data.corrections(one) for one in fitted.candidates]

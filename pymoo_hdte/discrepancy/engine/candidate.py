@@ -46,6 +46,8 @@ class Candidate:
         Base parameter that it frees of its tolerance.
     form : str
         In a word, where the library holds several forms of one effect.
+    remembers : bool
+        Whether its force depends on the previous motion, which a model follows less exactly.
     instead_of : str
         Name of the effect in whose place alone it is tried; a search leaves it out.
     unit : callable or None
@@ -63,6 +65,7 @@ class Candidate:
     listed: bool = True
     frees: str | None = None
     form: str = ""
+    remembers: bool = False
     instead_of: str = ""
     unit: Callable[[str], str] | None = None
 
@@ -149,6 +152,7 @@ def candidate_of(
         effect.exact,
         listed=not guess.name,
         form=guess.form,
+        remembers=effect.remembers,
         instead_of=guess.instead_of,
         unit=effect.unit,
     )

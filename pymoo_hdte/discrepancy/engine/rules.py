@@ -54,7 +54,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules):
         25.0,
         "chi-square",
         "A base that is adequate as a whole is not, if one candidate would reduce chi-square by "
-        "this much: one line of one channel is lost among a thousand features.",
+        "this much: one line of one channel is lost among a thousand features. A further effect "
+        "beside named ones that leave no more than noise, in any form of them, has to as well.",
         "Simulation: of 1000 campaigns of noise alone one gave some candidate of 28 this much; one "
         "in 100 gave 18.",
     )
@@ -127,7 +128,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules):
         0.02,
         "relative amplitude",
         "Up to here what a first effect of no exact form leaves of a drive is its model's own "
-        "error and no second effect at another port.",
+        "error and no second effect at another port, where it leaves more than noise or has "
+        "memory.",
         "Simulation: with three times as many harmonics what the drive model predicts for an "
         "effect changes by up to 1.9e-2 (springs of a fortieth of the load that slip at a tenth of "
         "the wind-up; others 2e-5 or less).",

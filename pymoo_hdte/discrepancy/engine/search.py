@@ -148,7 +148,7 @@ class Search:
         return self._by_label[label]
 
     def _from_other_starts(self) -> None:
-        """Fit single effects from all their starts where none so far explains most of the misfit."""
+        """Fit single effects from all their starts where none explains most of the misfit yet."""
         if self._by_label and self.found[0].explained < self.data.rules.explained_share:
             for one in self._of_size(1):
                 if starts := other_starts(one, self.base.values):
