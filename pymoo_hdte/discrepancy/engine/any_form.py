@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, adequate, down_to_noise, gains_enough
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    adequate,
+    down_to_noise,
+    gains_enough,
+)
 from pymoo_hdte.discrepancy.engine.screening import Screened, reduced, varied
 
 _RANK = 1e-5
