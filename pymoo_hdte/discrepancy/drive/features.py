@@ -91,6 +91,7 @@ def measure(
         elapsed=np.array([_middle(record) for record in records]),
         bends=np.array([line.bends for line in lines]),
         temperature=np.array([record.temperature for record in records], dtype=float),
+        input_angle=np.array([line.mean[3] for line in lines]),
     )
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness

@@ -1,0 +1,41 @@
+"""Lines that a record cannot tell from an analysed order are read there, as they are measured."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from virtual_rig_cases import BELIEVED, PHASES, RIG, SHORT, effect, true_rig
+
+from pymoo_hdte.discrepancy.drive.features import measure
+from pymoo_hdte.discrepancy.drive.parameters import base_parameters
+from pymoo_hdte.discrepancy.drive.prediction import predict
+from pymoo_hdte.drive.effects import MeshStiffnessVariation
+from pymoo_hdte.virtual.rig import run_campaign
+
+DEPTH, PHASE, SECOND = 0.05, 0.7, 0.2
+QUIET = replace(RIG, angle_noise=1e-12, input_torque_noise=1e-9, output_torque_noise=1e-6,
+                angle_quantisation=0.0, repeatability=0.0, input_torque_gain=0.0,
+                input_torque_zero=0.0, output_torque_gain=0.0, output_torque_zero=0.0)  # fmt: skip
+BEATS = (2.0 / 101.0, 200.0 / 101.0)
+"""Where a record of one output turn has the orders 0.02 and 1.98."""
+
+
+def test_the_beat_of_the_error_with_a_varying_stiffness_is_predicted_where_it_is_measured():
+    """Errors of order 2.02 under a stiffness of order 2, against an independent integrator."""
+    wave = effect("mesh", depth=DEPTH, depth_phase=PHASE, depth_second=SECOND, depth_clip=1.0)
+    rng = np.random.default_rng(3)
+    campaign = run_campaign(true_rig(wave), BELIEVED, QUIET, rng, SHORT)
+    orders = [1.0 / 101.0, BEATS[0], 1.0, BEATS[1], 2.0, 2.02, 4.0]
+    features = measure(campaign, campaign.running, orders)
+    values = {
+        one.name: np.array([one.start]) for one in base_parameters(BELIEVED, QUIET, PHASES, 0.0)
+    }
+    laws = [
+        MeshStiffnessVariation(DEPTH, PHASE, 2.0),
+        MeshStiffnessVariation(DEPTH / 5.0, SECOND, 4.0),
+    ]
+    predicted = predict(BELIEVED, QUIET, features.conditions, orders, values, laws)
+    for order in (*BEATS, 2.0):
+        real, imaginary = features.places(0)[orders.index(order)]
+        measured = features.values[:, real] + 1j * features.values[:, imaginary]
+        assert predicted.phasors[0, :, 0, orders.index(order)] == pytest.approx(measured, rel=0.05)
