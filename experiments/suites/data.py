@@ -123,35 +123,45 @@ class Outcome:
             and all((one, name) in ran or not takes(name, problem_of(one)) for one in problems)
         ]
 
-    def problems(self, suite: str, budget: int) -> list[str]:
-        """Return the problems of a suite on which ours was judged at a budget."""
-        ran = {key[0] for key in self.suites if key[1:3] == (OURS, budget)}
+    def problems(self, suite: str, budget: int, control: str = OURS) -> list[str]:
+        """Return the problems of a suite on which ours, or another, was judged at a budget."""
+        ran = {key[0] for key in self.suites if key[1:3] == (control, budget)}
         return [one.name for one in SUITES[suite] if one.name in ran]
 
     def medians(
-        self, suite: str, budget: int, measure: str, algorithms: Sequence[str]
+        self,
+        suite: str,
+        budget: int,
+        measure: str,
+        algorithms: Sequence[str],
+        control: str = OURS,
     ) -> NDArray[np.float64]:
-        """Return medians over the seeds, shape (problems, algorithms); NaN where none ran."""
+        """Return medians over the seeds, shape (problems, algorithms); NaN where none ran.
+
+        On the problems and with the seeds of ``control``, with which all are compared.
+        """
         place = 1 + MEASURES.index(measure)
-        problems = self.problems(suite, budget)
+        problems = self.problems(suite, budget, control)
         values = np.full((len(problems), len(algorithms)), np.nan)
         for row, problem in enumerate(problems):
             for column, algorithm in enumerate(algorithms):
-                runs = self.runs(problem, algorithm, budget, place)
+                runs = self.runs(problem, algorithm, budget, place, control)
                 if runs:
                     values[row, column] = np.median(runs)
         return values
 
-    def runs(self, problem: str, algorithm: str, budget: int, place: int) -> list[float]:
+    def runs(
+        self, problem: str, algorithm: str, budget: int, place: int, control: str = OURS
+    ) -> list[float]:
         """Return one number of the runs of an algorithm on a problem, by rising seed.
 
-        Only of seeds with which ours ran there as well: with more, a rival would be compared
-        otherwise than ours.
+        Only of seeds with which ours, or another ``control``, ran there as well: with more, a rival
+        would be compared otherwise.
         """
         keys = (
             (problem, algorithm, budget, seed)
             for seed in SEEDS
-            if (problem, OURS, budget, seed) in self.suites
+            if (problem, control, budget, seed) in self.suites
         )
         return [self.suites[key][place] for key in keys if key in self.suites]
 

@@ -18,7 +18,7 @@ from experiments.suites.demands import demands_table, in_one_sentence
 from experiments.suites.figures import how_to_choose, runtime_profiles
 from experiments.suites.formulas import engineering, imop, lz09
 from experiments.suites.gather import kept_table
-from experiments.suites.parts import parts_table
+from experiments.suites.parts.alone import parts_table
 from experiments.suites.peers import OURS
 from experiments.suites.problems import DIFFICULTY, SUITES
 from experiments.suites.protocol import DIMENSIONS, HELD_OUT

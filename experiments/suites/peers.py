@@ -17,7 +17,7 @@ from experiments.contest.contestants import CONTESTANTS, Contestant, of_jmetal
 from experiments.contest.offer import POPULATION, Offer
 from experiments.contest.peers_pymoo import OWN, PYMOO, run_pymoo
 from experiments.suites.coco import StartBox
-from experiments.suites.reduced import LESS
+from experiments.suites.parts.reduced import LESS
 from pymoo_hdte.algorithms import CompactSwarm
 
 OURS = "CompactSwarm"

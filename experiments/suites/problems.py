@@ -12,6 +12,8 @@ from pymoo.core.problem import Problem
 from pymoo.problems import get_problem
 
 from experiments.comparison.indicators import CORNER
+from experiments.contest.benchmark_fronts import front_of as benchmark_front
+from experiments.contest.problems import BENCHMARKS
 from experiments.runner.committed import committed_file, read_rows
 from experiments.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.suites.formulas.imop import imop_front, make_imop
@@ -20,6 +22,8 @@ from experiments.suites.formulas.lz09 import lz09_front, make_lz09
 DIFFICULTY = 5
 """Of DAS-CMOP: the fifth triplet of pymoo's sixteen, which are those of its authors."""
 BOXES = "suites_boxes"
+TUNING = "ZDT, moved ZDT, DTLZ2"
+"""Those of ``peers`` on which settings may be chosen."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,11 @@ SUITES: dict[str, tuple[SuiteProblem, ...]] = {
     "LZ09": tuple(
         SuiteProblem(f"LZ09-F{n}", "LZ09", partial(make_lz09, n), partial(lz09_front, n))
         for n in range(1, 10)
+    ),
+    TUNING: tuple(
+        SuiteProblem(one.name, TUNING, one.make, partial(benchmark_front, one.name))
+        for one in BENCHMARKS.values()
+        if one.tuning and one.family in ("ZDT", "ZDT moved", "DTLZ")
     ),
 }
 """Problems by suite."""

@@ -65,7 +65,7 @@ from experiments.runner.registry import Context
 from experiments.suites import data as suites
 from experiments.suites.bbob_tables import reached
 from experiments.suites.demands import demands
-from experiments.suites.parts import part_tests
+from experiments.suites.parts.alone import part_tests
 from experiments.suites.published import CITED
 from experiments.suites.suite_tables import feasible_runs, in_short
 from experiments.suites.suite_tables import ranks as suite_ranks

@@ -1,0 +1,136 @@
+"""The compact swarm with all parts that it once had, and with some of them left out, by name.
+
+`Attraction` among its moves left it by the rule of `protocol`, and a level of violation that counts
+as none (T. Takahama, S. Sakai 2006): nine tenths of the swarm's median, which shrinks as the swarm
+follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.population import Population
+from pymoo.core.problem import Problem
+
+from experiments.contest.reduced_swarms import EqualShares, NoMutation
+from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
+from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
+from pymoo_hdte.algorithms.points import Points
+from pymoo_hdte.algorithms.quadratic import ModelStep
+
+MOVES: dict[str, type[Move]] = {
+    move.__name__: move
+    for move in (Attraction, Exchange, Difference, NeighbourDifference, ModelStep)
+}
+TOLERANCE, GUESTS, LEADERS, SHARES = "tolerance", "guests", "several leaders", "learned shares"
+MUTATION = "mutation"
+
+
+class _Whole(CompactSwarm):
+    """With all parts but those that it lacks, by name."""
+
+    TOLERATED = 0.9
+    """Share of the swarm's median violation that counts as none."""
+
+    def __init__(
+        self, pop_size: int | None = None, *, lacks: Collection[str] = (), **kwargs: Any
+    ) -> None:
+        moves = tuple(move() for name, move in MOVES.items() if name not in lacks)
+        mutation = NoMutation() if MUTATION in lacks else None
+        super().__init__(pop_size, moves=moves, mutation=mutation, **kwargs)
+        # The moves are those of any user, who names none: with constraints without models.
+        self._by_problem = True
+        self.lacks = frozenset(lacks)
+        if GUESTS in lacks:
+            self.GUESTS = 0.0
+        if TOLERANCE in lacks:
+            self.TOLERATED = 0.0
+
+    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
+        super()._initialize_advance(infills, **kwargs)
+        if SHARES in self.lacks:
+            self.success = EqualShares(len(self.moves))
+
+    def _front(self, swarm: Points) -> Points:
+        if np.any(swarm.violation == 0.0):
+            return super()._front(_tolerant(swarm, self._level(swarm)))
+        if LEADERS in self.lacks:
+            # While nothing is feasible, the least infeasible particle leads all.
+            return ElitistSwarm._front(self, swarm)
+        return super()._front(swarm)
+
+    def _survivors(self, points: Points) -> NDArray[np.int_]:
+        before = points[np.arange(len(points) - len(self.chosen))]
+        return super()._survivors(_tolerant(points, self._level(before)))
+
+    def _level(self, swarm: Points) -> float:
+        """Return the violation that is tolerated: none once more than half is feasible."""
+        level = self.TOLERATED * float(np.median(swarm.violation))
+        return level if np.isfinite(level) else 0.0
+
+
+def _tolerant(points: Points, level: float) -> Points:
+    """Return the points with violations up to a level counted as none."""
+    return replace(points, violation=np.where(points.violation <= level, 0.0, points.violation))
+
+
+def _without(*lacks: str) -> Callable[[Problem], Algorithm]:
+    return lambda _: _Whole(lacks=lacks)
+
+
+_OF_ALL = {
+    **{f"without {move}": move for move in MOVES if move != ModelStep.__name__},
+    "without mutation": MUTATION,
+    "with equal shares of moves": SHARES,
+}
+_OF_CONSTRAINED = {
+    "without guests": GUESTS,
+    "without tolerance": TOLERANCE,
+    "with one leader": LEADERS,
+}
+_OF_PLAIN = {"without ModelStep": ModelStep.__name__}
+LACKED = _OF_PLAIN | _OF_CONSTRAINED | _OF_ALL
+"""The part that is left out alone, by the name of the swarm that lacks it."""
+GROWTH = "with 50 particles"
+"""Which is what the swarm grows to in 10,000 evaluations."""
+ALONE = ("without ModelStep", GROWTH, *_OF_CONSTRAINED, *_OF_ALL)
+"""Names of the swarms that lack one part."""
+ON_PLAIN, ON_CONSTRAINED = (
+    ("without ModelStep", GROWTH, *_OF_ALL),
+    (*_OF_CONSTRAINED, *_OF_ALL),
+)
+"""Those that lack something which counts without and with constraints; models do not with any."""
+WHOLE = "with all parts"
+SPREAD = "with quality=spread"
+
+LEFT = (Attraction.__name__, TOLERANCE)
+"""Parts that the swarm has no more."""
+CANDIDATES = (GUESTS, SHARES, Exchange.__name__, Difference.__name__, LEADERS)
+"""Parts that it has without their being shown to help by themselves."""
+
+
+def without_all(parts: Sequence[str]) -> str:
+    """Return the name of the swarm that lacks these parts, in this order."""
+    return f"without {' and '.join(parts)}"
+
+
+_TOGETHER = [LEFT[: 1 + n] for n in range(len(LEFT))] + [
+    (*LEFT, *chosen)
+    for count in range(1, 1 + len(CANDIDATES))
+    for chosen in combinations(CANDIDATES, count)
+]
+
+LESS: dict[str, Callable[[Problem], Algorithm]] = {
+    **{name: _without(part) for name, part in LACKED.items()},
+    **{without_all(parts): _without(*parts) for parts in _TOGETHER},
+    GROWTH: lambda _: _Whole(50),
+    WHOLE: lambda _: _Whole(),
+    SPREAD: lambda _: CompactSwarm(quality="spread"),
+}
+"""The swarms by name."""

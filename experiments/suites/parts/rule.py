@@ -1,0 +1,156 @@
+"""Parts leave the swarm, one after another, by the rule of `protocol`.
+
+``python -m experiments.suites.parts.rule OUT`` runs every swarm that the rule comes to and keeps
+the runs in ``OUT/runs/ORIGIN``, where `gather` finds them; a further call goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from experiments.comparison.paired import SIGNIFICANT
+from experiments.runner.campaign import Campaign
+from experiments.runner.result import Cell, Column, Table
+from experiments.suites.data import Outcome, stored
+from experiments.suites.parts.alone import (
+    JUDGED_AT,
+    PartTest,
+    on_bbob,
+    on_suites,
+    part_tests,
+)
+from experiments.suites.parts.reduced import LACKED, WHOLE, without_all
+from experiments.suites.problems import TUNING
+from experiments.suites.protocol import (
+    BUDGETS,
+    CONSTRAINED,
+    OURS,
+    PLAIN,
+    BbobPart,
+    SuitePart,
+    where_parts_leave,
+)
+
+ON_TUNING = BUDGETS[1]
+"""Evaluations on the problems of tuning."""
+PLACES = 6
+"""Tests of a step: three budgets of bbob-biobj and three groups of suites."""
+
+
+class Step(NamedTuple):
+    """A part that is left out beside all that left before, against the swarm with all parts."""
+
+    part: str
+    less: str
+    tests: list[PartTest]
+
+    @property
+    def worse(self) -> list[PartTest]:
+        """Return where the swarm is worse, p uncorrected."""
+        return [one for one in self.tests if one.test.ahead and one.test.p < SIGNIFICANT]
+
+    @property
+    def leaves(self) -> bool:
+        """Whether the part leaves."""
+        return not self.worse
+
+
+def order(outcome: Outcome) -> list[str]:
+    """Return the parts that are not shown to help by themselves, the one missed least first."""
+    gains: dict[str, float] = defaultdict(float)
+    helps = set()
+    for one in part_tests(outcome):
+        gains[one.part] += one.gain
+        if one.helps:
+            helps.add(one.part)
+    rest = [name for name in LACKED if name in gains and name not in helps]
+    return [LACKED[name] for name in sorted(rest, key=lambda name: -gains[name])]
+
+
+def steps(outcome: Outcome) -> list[Step]:
+    """Follow the rule as far as the outcome has the runs of its swarms."""
+    left: list[str] = []
+    found = []
+    for part in order(outcome):
+        step = step_of(outcome, left, part)
+        if len(step.tests) < PLACES:
+            break
+        found.append(step)
+        if step.leaves:
+            left.append(part)
+    return found
+
+
+def step_of(outcome: Outcome, left: Sequence[str], part: str) -> Step:
+    """Test the swarm without a part and without those that left before."""
+    less = without_all([*left, part])
+    tests = [
+        *on_bbob(outcome, less),
+        *on_suites(outcome, less, PLAIN, JUDGED_AT),
+        *on_suites(outcome, less, CONSTRAINED, JUDGED_AT),
+        *on_suites(outcome, less, [TUNING], ON_TUNING),
+    ]
+    return Step(part, less, tests)
+
+
+def steps_table(outcome: Outcome) -> Table:
+    """Show what came of the rule."""
+    rows: list[tuple[Cell, ...]] = []
+    for step in steps(outcome):
+        for one in step.tests:
+            rows.append(
+                (
+                    *(step.part, one.where, one.evaluations, one.whole, one.less),
+                    *(one.test.better, one.test.worse, one.test.p),
+                    "leaves" if step.leaves else "stays",
+                )
+            )
+    return Table(
+        "rule",
+        f"Parts that left {OURS} one after another, and parts that stay",
+        (
+            *(Column("left out too"), Column("where"), Column("evaluations")),
+            *(Column(name, "", 3, "mean") for name in ("whole", "less")),
+            *(Column("whole better"), Column("worse"), Column("p", digits=2), Column("so it")),
+        ),
+        tuple(rows),
+        note="Parts that are not shown to help by themselves, the one that is missed least first, "
+        "each left out together with all that left before it. It leaves unless the whole swarm is "
+        f"better anywhere with p below {SIGNIFICANT}, Wilcoxon's over the problems, uncorrected.",
+        folded=True,
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Carry the rule to its end and say what comes of it."""
+    parser = argparse.ArgumentParser(prog="python -m experiments.suites.parts.rule")
+    parser.add_argument("out", type=Path, metavar="OUT")
+    options = parser.parse_args(arguments)
+    campaign, outcome = Campaign(options.out), stored()
+    left: list[str] = []
+    _complete(campaign, outcome, WHOLE)
+    for part in order(outcome):
+        _complete(campaign, outcome, without_all([*left, part]))
+        step = step_of(outcome, left, part)
+        for one in step.tests:
+            found = f"gain {one.gain:+.4f}, whole better {one.test.better}, worse {one.test.worse}"
+            print(f"{step.less}: {one.where}, {one.evaluations}: {found}, p {one.test.p:.3g}")
+        print(f"{part} {'leaves' if step.leaves else 'stays'}", flush=True)
+        if step.leaves:
+            left.append(part)
+
+
+def _complete(campaign: Campaign, outcome: Outcome, name: str) -> None:
+    """Add what an outcome lacks of one swarm."""
+    parts: list[SuitePart | BbobPart] = [*where_parts_leave(name)]
+    for part in parts:
+        jobs = [job for job in part.jobs() if not outcome.has(job)]
+        outcome.add(jobs, campaign.run(jobs, name))
+
+
+if __name__ == "__main__":
+    main()
