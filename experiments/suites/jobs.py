@@ -61,7 +61,7 @@ def measured(name: str, F: NDArray[np.float64]) -> tuple[float, float, int]:
     front = front_among(F)
     ideal, nadir = box_of(name)
     scaled = (front - ideal) / (nadir - ideal)
-    scaled = scaled[most_hypervolume(scaled, FINAL_SIZE)]
+    scaled = scaled[most_hypervolume(scaled, FINAL_SIZE, keep_ends=False)]
     inside = scaled[np.all(scaled < CORNER, axis=1)]
     volume = float(hypervolume(inside, ref=[CORNER] * len(ideal))) if len(inside) else 0.0
     true = front_of(name)

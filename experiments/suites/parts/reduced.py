@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -20,6 +21,7 @@ from pymoo.core.problem import Problem
 
 from experiments.contest.reduced_swarms import EqualShares, NoMutation
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
+from pymoo_hdte.algorithms.hypervolume import most_hypervolume
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep
@@ -28,6 +30,8 @@ MOVES: dict[str, type[Move]] = {
     move.__name__: move
     for move in (Attraction, Exchange, Difference, NeighbourDifference, ModelStep)
 }
+SHRINKING = partial(most_hypervolume, keep_ends=False)
+"""The truncation of the time, which may lose the ends of a front of three objectives."""
 TOLERANCE, GUESTS, LEADERS, SHARES = "tolerance", "guests", "several leaders", "learned shares"
 MUTATION = "mutation"
 
@@ -43,7 +47,7 @@ class _Whole(CompactSwarm):
     ) -> None:
         moves = tuple(move() for name, move in MOVES.items() if name not in lacks)
         mutation = NoMutation() if MUTATION in lacks else None
-        super().__init__(pop_size, moves=moves, mutation=mutation, **kwargs)
+        super().__init__(pop_size, moves=moves, mutation=mutation, quality=SHRINKING, **kwargs)
         # The moves are those of any user, who names none: with constraints without models.
         self._by_problem = True
         self.lacks = frozenset(lacks)
