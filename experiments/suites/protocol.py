@@ -39,8 +39,9 @@ against the whole one on instance 10 after 500, 2,000 and 10,000 evaluations, on
 MW and DAS-CMOP after 10,000 with the seeds of the stored runs, and on ZDT, moved ZDT and DTLZ2
 after 2,000 with ten seeds, by Wilcoxon's signed ranks over the problems, two-sided, uncorrected,
 medians over the seeds. If the whole one is better anywhere with p < .05, the part stays, and the
-next one is tried without those that left; else it leaves. `parts.rule` does this and nothing else.
-What is left after the last one is the swarm.
+next one is tried without those that left, and what else was to be run of it is not; else it leaves.
+Without constraints, swarms that differ in the handling of constraints alone are run once.
+`parts.rule` does this and nothing else. What is left after the last one is the swarm.
 
 Beside peers: ours and up to four that move alike whatever their budget on instance 9, which was
 written down, and the peers run, before ours was. Ours was to run on instances 11 and 12 as well; it
@@ -191,11 +192,12 @@ BESIDE: tuple[SuitePart | BbobPart, ...] = (
 
 
 def where_parts_leave(name: str) -> tuple[SuitePart | BbobPart, ...]:
-    """Return what decides whether a part leaves, of the swarm of one name."""
+    """Return what decides whether a part leaves, of the swarm of one name, in the order of runs."""
     return (
-        BbobPart(name, (10_000,), (OF_PARTS,)),
-        *(SuitePart(suite, (name,), (10_000,), seeds) for suite, seeds in SUITE_SEEDS.items()),
+        *(SuitePart(suite, (name,), (10_000,), SUITE_SEEDS[suite]) for suite in CONSTRAINED),
         SuitePart(TUNING, (name,), (2000,), seeds=10),
+        *(SuitePart(suite, (name,), (10_000,), SUITE_SEEDS[suite]) for suite in PLAIN),
+        BbobPart(name, (10_000,), (OF_PARTS,)),
     )
 
 

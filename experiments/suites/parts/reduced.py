@@ -130,9 +130,22 @@ _TOGETHER = [LEFT[: 1 + n] for n in range(len(LEFT))] + [
     for chosen in combinations(CANDIDATES, count)
 ]
 
+_LACKS = {without_all(parts): parts for parts in _TOGETHER}
+
+
+def twins_without_constraints(name: str) -> list[str]:
+    """Return the names of the swarms that move as this one where there are no constraints."""
+
+    def counting(parts: tuple[str, ...]) -> list[str]:
+        return [part for part in parts if part not in _OF_CONSTRAINED.values()]
+
+    own = counting(_LACKS.get(name, (name,)))
+    return [other for other, parts in _LACKS.items() if counting(parts) == own and other != name]
+
+
 LESS: dict[str, Callable[[Problem], Algorithm]] = {
     **{name: _without(part) for name, part in LACKED.items()},
-    **{without_all(parts): _without(*parts) for parts in _TOGETHER},
+    **{name: _without(*parts) for name, parts in _LACKS.items()},
     GROWTH: lambda _: _Whole(50),
     WHOLE: lambda _: _Whole(),
     SPREAD: lambda _: CompactSwarm(quality="spread"),

@@ -1,7 +1,8 @@
 """Parts leave the swarm, one after another, by the rule of `protocol`.
 
 ``python -m experiments.suites.parts.rule OUT`` runs every swarm that the rule comes to and keeps
-the runs in ``OUT/runs/ORIGIN``, where `gather` finds them; a further call goes on.
+the runs in ``OUT/runs/ORIGIN``, where `gather` finds them; a further call goes on, and ``--done``
+names further such folders. Of a swarm that is found worse somewhere the rest is not run.
 """
 
 from __future__ import annotations
@@ -9,13 +10,16 @@ from __future__ import annotations
 import argparse
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from experiments.comparison.paired import SIGNIFICANT
-from experiments.runner.campaign import Campaign
+from experiments.runner.campaign import Campaign, read_run
 from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome, stored
+from experiments.suites.gather import path_of
+from experiments.suites.jobs import BbobRun, SuiteRun
 from experiments.suites.parts.alone import (
     JUDGED_AT,
     PartTest,
@@ -23,8 +27,8 @@ from experiments.suites.parts.alone import (
     on_suites,
     part_tests,
 )
-from experiments.suites.parts.reduced import LACKED, WHOLE, without_all
-from experiments.suites.problems import TUNING
+from experiments.suites.parts.reduced import LACKED, WHOLE, twins_without_constraints, without_all
+from experiments.suites.problems import TUNING, problem_of
 from experiments.suites.protocol import (
     BUDGETS,
     CONSTRAINED,
@@ -58,6 +62,11 @@ class Step(NamedTuple):
         """Whether the part leaves."""
         return not self.worse
 
+    @property
+    def decided(self) -> bool:
+        """Whether enough was run: everything, or where the swarm is worse."""
+        return not self.leaves or len(self.tests) == PLACES
+
 
 def order(outcome: Outcome) -> list[str]:
     """Return the parts that are not shown to help by themselves, the one missed least first."""
@@ -77,7 +86,7 @@ def steps(outcome: Outcome) -> list[Step]:
     found = []
     for part in order(outcome):
         step = step_of(outcome, left, part)
-        if len(step.tests) < PLACES:
+        if not step.decided:
             break
         found.append(step)
         if step.leaves:
@@ -129,27 +138,50 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Carry the rule to its end and say what comes of it."""
     parser = argparse.ArgumentParser(prog="python -m experiments.suites.parts.rule")
     parser.add_argument("out", type=Path, metavar="OUT")
+    parser.add_argument("--done", nargs="*", default=[], type=Path, metavar="FOLDER")
     options = parser.parse_args(arguments)
     campaign, outcome = Campaign(options.out), stored()
     left: list[str] = []
-    _complete(campaign, outcome, WHOLE)
-    for part in order(outcome):
-        _complete(campaign, outcome, without_all([*left, part]))
-        step = step_of(outcome, left, part)
+    for part in where_parts_leave(WHOLE):
+        _run(campaign, options.done, outcome, part)
+    for lacking in order(outcome):
+        for part in where_parts_leave(without_all([*left, lacking])):
+            _run(campaign, options.done, outcome, part)
+            step = step_of(outcome, left, lacking)
+            if not step.leaves:
+                break
         for one in step.tests:
             found = f"gain {one.gain:+.4f}, whole better {one.test.better}, worse {one.test.worse}"
             print(f"{step.less}: {one.where}, {one.evaluations}: {found}, p {one.test.p:.3g}")
-        print(f"{part} {'leaves' if step.leaves else 'stays'}", flush=True)
+        print(f"{lacking} {'leaves' if step.leaves else 'stays'}", flush=True)
         if step.leaves:
-            left.append(part)
+            left.append(lacking)
 
 
-def _complete(campaign: Campaign, outcome: Outcome, name: str) -> None:
-    """Add what an outcome lacks of one swarm."""
-    parts: list[SuitePart | BbobPart] = [*where_parts_leave(name)]
-    for part in parts:
-        jobs = [job for job in part.jobs() if not outcome.has(job)]
-        outcome.add(jobs, campaign.run(jobs, name))
+def _run(
+    campaign: Campaign, done: Sequence[Path], outcome: Outcome, part: SuitePart | BbobPart
+) -> None:
+    """Add what an outcome lacks of a part; runs that are done, or those of a twin, are taken."""
+    missing: list[SuiteRun | BbobRun] = []
+    for job in part.jobs():
+        twins = [] if _constrained(job) else twins_without_constraints(job.algorithm)
+        alike = [
+            one for one in (replace(job, algorithm=name) for name in twins) if outcome.has(one)
+        ]
+        path = path_of(done, job.key)
+        if outcome.has(job):
+            continue
+        if path:
+            outcome.add([job], [read_run(path)])
+        elif alike:
+            outcome.take(job, outcome, alike[0])
+        else:
+            missing.append(job)
+    outcome.add(missing, campaign.run(missing, missing[0].key if missing else ""))
+
+
+def _constrained(job: SuiteRun | BbobRun) -> bool:
+    return isinstance(job, SuiteRun) and problem_of(job.problem).has_constraints()
 
 
 if __name__ == "__main__":

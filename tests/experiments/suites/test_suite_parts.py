@@ -1,0 +1,96 @@
+"""Parts that leave the swarm by the protocol's rule, and the swarms that lack them."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from experiments.suites.data import Outcome
+from experiments.suites.jobs import BbobRun
+from experiments.suites.parts.reduced import LESS, WHOLE, without_all
+from experiments.suites.parts.rule import order, steps, steps_table
+from experiments.suites.problems import SUITES, TUNING, problem_of
+from experiments.suites.protocol import OF_PARTS
+
+
+def plant(outcome, name, gain):
+    """Let a swarm differ from the whole one by a gain, beside chance that cancels in pairs."""
+
+    def chance(number):
+        return 0.0 if name == WHOLE else 0.001 * (2 + number // 2) * (-1) ** number
+
+    for number, (dimension, function) in enumerate(product((10, 20), range(1, 56))):
+        share = 0.4 + gain + chance(number)
+        run = BbobRun(function, dimension, OF_PARTS, name, 10_000)
+        outcome.bbob[run] = dict.fromkeys((500, 2000, 10_000), share)
+    for suite, budget in (("LZ09", 10_000), ("MW", 10_000), (TUNING, 2000)):
+        for number, one in enumerate(SUITES[suite]):
+            volume = 0.4 + gain + chance(number)
+            outcome.suites[one.name, name, budget, 1] = float(budget), volume, 0.1, 9.0
+
+
+@pytest.fixture
+def outcome():
+    found = Outcome()
+    for name, gain in {
+        WHOLE: 0.0,
+        "without ModelStep": -0.2,
+        "without Attraction": 0.001,
+        "without tolerance": 0.0001,
+        "without guests": -0.0001,
+        "without Exchange": -0.001,
+    }.items():
+        plant(found, name, gain)
+    plant(found, without_all(["Attraction", "tolerance"]), 0.0)
+    return found
+
+
+def test_the_part_that_is_missed_least_leaves_first_and_one_that_helps_is_not_tried(outcome):
+    assert order(outcome) == ["Attraction", "tolerance", "guests", "Exchange"]
+
+
+def test_a_part_without_which_the_swarm_is_worse_anywhere_stays(outcome):
+    plant(outcome, without_all(["Attraction", "tolerance", "guests"]), 0.0)
+    for one in SUITES[TUNING]:
+        row = 2000.0, 0.2, 0.1, 9.0
+        outcome.suites[one.name, without_all(["Attraction", "tolerance", "guests"]), 2000, 1] = row
+    plant(outcome, without_all(["Attraction", "tolerance", "Exchange"]), 0.0)
+    found = steps(outcome)
+    assert [(step.part, step.leaves) for step in found] == [
+        ("Attraction", True),
+        ("tolerance", True),
+        ("guests", False),
+        ("Exchange", True),
+    ]
+    (worse,) = found[2].worse
+    assert (worse.where, worse.evaluations) == (TUNING, 2000)
+    assert len(steps_table(outcome).rows) == 6 * 4
+
+
+def test_the_rule_waits_for_runs_that_lack(outcome):
+    plant(outcome, without_all(["Attraction", "tolerance", "guests"]), 0.0)
+    for one in SUITES[TUNING]:
+        del outcome.suites[one.name, without_all(["Attraction", "tolerance", "guests"]), 2000, 1]
+    assert [step.part for step in steps(outcome)] == ["Attraction", "tolerance"]
+
+
+@pytest.mark.parametrize("name", LESS)
+def test_swarms_that_lack_parts_run(name):
+    for problem in map(problem_of, ("MW1", "LZ09-F1")):
+        algorithm = LESS[name](problem)
+        algorithm.setup(problem, termination=("n_eval", 60), seed=1).run()
+        assert np.isfinite(algorithm.pop.get("F")).all()
+
+
+def test_what_is_left_out_is_not_there():
+    problem = problem_of("MW1")
+    algorithm = LESS["without Attraction and tolerance and guests and Exchange"](problem)
+    algorithm.setup(problem, termination=("n_eval", 60), seed=1).run()
+    assert [type(move).__name__ for move in algorithm.moves] == [
+        "Difference",
+        "NeighbourDifference",
+    ]
+    assert (algorithm.TOLERATED, algorithm.GUESTS) == (0.0, 0.0)
+    algorithm = LESS["with equal shares of moves"](problem)
+    algorithm.setup(problem, termination=("n_eval", 400), seed=1).run()
+    np.testing.assert_array_equal(algorithm.success.shares, 0.25)
