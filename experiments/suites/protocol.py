@@ -164,7 +164,7 @@ FURTHER = tuple(name for name in QUICK_ENOUGH if name not in (OURS, *BESIDE_OURS
 
 PLAIN, CONSTRAINED = ("LZ09", "RE"), ("MW", "DAS-CMOP")
 """Suites on which parts are left out, beside bbob-biobj."""
-SUITE_SEEDS = {"LZ09": 3, "RE": 5, "MW": 5, "DAS-CMOP": 5}
+SUITE_SEEDS = {"LZ09": 3, "RE": 5, "MW": 5, "DAS-CMOP": 5, TUNING: 10}
 
 PARTS: tuple[SuitePart | BbobPart, ...] = (
     *(BbobPart(name, (10_000,), (OF_PARTS,)) for name in (WHOLE, *ON_PLAIN)),
@@ -191,14 +191,12 @@ BESIDE: tuple[SuitePart | BbobPart, ...] = (
 """What is run of the swarm that remains, beside its peers."""
 
 
-def where_parts_leave(name: str) -> tuple[SuitePart | BbobPart, ...]:
-    """Return what decides whether a part leaves, of the swarm of one name, in the order of runs."""
-    return (
-        *(SuitePart(suite, (name,), (10_000,), SUITE_SEEDS[suite]) for suite in CONSTRAINED),
-        SuitePart(TUNING, (name,), (2000,), seeds=10),
-        *(SuitePart(suite, (name,), (10_000,), SUITE_SEEDS[suite]) for suite in PLAIN),
-        BbobPart(name, (10_000,), (OF_PARTS,)),
-    )
+def where_parts_leave(name: str) -> Iterable[tuple[SuitePart | BbobPart, ...]]:
+    """Yield what is tested together of the swarm of one name, in the order of the runs."""
+    for suites in (CONSTRAINED, (TUNING,), PLAIN):
+        budgets = BUDGETS[1:2] if suites == (TUNING,) else BUDGETS[2:3]
+        yield tuple(SuitePart(one, (name,), budgets, SUITE_SEEDS[one]) for one in suites)
+    yield (BbobPart(name, (10_000,), (OF_PARTS,)),)
 
 
 STORED = (*PARTS, *BESIDE)

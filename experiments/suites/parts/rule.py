@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -142,11 +143,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     campaign, outcome = Campaign(options.out), stored()
     left: list[str] = []
-    for part in where_parts_leave(WHOLE):
-        _run(campaign, options.done, outcome, part)
+    _run(campaign, options.done, outcome, chain(*where_parts_leave(WHOLE)))
     for lacking in order(outcome):
-        for part in where_parts_leave(without_all([*left, lacking])):
-            _run(campaign, options.done, outcome, part)
+        for place in where_parts_leave(without_all([*left, lacking])):
+            _run(campaign, options.done, outcome, place)
             step = step_of(outcome, left, lacking)
             if not step.leaves:
                 break
@@ -159,15 +159,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(
-    campaign: Campaign, done: Sequence[Path], outcome: Outcome, part: SuitePart | BbobPart
+    campaign: Campaign,
+    done: Sequence[Path],
+    outcome: Outcome,
+    parts: Iterable[SuitePart | BbobPart],
 ) -> None:
-    """Add what an outcome lacks of a part; runs that are done, or those of a twin, are taken."""
+    """Add what an outcome lacks; runs that are done, or those of a twin, are taken."""
     missing: list[SuiteRun | BbobRun] = []
-    for job in part.jobs():
+    for job in (job for part in parts for job in part.jobs()):
         twins = [] if _constrained(job) else twins_without_constraints(job.algorithm)
-        alike = [
-            one for one in (replace(job, algorithm=name) for name in twins) if outcome.has(one)
-        ]
+        alike = [name for name in twins if outcome.has(replace(job, algorithm=name))]
         path = path_of(done, job.key)
         if outcome.has(job):
             continue
