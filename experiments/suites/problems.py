@@ -18,6 +18,7 @@ from experiments.runner.committed import committed_file, read_rows
 from experiments.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.suites.formulas.imop import imop_front, make_imop
 from experiments.suites.formulas.lz09 import lz09_front, make_lz09
+from experiments.suites.formulas.zcat import make_zcat, zcat_front
 
 DIFFICULTY = 5
 """Of DAS-CMOP: the fifth triplet of pymoo's sixteen, which are those of its authors."""
@@ -40,6 +41,13 @@ def _numbered(suite: str, count: int) -> list[str]:
     return [f"{suite}{number}" for number in range(1, count + 1)]
 
 
+def _zcat(n: int, n_obj: int) -> SuiteProblem:
+    """Return a problem of ZCAT; all four levels of difficulty take turns."""
+    level = 1 + (n + 2 * n_obj - 5) % 4
+    make, front = partial(make_zcat, n, n_obj, level), partial(zcat_front, n, n_obj)
+    return SuiteProblem(f"ZCAT{n}_{n_obj}", "ZCAT", make, front)
+
+
 def _dascmop(number: int) -> Problem:
     return get_problem(f"dascmop{number}", DIFFICULTY)
 
@@ -60,6 +68,7 @@ SUITES: dict[str, tuple[SuiteProblem, ...]] = {
         SuiteProblem(f"LZ09-F{n}", "LZ09", partial(make_lz09, n), partial(lz09_front, n))
         for n in range(1, 10)
     ),
+    "ZCAT": tuple(_zcat(n, n_obj) for n_obj in (2, 3) for n in range(1, 21)),
     TUNING: tuple(
         SuiteProblem(one.name, TUNING, one.make, partial(benchmark_front, one.name))
         for one in BENCHMARKS.values()

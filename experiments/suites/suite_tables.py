@@ -157,7 +157,7 @@ def rivals_table(outcome: Outcome) -> Table:
         columns.append(Column("p", digits=2, group=name))
     return Table(
         "rivals",
-        f"IMOP, held out: {OURS} against every other",
+        f"{' and '.join(HELD_OUT)}, held out: {OURS} against every other",
         tuple(columns),
         tuple(rows),
         note="Better and worse compare medians. p is Wilcoxon's over the problems that both take, "

@@ -1,6 +1,6 @@
-"""All held-out suites together, by hypervolume: IMOP and one instance of bbob-biobj.
+"""All held-out suites together, by hypervolume: ZCAT and one instance of bbob-biobj.
 
-A problem of IMOP gives the median hypervolume, one of bbob-biobj, with both dimensions counted, the
+A problem of ZCAT gives the median hypervolume, one of bbob-biobj, with both dimensions counted, the
 share of targets, which rises with the hypervolume of all points evaluated. They have no common
 unit, so that ranks and signs are what is compared. IGD+ needs a front; bbob-biobj has none in
 closed form.

@@ -22,26 +22,20 @@ from experiments.suites.data import Outcome, stored
 from experiments.suites.gather import path_of
 from experiments.suites.jobs import BbobRun, SuiteRun
 from experiments.suites.parts.alone import (
-    JUDGED_AT,
     PartTest,
     on_bbob,
     on_suites,
     part_tests,
 )
 from experiments.suites.parts.reduced import LACKED, WHOLE, twins_without_constraints, without_all
-from experiments.suites.problems import TUNING, problem_of
+from experiments.suites.problems import problem_of
 from experiments.suites.protocol import (
-    BUDGETS,
-    CONSTRAINED,
     OURS,
-    PLAIN,
     BbobPart,
     SuitePart,
     where_parts_leave,
 )
 
-ON_TUNING = BUDGETS[1]
-"""Evaluations on the problems of tuning."""
 PLACES = 6
 """Tests of a step: three budgets of bbob-biobj and three groups of suites."""
 
@@ -96,15 +90,22 @@ def steps(outcome: Outcome) -> list[Step]:
 
 
 def step_of(outcome: Outcome, left: Sequence[str], part: str) -> Step:
-    """Test the swarm without a part and without those that left before."""
+    """Test the swarm without a part and without those that left before, where all was run."""
     less = without_all([*left, part])
-    tests = [
-        *on_bbob(outcome, less),
-        *on_suites(outcome, less, PLAIN, JUDGED_AT),
-        *on_suites(outcome, less, CONSTRAINED, JUDGED_AT),
-        *on_suites(outcome, less, [TUNING], ON_TUNING),
-    ]
+    tests: list[PartTest] = []
+    for place in where_parts_leave(less):
+        if all(outcome.has(job) for one in place for job in one.jobs()):
+            tests += _tests(outcome, less, place)
     return Step(part, less, tests)
+
+
+def _tests(
+    outcome: Outcome, less: str, place: Sequence[SuitePart | BbobPart]
+) -> Iterable[PartTest]:
+    suites = [one for one in place if isinstance(one, SuitePart)]
+    if not suites:
+        return on_bbob(outcome, less)
+    return on_suites(outcome, less, [one.suite for one in suites], suites[0].budgets[0])
 
 
 def steps_table(outcome: Outcome) -> Table:

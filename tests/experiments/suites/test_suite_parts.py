@@ -9,8 +9,8 @@ from experiments.suites.data import Outcome
 from experiments.suites.jobs import BbobRun
 from experiments.suites.parts.reduced import LESS, WHOLE, without_all
 from experiments.suites.parts.rule import order, steps, steps_table
-from experiments.suites.problems import SUITES, TUNING, problem_of
-from experiments.suites.protocol import OF_PARTS
+from experiments.suites.problems import PROBLEMS, SUITES, TUNING, problem_of
+from experiments.suites.protocol import where_parts_leave
 
 
 def plant(outcome, name, gain):
@@ -19,14 +19,20 @@ def plant(outcome, name, gain):
     def chance(number):
         return 0.0 if name == WHOLE else 0.001 * (2 + number // 2) * (-1) ** number
 
-    for number, (dimension, function) in enumerate(product((10, 20), range(1, 56))):
-        share = 0.4 + gain + chance(number)
-        run = BbobRun(function, dimension, OF_PARTS, name, 10_000)
-        outcome.bbob[run] = dict.fromkeys((500, 2000, 10_000), share)
-    for suite, budget in (("LZ09", 10_000), ("MW", 10_000), (TUNING, 2000)):
-        for number, one in enumerate(SUITES[suite]):
-            volume = 0.4 + gain + chance(number)
-            outcome.suites[one.name, name, budget, 1] = float(budget), volume, 0.1, 9.0
+    jobs = [job for place in where_parts_leave(name) for part in place for job in part.jobs()]
+    for number, job in enumerate(jobs):
+        if isinstance(job, BbobRun):
+            outcome.bbob[job] = dict.fromkeys((500, 2000, 10_000), 0.4 + gain + chance(number))
+            continue
+        (budget,) = job.budgets
+        volume = 0.4 + gain + chance([*PROBLEMS].index(job.problem))
+        outcome.suites[job.problem, name, budget, job.seed] = float(budget), volume, 0.1, 9.0
+
+
+def replant(outcome, name, volume):
+    """Set the hypervolumes of a swarm on the problems of tuning."""
+    for one, seed in product(SUITES[TUNING], range(1, 11)):
+        outcome.suites[one.name, name, 2000, seed] = 2000.0, volume, 0.1, 9.0
 
 
 @pytest.fixture
@@ -51,9 +57,7 @@ def test_the_part_that_is_missed_least_leaves_first_and_one_that_helps_is_not_tr
 
 def test_a_part_without_which_the_swarm_is_worse_anywhere_stays(outcome):
     plant(outcome, without_all(["Attraction", "tolerance", "guests"]), 0.0)
-    for one in SUITES[TUNING]:
-        row = 2000.0, 0.2, 0.1, 9.0
-        outcome.suites[one.name, without_all(["Attraction", "tolerance", "guests"]), 2000, 1] = row
+    replant(outcome, without_all(["Attraction", "tolerance", "guests"]), 0.2)
     plant(outcome, without_all(["Attraction", "tolerance", "Exchange"]), 0.0)
     found = steps(outcome)
     assert [(step.part, step.leaves) for step in found] == [
@@ -69,8 +73,7 @@ def test_a_part_without_which_the_swarm_is_worse_anywhere_stays(outcome):
 
 def test_the_rule_waits_for_runs_that_lack(outcome):
     plant(outcome, without_all(["Attraction", "tolerance", "guests"]), 0.0)
-    for one in SUITES[TUNING]:
-        del outcome.suites[one.name, without_all(["Attraction", "tolerance", "guests"]), 2000, 1]
+    del outcome.suites["ZDT4", without_all(["Attraction", "tolerance", "guests"]), 2000, 7]
     assert [step.part for step in steps(outcome)] == ["Attraction", "tolerance"]
 
 
