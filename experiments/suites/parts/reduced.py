@@ -1,8 +1,8 @@
 """The compact swarm with all parts that it once had, and with some of them left out, by name.
 
-`Attraction` among its moves left it by the rule of `protocol`, and a level of violation that counts
-as none (T. Takahama, S. Sakai 2006): nine tenths of the swarm's median, which shrinks as the swarm
-follows.
+By the rule of `protocol` left it: `Attraction` among its moves; a level of violation that counts as
+none (T. Takahama, S. Sakai 2006), nine tenths of the swarm's median, which shrinks as the swarm
+follows; a fifth of the places for infeasible particles, the guests; `Difference`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from pymoo_hdte.algorithms.hypervolume import most_hypervolume
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep
+from pymoo_hdte.algorithms.survival import survivors
 
 MOVES: dict[str, type[Move]] = {
     move.__name__: move
@@ -41,6 +42,8 @@ class _Whole(CompactSwarm):
 
     TOLERATED = 0.9
     """Share of the swarm's median violation that counts as none."""
+    INVITED = 0.2
+    """Share of the swarm's places for infeasible particles."""
 
     def __init__(
         self, pop_size: int | None = None, *, lacks: Collection[str] = (), **kwargs: Any
@@ -52,7 +55,7 @@ class _Whole(CompactSwarm):
         self._by_problem = True
         self.lacks = frozenset(lacks)
         if GUESTS in lacks:
-            self.GUESTS = 0.0
+            self.INVITED = 0.0
         if TOLERANCE in lacks:
             self.TOLERATED = 0.0
 
@@ -71,7 +74,12 @@ class _Whole(CompactSwarm):
 
     def _survivors(self, points: Points) -> NDArray[np.int_]:
         before = points[np.arange(len(points) - len(self.chosen))]
-        return super()._survivors(_tolerant(points, self._level(before)))
+        points = _tolerant(points, self._level(before))
+        # A callback may have left few particles: not all of them are guests.
+        invited = guests(points, min(int(self.INVITED * self.pop_size), len(points) - 1))
+        others = np.delete(np.arange(len(points)), invited)
+        kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
+        return np.sort(np.concatenate([invited, others[kept]]))
 
     def _level(self, swarm: Points) -> float:
         """Return the violation that is tolerated: none once more than half is feasible."""
@@ -82,6 +90,22 @@ class _Whole(CompactSwarm):
 def _tolerant(points: Points, level: float) -> Points:
     """Return the points with violations up to a level counted as none."""
     return replace(points, violation=np.where(points.violation <= level, 0.0, points.violation))
+
+
+def guests(points: Points, size: int) -> NDArray[np.int_]:
+    """Return at most ``size`` infeasible rows, ascending: the best in objectives and violation.
+
+    Violation counts as a further objective, so that points stay that cross an infeasible region, or
+    that come from different sides as long as nothing is feasible (H. K. Singh, A. Isaacs, T. Ray,
+    W. Smith, "Infeasibility driven evolutionary algorithm (IDEA) for engineering design
+    optimization", AI 2008: Advances in Artificial Intelligence, 104-115).
+    """
+    rows = np.flatnonzero((points.violation > 0.0) & np.isfinite(points.violation))
+    if not len(rows) or size < 1:
+        return rows[:0]
+    keys = np.column_stack([points.F[rows], points.violation[rows]])
+    free = Points(points.X[rows], keys, np.zeros(len(rows)))
+    return rows[survivors(free, size)]
 
 
 def _without(*lacks: str) -> Callable[[Problem], Algorithm]:
@@ -114,9 +138,9 @@ WHOLE = "with all parts"
 SPREAD = "with quality=spread"
 
 LEFT = (Attraction.__name__, TOLERANCE)
-"""Parts that the swarm has no more."""
+"""Parts that left first."""
 CANDIDATES = (GUESTS, SHARES, Exchange.__name__, Difference.__name__, LEADERS)
-"""Parts that it has without their being shown to help by themselves."""
+"""Parts that were tried after these, in this order."""
 
 
 def without_all(parts: Sequence[str]) -> str:

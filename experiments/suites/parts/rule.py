@@ -94,8 +94,12 @@ def step_of(outcome: Outcome, left: Sequence[str], part: str) -> Step:
     less = without_all([*left, part])
     tests: list[PartTest] = []
     for place in where_parts_leave(less):
-        if all(outcome.has(job) for one in place for job in one.jobs()):
-            tests += _tests(outcome, less, place)
+        jobs = [job for one in place for job in one.jobs()]
+        alike = [] if any(map(_constrained, jobs)) else twins_without_constraints(less)
+        for name in (less, *alike):
+            if all(outcome.has(replace(job, algorithm=name)) for job in jobs):
+                tests += _tests(outcome, name, place)
+                break
     return Step(part, less, tests)
 
 

@@ -7,10 +7,11 @@ import pytest
 
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import BbobRun
-from experiments.suites.parts.reduced import LESS, WHOLE, without_all
+from experiments.suites.parts.reduced import LESS, WHOLE, guests, without_all
 from experiments.suites.parts.rule import order, steps, steps_table
 from experiments.suites.problems import PROBLEMS, SUITES, TUNING, problem_of
 from experiments.suites.protocol import where_parts_leave
+from pymoo_hdte.algorithms.points import Points
 
 
 def plant(outcome, name, gain):
@@ -93,7 +94,26 @@ def test_what_is_left_out_is_not_there():
         "Difference",
         "NeighbourDifference",
     ]
-    assert (algorithm.TOLERATED, algorithm.GUESTS) == (0.0, 0.0)
+    assert (algorithm.TOLERATED, algorithm.INVITED) == (0.0, 0.0)
     algorithm = LESS["with equal shares of moves"](problem)
     algorithm.setup(problem, termination=("n_eval", 400), seed=1).run()
     np.testing.assert_array_equal(algorithm.success.shares, 0.25)
+
+
+def points(F, violation):
+    F = np.asarray(F, dtype=float)
+    return Points(np.zeros((len(F), 1)), F, np.asarray(violation, dtype=float))
+
+
+def test_guests_are_infeasible_and_best_in_objectives_and_violation():
+    swarm = points([[0, 0], [1, 1], [2, 2], [0, 3], [3, 3], [9, 9]], [5.0, 2.0, 1.0, 2.0, 2.0, 0.0])
+    # The fifth is worse than the third in everything; the last one is feasible.
+    np.testing.assert_array_equal(guests(swarm, 4), [0, 1, 2, 3])
+    np.testing.assert_array_equal(guests(swarm, 9), [0, 1, 2, 3, 4])
+    assert len(guests(swarm, 0)) == 0
+
+
+def test_whoever_cannot_be_judged_is_no_guest():
+    swarm = points([[0, 0], [1, 1], [np.nan, 0]], [np.inf, 1.0, np.inf])
+    np.testing.assert_array_equal(guests(swarm, 3), [1])
+    assert len(guests(points([[0, 0]], [np.inf]), 1)) == 0
