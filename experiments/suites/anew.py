@@ -10,8 +10,8 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.result import Cell, Column, Finding, Table
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import MEASURES, BbobRun, SuiteRun
-from experiments.suites.parts.reduced import WHOLE
 from experiments.suites.peers import OURS
+from experiments.suites.reduced import WHOLE
 
 SUITE_RUNS = (
     SuiteRun("IMOP1", OURS, 1, (500,)),

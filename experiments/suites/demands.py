@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments.comparison.rivals import RivalTest
 from experiments.runner.result import Cell, Column, Table, significant
+from experiments.suites.bbob.published import BEST, CITED
 from experiments.suites.bbob_tables import reached
 from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
@@ -20,7 +21,6 @@ from experiments.suites.protocol import (
     RIVAL_ON_RE,
     SHARES,
 )
-from experiments.suites.published import BEST, CITED
 from experiments.suites.suite_tables import (
     NAMES,
     can_show,

@@ -12,18 +12,18 @@ from experiments.runner.registry import Context
 from experiments.runner.result import NEW, Picture, Result
 from experiments.suites import protocol
 from experiments.suites.anew import anew_table
+from experiments.suites.bbob.published import BEST, CITED
 from experiments.suites.bbob_tables import duels_table, reached, shares_table
 from experiments.suites.data import NAME, Outcome, outcome_for
 from experiments.suites.demands import demands_table, in_one_sentence
 from experiments.suites.figures import how_to_choose, runtime_profiles
 from experiments.suites.formulas import engineering, imop, lz09, zcat
 from experiments.suites.gather import kept_table
-from experiments.suites.parts.alone import parts_table
-from experiments.suites.parts.rule import steps_table
+from experiments.suites.parts import parts_table
 from experiments.suites.peers import OURS
 from experiments.suites.problems import DIFFICULTY, SUITES
 from experiments.suites.protocol import DIMENSIONS, HELD_OUT
-from experiments.suites.published import BEST, CITED
+from experiments.suites.rule import steps_table
 from experiments.suites.suite_tables import (
     in_short,
     medians_tables,

@@ -6,11 +6,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
+from experiments.suites.bbob.published import BEST, CITED, curves
 from experiments.suites.bbob_tables import told_most
 from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
-from experiments.suites.published import BEST, CITED, curves
 from experiments.suites.suite_tables import named, ranks
 
 LINES = {OURS: BLUE, "ElitistSwarm": SKY, "NSGA-II": GREEN, "COMO-CMA-ES": PINK}

@@ -12,7 +12,7 @@ from pymoo.indicators.igd_plus import IGDPlus
 
 from experiments.comparison.indicators import CORNER, front_among
 from experiments.runner.campaign import Run
-from experiments.suites.coco import MARKS, BbobProblem, shares_of_run
+from experiments.suites.bbob.coco import MARKS, BbobProblem, shares_of_run
 from experiments.suites.peers import ON_BBOB, ON_SUITES
 from experiments.suites.problems import box_of, front_of, problem_of
 from pymoo_hdte.algorithms.hypervolume import most_hypervolume

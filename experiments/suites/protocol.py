@@ -43,7 +43,7 @@ after 2,000 with ten seeds, by Wilcoxon's signed ranks over the problems, two-si
 medians over the seeds. If the whole one is better anywhere with p < .05, the part stays, and the
 next one is tried without those that left, and what else was to be run of it is not; else it leaves.
 Without constraints, swarms that differ in the handling of constraints alone are run once.
-`parts.rule` does this and nothing else. What is left after the last one is the swarm. What came
+`rule` does this and nothing else. What is left after the last one is the swarm. What came
 of it: guests and `Difference` left; learned shares, `Exchange` and several leaders stay, because
 without each of them and all that left the swarm is worse on MW and DAS-CMOP.
 
@@ -83,17 +83,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from experiments.suites.coco import FUNCTIONS
+from experiments.suites.bbob.coco import FUNCTIONS
 from experiments.suites.jobs import BbobRun, SuiteRun
-from experiments.suites.parts.reduced import (
+from experiments.suites.peers import BBOB_PEERS, ON_SUITES, OURS, PEERS, takes
+from experiments.suites.problems import SUITES, TUNING, problem_of
+from experiments.suites.reduced import (
     ON_CONSTRAINED,
     ON_PLAIN,
     SPREAD,
     WHOLE,
     without_all,
 )
-from experiments.suites.peers import BBOB_PEERS, ON_SUITES, OURS, PEERS, takes
-from experiments.suites.problems import SUITES, TUNING, problem_of
 
 HELD_OUT, VALIDATION = ("ZCAT",), ("IMOP", "RE", "MW", "DAS-CMOP", "LZ09")
 INSTANCES = (8, 9, 10)

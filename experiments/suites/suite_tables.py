@@ -11,13 +11,13 @@ from experiments.comparison.paired import SIGNIFICANT
 from experiments.comparison.ranks import average_ranks
 from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
+from experiments.suites.bbob.published import BEST, CITED
 from experiments.suites.bbob_tables import reached
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import MEASURES
 from experiments.suites.peers import OURS
 from experiments.suites.problems import PROBLEMS, SUITES
 from experiments.suites.protocol import BUDGETS, CONSTRAINED, DIMENSIONS, HELD_OUT, VALIDATION
-from experiments.suites.published import BEST, CITED
 
 NAMES = {"hypervolume": "hypervolume", "igd_plus": "IGD+"}
 SWARMS = (OURS, "ElitistSwarm")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from experiments.comparison.ranks import average_ranks
 from experiments.comparison.rivals import RivalTest, signs_against
 from experiments.runner.result import Cell, Column, Table
-from experiments.suites.coco import FUNCTIONS
+from experiments.suites.bbob.coco import FUNCTIONS
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import BbobRun
 from experiments.suites.peers import BBOB_PEERS, OURS

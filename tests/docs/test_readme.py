@@ -63,10 +63,10 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.committed import DATA
 from experiments.runner.registry import Context
 from experiments.suites import data as suites
+from experiments.suites.bbob.published import CITED
 from experiments.suites.bbob_tables import reached
 from experiments.suites.demands import demands
-from experiments.suites.parts.alone import part_tests
-from experiments.suites.published import CITED
+from experiments.suites.parts import part_tests
 from experiments.suites.suite_tables import feasible_runs, in_short
 from experiments.suites.suite_tables import ranks as suite_ranks
 from experiments.suites.suite_tables import tests as rival_tests

@@ -9,17 +9,17 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.suites import experiment
 from experiments.suites.anew import BBOB_RUNS, SUITE_RUNS
+from experiments.suites.bbob.coco import MARKS
+from experiments.suites.bbob.published import BEST, CITED, curves
 from experiments.suites.bbob_tables import duels, reached
-from experiments.suites.coco import MARKS
 from experiments.suites.data import Outcome, bbob_text, outcome_for, read_outcome, suites_text
 from experiments.suites.demands import demands, in_one_sentence
 from experiments.suites.jobs import BbobRun
-from experiments.suites.parts.alone import part_tests, parts_table
-from experiments.suites.parts.reduced import WHOLE
+from experiments.suites.parts import part_tests, parts_table
 from experiments.suites.peers import OURS
 from experiments.suites.problems import SUITES
 from experiments.suites.protocol import BESIDE_PEERS, FULL, OF_PARTS, SHARES, STORED
-from experiments.suites.published import BEST, CITED, curves
+from experiments.suites.reduced import WHOLE
 from experiments.suites.suite_tables import feasible_beside, feasible_runs, ranks
 from experiments.suites.together import ranks_together, signs_together
 

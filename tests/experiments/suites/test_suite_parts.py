@@ -7,10 +7,10 @@ import pytest
 
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import BbobRun
-from experiments.suites.parts.reduced import LESS, WHOLE, guests, without_all
-from experiments.suites.parts.rule import order, steps, steps_table
 from experiments.suites.problems import PROBLEMS, SUITES, TUNING, problem_of
 from experiments.suites.protocol import where_parts_leave
+from experiments.suites.reduced import LESS, WHOLE, guests, without_all
+from experiments.suites.rule import order, steps, steps_table
 from pymoo_hdte.algorithms.points import Points
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from experiments.runner import registry
 from experiments.runner.registry import ExtraMissing
-from experiments.suites import coco
-from experiments.suites.coco import MARKS, TARGETS, shares
+from experiments.suites.bbob import coco
+from experiments.suites.bbob.coco import MARKS, TARGETS, shares
 from experiments.suites.jobs import BbobRun, SuiteRun, measured
 from experiments.suites.peers import BBOB_PEERS, OURS, PEERS, takes
 from experiments.suites.problems import front_of, problem_of

@@ -1,6 +1,6 @@
 """Parts leave the swarm, one after another, by the rule of `protocol`.
 
-``python -m experiments.suites.parts.rule OUT`` runs every swarm that the rule comes to and keeps
+``python -m experiments.suites.rule OUT`` runs every swarm that the rule comes to and keeps
 the runs in ``OUT/runs/ORIGIN``, where `gather` finds them; a further call goes on, and ``--done``
 names further such folders. Of a swarm that is found worse somewhere the rest is not run.
 """
@@ -21,13 +21,12 @@ from experiments.runner.result import Cell, Column, Table
 from experiments.suites.data import Outcome, stored
 from experiments.suites.gather import path_of
 from experiments.suites.jobs import BbobRun, SuiteRun
-from experiments.suites.parts.alone import (
+from experiments.suites.parts import (
     PartTest,
     on_bbob,
     on_suites,
     part_tests,
 )
-from experiments.suites.parts.reduced import LACKED, WHOLE, twins_without_constraints, without_all
 from experiments.suites.problems import problem_of
 from experiments.suites.protocol import (
     OURS,
@@ -35,6 +34,7 @@ from experiments.suites.protocol import (
     SuitePart,
     where_parts_leave,
 )
+from experiments.suites.reduced import LACKED, WHOLE, twins_without_constraints, without_all
 
 PLACES = 6
 """Tests of a step: three budgets of bbob-biobj and three groups of suites."""
@@ -142,7 +142,7 @@ def steps_table(outcome: Outcome) -> Table:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Carry the rule to its end and say what comes of it."""
-    parser = argparse.ArgumentParser(prog="python -m experiments.suites.parts.rule")
+    parser = argparse.ArgumentParser(prog="python -m experiments.suites.rule")
     parser.add_argument("out", type=Path, metavar="OUT")
     parser.add_argument("--done", nargs="*", default=[], type=Path, metavar="FOLDER")
     options = parser.parse_args(arguments)

@@ -13,9 +13,9 @@ from experiments.comparison.statistics import holm
 from experiments.runner.result import Column, Table
 from experiments.suites.bbob_tables import duels
 from experiments.suites.data import Outcome
-from experiments.suites.parts.reduced import ALONE, ON_CONSTRAINED, ON_PLAIN, WHOLE
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, CONSTRAINED, OF_PARTS, PLAIN
+from experiments.suites.reduced import ALONE, ON_CONSTRAINED, ON_PLAIN, WHOLE
 
 JUDGED_AT = BUDGETS[2]
 """Evaluations after which suites are judged, and the most on bbob-biobj."""

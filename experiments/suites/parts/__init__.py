@@ -1,1 +1,0 @@
-"""Which parts our swarm has: each left out alone, and all that leave by the protocol's rule."""
