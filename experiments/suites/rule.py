@@ -34,7 +34,7 @@ from experiments.suites.protocol import (
     SuitePart,
     where_parts_leave,
 )
-from experiments.suites.reduced import LACKED, WHOLE, twins_without_constraints, without_all
+from experiments.suites.reduced import LACKED, LESS, WHOLE, twins_without_constraints, without_all
 
 PLACES = 6
 """Tests of a step: three budgets of bbob-biobj and three groups of suites."""
@@ -93,7 +93,7 @@ def step_of(outcome: Outcome, left: Sequence[str], part: str) -> Step:
     """Test the swarm without a part and without those that left before, where all was run."""
     less = without_all([*left, part])
     tests: list[PartTest] = []
-    for place in where_parts_leave(less):
+    for place in where_parts_leave(less) if less in LESS else ():
         jobs = [job for one in place for job in one.jobs()]
         alike = [] if any(map(_constrained, jobs)) else twins_without_constraints(less)
         for name in (less, *alike):

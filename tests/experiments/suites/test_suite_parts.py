@@ -74,8 +74,18 @@ def test_a_part_without_which_the_swarm_is_worse_anywhere_stays(outcome):
 
 def test_the_rule_waits_for_runs_that_lack(outcome):
     plant(outcome, without_all(["Attraction", "tolerance", "guests"]), 0.0)
-    del outcome.suites["ZDT4", without_all(["Attraction", "tolerance", "guests"]), 2000, 7]
+    del outcome.suites["MW4", without_all(["Attraction", "tolerance", "guests"]), 10_000, 2]
     assert [step.part for step in steps(outcome)] == ["Attraction", "tolerance"]
+
+
+def test_swarms_that_are_alike_without_constraints_are_run_once_there(outcome):
+    less = without_all(["Attraction", "tolerance", "guests"])
+    plant(outcome, less, 0.0)
+    for job in [run for run in outcome.bbob if run.algorithm == less]:
+        del outcome.bbob[job]
+    alike = steps(outcome)[:3]
+    assert [len(step.tests) for step in alike] == [6, 6, 6]
+    assert alike[2].tests[-1].test.p == alike[0].tests[-1].test.p
 
 
 @pytest.mark.parametrize("name", LESS)
