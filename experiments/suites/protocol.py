@@ -191,7 +191,7 @@ PARTS: tuple[SuitePart | BbobPart, ...] = (
 
 BESIDE: tuple[SuitePart | BbobPart, ...] = (
     BbobPart(OURS, BUDGETS[-1:], (BESIDE_PEERS,)),
-    SuitePart("ZCAT", (OURS, *BESIDE_OURS, "CMOPSO"), BUDGETS, seeds=1),
+    SuitePart("ZCAT", (OURS, *BESIDE_OURS, "CMOPSO"), BUDGETS, seeds=3),
     SuitePart("IMOP", QUICK_ENOUGH, (500, 2000, 10_000), seeds=3),
     SuitePart("IMOP", (OURS, *BESIDE_OURS), (25_000,), seeds=3),
     SuitePart("RE", (OURS, "ElitistSwarm", "NSGA-II", "SMS-EMOA"), BUDGETS, seeds=5),
