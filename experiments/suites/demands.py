@@ -68,7 +68,7 @@ def demands_table(outcome: Outcome) -> Table:
         ),
         tuple(rows),
         note="Demands were written before the runs. Own time per generation of at most half of "
-        "NSGA-II's was demanded too and is missed; python -m experiments benchmark measures it.",
+        "NSGA-II's was demanded too and is missed: see the table of own time.",
     )
 
 
@@ -78,7 +78,7 @@ def _shares(outcome: Outcome) -> Iterable[Demand]:
         yield Demand(
             f"bbob-biobj, {dimension} dimensions: share of targets {asked:.2f}",
             evaluations,
-            "not run" if share is None else f"{share:.3f}",
+            "not run" if share is None else f"{share:.4f}",
             f"{BEST} {CITED[dimension, evaluations]:.3f}",
             None if share is None else share >= asked,
         )
@@ -193,5 +193,5 @@ def _short(outcome: Outcome, dimension: int, evaluations: int) -> tuple[str, boo
     share, asked = reached(outcome, dimension, evaluations), SHARES[dimension, evaluations]
     if share is None:
         return "", None
-    words = f"in {dimension}-D after {evaluations:,} ({share:.3f} of {asked:.2f}; "
+    words = f"in {dimension}-D after {evaluations:,} ({share:.4f} of {asked:.2f}; "
     return f"{words}{BEST} {CITED[dimension, evaluations]:.3f})", share >= asked

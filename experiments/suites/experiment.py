@@ -19,6 +19,7 @@ from experiments.suites.demands import demands_table, in_one_sentence
 from experiments.suites.figures import how_to_choose, runtime_profiles
 from experiments.suites.formulas import engineering, imop, lz09, zcat
 from experiments.suites.gather import kept_table
+from experiments.suites.own_time import own_time_table
 from experiments.suites.parts import parts_table
 from experiments.suites.peers import OURS
 from experiments.suites.problems import DIFFICULTY, SUITES
@@ -75,6 +76,7 @@ def run(context: Context) -> Result:
             *(one for one in (duels_table(outcome),) if one.rows),
             parts_table(outcome),
             steps_table(outcome),
+            own_time_table(),
             *ranks_tables(outcome),
             rivals_table(outcome),
             *medians_tables(outcome),
