@@ -563,6 +563,29 @@ class TestNumbersOfTheSuites:
             theirs = outcome.shares(dimension, "ElitistSwarm", 25_000)[25_000]
             assert reached(outcome, dimension, 25_000) > theirs
 
+    def test_places_on_the_suite_that_nothing_had_been_run_on(self, outcome):
+        places, beaten = {}, {}
+        for measure in ("hypervolume", "igd_plus"):
+            found = [suite_ranks(outcome, "ZCAT", budget, measure) for budget in BUDGETS]
+            places[measure] = ", ".join(
+                str(sum(rank <= one["CompactSwarm"] for rank in one.values())) for one in found
+            )
+            tested = [rival_tests(outcome, "ZCAT", budget, measure) for budget in BUDGETS]
+            beaten[measure] = ", ".join(str(sum(one.beaten for one in tests)) for tests in tested)
+        none = ", ".join(
+            str(int(np.sum(~np.any(volumes, axis=1))))
+            for volumes in (
+                outcome.medians("ZCAT", n, "hypervolume", outcome.algorithms("ZCAT", n))
+                for n in BUDGETS
+            )
+        )
+        assert (
+            f"its place is {places['hypervolume']} by hypervolume and {places['igd_plus']} by IGD+ "
+            "after the four budgets, and it is better beyond chance than "
+            f"{beaten['hypervolume']} and {beaten['igd_plus']} of the four. Nobody finds any "
+            f"hypervolume on {none} of the 40 problems"
+        ) in WORDS
+
     def test_ranks_on_the_suite_that_showed_what_truncation_lacked(self, outcome):
         ours, distance = (
             ", ".join(
@@ -639,7 +662,7 @@ class TestNumbersOfTheSuites:
             said = "leaves" if step.leaves else "stays"
             assert f"| {step.part} | {' | '.join(places)} | {said} |" in PAGES
         left = {step.part for step in found if step.leaves}
-        swarm = CompactSwarm().setup(get_problem("zdt1"), ("n_eval", 100))
+        swarm = CompactSwarm().setup(get_problem("zdt1"), termination=("n_eval", 100))
         moves = {type(move).__name__ for move in swarm.moves}
         assert left == {"Attraction", "tolerance", "guests", "Difference"}
         assert {step.part for step in found} - left == {
