@@ -45,8 +45,9 @@ class CompactSwarm(ElitistSwarm):
     size follows from the evaluations made so far, no budget has to be known: a run may be stopped
     or continued at any time. All that it finds is offered to two archives: the result, which
     `quality` thins out in every generation, and `archive_all`. Of the moves of `ElitistSwarm` it
-    has `Exchange`; with it go a move among neighbours, `NeighbourDifference`, and one by quadratic
-    models of the objectives, `ModelStep`, for variables that depend on each other.
+    has `Exchange`; with it go a move among neighbours, `NeighbourDifference` (after Li, Zhang
+    2009), and one by quadratic models of the objectives, `ModelStep`, for variables that depend on
+    each other.
 
     Parameters
     ----------
