@@ -48,8 +48,11 @@ def most_hypervolume(
         order = np.lexsort(scaled.T[::-1])
         kept = _kept_of_two if COMPILES else _kept_of_two_in_numpy
         return np.sort(order[kept(scaled[order], order, size)])
+    safe = np.zeros(n, dtype=bool)
     ends = np.unique(scaled.argmax(axis=0))
-    return _kept_of_three(scaled, size, ends if keep_ends and len(ends) <= size else ends[:0])
+    if keep_ends and len(ends) <= size:
+        safe[ends] = True
+    return _kept_of_three(scaled, size, safe)
 
 
 @compiled
@@ -116,7 +119,7 @@ def _kept_of_two_in_numpy(
 
 
 def _kept_of_three(
-    scaled: NDArray[np.float64], size: int, safe: NDArray[np.int_]
+    scaled: NDArray[np.float64], size: int, safe: NDArray[np.bool_]
 ) -> NDArray[np.int_]:
     """Return which rows stay, the ``safe`` ones among them."""
     reference = np.full(3, _REFERENCE)
@@ -124,6 +127,6 @@ def _kept_of_three(
     while len(rows) > size:
         # All anew in O(n log n): in Python, recounting only what changed takes longer.
         added = hv_contributions(scaled[rows], ref=reference)
-        added[np.isin(rows, safe)] = np.inf
+        added[safe[rows]] = np.inf
         rows = np.delete(rows, added.argmin())
     return rows
