@@ -112,8 +112,10 @@ def _first(found: dict[str, float], evaluations: int, asked: str) -> Demand:
     others = {name: rank for name, rank in found.items() if name != OURS}
     best = min(others, key=lambda name: others[name])
     place = 1 + sum(rank < ours for rank in others.values())
-    measured = f"place {place} of {len(found)}, rank {ours:.2f}"
-    return Demand(asked, evaluations, measured, f"{best} {others[best]:.2f}", place == 1)
+    shared = ", shared" if ours in others.values() else ""
+    measured = f"place {place} of {len(found)}{shared}, rank {ours:.2f}"
+    met = place == 1 and not shared
+    return Demand(asked, evaluations, measured, f"{best} {others[best]:.2f}", met)
 
 
 def _better_than_each(

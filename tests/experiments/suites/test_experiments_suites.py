@@ -63,6 +63,16 @@ def test_demands_are_met_by_one_who_leads_and_missed_by_one_who_trails():
     assert (leading[feasible], trailing[feasible]) == (True, False)
 
 
+def test_a_first_place_that_is_shared_is_told_and_not_met():
+    outcome = planted(0.2)
+    for key in [*outcome.suites]:
+        if key[1] == "NSGA-II":
+            outcome.suites[key] = outcome.suites[key[0], OURS, *key[2:]]
+    asked = "MW: first by hypervolume"
+    (found,) = [one for one in demands(outcome) if one.asked == asked]
+    assert (found.met, found.measured) == (False, "place 1 of 4, shared, rank 1.50")
+
+
 def test_what_did_not_run_is_neither_met_nor_missed():
     assert {demand.met for demand in demands(Outcome())} == {None}
     assert in_one_sentence(Outcome()) == "Nothing was run."
