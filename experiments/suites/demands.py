@@ -181,7 +181,9 @@ def in_one_sentence(outcome: Outcome) -> str:
             for measure, name in NAMES.items():
                 found = ranks(outcome, suite, budget, measure)
                 place = 1 + int(np.sum([rank < found[OURS] for rank in found.values()]))
-                by_measure.append(f"{place} by {name}")
+                others = [rank for rival, rank in found.items() if rival != OURS]
+                shared = " (shared)" if found[OURS] in others else ""
+                by_measure.append(f"{place}{shared} by {name}")
             places.append(f"{' and '.join(by_measure)} after {budget:,}")
         if places:
             count = len(outcome.algorithms(suite, budgets[0]))

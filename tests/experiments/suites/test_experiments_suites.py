@@ -71,6 +71,7 @@ def test_a_first_place_that_is_shared_is_told_and_not_met():
     asked = "MW: first by hypervolume"
     (found,) = [one for one in demands(outcome) if one.asked == asked]
     assert (found.met, found.measured) == (False, "place 1 of 4, shared, rank 1.50")
+    assert "is 1 (shared) by hypervolume and 1 (shared) by IGD+" in in_one_sentence(outcome)
 
 
 def test_what_did_not_run_is_neither_met_nor_missed():
