@@ -1,1 +1,1 @@
-"""The swarms on suites of others: bbob-biobj, IMOP, RE, MW, DAS-CMOP and LZ09."""
+"""The swarms on suites of others: bbob-biobj, ZCAT, IMOP, RE, MW, DAS-CMOP and LZ09."""

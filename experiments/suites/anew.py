@@ -15,6 +15,7 @@ from experiments.suites.reduced import WHOLE
 
 SUITE_RUNS = (
     SuiteRun("IMOP1", OURS, 1, (500,)),
+    SuiteRun("ZCAT1_3", OURS, 1, (500,)),
     SuiteRun("IMOP4", OURS, 1, (500,)),
     SuiteRun("IMOP3", "ElitistSwarm", 1, (500,)),
     SuiteRun("IMOP2", "NSGA-II", 1, (500,)),

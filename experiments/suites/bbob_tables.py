@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from experiments.comparison.rivals import RivalTest, holm_against
 from experiments.runner.result import Cell, Column, Table
+from experiments.suites.bbob.published import curves
 from experiments.suites.data import Outcome
 from experiments.suites.peers import BBOB_PEERS, ON_BBOB, OURS
 from experiments.suites.protocol import BESIDE_PEERS, BUDGETS, DIMENSIONS
-from experiments.suites.published import curves
 
 
 def reached(outcome: Outcome, dimension: int, evaluations: int) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from experiments.runner.campaign import Run
 from experiments.runner.committed import committed_file, read_rows, rounded, table_with_origin
 from experiments.runner.registry import Context, require
 from experiments.runner.store import write_atomically
-from experiments.suites.coco import EXTRA
+from experiments.suites.bbob.coco import EXTRA
 from experiments.suites.jobs import MEASURES, BbobRun, SuiteRun
 from experiments.suites.peers import OURS, PEERS, takes
 from experiments.suites.problems import PROBLEMS, SUITES, problem_of
@@ -76,14 +76,22 @@ class Outcome:
         keys = ((job.problem, job.algorithm, budget, job.seed) for budget in job.budgets)
         return all(key in self.suites for key in keys)
 
-    def take(self, job: SuiteRun | BbobRun, other: Outcome) -> None:
-        """Take over what another outcome has of a job."""
+    def numbers(self, job: SuiteRun | BbobRun) -> NDArray[np.float64]:
+        """Return all numbers of a job's run, which is there."""
         if isinstance(job, BbobRun):
-            self.bbob[job] = other.bbob[job]
+            return np.array([*self.bbob[job].items()], dtype=float)
+        keys = ((job.problem, job.algorithm, budget, job.seed) for budget in job.budgets)
+        return np.array([self.suites[key] for key in keys], dtype=float)
+
+    def take(self, job: SuiteRun | BbobRun, other: Outcome, algorithm: str | None = None) -> None:
+        """Take over what another outcome has of a job, or of an algorithm that gives the same."""
+        like = algorithm or job.algorithm
+        if isinstance(job, BbobRun):
+            self.bbob[job] = other.bbob[replace(job, algorithm=like)]
             return
         for budget in job.budgets:
-            key = job.problem, job.algorithm, budget, job.seed
-            self.suites[key] = other.suites[key]
+            row = other.suites[job.problem, like, budget, job.seed]
+            self.suites[job.problem, job.algorithm, budget, job.seed] = row
 
     def without(self, algorithms: Collection[str]) -> Outcome:
         """Return the outcome without the runs of some algorithms."""
@@ -123,35 +131,45 @@ class Outcome:
             and all((one, name) in ran or not takes(name, problem_of(one)) for one in problems)
         ]
 
-    def problems(self, suite: str, budget: int) -> list[str]:
-        """Return the problems of a suite on which ours was judged at a budget."""
-        ran = {key[0] for key in self.suites if key[1:3] == (OURS, budget)}
+    def problems(self, suite: str, budget: int, control: str = OURS) -> list[str]:
+        """Return the problems of a suite on which ours, or another, was judged at a budget."""
+        ran = {key[0] for key in self.suites if key[1:3] == (control, budget)}
         return [one.name for one in SUITES[suite] if one.name in ran]
 
     def medians(
-        self, suite: str, budget: int, measure: str, algorithms: Sequence[str]
+        self,
+        suite: str,
+        budget: int,
+        measure: str,
+        algorithms: Sequence[str],
+        control: str = OURS,
     ) -> NDArray[np.float64]:
-        """Return medians over the seeds, shape (problems, algorithms); NaN where none ran."""
+        """Return medians over the seeds, shape (problems, algorithms); NaN where none ran.
+
+        On the problems and with the seeds of ``control``, with which all are compared.
+        """
         place = 1 + MEASURES.index(measure)
-        problems = self.problems(suite, budget)
+        problems = self.problems(suite, budget, control)
         values = np.full((len(problems), len(algorithms)), np.nan)
         for row, problem in enumerate(problems):
             for column, algorithm in enumerate(algorithms):
-                runs = self.runs(problem, algorithm, budget, place)
+                runs = self.runs(problem, algorithm, budget, place, control)
                 if runs:
                     values[row, column] = np.median(runs)
         return values
 
-    def runs(self, problem: str, algorithm: str, budget: int, place: int) -> list[float]:
+    def runs(
+        self, problem: str, algorithm: str, budget: int, place: int, control: str = OURS
+    ) -> list[float]:
         """Return one number of the runs of an algorithm on a problem, by rising seed.
 
-        Only of seeds with which ours ran there as well: with more, a rival would be compared
-        otherwise than ours.
+        Only of seeds with which ours, or another ``control``, ran there as well: with more, a rival
+        would be compared otherwise.
         """
         keys = (
             (problem, algorithm, budget, seed)
             for seed in SEEDS
-            if (problem, OURS, budget, seed) in self.suites
+            if (problem, control, budget, seed) in self.suites
         )
         return [self.suites[key][place] for key in keys if key in self.suites]
 

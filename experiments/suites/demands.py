@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments.comparison.rivals import RivalTest
 from experiments.runner.result import Cell, Column, Table, significant
+from experiments.suites.bbob.published import BEST, CITED
 from experiments.suites.bbob_tables import reached
 from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
@@ -20,7 +21,6 @@ from experiments.suites.protocol import (
     RIVAL_ON_RE,
     SHARES,
 )
-from experiments.suites.published import BEST, CITED
 from experiments.suites.suite_tables import (
     NAMES,
     can_show,
@@ -68,7 +68,7 @@ def demands_table(outcome: Outcome) -> Table:
         ),
         tuple(rows),
         note="Demands were written before the runs. Own time per generation of at most half of "
-        "NSGA-II's was demanded too and is missed; python -m experiments benchmark measures it.",
+        "NSGA-II's was demanded too and is missed: see the table of own time.",
     )
 
 
@@ -78,7 +78,7 @@ def _shares(outcome: Outcome) -> Iterable[Demand]:
         yield Demand(
             f"bbob-biobj, {dimension} dimensions: share of targets {asked:.2f}",
             evaluations,
-            "not run" if share is None else f"{share:.3f}",
+            "not run" if share is None else f"{share:.4f}",
             f"{BEST} {CITED[dimension, evaluations]:.3f}",
             None if share is None else share >= asked,
         )
@@ -112,8 +112,10 @@ def _first(found: dict[str, float], evaluations: int, asked: str) -> Demand:
     others = {name: rank for name, rank in found.items() if name != OURS}
     best = min(others, key=lambda name: others[name])
     place = 1 + sum(rank < ours for rank in others.values())
-    measured = f"place {place} of {len(found)}, rank {ours:.2f}"
-    return Demand(asked, evaluations, measured, f"{best} {others[best]:.2f}", place == 1)
+    shared = ", shared" if ours in others.values() else ""
+    measured = f"place {place} of {len(found)}{shared}, rank {ours:.2f}"
+    met = place == 1 and not shared
+    return Demand(asked, evaluations, measured, f"{best} {others[best]:.2f}", met)
 
 
 def _better_than_each(
@@ -179,7 +181,9 @@ def in_one_sentence(outcome: Outcome) -> str:
             for measure, name in NAMES.items():
                 found = ranks(outcome, suite, budget, measure)
                 place = 1 + int(np.sum([rank < found[OURS] for rank in found.values()]))
-                by_measure.append(f"{place} by {name}")
+                others = [rank for rival, rank in found.items() if rival != OURS]
+                shared = " (shared)" if found[OURS] in others else ""
+                by_measure.append(f"{place}{shared} by {name}")
             places.append(f"{' and '.join(by_measure)} after {budget:,}")
         if places:
             count = len(outcome.algorithms(suite, budgets[0]))
@@ -193,5 +197,5 @@ def _short(outcome: Outcome, dimension: int, evaluations: int) -> tuple[str, boo
     share, asked = reached(outcome, dimension, evaluations), SHARES[dimension, evaluations]
     if share is None:
         return "", None
-    words = f"in {dimension}-D after {evaluations:,} ({share:.3f} of {asked:.2f}; "
+    words = f"in {dimension}-D after {evaluations:,} ({share:.4f} of {asked:.2f}; "
     return f"{words}{BEST} {CITED[dimension, evaluations]:.3f})", share >= asked

@@ -6,11 +6,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.comparison.figures import BLUE, GREEN, GREY, ORANGE, PINK, SKY, YELLOW, grid
+from experiments.suites.bbob.published import BEST, CITED, curves
 from experiments.suites.bbob_tables import told_most
 from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, DIMENSIONS, HELD_OUT
-from experiments.suites.published import BEST, CITED, curves
 from experiments.suites.suite_tables import named, ranks
 
 LINES = {OURS: BLUE, "ElitistSwarm": SKY, "NSGA-II": GREEN, "COMO-CMA-ES": PINK}
@@ -61,14 +61,18 @@ def how_to_choose(outcome: Outcome) -> Figure:
         found = {budget: ranks(outcome, suite, budget, measure) for budget in budgets}
         for name, colour in colours.items():
             line = {b: by_name[name] for b, by_name in found.items() if name in by_name}
+            if not line:
+                continue
             bold = name in (OURS, "ElitistSwarm")
             axis.plot(*_line(line), "o-", color=colour, lw=2.2 if bold else 1.0, ms=4, label=name)
         axis.set_title(f"{named(outcome, suite)}, {words}", fontsize=9)
         axis.set_ylabel("average rank, 1 is best")
         axis.invert_yaxis()
         _over_evaluations(axis)
-    # Between the two swarms and the others, where no line runs.
-    axes[0, 0].legend(fontsize=7, frameon=False, ncols=2, loc="center", bbox_to_anchor=(0.5, 0.58))
+    # Below all lines.
+    worst, best = axes[0, 0].get_ylim()
+    axes[0, 0].set_ylim(worst + 0.3 * (worst - best), best)
+    axes[0, 0].legend(fontsize=7, frameon=False, ncols=2, loc="lower left")
     axis = axes[0, 2]
     _run_here(axis, outcome, DIMENSIONS[0])
     cited = {n: share for (d, n), share in CITED.items() if d == DIMENSIONS[0]}

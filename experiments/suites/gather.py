@@ -13,6 +13,8 @@ import argparse
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from experiments.runner.campaign import read_run
 from experiments.runner.committed import DATA
 from experiments.runner.result import Cell, Column, Table
@@ -20,7 +22,7 @@ from experiments.suites.data import Outcome, stored, write_outcome
 from experiments.suites.jobs import BbobRun, SuiteRun
 from experiments.suites.peers import ON_BBOB, ON_SUITES
 from experiments.suites.protocol import STORED, BbobPart
-from pymoo_hdte.checks import one_of
+from pymoo_hdte.checks import InvalidInput, one_of
 
 COMMAND = (
     "python -m experiments.suites.gather; whole groups of runs only, those of algorithms that did "
@@ -32,23 +34,39 @@ def gathered(folders: Sequence[Path], before: Outcome) -> Outcome:
     """Return the outcome of all whole groups among the runs in folders and in another outcome.
 
     A run that lies in several places is taken from the first folder that has it.
+
+    Raises
+    ------
+    InvalidInput
+        If a file and the other outcome tell differently of a run: its algorithm changed, so that
+        nothing that is stored of it may stand beside new runs.
     """
     outcome = Outcome()
     for part in STORED:
         groups: Iterable[Sequence[SuiteRun | BbobRun]] = part.groups()
         for group in groups:
-            found = [_path(folders, job.key) for job in group]
+            found = [path_of(folders, job.key) for job in group]
             if not all(path or before.has(job) for job, path in zip(group, found, strict=True)):
                 continue
             for job, path in zip(group, found, strict=True):
                 if path:
                     outcome.add([job], [read_run(path)])
+                    _check_same(job, outcome, before)
                 else:
                     outcome.take(job, before)
     return outcome
 
 
-def _path(folders: Sequence[Path], key: str) -> Path | None:
+def _check_same(job: SuiteRun | BbobRun, outcome: Outcome, before: Outcome) -> None:
+    if before.has(job) and not np.array_equal(
+        outcome.numbers(job), before.numbers(job), equal_nan=True
+    ):
+        allowed = f"what is stored, if its algorithm did not change, else --anew {job.algorithm}"
+        raise InvalidInput(job.key, outcome.numbers(job).tolist(), allowed)
+
+
+def path_of(folders: Sequence[Path], key: str) -> Path | None:
+    """Return the file of a finished run in the first folder that has it."""
     paths = (folder / f"{key}.csv" for folder in folders)
     return next((path for path in paths if path.is_file()), None)
 

@@ -12,7 +12,7 @@ from pymoo.indicators.igd_plus import IGDPlus
 
 from experiments.comparison.indicators import CORNER, front_among
 from experiments.runner.campaign import Run
-from experiments.suites.coco import MARKS, BbobProblem, shares_of_run
+from experiments.suites.bbob.coco import MARKS, BbobProblem, shares_of_run
 from experiments.suites.peers import ON_BBOB, ON_SUITES
 from experiments.suites.problems import box_of, front_of, problem_of
 from pymoo_hdte.algorithms.hypervolume import most_hypervolume
@@ -61,7 +61,7 @@ def measured(name: str, F: NDArray[np.float64]) -> tuple[float, float, int]:
     front = front_among(F)
     ideal, nadir = box_of(name)
     scaled = (front - ideal) / (nadir - ideal)
-    scaled = scaled[most_hypervolume(scaled, FINAL_SIZE)]
+    scaled = scaled[most_hypervolume(scaled, FINAL_SIZE, keep_ends=False)]
     inside = scaled[np.all(scaled < CORNER, axis=1)]
     volume = float(hypervolume(inside, ref=[CORNER] * len(ideal))) if len(inside) else 0.0
     true = front_of(name)

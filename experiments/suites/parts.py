@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,14 +15,14 @@ from experiments.suites.bbob_tables import duels
 from experiments.suites.data import Outcome
 from experiments.suites.peers import OURS
 from experiments.suites.protocol import BUDGETS, CONSTRAINED, OF_PARTS, PLAIN
-from experiments.suites.reduced import LESS, ON_CONSTRAINED, ON_PLAIN, WHOLE
+from experiments.suites.reduced import ALONE, ON_CONSTRAINED, ON_PLAIN, WHOLE
 
 JUDGED_AT = BUDGETS[2]
 """Evaluations after which suites are judged, and the most on bbob-biobj."""
 
 
 class PartTest(NamedTuple):
-    """The whole swarm and one that lacks a part on the same problems; p after Holm over all."""
+    """The whole swarm and one that lacks something on the same problems."""
 
     part: str
     where: str
@@ -37,15 +37,15 @@ class PartTest(NamedTuple):
         """Whether the whole swarm is better beyond chance."""
         return self.test.beaten
 
+    @property
+    def gain(self) -> float:
+        """What is gained without it, in the mean."""
+        return self.less - self.whole
+
 
 def part_tests(outcome: Outcome) -> list[PartTest]:
-    """Return the tests of all parts that were left out, on bbob-biobj and on the other suites."""
-    found = [
-        one
-        for part in LESS
-        if part != WHOLE
-        for one in (*_on_bbob(outcome, part), *_on_suites(outcome, part))
-    ]
+    """Return the tests of all parts left out alone; p after Holm over all of them."""
+    found = [one for part in ALONE for one in (*on_bbob(outcome, part), *_on_suites(outcome, part))]
     corrected = holm([one.test.p for one in found])
     return [
         one._replace(test=one.test._replace(p=float(p)))
@@ -53,25 +53,32 @@ def part_tests(outcome: Outcome) -> list[PartTest]:
     ]
 
 
-def _on_bbob(outcome: Outcome, part: str) -> Iterable[PartTest]:
+def on_bbob(outcome: Outcome, less: str) -> Iterable[PartTest]:
+    """Yield the tests by the share of targets, uncorrected."""
     where = f"bbob-biobj, instance {OF_PARTS}"
     for budget in BUDGETS[: 1 + BUDGETS.index(JUDGED_AT)]:
-        for duel in duels(outcome, budget, [part], WHOLE):
-            yield PartTest(part, where, budget, duel.problems, duel.ours, duel.theirs, duel.test)
+        for duel in duels(outcome, budget, [less], WHOLE):
+            yield PartTest(less, where, budget, duel.problems, duel.ours, duel.theirs, duel.test)
 
 
-def _on_suites(outcome: Outcome, part: str) -> Iterable[PartTest]:
-    names = [WHOLE, part]
+def _on_suites(outcome: Outcome, less: str) -> Iterable[PartTest]:
     for suites, parts in ((PLAIN, ON_PLAIN), (CONSTRAINED, ON_CONSTRAINED)):
-        if part not in parts:
-            continue
-        medians = [outcome.medians(one, JUDGED_AT, "hypervolume", names) for one in suites]
-        values = np.concatenate(medians)
-        values = values[~np.isnan(values).any(axis=1)]
-        if len(values):
-            (test,) = holm_against(WHOLE, names, values, smaller_is_better=False)
-            whole, less = values.mean(axis=0).tolist()
-            yield PartTest(part, " and ".join(suites), JUDGED_AT, len(values), whole, less, test)
+        if less in parts:
+            yield from on_suites(outcome, less, suites, JUDGED_AT)
+
+
+def on_suites(
+    outcome: Outcome, less: str, suites: Sequence[str], budget: int
+) -> Iterable[PartTest]:
+    """Yield the test by the median hypervolume on some suites together, if both ran there."""
+    names = [WHOLE, less]
+    medians = [outcome.medians(one, budget, "hypervolume", names, WHOLE) for one in suites]
+    values = np.concatenate(medians)
+    values = values[~np.isnan(values).any(axis=1)]
+    if len(values):
+        (test,) = holm_against(WHOLE, names, values, smaller_is_better=False)
+        whole, without = values.mean(axis=0).tolist()
+        yield PartTest(less, " and ".join(suites), budget, len(values), whole, without, test)
 
 
 def parts_table(outcome: Outcome) -> Table:

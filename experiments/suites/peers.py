@@ -16,7 +16,7 @@ from experiments.comparison.indicators import front_among
 from experiments.contest.contestants import CONTESTANTS, Contestant, of_jmetal
 from experiments.contest.offer import POPULATION, Offer
 from experiments.contest.peers_pymoo import OWN, PYMOO, run_pymoo
-from experiments.suites.coco import StartBox
+from experiments.suites.bbob.coco import StartBox
 from experiments.suites.reduced import LESS
 from pymoo_hdte.algorithms import CompactSwarm
 

@@ -12,14 +12,19 @@ from pymoo.core.problem import Problem
 from pymoo.problems import get_problem
 
 from experiments.comparison.indicators import CORNER
+from experiments.contest.benchmark_fronts import front_of as benchmark_front
+from experiments.contest.problems import BENCHMARKS
 from experiments.runner.committed import committed_file, read_rows
 from experiments.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.suites.formulas.imop import imop_front, make_imop
 from experiments.suites.formulas.lz09 import lz09_front, make_lz09
+from experiments.suites.formulas.zcat import make_zcat, zcat_front
 
 DIFFICULTY = 5
 """Of DAS-CMOP: the fifth triplet of pymoo's sixteen, which are those of its authors."""
 BOXES = "suites_boxes"
+TUNING = "ZDT, moved ZDT, DTLZ2"
+"""Those of ``peers`` on which settings may be chosen."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,13 @@ class SuiteProblem:
 
 def _numbered(suite: str, count: int) -> list[str]:
     return [f"{suite}{number}" for number in range(1, count + 1)]
+
+
+def _zcat(n: int, n_obj: int) -> SuiteProblem:
+    """Return a problem of ZCAT; all four levels of difficulty take turns."""
+    level = 1 + (n + 2 * n_obj - 5) % 4
+    make, front = partial(make_zcat, n, n_obj, level), partial(zcat_front, n, n_obj)
+    return SuiteProblem(f"ZCAT{n}_{n_obj}", "ZCAT", make, front)
 
 
 def _dascmop(number: int) -> Problem:
@@ -55,6 +67,12 @@ SUITES: dict[str, tuple[SuiteProblem, ...]] = {
     "LZ09": tuple(
         SuiteProblem(f"LZ09-F{n}", "LZ09", partial(make_lz09, n), partial(lz09_front, n))
         for n in range(1, 10)
+    ),
+    "ZCAT": tuple(_zcat(n, n_obj) for n_obj in (2, 3) for n in range(1, 21)),
+    TUNING: tuple(
+        SuiteProblem(one.name, TUNING, one.make, partial(benchmark_front, one.name))
+        for one in BENCHMARKS.values()
+        if one.tuning and one.family in ("ZDT", "ZDT moved", "DTLZ")
     ),
 }
 """Problems by suite."""

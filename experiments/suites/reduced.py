@@ -1,14 +1,16 @@
-"""The compact swarm with all parts that it once had, and with a part left out, by name.
+"""The compact swarm with all parts that it once had, and with some of them left out, by name.
 
-Two parts left it by the rule of `protocol` and stand here only: `Attraction` among its moves, and a
-level of violation that counts as none (T. Takahama, S. Sakai 2006), nine tenths of the swarm's
-median, which shrinks as the swarm follows.
+By the rule of `protocol` left it: `Attraction` among its moves; a level of violation that counts as
+none (T. Takahama, S. Sakai 2006), nine tenths of the swarm's median, which shrinks as the swarm
+follows; a fifth of the places for infeasible particles, the guests; `Difference`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -19,33 +21,65 @@ from pymoo.core.problem import Problem
 
 from experiments.contest.reduced_swarms import EqualShares, NoMutation
 from pymoo_hdte.algorithms import CompactSwarm, ElitistSwarm
+from pymoo_hdte.algorithms.hypervolume import most_hypervolume
 from pymoo_hdte.algorithms.moves import Attraction, Difference, Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep
+from pymoo_hdte.algorithms.survival import survivors
 
-MOVES: tuple[type[Move], ...] = (Attraction, Exchange, Difference, NeighbourDifference, ModelStep)
+MOVES: dict[str, type[Move]] = {
+    move.__name__: move
+    for move in (Attraction, Exchange, Difference, NeighbourDifference, ModelStep)
+}
+SHRINKING = partial(most_hypervolume, keep_ends=False)
+"""The truncation of the time, which may lose the ends of a front of three objectives."""
+TOLERANCE, GUESTS, LEADERS, SHARES = "tolerance", "guests", "several leaders", "learned shares"
+MUTATION = "mutation"
 
 
 class _Whole(CompactSwarm):
-    """With all parts."""
+    """With all parts but those that it lacks, by name."""
 
     TOLERATED = 0.9
     """Share of the swarm's median violation that counts as none."""
-    LEFT_OUT: type[Move] | None = None
+    INVITED = 0.2
+    """Share of the swarm's places for infeasible particles."""
 
-    def _plan(self) -> None:
-        if not self.is_initialized:
-            self.moves = tuple(move() for move in MOVES if move is not self.LEFT_OUT)
-        super()._plan()
+    def __init__(
+        self, pop_size: int | None = None, *, lacks: Collection[str] = (), **kwargs: Any
+    ) -> None:
+        moves = tuple(move() for name, move in MOVES.items() if name not in lacks)
+        mutation = NoMutation() if MUTATION in lacks else None
+        super().__init__(pop_size, moves=moves, mutation=mutation, quality=SHRINKING, **kwargs)
+        # The moves are those of any user, who names none: with constraints without models.
+        self._by_problem = True
+        self.lacks = frozenset(lacks)
+        if GUESTS in lacks:
+            self.INVITED = 0.0
+        if TOLERANCE in lacks:
+            self.TOLERATED = 0.0
+
+    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
+        super()._initialize_advance(infills, **kwargs)
+        if SHARES in self.lacks:
+            self.success = EqualShares(len(self.moves))
 
     def _front(self, swarm: Points) -> Points:
         if np.any(swarm.violation == 0.0):
             return super()._front(_tolerant(swarm, self._level(swarm)))
+        if LEADERS in self.lacks:
+            # While nothing is feasible, the least infeasible particle leads all.
+            return ElitistSwarm._front(self, swarm)
         return super()._front(swarm)
 
     def _survivors(self, points: Points) -> NDArray[np.int_]:
         before = points[np.arange(len(points) - len(self.chosen))]
-        return super()._survivors(_tolerant(points, self._level(before)))
+        points = _tolerant(points, self._level(before))
+        # A callback may have left few particles: not all of them are guests.
+        invited = guests(points, min(int(self.INVITED * self.pop_size), len(points) - 1))
+        others = np.delete(np.arange(len(points)), invited)
+        kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
+        return np.sort(np.concatenate([invited, others[kept]]))
 
     def _level(self, swarm: Points) -> float:
         """Return the violation that is tolerated: none once more than half is feasible."""
@@ -58,68 +92,86 @@ def _tolerant(points: Points, level: float) -> Points:
     return replace(points, violation=np.where(points.violation <= level, 0.0, points.violation))
 
 
-class _EqualSwarm(_Whole):
-    """Without learning which move succeeds."""
+def guests(points: Points, size: int) -> NDArray[np.int_]:
+    """Return at most ``size`` infeasible rows, ascending: the best in objectives and violation.
 
-    def _initialize_advance(self, infills: Population | None = None, **kwargs: Any) -> None:
-        super()._initialize_advance(infills, **kwargs)
-        self.success = EqualShares(len(self.moves))
-
-
-class _NoGuests(_Whole):
-    """Without places for infeasible particles."""
-
-    GUESTS = 0.0
-
-
-class _NoTolerance(_Whole):
-    """Every violation counts."""
-
-    TOLERATED = 0.0
+    Violation counts as a further objective, so that points stay that cross an infeasible region, or
+    that come from different sides as long as nothing is feasible (H. K. Singh, A. Isaacs, T. Ray,
+    W. Smith, "Infeasibility driven evolutionary algorithm (IDEA) for engineering design
+    optimization", AI 2008: Advances in Artificial Intelligence, 104-115).
+    """
+    rows = np.flatnonzero((points.violation > 0.0) & np.isfinite(points.violation))
+    if not len(rows) or size < 1:
+        return rows[:0]
+    keys = np.column_stack([points.F[rows], points.violation[rows]])
+    free = Points(points.X[rows], keys, np.zeros(len(rows)))
+    return rows[survivors(free, size)]
 
 
-class _OneLeader(_Whole):
-    """While nothing is feasible, the least infeasible particle leads all."""
-
-    def _front(self, swarm: Points) -> Points:
-        feasible = np.any(swarm.violation == 0.0)
-        return super()._front(swarm) if feasible else ElitistSwarm._front(self, swarm)
+def _without(*lacks: str) -> Callable[[Problem], Algorithm]:
+    return lambda _: _Whole(lacks=lacks)
 
 
-def _without(left_out: type[Move]) -> Callable[[], Algorithm]:
-    """Return what makes the swarm without a move; with constraints it has no models anyway."""
-
-    class Fewer(_Whole):
-        LEFT_OUT = left_out
-
-    return Fewer
-
-
-_OF_ALL: dict[str, Callable[[], Algorithm]] = {
-    **{f"without {move.__name__}": _without(move) for move in MOVES if move is not ModelStep},
-    "without mutation": lambda: _Whole(mutation=NoMutation()),
-    "with equal shares of moves": _EqualSwarm,
+_OF_ALL = {
+    **{f"without {move}": move for move in MOVES if move != ModelStep.__name__},
+    "without mutation": MUTATION,
+    "with equal shares of moves": SHARES,
 }
-_OF_PLAIN: dict[str, Callable[[], Algorithm]] = {
-    "without ModelStep": _without(ModelStep),
-    "with 50 particles": lambda: _Whole(50),
+_OF_CONSTRAINED = {
+    "without guests": GUESTS,
+    "without tolerance": TOLERANCE,
+    "with one leader": LEADERS,
 }
-_OF_CONSTRAINED: dict[str, Callable[[], Algorithm]] = {
-    "without guests": _NoGuests,
-    "without tolerance": _NoTolerance,
-    "with one leader": _OneLeader,
-}
-ON_PLAIN, ON_CONSTRAINED = (*_OF_PLAIN, *_OF_ALL), (*_OF_CONSTRAINED, *_OF_ALL)
-"""Names of those that lack something which counts without and with constraints."""
+_OF_PLAIN = {"without ModelStep": ModelStep.__name__}
+LACKED = _OF_PLAIN | _OF_CONSTRAINED | _OF_ALL
+"""The part that is left out alone, by the name of the swarm that lacks it."""
+GROWTH = "with 50 particles"
+"""Which is what the swarm grows to in 10,000 evaluations."""
+ALONE = ("without ModelStep", GROWTH, *_OF_CONSTRAINED, *_OF_ALL)
+"""Names of the swarms that lack one part."""
+ON_PLAIN, ON_CONSTRAINED = (
+    ("without ModelStep", GROWTH, *_OF_ALL),
+    (*_OF_CONSTRAINED, *_OF_ALL),
+)
+"""Those that lack something which counts without and with constraints; models do not with any."""
 WHOLE = "with all parts"
 SPREAD = "with quality=spread"
 
+LEFT = (Attraction.__name__, TOLERANCE)
+"""Parts that left first."""
+CANDIDATES = (GUESTS, SHARES, Exchange.__name__, Difference.__name__, LEADERS)
+"""Parts that were tried after these, in this order."""
 
-def _for_any(make: Callable[[], Algorithm]) -> Callable[[Problem], Algorithm]:
-    return lambda _: make()
+
+def without_all(parts: Sequence[str]) -> str:
+    """Return the name of the swarm that lacks these parts, in this order."""
+    return f"without {' and '.join(parts)}"
+
+
+_TOGETHER = [LEFT[: 1 + n] for n in range(len(LEFT))] + [
+    (*LEFT, *chosen)
+    for count in range(1, 1 + len(CANDIDATES))
+    for chosen in combinations(CANDIDATES, count)
+]
+
+_LACKS = {without_all(parts): parts for parts in _TOGETHER}
+
+
+def twins_without_constraints(name: str) -> list[str]:
+    """Return the names of the swarms that move as this one where there are no constraints."""
+
+    def counting(parts: tuple[str, ...]) -> list[str]:
+        return [part for part in parts if part not in _OF_CONSTRAINED.values()]
+
+    own = counting(_LACKS.get(name, (name,)))
+    return [other for other, parts in _LACKS.items() if counting(parts) == own and other != name]
 
 
 LESS: dict[str, Callable[[Problem], Algorithm]] = {
-    name: _for_any(make) for name, make in (_OF_PLAIN | _OF_CONSTRAINED | _OF_ALL).items()
-} | {WHOLE: lambda _: _Whole(), SPREAD: lambda _: CompactSwarm(quality="spread")}
-"""The swarms by name: 50 particles is what it grows to in 10,000 evaluations."""
+    **{name: _without(part) for name, part in LACKED.items()},
+    **{name: _without(*parts) for name, parts in _LACKS.items()},
+    GROWTH: lambda _: _Whole(50),
+    WHOLE: lambda _: _Whole(),
+    SPREAD: lambda _: CompactSwarm(quality="spread"),
+}
+"""The swarms by name."""

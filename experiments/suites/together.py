@@ -1,6 +1,6 @@
-"""All held-out suites together, by hypervolume: IMOP and one instance of bbob-biobj.
+"""All held-out suites together, by hypervolume: ZCAT and one instance of bbob-biobj.
 
-A problem of IMOP gives the median hypervolume, one of bbob-biobj, with both dimensions counted, the
+A problem of ZCAT gives the median hypervolume, one of bbob-biobj, with both dimensions counted, the
 share of targets, which rises with the hypervolume of all points evaluated. They have no common
 unit, so that ranks and signs are what is compared. IGD+ needs a front; bbob-biobj has none in
 closed form.
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from experiments.comparison.ranks import average_ranks
 from experiments.comparison.rivals import RivalTest, signs_against
 from experiments.runner.result import Cell, Column, Table
-from experiments.suites.coco import FUNCTIONS
+from experiments.suites.bbob.coco import FUNCTIONS
 from experiments.suites.data import Outcome
 from experiments.suites.jobs import BbobRun
 from experiments.suites.peers import BBOB_PEERS, OURS

@@ -16,11 +16,11 @@ from pymoo_hdte.algorithms.archive import FrontArchive
 from pymoo_hdte.algorithms.dominance import best_front
 from pymoo_hdte.algorithms.elitist import ElitistSwarm
 from pymoo_hdte.algorithms.horizon import evaluation_limit
-from pymoo_hdte.algorithms.moves import Difference, Exchange, Move, NeighbourDifference
+from pymoo_hdte.algorithms.moves import Exchange, Move, NeighbourDifference
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.algorithms.survival import Quality, guests, survivors
+from pymoo_hdte.algorithms.survival import Quality
 from pymoo_hdte.checks import whole_number
 
 SMALLEST, LARGEST = 10, 100
@@ -44,10 +44,10 @@ class CompactSwarm(ElitistSwarm):
     A small swarm comes near the front with few evaluations, a large one spreads along it. As the
     size follows from the evaluations made so far, no budget has to be known: a run may be stopped
     or continued at any time. All that it finds is offered to two archives: the result, which
-    `quality` thins out in every generation, and `archive_all`. Moves and mutation are those of
-    `ElitistSwarm`, but for `Attraction`; added are a move among neighbours, `NeighbourDifference`,
-    and one by quadratic models of the objectives, `ModelStep`, for variables that depend on each
-    other, and infeasible particles that stay beside the feasible ones.
+    `quality` thins out in every generation, and `archive_all`. Of the moves of `ElitistSwarm` it
+    has `Exchange`; with it go a move among neighbours, `NeighbourDifference` (after Li, Zhang
+    2009), and one by quadratic models of the objectives, `ModelStep`, for variables that depend on
+    each other.
 
     Parameters
     ----------
@@ -65,8 +65,7 @@ class CompactSwarm(ElitistSwarm):
     quality : "spread", "hypervolume" or callable
         As of `ElitistSwarm`, for the swarm and for the result.
     sampling, moves, **kwargs
-        As of `ElitistSwarm`; by default `Exchange`, `Difference`, `NeighbourDifference` and
-        `ModelStep`.
+        As of `ElitistSwarm`; by default `Exchange`, `NeighbourDifference` and `ModelStep`.
 
     Raises
     ------
@@ -83,9 +82,6 @@ class CompactSwarm(ElitistSwarm):
 
     Notes
     -----
-    - a fifth of the places of a swarm goes to infeasible particles, as long as there are any: the
-      best in objectives and violation together (Singh, Isaacs, Ray, Smith 2008), who may cross a
-      gap between feasible regions;
     - as long as nothing is feasible, the less infeasible half of the swarm leads;
     - the result is feasible as pymoo defines it, with equalities met to 1e-4;
     - the models know objectives only: with constraints they led away from feasible regions (MW:
@@ -106,9 +102,6 @@ class CompactSwarm(ElitistSwarm):
     True
     """
 
-    GUESTS = 0.2
-    """Share of the swarm's places for infeasible particles."""
-
     def __init__(
         self,
         pop_size: int | None = None,
@@ -124,7 +117,7 @@ class CompactSwarm(ElitistSwarm):
             pop_size = len(sampling)
         self._by_problem = moves is None
         if moves is None:
-            moves = (Exchange(), Difference(), NeighbourDifference(), ModelStep())
+            moves = (Exchange(), NeighbourDifference(), ModelStep())
         size = LARGEST if pop_size is None else pop_size
         super().__init__(size, sampling=sampling, moves=moves, quality=quality, **kwargs)
         self._by_budget, self._grows, self._spent = pop_size is None, False, 0
@@ -186,13 +179,6 @@ class CompactSwarm(ElitistSwarm):
             return super()._front(swarm)
         judged = swarm[np.flatnonzero(np.isfinite(swarm.violation))]
         return judged[np.argsort(judged.violation, kind="stable")[: max(1, len(judged) // 2)]]
-
-    def _survivors(self, points: Points) -> NDArray[np.int_]:
-        # A callback may have left few particles: not all of them are guests.
-        invited = guests(points, min(int(self.GUESTS * self.pop_size), len(points) - 1))
-        others = np.delete(np.arange(len(points)), invited)
-        kept = survivors(points[others], self.pop_size - len(invited), self._truncation)
-        return np.sort(np.concatenate([invited, others[kept]]))
 
     def archive_all(self) -> Population:
         """Return all non-dominated feasible solutions found, at most ``n_archive``, thinned out."""

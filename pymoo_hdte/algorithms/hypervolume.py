@@ -23,13 +23,19 @@ Computation 26 (2018) 411-440).
 """
 
 
-def most_hypervolume(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
+def most_hypervolume(
+    F: NDArray[np.float64], size: int, *, keep_ends: bool = True
+) -> NDArray[np.int_]:
     """Return the rows, ascending, of ``F`` (n, m) that stay when ``size`` of them may.
 
     Objectives count in the ranges of the whole ``F``, whose rows must not dominate each other. With
     two objectives the ends stay as long as two rows may; with three the reference point lies a
-    tenth of the range beyond the largest values. Of equal contributions the first row leaves. With
-    four or more objectives contributions take too long, and `most_spread` decides.
+    tenth of the range beyond the largest values, and the row with the largest value of each
+    objective stays as long as so many may, unless ``keep_ends`` is false. Without that, a swarm
+    whose points nearly all have the least value of an objective loses the few others, which add
+    little in the ranges of today, and never finds what lies beyond. Of equal contributions the
+    first row leaves. With four or more objectives contributions take too long, and `most_spread`
+    decides.
     """
     n, n_obj = F.shape
     if n <= size:
@@ -42,7 +48,11 @@ def most_hypervolume(F: NDArray[np.float64], size: int) -> NDArray[np.int_]:
         order = np.lexsort(scaled.T[::-1])
         kept = _kept_of_two if COMPILES else _kept_of_two_in_numpy
         return np.sort(order[kept(scaled[order], order, size)])
-    return _kept_of_three(scaled, size)
+    safe = np.zeros(n, dtype=bool)
+    ends = np.unique(scaled.argmax(axis=0))
+    if keep_ends and len(ends) <= size:
+        safe[ends] = True
+    return _kept_of_three(scaled, size, safe)
 
 
 @compiled
@@ -108,11 +118,15 @@ def _kept_of_two_in_numpy(
     return stays
 
 
-def _kept_of_three(scaled: NDArray[np.float64], size: int) -> NDArray[np.int_]:
-    """Return which rows stay."""
+def _kept_of_three(
+    scaled: NDArray[np.float64], size: int, safe: NDArray[np.bool_]
+) -> NDArray[np.int_]:
+    """Return which rows stay, the ``safe`` ones among them."""
     reference = np.full(3, _REFERENCE)
     rows = np.arange(len(scaled))
     while len(rows) > size:
         # All anew in O(n log n): in Python, recounting only what changed takes longer.
-        rows = np.delete(rows, hv_contributions(scaled[rows], ref=reference).argmin())
+        added = hv_contributions(scaled[rows], ref=reference)
+        added[safe[rows]] = np.inf
+        rows = np.delete(rows, added.argmin())
     return rows

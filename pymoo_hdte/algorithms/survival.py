@@ -58,22 +58,6 @@ def survivors(points: Points, size: int, truncation: Truncation = most_spread) -
     return np.sort(np.concatenate([safe, front[chosen]]))
 
 
-def guests(points: Points, size: int) -> NDArray[np.int_]:
-    """Return at most ``size`` infeasible rows, ascending: the best in objectives and violation.
-
-    Violation counts as a further objective, so that points stay that cross an infeasible region, or
-    that come from different sides as long as nothing is feasible (H. K. Singh, A. Isaacs, T. Ray,
-    W. Smith, "Infeasibility driven evolutionary algorithm (IDEA) for engineering design
-    optimization", AI 2008: Advances in Artificial Intelligence, 104-115).
-    """
-    rows = np.flatnonzero((points.violation > 0.0) & np.isfinite(points.violation))
-    if not len(rows) or size < 1:
-        return rows[:0]
-    keys = np.column_stack([points.F[rows], points.violation[rows]])
-    free = Points(points.X[rows], keys, np.zeros(len(rows)))
-    return rows[survivors(free, size)]
-
-
 def _copies(points: Points) -> NDArray[np.bool_]:
     """Return which rows (n,) repeat an earlier one in objectives and violation."""
     keys = np.column_stack([points.F, points.violation])

@@ -1,4 +1,4 @@
-"""Parts of the compact swarm: neighbours, guests, archive, size."""
+"""Parts of the compact swarm: neighbours, archive, size."""
 
 import numpy as np
 import pytest
@@ -17,9 +17,13 @@ from pymoo_hdte.algorithms.moves import NeighbourDifference, nearest_in_objectiv
 from pymoo_hdte.algorithms.points import Points
 from pymoo_hdte.algorithms.quadratic import ModelStep, Quadratic, fitted, lowest_within
 from pymoo_hdte.algorithms.spread import most_spread
-from pymoo_hdte.algorithms.survival import guests
 
 D = 5
+
+
+def points(F, violation):
+    F = np.asarray(F, dtype=float)
+    return Points(np.zeros((len(F), 1)), F, np.asarray(violation, dtype=float))
 
 
 # --- move among neighbours ------------------------------------------------------------------------
@@ -66,28 +70,6 @@ def test_objectives_that_are_not_finite_have_neighbours_like_themselves(rng, los
     assert np.all(np.sort(near[:5]) < 5)
     assert np.all(near[5:] >= 5)
     assert nearest_in_objectives(np.full((6, 2), lost), 3).shape == (6, 3)
-
-
-# --- guests ---------------------------------------------------------------------------------------
-
-
-def points(F, violation):
-    F = np.asarray(F, dtype=float)
-    return Points(np.zeros((len(F), 1)), F, np.asarray(violation, dtype=float))
-
-
-def test_guests_are_infeasible_and_best_in_objectives_and_violation():
-    swarm = points([[0, 0], [1, 1], [2, 2], [0, 3], [3, 3], [9, 9]], [5.0, 2.0, 1.0, 2.0, 2.0, 0.0])
-    # The fifth is worse than the third in everything; the last one is feasible.
-    np.testing.assert_array_equal(guests(swarm, 4), [0, 1, 2, 3])
-    np.testing.assert_array_equal(guests(swarm, 9), [0, 1, 2, 3, 4])
-    assert len(guests(swarm, 0)) == 0
-
-
-def test_whoever_cannot_be_judged_is_no_guest():
-    swarm = points([[0, 0], [1, 1], [np.nan, 0]], [np.inf, 1.0, np.inf])
-    np.testing.assert_array_equal(guests(swarm, 3), [1])
-    assert len(guests(points([[0, 0]], [np.inf]), 1)) == 0
 
 
 # --- archive --------------------------------------------------------------------------------------

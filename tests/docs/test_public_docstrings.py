@@ -53,7 +53,7 @@ SOURCES = {
     "problems.RobustProblem": "Eqs. 29 and 30",
     "algorithms.AMOPSO": "Section 5.2",
     "algorithms.AMPMOPSO": "Section 5.1",
-    "algorithms.CompactSwarm": "Singh, Isaacs, Ray, Smith 2008",
+    "algorithms.CompactSwarm": "Li, Zhang",
     "algorithms.ElitistSwarm": "Deb et al. 2002",
     "algorithms.EntropyWeight": "Coello Coello",
     "algorithms.Flat": "Kennedy and Eberhart",

@@ -42,6 +42,7 @@ LOWEST_EXPERIMENTS_FIRST = (
     *(
         "contest",
         "suites.formulas",
+        "suites.bbob",
         "suites",
         "cards",
         "robust",

@@ -9,8 +9,9 @@ from experiments.runner.campaign import Campaign
 from experiments.runner.registry import Context
 from experiments.suites import experiment
 from experiments.suites.anew import BBOB_RUNS, SUITE_RUNS
+from experiments.suites.bbob.coco import MARKS
+from experiments.suites.bbob.published import BEST, CITED, curves
 from experiments.suites.bbob_tables import duels, reached
-from experiments.suites.coco import MARKS
 from experiments.suites.data import Outcome, bbob_text, outcome_for, read_outcome, suites_text
 from experiments.suites.demands import demands, in_one_sentence
 from experiments.suites.jobs import BbobRun
@@ -18,7 +19,6 @@ from experiments.suites.parts import part_tests, parts_table
 from experiments.suites.peers import OURS
 from experiments.suites.problems import SUITES
 from experiments.suites.protocol import BESIDE_PEERS, FULL, OF_PARTS, SHARES, STORED
-from experiments.suites.published import BEST, CITED, curves
 from experiments.suites.reduced import WHOLE
 from experiments.suites.suite_tables import feasible_beside, feasible_runs, ranks
 from experiments.suites.together import ranks_together, signs_together
@@ -57,10 +57,21 @@ def test_demands_are_met_by_one_who_leads_and_missed_by_one_who_trails():
     for asked in [*shares, "RE: no worse than SMS-EMOA, hypervolume", "MW: first by hypervolume"]:
         assert leading[asked] is True
         assert trailing[asked] is False
-    met = [d.met for d in demands(planted(0.2)) if d.asked.startswith("IMOP") and d.met is not None]
+    met = [d.met for d in demands(planted(0.2)) if d.asked.startswith("ZCAT") and d.met is not None]
     assert met == [True] * 4
     feasible = next(asked for asked in leading if "feasible in as many" in asked)
     assert (leading[feasible], trailing[feasible]) == (True, False)
+
+
+def test_a_first_place_that_is_shared_is_told_and_not_met():
+    outcome = planted(0.2)
+    for key in [*outcome.suites]:
+        if key[1] == "NSGA-II":
+            outcome.suites[key] = outcome.suites[key[0], OURS, *key[2:]]
+    asked = "MW: first by hypervolume"
+    (found,) = [one for one in demands(outcome) if one.asked == asked]
+    assert (found.met, found.measured) == (False, "place 1 of 4, shared, rank 1.50")
+    assert "is 1 (shared) by hypervolume and 1 (shared) by IGD+" in in_one_sentence(outcome)
 
 
 def test_what_did_not_run_is_neither_met_nor_missed():
@@ -152,10 +163,10 @@ def test_all_held_out_suites_together():
     outcome = planted(0.2)
     assert ranks_together(outcome, 10_000) == {OURS: 1.0, "NSGA-II": 2.0}
     (test,) = signs_together(outcome, 10_000)
-    assert (test.better, test.worse, test.beaten) == (118, 0, True)
+    assert (test.better, test.worse, test.beaten) == (150, 0, True)
     (test,) = signs_together(planted(-0.2), 10_000)
-    assert (test.better, test.worse, test.beaten) == (0, 118, False)
-    # IMOP was not run there.
+    assert (test.better, test.worse, test.beaten) == (0, 150, False)
+    # ZCAT was not run there.
     assert signs_together(outcome, 500) == []
     # One that lacks a problem of either suite is not ranked over the others.
     del outcome.bbob[BbobRun(7, 10, BESIDE_PEERS, "NSGA-II", 25_000)]
@@ -181,7 +192,8 @@ def test_parts_that_help_are_told_from_those_that_do_not(rng):
             ("without mutation", other),
         ):
             outcome.bbob[BbobRun(function, dimension, OF_PARTS, name, 10_000)] = shares
-    for one, name in product(SUITES["MW"], (OURS, WHOLE, "without guests")):
+    # Whether ours ran there does not matter.
+    for one, name in product(SUITES["MW"], (WHOLE, "without guests")):
         outcome.suites[one.name, name, 10_000, 1] = 10_000.0, 0.5 + 0.1 * (name == WHOLE), 0.1, 9.0
     helps = {(one.part, one.evaluations): one.helps for one in part_tests(outcome)}
     assert helps == {

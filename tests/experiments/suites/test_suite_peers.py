@@ -1,12 +1,16 @@
 """Runs on suites: budgets, seeds, COCO's shares, and extras that are missing."""
 
+import time
+
 import numpy as np
 import pytest
+from pymoo.problems.multi.zdt import ZDT1
 
 from experiments.runner import registry
 from experiments.runner.registry import ExtraMissing
-from experiments.suites import coco
-from experiments.suites.coco import MARKS, TARGETS, shares
+from experiments.suites import own_time
+from experiments.suites.bbob import coco
+from experiments.suites.bbob.coco import MARKS, TARGETS, shares
 from experiments.suites.jobs import BbobRun, SuiteRun, measured
 from experiments.suites.peers import BBOB_PEERS, OURS, PEERS, takes
 from experiments.suites.problems import front_of, problem_of
@@ -96,6 +100,21 @@ def test_a_run_is_judged_at_each_of_its_budgets():
     assert run.columns[:2] == ("evaluations", "spent")
     assert run.values[:, :2].tolist() == [[200, 200], [400, 400]]
     assert run.values[1, 2] >= run.values[0, 2]
+
+
+def test_own_time_leaves_out_that_of_evaluations(monkeypatch):
+    class Slow(ZDT1):
+        def _evaluate(self, x, out, *args, **kwargs):
+            begin = time.process_time()
+            while time.process_time() < begin + 0.05:
+                pass
+            super()._evaluate(x, out, *args, **kwargs)
+
+    monkeypatch.setattr(own_time, "EVALUATIONS", 500)
+    monkeypatch.setattr(own_time, "get_problem", lambda name: Slow())
+    generations, seconds = own_time.own_seconds("any", own_time.MADE["NSGA-II"])
+    assert generations == 5
+    assert 0.0 < seconds < 0.05 * generations
 
 
 def test_an_instance_without_targets_is_refused():

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 from moocore import is_nondominated
+from pymoo.problems import get_problem
 
 from experiments.runner.committed import DATA, read_rows
 from experiments.suites.formulas import lz09
 from experiments.suites.formulas.engineering import MEMBERS, make_engineering
 from experiments.suites.formulas.imop import N_PLACES, imop_front, make_imop
 from experiments.suites.formulas.lz09 import lz09_front, make_lz09
+from experiments.suites.formulas.zcat import make_zcat, zcat_front
 
 
 def optimal_imop(number, n):
@@ -93,3 +95,27 @@ def test_a_pressure_vessel_that_holds_violates_nothing():
     # Sheets of 1/16 inch hold a radius of ten inches not, and the volume lacks nearly all.
     missing = 1_296_000 - np.pi * 1000.0 * (1.0 + 4.0 / 3.0)
     assert F[1, 1] == pytest.approx(0.193 - 0.0625 + 0.0954 - 0.0625 + missing)
+
+
+@pytest.mark.parametrize("n_obj", [2, 3])
+@pytest.mark.parametrize("number", range(1, 21))
+def test_zcat_is_that_of_pymoo_and_no_design_lies_below_its_front(number, n_obj):
+    rng = np.random.default_rng(number)
+    for level in (1, 2, 3, 4):
+        problem = make_zcat(number, n_obj, level)
+        X = rng.uniform(problem.xl, problem.xu, (6, problem.n_var))
+        X[:2] = problem.xl, problem.xu
+        theirs = get_problem(
+            f"zcat{number}", n_var=30, n_obj=n_obj, complicated_pareto_set=True, level=level
+        )
+        np.testing.assert_allclose(problem.evaluate(X), theirs.evaluate(X), rtol=1e-12)
+    # At 0.221 the plain sets of the paper miss nothing, and have the same front.
+    plain = get_problem(f"zcat{number}", n_var=30, n_obj=n_obj)
+    X[:] = 0.2210
+    X[:, : n_obj - 1] = rng.random((len(X), n_obj - 1))
+    F = plain.evaluate(plain.xl + X * (plain.xu - plain.xl))
+    front = zcat_front(number, n_obj)
+    assert is_nondominated(front).all()
+    for row in F:
+        # A point of the front is as good or better, but for the gaps of equal steps.
+        assert np.max(front - row, axis=1).min() < 0.05 * np.ptp(front, axis=0).max()

@@ -69,6 +69,19 @@ def test_what_is_stored_is_completed_and_kept(tmp_path):
 
 
 @pytest.mark.usefixtures("protocol")
+def test_runs_from_before_and_after_a_change_are_not_mixed(tmp_path):
+    ours, *_ = PART.groups()
+    before, job = outcome_of(ours), ours[3]
+    text = f"evaluations,spent,hypervolume,igd_plus,solutions\n{job.budgets[0]},200,{{}},0.1,10\n"
+    (tmp_path / f"{job.key}.csv").write_text(text.format(0.5))
+    assert gather.gathered([tmp_path], before).suites == before.suites
+    (tmp_path / f"{job.key}.csv").write_text(text.format(0.6))
+    with pytest.raises(InvalidInput, match=f"--anew {OURS}"):
+        gather.gathered([tmp_path], before)
+    assert not gather.gathered([tmp_path], before.without([OURS])).suites
+
+
+@pytest.mark.usefixtures("protocol")
 def test_some_algorithms_are_run_and_what_is_stored_is_passed_over(tmp_path, monkeypatch):
     stored, *_ = [one for one in PART.groups() if one[0].algorithm == "random search"]
     monkeypatch.setattr(only, "stored", lambda: outcome_of(stored))

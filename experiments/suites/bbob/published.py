@@ -11,7 +11,7 @@ from pathlib import Path
 
 from experiments.runner.committed import read_rows
 
-ANCHORS = Path(__file__).resolve().parents[3] / "shared" / "anchors" / "bbob_biobj.csv"
+ANCHORS = Path(__file__).resolve().parents[4] / "shared" / "anchors" / "bbob_biobj.csv"
 BEST = "HMO-CMA-ES"
 CITED = {
     **{(10, 500): 0.214, (10, 2000): 0.295, (10, 10_000): 0.372, (10, 25_000): 0.414},

@@ -1,0 +1,1 @@
+"""Problems of bbob-biobj, and shares of their targets that were published."""
