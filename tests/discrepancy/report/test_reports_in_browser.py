@@ -30,6 +30,8 @@ def looked_at(page, tmp_path, width, script="null"):
     assert seen["wider_than_window"] <= 0
     assert all(natural > 0 and visible for _, natural, visible in seen["images"])
     assert all(alt for alt, _, _ in seen["images"])
+    # A picture that is wider than its place says that it scrolls, and no other one does.
+    assert all(scrolls == said for scrolls, said in seen["pictures"])
     assert all(rows > 1 and visible for rows, visible in seen["tables"])
     for link in seen["links"]:
         if not link.startswith(("#", "http")):
