@@ -31,6 +31,9 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
     named = bool(finding.accepted.candidates)
     for row, name in enumerate(names):
         port = _port_of(finding, name)
+        # A port that is read shows a force: its motion is that of what the sensor sits on.
+        read = finding.mechanism.port(port).read
+        where = f"at sensor {port}" if read else f"of {port}"
         for record, balance in enumerate(finding.data.spectra):
             motion = balance.ports[port]
             rows = np.flatnonzero(balance.moving.whole)
@@ -44,10 +47,10 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
                         over[rows], balance.in_time(residual)[rows], marker, ms=3, color=colour,
                         alpha=0.6, label=label if record == 0 else None,
                     )  # fmt: skip
-        axes[row, 0].set_ylabel(f"left of {name} [{unit_of(finding.mechanism, name)}]")
+        axes[row, 0].set_ylabel(f"residual of {name} [{unit_of(finding.mechanism, name)}]")
         for column, quantity in enumerate(("speed", "position")):
             unit = unit_of(finding.mechanism, port, quantity)
-            axes[row, column].set_xlabel(f"{quantity} of {port} [{unit}]")
+            axes[row, column].set_xlabel(f"{quantity} {where} [{unit}]")
         for axis in axes[row]:
             _plain(axis)
     axes[0, 0].legend(frameon=False)
@@ -84,7 +87,10 @@ def misfit_over_frequency(finding: MechanismFinding) -> Figure:
         )
         unit = unit_of(finding.mechanism, name)
         axes[part].set(
-            xscale="log", yscale="log", xlabel="frequency [Hz]", ylabel=f"left of {name} [{unit}]"
+            xscale="log",
+            yscale="log",
+            xlabel="frequency [Hz]",
+            ylabel=f"residual of {name} [{unit}]",
         )
         _plain(axes[part])
     axes[0].legend(frameon=False)

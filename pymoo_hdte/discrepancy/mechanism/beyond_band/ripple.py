@@ -226,7 +226,8 @@ def _limits(
     """Return what was seen at a port and is not named, or cannot be told, in sentences."""
     limits = []
     if search.cut:
-        limits.append(f"Orders at the {port} were searched up to {search.highest:.4g} only.")
+        highest = np.format_float_positional(search.highest, 4, fractional=False, trim="-")
+        limits.append(f"Orders at the {port} were searched up to {highest} only.")
     if any(one.ways == 1 for one in found):
         limits.append(_one_way(port))
     if lost:
