@@ -81,11 +81,13 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
 
 def _next_best(best: Hypothesis, chosen: Hypothesis) -> str:
     """Return what the next best explains; where the share is the same, the BIC tells them apart."""
-    same = percent(best.explained) == percent(chosen.explained)
-    explains = "as much to a tenth of a per cent" if same else percent(best.explained)
-    gap = best.bic - chosen.bic
+    share, gap = percent(best.explained), best.bic - chosen.bic
+    if share == percent(chosen.explained):
+        share = "as much to a tenth of a per cent"
+    elif gap > 0.0 and best.explained < chosen.explained:
+        return f"The next best, {in_words(best.label)}, explains {share}."
     return (
-        f"The next best, {in_words(best.label)}, explains {explains}; its BIC is "
+        f"The next best, {in_words(best.label)}, explains {share}; its BIC is "
         f"{number(abs(gap), 2)} {'above' if gap > 0.0 else 'below'}."
     )
 
