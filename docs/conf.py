@@ -21,6 +21,7 @@ extensions = [
     "problem_cards",
     "glossary",
     "readme_code",
+    "signatures",
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
@@ -19,6 +20,8 @@ Values = NDArray[np.float64]
 
 _POINTS = 2000
 _BANDS = 30
+_NARROW = 300.0
+"""Ratio of frequencies below which decades alone would be too few ticks."""
 
 
 def misfit_over_motion(finding: MechanismFinding) -> Figure:
@@ -92,6 +95,7 @@ def misfit_over_frequency(finding: MechanismFinding) -> Figure:
             xlabel="frequency [Hz]",
             ylabel=f"residual of {name} [{unit}]",
         )
+        _few_ticks(axes[part])
         _plain(axes[part])
     axes[0].legend(frameon=False)
     return figure
@@ -111,6 +115,7 @@ def overlay(finding: MechanismFinding, gap: MeasuredGap) -> Figure:
     lower.plot(time, (gap.measured - gap.predicted_before)[stride], "--", color=BEFORE)
     lower.plot(time, (gap.measured - gap.predicted_after)[stride], "-", color=AFTER)
     lower.set(xlabel="time [s]", ylabel="difference")
+    lower.ticklabel_format(axis="x", useOffset=False)
     for axis in (upper, lower):
         _plain(axis)
     return figure
@@ -152,6 +157,15 @@ def _banded(frequency: Values, size: Values, edges: NDArray[np.int_]) -> tuple[V
     middle = np.array([frequency[low:high].mean() for low, high in parts])
     power = np.array([np.sqrt(np.mean(size[low:high] ** 2)) for low, high in parts])
     return middle, power
+
+
+def _few_ticks(axis: Axes) -> None:
+    """Write 1, 2 and 5 of each decade where there are few, and decades alone else."""
+    low, high = axis.get_xlim()
+    ratio = high / low
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio < _NARROW else (1.0,)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _plain(axis: Axes) -> None:
