@@ -21,6 +21,7 @@ extensions = [
     "problem_cards",
     "glossary",
     "readme_code",
+    "signatures",
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
@@ -70,6 +71,8 @@ sphinx_gallery_conf = {
     "filename_pattern": r"\.py$",
     "within_subsection_order": "guide_order.place",
     "abort_on_example_error": True,
+    # What a guide shows it prints: the value of a last line may hold an address in memory.
+    "capture_repr": (),
     "download_all_examples": False,
     "show_memory": False,
     "show_signature": False,

@@ -171,9 +171,13 @@ def _at_stated(scores: Scores, word: str) -> str:
 
 
 def _near_each_other(scores: Scores) -> str:
-    means = [
-        scores.of(Case(MODEL, EXACT, RETURNED, *STATED, name), COMPARED["igd"]).mean()
+    runs = [
+        scores.of(Case(MODEL, EXACT, RETURNED, *STATED, name), COMPARED["igd"])
         for name in (OURS, *RIVALS)
     ]
+    means = [run.mean() for run in runs]
     percent = 100.0 * (max(means) / min(means) - 1.0)
-    return f"the mean IGDs of the three lie within {significant(percent, 2)} % of each other"
+    return (
+        f"the mean IGDs of the three over {len(runs[0])} seeds lie within "
+        f"{significant(percent, 2)} % of each other"
+    )

@@ -17,6 +17,8 @@ from pymoo_hdte.drive.effects import ENCODER_LINE
 
 _TRUTHS = (*LISTED, "none", *UNLISTED)
 _ANSWERS = (*LISTED, PARAMETER, ENCODER_LINE, "adequate", "unlisted", ERROR)
+_APART = 0.06
+"""Probabilities between which there is room for a number."""
 _OF_ONE = ("none", "single", "unlisted")
 """Kinds that hide at most one effect, and no stress."""
 
@@ -62,9 +64,13 @@ def reliability_diagram(outcomes: Sequence[Outcome]) -> Figure:
     ]
     if points:
         axis.errorbar(said, values, np.abs(ends), fmt="o", color=BLUE, markersize=4, linewidth=1)
-    for point, one in points:
-        axis.annotate(str(one.n), (point, one.value), xytext=(5, -9), textcoords="offset points",
-                      fontsize=7)  # fmt: skip
+    level, last = 0, -1.0
+    for point, one in sorted(points, key=lambda each: each[0]):
+        # A number that would meet the last one stands a line lower.
+        level = level + 1 if point - last < _APART else 0
+        last = point
+        axis.annotate(str(one.n), (point, one.value), xytext=(4, -9 - 9 * level),
+                      textcoords="offset points", fontsize=7)  # fmt: skip
     axis.set_xlabel("mean probability said")
     axis.set_ylabel("share true")
     return figure

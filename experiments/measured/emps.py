@@ -53,7 +53,11 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
     )
     first, *seconds = one.names or ("nothing",)
     findings = (
-        Finding(first == "coulomb_friction", f"The first name is {first}.", check=True),
+        Finding(
+            first == "coulomb_friction",
+            f"The first effect that is named is {first.replace('_', ' ')}.",
+            check=True,
+        ),
         Finding(
             near,
             "Mass, viscous and Coulomb friction lie within 5 % of the published values, which "
@@ -73,7 +77,8 @@ def _judged(one: Study, found: tuple[Twin, ...]) -> Table:
         ),
         Finding(
             bool({"direction_dependent_friction", "force_offset"} & set(seconds)),
-            f"Second: {', '.join(seconds) or 'none'}.",
+            "The next one is a force offset or a friction that depends on the direction: "
+            f"{' and '.join(seconds).replace('_', ' ') or 'none'} is named.",
             check=True,
         ),
         twins_finding(found),

@@ -43,6 +43,7 @@ from experiments.runner.registry import Context
 from experiments.runner.result import Cell, Column, Finding, Result, Table
 from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.discrepancy.mechanism.proof import prove_measured
+from pymoo_hdte.discrepancy.report.tables import STATUSES
 from pymoo_hdte.io.text_table import csv_text
 
 NAME = "real"
@@ -123,7 +124,7 @@ def run(context: Context) -> Result:
                 "verdicts",
                 "Verdicts",
                 VERDICTS,
-                _cells(first),
+                _cells([[*row[:2], STATUSES[row[2]], *row[3:]] for row in first]),
                 note=NOTE,
                 findings=_findings(first),
             ),

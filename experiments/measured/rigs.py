@@ -22,6 +22,9 @@ from pymoo_hdte.discrepancy.report.mechanism import extent_sentence, proof_sente
 from pymoo_hdte.discrepancy.report.mechanism_document import limits, offered, remainder
 from pymoo_hdte.discrepancy.report.mechanism_figures import misfit_over_motion, overlay
 from pymoo_hdte.discrepancy.report.mechanism_values import effects, quantities
+from pymoo_hdte.discrepancy.report.tables import STATUSES
+from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.reports.html import percent
 
 MEASURED = Path(__file__).resolve().parents[3] / "shared" / "measured"
 """Folder of the measurements, which are not part of the project."""
@@ -94,12 +97,12 @@ def verdict_paragraphs(one: Study) -> tuple[str, ...]:
     """Return the verdict in words: what is missing, what is left, what cannot be said."""
     named = " Then: ".join(c.sentence for c in one.finding.accepted.candidates)
     second = " ".join(
-        f"Beside it {other['name'].replace('_', ' ')} would take {other['removes']:.0%} of what is "
-        "left."
+        f"Beside it {other['name'].replace('_', ' ')} would take {percent(other['removes'])} of "
+        "what is left."
         for other in offered(one.finding)
     )
     return (
-        f"Verdict: {one.finding.verdict.status}. {named}",
+        f"Verdict: {STATUSES[one.finding.verdict.status]}. {named}",
         f"{remainder(one.finding)['sentence']} {second}".strip(),
         *limits(one.finding),
         proof_sentence(one.finding, one.gaps),
@@ -190,7 +193,8 @@ def evidence_table(one: Study) -> Table:
         "Explanations that were tried",
         (Column("effects"), Column("share of the misfit removed", "%", 4), Column("BIC", "", 5)),
         tuple(
-            (hypothesis.label, 100.0 * hypothesis.explained, hypothesis.bic) for hypothesis in found
+            (in_words(hypothesis.label), 100.0 * hypothesis.explained, hypothesis.bic)
+            for hypothesis in found
         ),
         folded=True,
     )

@@ -26,6 +26,7 @@ from experiments.runner.store import TIMES, write_atomically
 from pymoo_hdte.discrepancy import DriveAnalysis, analyse, read_campaign
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.report.tables import STATUSES as SHOWN
+from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.io.text_table import csv_text
 
 NAME = "sealed_rigs"
@@ -61,6 +62,8 @@ NOTE = (
 )
 
 Rows = list[list[str]]
+_WORDS = 5
+"""Columns of a verdict before its numbers."""
 
 
 def run(context: Context) -> Result:
@@ -78,7 +81,9 @@ def run(context: Context) -> Result:
         answer=_counted([row[1] for row in found]),
         paragraphs=(*stored_outcome(context, NAME), SETTING),
         tables=(
-            Table("verdicts", "What is said to be missing", COLUMNS, _cells(found), note=NOTE),
+            Table(
+                "verdicts", "What is said to be missing", COLUMNS, _cells(_told(found)), note=NOTE
+            ),
             Table("seconds", "CPU time", SECONDS, _cells(seconds), wall_times=True),
         ),
     )
@@ -133,6 +138,19 @@ def _headings(columns: Sequence[Column]) -> list[str]:
 def _committed(name: str) -> Rows:
     path: Path = committed_file(name, NAME)
     return [list(row.values()) for row in read_rows(path)]
+
+
+def _told(rows: Rows) -> Rows:
+    """Return the rows of verdicts with statuses and labels in words."""
+    return [
+        [
+            row[0],
+            SHOWN[row[1]],
+            *(in_words(text).replace("_", " ") for text in row[2:_WORDS]),
+            *row[_WORDS:],
+        ]
+        for row in rows
+    ]
 
 
 def _cells(rows: Rows) -> tuple[tuple[Cell, ...], ...]:

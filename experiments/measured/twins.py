@@ -17,6 +17,7 @@ from experiments.runner.result import Column, Table
 from experiments.runner.result import Finding as Agreement
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding, examine_mechanism
 from pymoo_hdte.discrepancy.mechanism.held_out import fitted_mechanism
+from pymoo_hdte.discrepancy.report.tables import STATUSES
 from pymoo_hdte.effects.friction import NonlinearDrag
 from pymoo_hdte.mechanism import LawAt, Mechanism, Record
 from pymoo_hdte.mechanism.balances import ForceBalance
@@ -86,15 +87,20 @@ def twins_finding(found: Sequence[Twin]) -> Agreement:
     first, *others = found
     named = [twin.names == (twin.hidden,) for twin in others]
     agrees = first.finding.verdict.status == "adequate" and all(named)
-    words = ", ".join(" + ".join(twin.names) or "nothing" for twin in found)
-    return Agreement(agrees, f"Twins: {words}.", check=True)
+    words = [
+        f"{_words(twin.names)} where {_words([twin.hidden])} is hidden"
+        f"{' under a disturbance like the real one' if twin.rest else ''}"
+        for twin in found
+    ]
+    sentence = f"In simulated copies of the rig is found: {', '.join(words)}."
+    return Agreement(agrees, sentence, check=True)
 
 
 def twins_table(found: Sequence[Twin]) -> Table:
     """Return what is hidden in each twin and what is found."""
     return Table(
         "twins",
-        "Twins of the rig: what is hidden, and what is found",
+        "Simulated copies of the rig: what is hidden, and what is found",
         (
             Column("hidden"),
             Column("disturbed like the real rig"),
@@ -103,16 +109,21 @@ def twins_table(found: Sequence[Twin]) -> Table:
         ),
         tuple(
             (
-                twin.hidden.replace("_", " "),
+                _words([twin.hidden]),
                 "yes" if twin.rest else "no",
-                twin.finding.verdict.status,
-                " + ".join(twin.names).replace("_", " ") or "nothing",
+                STATUSES[twin.finding.verdict.status],
+                _words(twin.names),
             )
             for twin in found
         ),
-        note="Without friction, whatever the real rig has. The disturbance has the spectrum of "
+        note="They move as the real rig did, by the fitted model without friction, so that what is "
+        "found must come from the records. The disturbance has the spectrum of "
         "what the model leaves unexplained in the real records.",
     )
+
+
+def _words(names: Sequence[str]) -> str:
+    return " and ".join(names).replace("_", " ") or "nothing"
 
 
 def _found(

@@ -141,7 +141,8 @@ def _remarks(remarks: list[str]) -> list[str]:
     """Return one line on how records were read; the report has them all."""
     if len(remarks) < 2:
         return remarks
-    return [f"{remarks[0]} {len(remarks) - 1} more of these stand in the report."]
+    more = len(remarks) - 1
+    return [f"{remarks[0]} The report has {more} more such remark{'s' if more > 1 else ''}."]
 
 
 def _name(effect: dict[str, Any]) -> str:

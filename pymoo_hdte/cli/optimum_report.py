@@ -204,22 +204,22 @@ def _agreement(study: DesignStudy) -> str:
     search = study.search
     mean, std = (number(float(one)) for one in search.width)
     parts = [
-        f"Its values are the model's own, from {math.prod(study.problem.moments.nodes)} drives a "
-        "design, the nodes of a quadrature."
+        "Each design of the front is computed by the drive model itself, over "
+        f"{math.prod(study.problem.moments.nodes)} drives (Gauss quadrature)."
     ]
     if np.isfinite(search.difference):
         parts.append(
-            f"The last of the {study.evaluated} designs computed had been predicted to "
-            f"{100.0 * search.difference:.1f} %."
+            f"The last of {study.evaluated} designs came out within "
+            f"{100.0 * search.difference:.1f} % of what had been interpolated for it."
         )
     if np.isfinite(study.quadrature):
         parts.append(
-            f"On {SETS * DRIVES} other drives each, {len(study.checks)} designs differ by at most "
-            f"{100.0 * study.quadrature:.1f} %, two standard errors included."
+            f"Computed again on {SETS * DRIVES} other drives each, {len(study.checks)} designs "
+            f"differ by at most {100.0 * study.quadrature:.1f} %, two standard errors included."
         )
     parts.append(
-        f"The width is {mean} arcsec in the mean and {std} in the standard deviation, "
-        f"{100.0 * HARDLY_WORTH:g} % of the least value being the least that counts."
+        f"All of the front's width, {mean} arcsec in the mean and {std} in the standard deviation; "
+        f"a narrower one than {100.0 * HARDLY_WORTH:g} % of the least value counts as that wide."
     )
     return " ".join(parts)
 

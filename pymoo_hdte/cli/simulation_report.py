@@ -15,7 +15,7 @@ from pymoo_hdte.drive.dte_map import neighbouring_resonances
 from pymoo_hdte.io.text_table import csv_text
 from pymoo_hdte.reports.figures import AFTER, BEFORE, GREY, data_uri
 from pymoo_hdte.reports.folder import ReportFolder
-from pymoo_hdte.reports.html import number, page
+from pymoo_hdte.reports.html import change, number, page
 from pymoo_hdte.units import ARCSEC
 
 TURN_FILE = "transmission_error.csv"
@@ -71,7 +71,7 @@ def simulation_document(found: Simulation, notes: Sequence[str]) -> dict[str, An
 def sentences(found: Simulation) -> list[str]:
     """Say how large the DTE is, of what it is made, and where the drive resonates."""
     largest = sorted(_moving(found).items(), key=lambda one: -one[1])[:3]
-    made_of = ", ".join(f"{order:g} ({number(size, 3)} arcsec)" for order, size in largest)
+    made_of = ", ".join(f"order {order:g} ({number(size, 3)} arcsec)" for order, size in largest)
     places = ", ".join(f"order {order:g} at {speed:.0f} r/min" for order, speed in found.resonances)
     if found.mode.resonates:
         mode = (
@@ -83,7 +83,7 @@ def sentences(found: Simulation) -> list[str]:
     return [
         f"DTE {found.steady:.2f} arcsec peak-to-peak at {found.speed:.0f} r/min and "
         f"{number(found.model.sheet.load_torque)} N.m.",
-        f"Its largest orders of the input turn: {made_of}.",
+        f"Its largest lines, by order of the input turn: {made_of}.",
         mode,
     ]
 
@@ -93,14 +93,16 @@ def limits(found: Simulation, notes: Sequence[str]) -> list[str]:
     said = list(notes)
     near = [o for o, speed in found.resonances if abs(found.speed / speed - 1.0) < _NEAR]
     if near:
-        orders = ", ".join(f"{order:g}" for order in near)
+        where = "resonances of orders" if near[1:] else "resonance of order"
+        orders = " and ".join(f"{order:g}" for order in near)
         said.append(
-            f"This speed is within {_NEAR:.0%} of the resonance of order {orders}: the DTE depends "
+            f"This speed is within {100.0 * _NEAR:g} % of the {where} {orders}: the DTE depends "
             "strongly on damping and inertia."
         )
     if abs(found.difference) > _APART:
         said.append(
-            f"The integration in time differs from the steady state by {found.difference:+.1%}: "
+            "The integration in time differs from the steady state by "
+            f"{change(100.0 * found.difference)}: "
             "the input angle itself fluctuates, or the motion has not settled."
         )
     if found.speeds.unstable:

@@ -114,7 +114,7 @@ def neighbouring_resonances(model: DriveModel, fastest: float) -> list[tuple[str
     while within:
         speed = within[0][1]
         together = [order for order, other in within if abs(other - speed) <= _NEIGHBOURS * speed]
-        found.append((", ".join(f"{order:g}" for order in together), speed))
+        found.append((" and ".join(f"{order:g}" for order in together), speed))
         within = within[len(together) :]
     return found
 

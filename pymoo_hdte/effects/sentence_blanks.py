@@ -65,6 +65,15 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
+def orders_in_words(orders: Sequence[float]) -> str:
+    """Return orders in words.
+
+    >>> orders_in_words([200.0]), orders_in_words([200.0, 400.0])
+    ('order 200', 'orders 200 and 400')
+    """
+    return f"order{'s' if len(orders) > 1 else ''} {listed([f'{one:.5g}' for one in orders])}"
+
+
 def in_words(text: str) -> str:
     """Return a text with all labels of candidates, such as ``torque_ripple:input@6``, in words."""
     return _LABEL.sub(_words, text).replace(")+", ") and ")

@@ -87,7 +87,7 @@ def _at_the_finest(paths: Sequence[Path], tables: Sequence[Table]) -> Table:
         raise InvalidInput(
             "rates of the files, Hz",
             {name: float(f"{rate:.6g}") for name, rate in rates.items()},
-            f"the same within {_RATES:.1%}: take every row of the finer ones that "
+            f"the same within {100.0 * _RATES:g} %: take every row of the finer ones that "
             "belongs to one of the coarsest",
         )
     step = _step(finest)

@@ -93,7 +93,7 @@ class Record:
             raise InvalidInput(
                 f"step {worst} of the time of record {name}",
                 float(steps[worst]),
-                f"{step:g} s within {STEP_SPREAD:.0%}, as the mean of the record; "
+                f"{step:g} s within {100.0 * STEP_SPREAD:g} %, as the mean of the record; "
                 "pymoo_hdte.io.even_steps brings signals to even steps",
             )
         for what, given in (("channels", channels), ("noise", {} if noise is None else noise)):

@@ -20,7 +20,7 @@ def page(package: str, template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"change": change, "number": number, "with_error": with_error}
+    environment.filters |= {one.__name__: one for one in (change, number, percent, with_error)}
     environment.globals |= {"digits": digits, "terms_in": terms_in}
     return environment.get_template(template).render(**values)
 
@@ -52,6 +52,15 @@ def change(percent: float) -> str:
     ('−25.0 %', '+3.1 %')
     """
     return f"{percent:+.1f} %".replace("-", "\N{MINUS SIGN}")
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent, rounded down, so that only a full share becomes 100 %.
+
+    >>> percent(0.99962), percent(1.0)
+    ('99.9 %', '100 %')
+    """
+    return f"{np.floor(1000.0 * share + 1e-9) / 10.0:g} %".replace("-", "\N{MINUS SIGN}")
 
 
 def with_error(value: float, half_width: float) -> str:

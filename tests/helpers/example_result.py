@@ -9,7 +9,7 @@ HOSTILE = "<script>alert('x')</script>"
 
 
 def line_plot() -> Figure:
-    figure = Figure(figsize=(2, 2))
+    figure = Figure(figsize=(6, 2))
     figure.subplots().plot([0, 1], [0, np.pi])
     return figure
 

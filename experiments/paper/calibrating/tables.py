@@ -95,10 +95,12 @@ def numbers_table(best: Outcome) -> Table:
         Column("paper", "arcsec", 5, paper=True),
     )  # fmt: skip
     title = "Published numbers, predicted by the presets and by the best rung of the ladder"
+    effects, reading, bands = _rung(best)
     note = (
-        f"The best rung is {best.candidate.name}; the preset calibrated is this rung with rounded "
-        "values. Means and standard deviations come through a surrogate of order 3, as in the "
-        f"paper; those of the model itself (order {EXACT_ORDER}) stand in the column beside."
+        f"The best rung adds {effects}, with theta_s as {reading} and bands {bands}; the preset "
+        "calibrated is this rung with rounded values. Means and standard deviations come through "
+        f"a surrogate of order 3, as in the paper; those of the model itself (order {EXACT_ORDER}) "
+        "stand in the column beside."
     )
     return Table("numbers", title, columns, rows, findings=(*findings, moved, step), note=note)
 

@@ -61,7 +61,9 @@ def curves(profiled: Sequence[Profiled]) -> Figure:
         axis.set_ylim(-0.5, 12.0)
         axis.set_xlabel(name.replace("_", " "))
     axes.flat[0].set_ylabel("deviance above the least")
-    axes.flat[0].legend(frameon=False, fontsize=7)
+    # No panel has room for it.
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", frameon=False, fontsize=8, ncols=2)
     return figure
 
 

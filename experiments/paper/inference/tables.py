@@ -15,6 +15,7 @@ from experiments.paper.inference.held_out import (
     surrogate_rmse,
 )
 from experiments.paper.inference.likelihood import OBSERVED, READING
+from experiments.paper.inference.rungs import Rung
 from experiments.paper.inference.verdicts import (
     PRESET,
     STEPS,
@@ -33,10 +34,11 @@ from experiments.runner.result import Cell, Column, Finding, Table, significant
 
 def of_the_first_page(fits: Sequence[Fit]) -> str:
     """Say whether its trade-off and its optima go together, as part of a longer sentence."""
-    both = len(gives_both(fits))
+    both = len(_models(gives_both(fits)))
     return (
-        f"{both or 'none'} of {len(fits)} fitted models {_give(both or 1)} its trade-off between "
-        f"mean and scatter and {'leave' if both > 1 else 'leaves'} its optima optimal"
+        f"{both or 'none'} of {len(_models(fits))} fitted drive models {_give(both or 1)} its "
+        f"trade-off between mean and scatter and {'leave' if both > 1 else 'leaves'} its optima "
+        "optimal"
     )
 
 
@@ -70,6 +72,11 @@ def opening(fits: Sequence[Fit]) -> str:
         f"optima, in the likeliest by {significant(first.evaluation.depths.max(), 2)} widths of "
         f"the published front. {_nearest(fits)}. {last}"
     )
+
+
+def _models(fits: Sequence[Fit]) -> set[Rung]:
+    """Return the models of fits: one may be fitted to several targets."""
+    return {one.rung for one in fits}
 
 
 def _nearest(fits: Sequence[Fit]) -> str:
@@ -160,7 +167,8 @@ def _findings(fits: Sequence[Fit]) -> list[Finding]:
         ),
         Finding(
             bool(both),
-            f"{len(both)} of {len(fits)} fits do so and leave the three optima non-dominated.",
+            f"{len(_models(both))} of {len(_models(fits))} models do so and leave the three optima "
+            f"non-dominated; some were fitted to that as well, {len(fits)} fits in all.",
         ),
     ]
 

@@ -86,7 +86,8 @@ def drive_model(campaign: Campaign, fitted: Fit, name: str, description: str) ->
         description=f"{campaign.drive}: {description}. The load of the rig is its load inertia.",
         provenance=(
             f"Fitted to the campaign {campaign.title!r}. The scatter of theta_s over prototypes is "
-            f"not measured by one rig: three standard deviations are its tolerance, {scatter:.0%}."
+            "not measured by one rig: three standard deviations are its tolerance, "
+            f"{100.0 * scatter:.0f} %."
         ),
         sheet=_sheet(campaign, values, static_error),
         kinematic_error=KinematicError(

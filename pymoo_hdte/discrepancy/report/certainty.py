@@ -13,9 +13,8 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
-from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.effects.sentence_blanks import in_words
-from pymoo_hdte.reports.html import number
+from pymoo_hdte.reports.html import number, percent
 
 
 def how_sure(finding: DriveFinding) -> str:
@@ -71,10 +70,7 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
         words.append(f"What these records cannot tell from it explains {shares}.")
     elif others:
         best = max(others, key=lambda one: one.explained)
-        words.append(
-            f"The next best, {in_words(best.label)}, explains {percent(best.explained)}, and its "
-            f"BIC is {_apart(best.bic - chosen.bic)}."
-        )
+        words.append(_next_best(best, chosen))
     else:
         words.append("No other set of as many effects came near enough to be compared.")
     if not verdict.shown_in_held_out:
@@ -83,8 +79,17 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
     return " ".join(words)
 
 
-def _apart(gap: float) -> str:
-    return f"{number(abs(gap), 2)} {'above' if gap > 0.0 else 'below'}"
+def _next_best(best: Hypothesis, chosen: Hypothesis) -> str:
+    """Return what the next best explains; where the share is the same, the BIC tells them apart."""
+    share, gap = percent(best.explained), best.bic - chosen.bic
+    if share == percent(chosen.explained):
+        share = "as much to a tenth of a per cent"
+    elif gap > 0.0 and best.explained < chosen.explained:
+        return f"The next best, {in_words(best.label)}, explains {share}."
+    return (
+        f"The next best, {in_words(best.label)}, explains {share}; its BIC is "
+        f"{number(abs(gap), 2)} {'above' if gap > 0.0 else 'below'}."
+    )
 
 
 def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
@@ -120,7 +125,7 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
         words.append(f"What these data cannot tell from it explains {shares}.")
     elif others:
         best = min(others, key=lambda hypothesis: hypothesis.bic)
-        words.append(f"The next best, {in_words(best.label)}, explains {percent(best.explained)}.")
+        words.append(_next_best(best, chosen))
     if chosen.fit.at_bounds:
         orders = finding.campaign.believed.error_orders
         names = ", ".join(words_of(name, orders) for name in chosen.fit.at_bounds)

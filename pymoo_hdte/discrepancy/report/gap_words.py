@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.proof import Proof
+from pymoo_hdte.reports.html import percent
 
 _SHOWN = 3
 """Most records that a sentence names."""
@@ -48,8 +47,3 @@ def _worse(proof: Proof) -> str:
     elif records:
         parts.append(f"transmission error of {', '.join(records)}")
     return f" Worse than before: {'; '.join(parts)}." if parts else ""
-
-
-def percent(share: float) -> str:
-    """Return a share in per cent, rounded down, so that only a full share becomes 100 %."""
-    return f"{np.floor(1000.0 * share + 1e-9) / 10.0:g} %"

@@ -17,7 +17,6 @@ from pymoo_hdte.discrepancy.mechanism.revision import MODEL_FILE, revised_mechan
 from pymoo_hdte.discrepancy.report.certainty import how_sure_of_records
 from pymoo_hdte.discrepancy.report.document import believed_in_words
 from pymoo_hdte.discrepancy.report.folder import FOLDER
-from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.discrepancy.report.mechanism_document import evidence, mechanism_verdict_document
 from pymoo_hdte.discrepancy.report.mechanism_figures import gaps as gaps_figure
 from pymoo_hdte.discrepancy.report.mechanism_figures import (
@@ -29,7 +28,7 @@ from pymoo_hdte.discrepancy.report.tables import STATUSES
 from pymoo_hdte.discrepancy.report.torsion import torsion_document
 from pymoo_hdte.discrepancy.report.torsion_figure import torsion_picture
 from pymoo_hdte.reports.figures import data_uri
-from pymoo_hdte.reports.html import number, page
+from pymoo_hdte.reports.html import number, page, percent
 
 _SIZES = 5
 """Parameters on the first screen."""

@@ -16,13 +16,12 @@ from pymoo_hdte.discrepancy.mechanism.location import locate_in_mechanism
 from pymoo_hdte.discrepancy.mechanism.next_tests import NextTest
 from pymoo_hdte.discrepancy.mechanism.proof import MeasuredGap, not_proven, rests_told
 from pymoo_hdte.discrepancy.report.document import SCHEMA_VERSION, sentence, with_believed_effects
-from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.discrepancy.report.mechanism_values import effects, quantities, ripples
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.mechanism.quantity_units import unit_of
 from pymoo_hdte.mechanism.resampling import share_beyond
-from pymoo_hdte.reports.html import number
+from pymoo_hdte.reports.html import number, percent
 
 
 def mechanism_verdict_document(

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
@@ -19,6 +20,8 @@ Values = NDArray[np.float64]
 
 _POINTS = 2000
 _BANDS = 30
+_NARROW = 300.0
+"""Ratio of frequencies below which decades alone would be too few ticks."""
 
 
 def misfit_over_motion(finding: MechanismFinding) -> Figure:
@@ -31,6 +34,9 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
     named = bool(finding.accepted.candidates)
     for row, name in enumerate(names):
         port = _port_of(finding, name)
+        # A port that is read shows a force: its motion is that of what the sensor sits on.
+        read = finding.mechanism.port(port).read
+        where = f"at sensor {port}" if read else f"of {port}"
         for record, balance in enumerate(finding.data.spectra):
             motion = balance.ports[port]
             rows = np.flatnonzero(balance.moving.whole)
@@ -44,10 +50,10 @@ def misfit_over_motion(finding: MechanismFinding) -> Figure:
                         over[rows], balance.in_time(residual)[rows], marker, ms=3, color=colour,
                         alpha=0.6, label=label if record == 0 else None,
                     )  # fmt: skip
-        axes[row, 0].set_ylabel(f"left of {name} [{unit_of(finding.mechanism, name)}]")
+        axes[row, 0].set_ylabel(f"residual of {name} [{unit_of(finding.mechanism, name)}]")
         for column, quantity in enumerate(("speed", "position")):
             unit = unit_of(finding.mechanism, port, quantity)
-            axes[row, column].set_xlabel(f"{quantity} of {port} [{unit}]")
+            axes[row, column].set_xlabel(f"{quantity} {where} [{unit}]")
         for axis in axes[row]:
             _plain(axis)
     axes[0, 0].legend(frameon=False)
@@ -84,8 +90,12 @@ def misfit_over_frequency(finding: MechanismFinding) -> Figure:
         )
         unit = unit_of(finding.mechanism, name)
         axes[part].set(
-            xscale="log", yscale="log", xlabel="frequency [Hz]", ylabel=f"left of {name} [{unit}]"
+            xscale="log",
+            yscale="log",
+            xlabel="frequency [Hz]",
+            ylabel=f"residual of {name} [{unit}]",
         )
+        _few_ticks(axes[part])
         _plain(axes[part])
     axes[0].legend(frameon=False)
     return figure
@@ -105,6 +115,7 @@ def overlay(finding: MechanismFinding, gap: MeasuredGap) -> Figure:
     lower.plot(time, (gap.measured - gap.predicted_before)[stride], "--", color=BEFORE)
     lower.plot(time, (gap.measured - gap.predicted_after)[stride], "-", color=AFTER)
     lower.set(xlabel="time [s]", ylabel="difference")
+    lower.ticklabel_format(axis="x", useOffset=False)
     for axis in (upper, lower):
         _plain(axis)
     return figure
@@ -146,6 +157,15 @@ def _banded(frequency: Values, size: Values, edges: NDArray[np.int_]) -> tuple[V
     middle = np.array([frequency[low:high].mean() for low, high in parts])
     power = np.array([np.sqrt(np.mean(size[low:high] ** 2)) for low, high in parts])
     return middle, power
+
+
+def _few_ticks(axis: Axes) -> None:
+    """Write 1, 2 and 5 of each decade where there are few, and decades alone else."""
+    low, high = axis.get_xlim()
+    ratio = high / low
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if ratio < _NARROW else (1.0,)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _plain(axis: Axes) -> None:

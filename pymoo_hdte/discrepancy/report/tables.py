@@ -17,9 +17,9 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.discrepancy.report.gap_words import percent
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import Parameter
+from pymoo_hdte.reports.html import percent
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 METRICS = {

@@ -45,7 +45,7 @@ def torsion_picture(finding: JointFinding) -> Figure:
                     label=label if record == 0 else None,
                 )  # fmt: skip
     axes[0, 0].set_ylabel(f"torsion of {gear} [arcsec]")
-    axes[1, 0].set_ylabel("left [arcsec]")
+    axes[1, 0].set_ylabel("residual [arcsec]")
     axes[1, 0].set_xlabel("torque of the motor, at the output [N.m]")
     axes[1, 1].set_xlabel("angle [rad]")
     for axis in axes.flat:

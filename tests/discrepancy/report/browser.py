@@ -21,6 +21,10 @@ window.addEventListener("load", () => setTimeout(() => {
     errors,
     wider_than_window: document.scrollingElement.scrollWidth - window.innerWidth,
     images: [...document.images].map((one) => [one.alt, one.naturalWidth, seen(one)]),
+    pictures: [...document.querySelectorAll("figure:has(figcaption)")].map((one) => [
+      one.scrollWidth > one.clientWidth,
+      getComputedStyle(one.querySelector("figcaption"), "::before").content.includes("scrolls"),
+    ]),
     tables: [...document.querySelectorAll("table")].map((one) => [one.rows.length, seen(one)]),
     broken_anchors: [...document.querySelectorAll('a[href^="#"]')]
       .map((one) => one.getAttribute("href")).filter((to) => !document.querySelector(to)),

@@ -162,6 +162,17 @@ def test_words_do_not_promise_what_is_not_there(ripple):
     assert "explains 100 % of the misfit" in how_sure(ripple)
 
 
+def test_a_next_best_that_explains_the_same_share_is_told_apart_by_its_bic(ripple):
+    chosen, verdict = ripple.verdict.chosen, ripple.verdict
+    fit = replace(chosen.fit, candidates=(replace(chosen.candidates[0], name="another"),))
+    rival = replace(chosen, fit=fit, bic=chosen.bic + 9.0)
+    verdict = replace(verdict, equivalent=(), alternatives=(rival,))
+    said = how_sure(replace(ripple, verdict=verdict))
+    share = re.search(r"explains ([\d.]+ %)", said).group(1)
+    assert said.count(share) == 1
+    assert "its BIC is 9 above" in said
+
+
 def test_parameters_are_told_in_the_reader_s_units(ripple):
     rows = {row.name: row for row in parameter_rows(ripple)}
     fitted = ripple.verdict.accepted

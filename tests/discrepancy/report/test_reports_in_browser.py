@@ -1,6 +1,7 @@
 """Every report in headless Chromium, wide and narrow: all visible, nothing from outside."""
 
 import json
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,11 +12,14 @@ from browser import CHROMIUM, probe
 from example_result import example
 from kept_results import kept, put_files
 from measured_oscillator import cubic_analysis
+from places import DOCS
 from quick_campaigns import ripple_analysis_and_report, study_and_report
 
 from experiments.runner.report import write_report
 from experiments.runner.store import save
 from pymoo_hdte.cli import command_line as cli
+from pymoo_hdte.drive import hs_20_100, preset
+from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 WIDE, NARROW = 1280, 500
@@ -30,6 +34,8 @@ def looked_at(page, tmp_path, width, script="null"):
     assert seen["wider_than_window"] <= 0
     assert all(natural > 0 and visible for _, natural, visible in seen["images"])
     assert all(alt for alt, _, _ in seen["images"])
+    # A picture that is wider than its place says that it scrolls, and no other one does.
+    assert all(scrolls == said for scrolls, said in seen["pictures"])
     assert all(rows > 1 and visible for rows, visible in seen["tables"])
     for link in seen["links"]:
         if not link.startswith(("#", "http")):
@@ -48,6 +54,14 @@ def files_of(name):
             write_series(series)
             arguments = (str(series), "--datasheet", "hs_20_100", "--out", str(out), "--quiet")
             assert cli.main([name, *arguments]) == 0
+        elif name == "plan":
+            page = (DOCS / "command_line.md").read_text(encoding="utf-8")
+            (limits,) = re.findall(r"```toml\n(input_speeds_rpm.*?)```", page, re.S)
+            (Path(top) / "limits.toml").write_text(limits)
+            (Path(top) / "joint.toml").write_text(model_toml(preset("calibrated")))
+            (Path(top) / "joint_sheet.toml").write_text(sheet_toml(hs_20_100()))
+            arguments = (f"{top}/joint.toml", "--limits", f"{top}/limits.toml", "--out", str(out))
+            assert cli.main([name, *arguments, "--quiet"]) == 0
         else:
             save(out, "table7", example())
             write_report(out)
@@ -79,6 +93,7 @@ def page(name, tmp_path):
         pytest.param("optimise", 0, 5, marks=pytest.mark.nightly),
         pytest.param("simulate", 3, 1, marks=pytest.mark.nightly),
         pytest.param("identify", 5, 3, marks=pytest.mark.nightly),
+        pytest.param("plan", 0, 2, marks=pytest.mark.nightly),
         ("discrepancy", 5, 4),
         pytest.param("measured", 3, 3, marks=pytest.mark.nightly),
         ("experiments", 1, 1),

@@ -21,6 +21,8 @@ def test_every_rig_is_shown_with_its_seconds(committed, tmp_path):
     assert list(committed) == [row[0] for row in verdicts.rows] == rigs
     assert [row[0] for row in seconds.rows] == rigs
     assert all(len(row) == len(COLUMNS) for row in verdicts.rows)
+    # Labels of code are for files.
+    assert not [cell for row in verdicts.rows for cell in row if {"_", "@", ":"} & set(str(cell))]
     assert all(isinstance(cell, float) for row in seconds.rows for cell in row[1 : len(SECONDS)])
 
 

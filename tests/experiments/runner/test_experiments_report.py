@@ -350,3 +350,13 @@ def test_an_empty_folder_gives_an_empty_report(tmp_path):
     page = write_report(tmp_path, notice="Interrupted.").read_text()
     assert "Interrupted." in page
     assert "<img" not in page
+
+
+def test_a_table_without_rows_says_so_and_shows_no_head(tmp_path):
+    result = example()
+    empty = replace(result.tables[0], rows=(), note="", findings=())
+    save(tmp_path, "table7", replace(result, tables=(empty,), pictures=(), shown_first=""))
+    pages(tmp_path)
+    text = (tmp_path / "table7" / "index.html").read_text()
+    assert "<table" not in text
+    assert "None." in text

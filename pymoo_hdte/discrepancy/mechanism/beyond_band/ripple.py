@@ -34,7 +34,7 @@ from pymoo_hdte.discrepancy.mechanism.beyond_band.ripple_size import (
     trend_of,
 )
 from pymoo_hdte.effects.effect import effect_named
-from pymoo_hdte.effects.sentence_blanks import listed, sentence_at
+from pymoo_hdte.effects.sentence_blanks import listed, orders_in_words, sentence_at
 from pymoo_hdte.mechanism import LawAt, Mechanism, Port, Record
 
 Values = NDArray[np.float64]
@@ -226,19 +226,20 @@ def _limits(
     """Return what was seen at a port and is not named, or cannot be told, in sentences."""
     limits = []
     if search.cut:
-        limits.append(f"Orders at the {port} were searched up to {search.highest:.4g} only.")
+        highest = np.format_float_positional(search.highest, 4, fractional=False, trim="-")
+        limits.append(f"Orders at the {port} were searched up to {highest} only.")
     if any(one.ways == 1 for one in found):
         limits.append(_one_way(port))
     if lost:
-        orders = ", ".join(f"{one.order:.5g}" for one in lost)
+        orders = orders_in_words([one.order for one in lost])
         limits.append(
-            f"Ripple at the {port}, order {orders}, is seen, but to take it away makes the forces "
+            f"Ripple at the {port}, {orders}, is seen, but to take it away makes the forces "
             "of the held-out records no smaller: it is not named."
         )
     if search.undecided:
-        orders = ", ".join(f"{one:.5g}" for one in search.undecided)
+        orders = orders_in_words(search.undecided)
         limits.append(
-            f"Ripple at the {port}, order {orders}, is seen at one speed or is weak, so that "
+            f"Ripple at the {port}, {orders}, is seen at one speed or is weak, so that "
             "these records do not tell it from a frequency: it is not named."
         )
     if search.fixed:
