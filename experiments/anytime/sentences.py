@@ -178,6 +178,6 @@ def _near_each_other(scores: Scores) -> str:
     means = [run.mean() for run in runs]
     percent = 100.0 * (max(means) / min(means) - 1.0)
     return (
-        f"the mean IGDs of the three over {len(runs[0])} seeds lie within "
+        f"the mean IGDs of the three, in arcsec over {len(runs[0])} seeds, lie within "
         f"{significant(percent, 2)} % of each other"
     )
