@@ -128,7 +128,7 @@ def judge(
     else:
         search.singles(screened)
         search.grow()
-    chosen = _special_case(search, _best(search))
+    chosen = _confirmed(search, _special_case(search, _best(search)))
     certain = _explains(search, chosen)
     if not certain:
         chosen = _simpler_law(search, chosen)
@@ -171,10 +171,7 @@ def _best(search: Search) -> Hypothesis:
     """
     found = search.found
     explaining = (one for one in found if _explains(search, one) and search.earned(one))
-    best = next(explaining, None)
-    if best is not None:
-        return best
-    return next(one for one in found if search.earned(one))
+    return next(explaining, None) or next(one for one in found if search.earned(one))
 
 
 def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
@@ -191,6 +188,22 @@ def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
         if one.names != best.names and contains(best, one) and search.enough(one)
     )
     return next((one for one in simpler if _explains(search, one) and search.earned(one)), best)
+
+
+def _confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
+    """Return a set without small members that held-out records deny.
+
+    What a member removes beside others that leave no more than noise, fitted and held-out records
+    taken together, has to be more than noise gives.
+    """
+    data = search.data
+    for member in chosen.members if len(chosen.members) > 1 else ():
+        rest = search.without(chosen, member)
+        vote = data.held_out_vote(rest.fit, chosen.fit) if search.enough(rest) else None
+        gain = rest.fit.chi_square - chosen.fit.chi_square
+        if vote and gain + vote.before - vote.after < data.rules.single_effect_gain:
+            return _confirmed(search, rest)
+    return chosen
 
 
 def _explains(search: Search, one: Hypothesis) -> bool:

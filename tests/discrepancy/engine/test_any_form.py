@@ -14,7 +14,7 @@ from pymoo_hdte.discrepancy.drive.forms.corrections import (
 )
 from pymoo_hdte.discrepancy.engine import verdict
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
-from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.fitting import Vote, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import down_to_noise, hypothesis_of
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.effects.friction import PeriodicTorque, smoothed_sign
@@ -90,6 +90,22 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
     data = planted(FOREIGN[SPRING], *small_drift())
     found = judge(data, fit(data), of_labels(SPRING, DRIFT))
     assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
+
+
+@pytest.mark.parametrize(("worse", "named"), [(0.0, True), (140.0, False)])
+def test_a_small_effect_that_held_out_records_deny_is_not_named(monkeypatch, worse, named):
+    """As the encoder of sealed rig 7, whose shift took 33 of chi-square there and added 26 here."""
+    (law,) = of_labels("coulomb_friction:output")
+    (drift,) = of_labels(DRIFT)
+    data = planted(*law.build((6.0,)), *drift.build((2e-8, 500.0)))
+
+    def vote(self, before, after):
+        beside = before.candidates == (law,)
+        return Vote(500.0, 500.0 + worse if beside else 400.0, 10.0)
+
+    monkeypatch.setattr(Data, "held_out_vote", vote)
+    found = judge(data, fit(data), [law, drift])
+    assert (DRIFT in {one.label for one in found.chosen.candidates}) == named
 
 
 COARSE = replace(DATA.rules, model_accuracy=0.5)
