@@ -26,13 +26,12 @@ from pymoo_hdte.drive import (
 from pymoo_hdte.drive.effects import Session
 from pymoo_hdte.drive.solve.free_angle import STEPS
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
-from pymoo_hdte.drive.solve.torus import Torus
 
 _SAME = 1e-8
 """Orders nearer to each other are one; those of a torus are sums of rounded numbers."""
 _UNRESOLVED = 0.1
-"""Cycles in an output turn, the shortest record, within which two lines are read as one: what is
-lost of the line is 1 - sinc(0.1), less than two per cent."""
+"""Cycles in an output turn within which two lines are read as one; farther apart, they are lines of
+their own to records of a few turns."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,8 @@ class Conditions:
         Contribution of a drift that is curved within a record: see `OrderLines`.
     temperature : ndarray, optional
         In kelvin, NaN where it is not known; by default in no record.
-    input_angle : ndarray, optional
-        In the middle of the record, rad; by default zero.
+    input_angle, travel : ndarray, optional
+        Of the input in the middle of the record, and from its start to its end, rad; by default 0.
     """
 
     input_speed: NDArray[np.float64]
@@ -61,16 +60,17 @@ class Conditions:
     bends: NDArray[np.complex128]
     temperature: NDArray[np.float64] | None = None
     input_angle: NDArray[np.float64] | None = None
+    travel: NDArray[np.float64] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
+        optional = (self.temperature, self.input_angle, self.travel)
         return Conditions(
             self.input_speed[rows],
             self.output_torque[rows],
             self.elapsed[rows],
             self.bends[rows],
-            None if self.temperature is None else self.temperature[rows],
-            None if self.input_angle is None else self.input_angle[rows],
+            *(None if one is None else one[rows] for one in optional),
         )
 
     def __len__(self) -> int:
@@ -161,8 +161,7 @@ def _predict_group(
         balance.coupling_torque,
         balance.lead,
     ]
-    angle = np.zeros(records) if conditions.input_angle is None else conditions.input_angle
-    lines = _lines(balance, channels, orders, believed.ratio, np.tile(angle, count))
+    lines = _lines(balance, channels, orders, believed.ratio, conditions)
     means = np.array([channel[:, 0].real for channel in channels])
     phasors = lines.reshape(count, records, len(CHANNELS), len(orders))
     mean = means.T.reshape(count, records, len(CHANNELS))
@@ -219,34 +218,43 @@ def _lines(
     channels: Sequence[NDArray[np.complex128]],
     orders: Sequence[float],
     ratio: float,
-    angle: NDArray[np.float64],
+    conditions: Conditions,
 ) -> NDArray[np.complex128]:
-    """Return the phasors of all channels at analysed orders, (n, 4, m), for input angles (n,)."""
-    found = np.zeros((len(angle), len(channels), len(orders)), dtype=complex)
-    values = np.stack(np.broadcast_arrays(*channels), axis=1)
-    for place, column, conjugate, beyond in _readings(balance.torus, tuple(orders), ratio):
-        lines = values[..., column]
-        turned = np.exp(1j * beyond * angle)[:, None] if beyond else 1.0
-        found[..., place] += turned * (lines.conj() if conjugate else lines)
+    """Return the phasors of all channels at analysed orders, (n, 4, m), records innermost."""
+    kept = tuple(balance.torus.orders.tolist())
+    angle, travel = (
+        np.zeros(len(conditions)) if one is None else one
+        for one in (conditions.input_angle, conditions.travel)
+    )
+    found = np.zeros((len(balance.lead), len(channels), len(orders)), dtype=complex)
+    for place, column, conjugate, beyond in _readings(kept, tuple(orders), ratio):
+        lines = np.stack([one[:, column] for one in channels], axis=1)
+        lines = lines.conj() if conjugate else lines
+        if beyond:
+            seen = np.exp(1j * beyond * angle) * np.sinc(beyond * travel / (2.0 * np.pi))
+            lines = lines * np.tile(seen, len(lines) // len(seen))[:, None]
+        found[..., place] += lines
     return found
 
 
 @lru_cache(maxsize=64)
 def _readings(
-    torus: Torus, orders: tuple[float, ...], ratio: float
-) -> list[tuple[int, int, bool, float]]:
+    kept: tuple[float, ...], orders: tuple[float, ...], ratio: float
+) -> tuple[tuple[int, int, bool, float], ...]:
     """Return for each line that is read: where, its harmonic, whether conjugate, order beyond.
 
-    A line is read at its own order, or at the nearest one that a record cannot tell from it: errors
-    of orders 2 and 2.02 beat at 0.02, which is 2/101 to a record of one output turn.
+    A line is read at its own order, or at the nearest one that a record of one output turn cannot
+    tell from it: errors of orders 2 and 2.02 beat at 0.02, which is 2/101 there. Over a longer
+    record it turns against that order, and the less of it is seen. Lines as near to zero as that
+    are in no analysed line, and drift in a record.
     """
     found = []
-    for column, order in enumerate(torus.orders.tolist()):
+    for column, order in enumerate(kept):
         place = int(np.argmin(np.abs(np.subtract(orders, abs(order)))))
         beyond = abs(order) - orders[place]
         if abs(beyond) * ratio < _UNRESOLVED:
             found.append((place, column, order < 0.0, 0.0 if abs(beyond) < _SAME else beyond))
-    return found
+    return tuple(found)
 
 
 def _driving(balance: SteadyMotion, coefficients: Coefficients) -> NDArray[np.complex128]:

@@ -104,11 +104,15 @@ def imagined_campaign(
     running = [one for one in tests if one.kind == "running"]
     sweeps = [one for one in tests if one.kind != "running"]
     orders = _orders(believed)
+    speed, travel = np.array([one.speed for one in running]), _travel(limits, believed.ratio)
     conditions = Conditions(
-        np.array([one.speed for one in running]),
+        speed,
         np.array([one.load for one in running]),
         np.array([one.elapsed for one in running]),
         np.zeros((len(running), 3, 1 + len(orders)), dtype=complex),
+        # What is read at an order is written there, as records of this length have it.
+        input_angle=np.sign(speed) * travel / 2.0,
+        travel=np.full(len(running), travel),
     )
     found = predict(believed, limits.rig, conditions, orders, values, effects)
     records = [
@@ -124,6 +128,11 @@ def imagined_campaign(
     return Campaign(
         "planned", "believed", believed, limits.rig, tuple(records), tuple(swept), rules
     )
+
+
+def _travel(limits: PlanLimits, ratio: float) -> float:
+    """Return how far the input turns in a record, rad."""
+    return float(limits.output_turns * 2.0 * np.pi * ratio)
 
 
 def _orders(believed: BelievedDrive) -> list[float]:
@@ -173,7 +182,7 @@ def _running(
     rig, speed = limits.rig, abs(test.speed)
     averaged = max(int(limits.sample_rate * 2.0 * np.pi / (_ROWS_A_TURN * speed)), 1)
     rate = limits.sample_rate / averaged
-    duration = limits.output_turns * 2.0 * np.pi * ratio / speed
+    duration = _travel(limits, ratio) / speed
     time = np.arange(int(np.ceil(duration * rate)) + 1) / rate
     angle = test.speed * time
     waves = np.exp(1j * np.outer(orders, angle))
