@@ -229,8 +229,8 @@ def _tell_budget(fit: AdaptiveFit, responses: tuple[str, ...], asked: Sequence[i
     error, _, place = largest_error(fit, asked)
     message = (
         f"the budget of {fit.n_runs} runs is used up: the error of {responses[place]!r} is "
-        f"{error:.2g} of its scatter, as asked for, but not confirmed: for that, {IN_A_ROW} "
-        f"judgements in a row have to find at most {LOOSEST:g} and what is asked for"
+        f"{error:.2g} of its scatter, no more than asked for, but not confirmed: {IN_A_ROW} checks "
+        f"in a row have to find that, and at most {LOOSEST:g}"
     )
     warnings.warn(message, RuntimeWarning, stacklevel=3)
 

@@ -61,7 +61,10 @@ def inaccurate(
     worst = fit.held_out_points[share > _LIKE_THE_WORST * np.nanmax(share)]
     region = region_of(inputs.names, inputs.values(worst), reach(inputs))
     field = f"error of the {moment} of {responses[place]!r} after {fit.n_runs} runs"
-    allowed = f"at most {accuracy:g} of the scatter"
+    allowed = (
+        f"at most {accuracy:g} of the scatter, to be had by more runs (budget), narrower ranges or "
+        "scale='log' for one over decades, or a larger accuracy"
+    )
     return field, float(f"{error:.3g}"), allowed, region
 
 
