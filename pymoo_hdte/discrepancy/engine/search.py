@@ -1,8 +1,7 @@
 """Search for the set of effects that explains a misfit; sets that decide are fitted to the end.
 
 Sets grow by the effects that could remove most of what is left, in total or in the part of the data
-that is explained worst. Sets of several effects are tried by exchange of each member as well, and
-compared with what is left of them if a member is removed: each member has to be earned.
+that is explained worst. Members of sets are tried by exchange, too, and each has to be earned.
 """
 
 from __future__ import annotations
@@ -43,8 +42,6 @@ class Search:
 
     Attributes
     ----------
-    found : list of Hypothesis
-        All sets fitted so far.
     forms : AnyForm
         What sets leave in any form of their laws.
     """
@@ -56,6 +53,7 @@ class Search:
         self.excess = base.chi_square - self.degrees_of_freedom
         self._by_label: dict[frozenset[str], Hypothesis] = {}
         self._finished: set[frozenset[str]] = set()
+        self._from_all_starts: set[frozenset[str]] = set()
         self._extended: set[frozenset[str]] = set()
         self._resumed = False
         self._beside_base: dict[str, Screened] = {}
@@ -73,11 +71,12 @@ class Search:
         promising = [one for one in screened if one.reduction >= least]
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
             self._fit((one.candidate,), np.append(self.base.values, one.start))
-        self._from_other_starts()
+        if self._by_label and self.found[0].explained < rules.explained_share:
+            self._from_other_starts(self._of_size(1))
         self._parameters()
         self._finish_near(1)
         if not self.enough(self.found[0]):
-            self._finish(self.found[0], *other_starts(self.found[0], self.base.values))
+            self._from_other_starts(self.found[:1])
         self._special_cases(self.found[0])
         self._finish_near(1)
 
@@ -147,12 +146,13 @@ class Search:
             self._by_label[label] = hypothesis_of(trial, self.excess)
         return self._by_label[label]
 
-    def _from_other_starts(self) -> None:
-        """Fit single effects from all their starts where none explains most of the misfit yet."""
-        if self._by_label and self.found[0].explained < self.data.rules.explained_share:
-            for one in self._of_size(1):
-                if starts := other_starts(one, self.base.values):
-                    self._finish(one, *starts)
+    def _from_other_starts(self, sets: Sequence[Hypothesis]) -> None:
+        """Fit single effects from all their starts, each once."""
+        for one in sets:
+            starts = other_starts(one, self.base.values)
+            if starts and (label := label_of(one.candidates)) not in self._from_all_starts:
+                self._finish(one, *starts)
+                self._from_all_starts.add(label)
 
     def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end: from its values, the believed base and other starts.
