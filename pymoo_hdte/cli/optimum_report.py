@@ -218,8 +218,8 @@ def _agreement(study: DesignStudy) -> str:
             f"differ by at most {100.0 * study.quadrature:.1f} %, two standard errors included."
         )
     parts.append(
-        f"Percentages are of the front's width, {mean} arcsec in the mean and {std} in the standard "
-        f"deviation, or of {100.0 * HARDLY_WORTH:g} % of the least value where the front is narrower."
+        f"Percentages are of the front's width, {mean} arcsec in the mean and {std} in the "
+        f"deviation, taken as {100.0 * HARDLY_WORTH:g} % of the least value where it is less."
     )
     return " ".join(parts)
 
