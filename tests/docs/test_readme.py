@@ -651,6 +651,7 @@ class TestNumbersOfTheSuites:
             *(("without ModelStep", "bbob", n) for n in (500, 2000, 10_000)),
             *(("with 50 particles", "bbob", n) for n in (500, 10_000)),
             ("without NeighbourDifference", "bbob", 10_000),
+            ("with one leader", "MW a", 10_000),
             ("without mutation", "MW a", 10_000),
         ):
             one = found[part, where, evaluations]
@@ -659,6 +660,7 @@ class TestNumbersOfTheSuites:
             "without ModelStep",
             "with 50 particles",
             "without NeighbourDifference",
+            "with one leader",
             "without mutation",
         }
         assert not found["with 50 particles", "bbob", 10_000].helps
@@ -677,11 +679,7 @@ class TestNumbersOfTheSuites:
         swarm = CompactSwarm().setup(get_problem("zdt1"), termination=("n_eval", 100))
         moves = {type(move).__name__ for move in swarm.moves}
         assert left == {"Attraction", "tolerance", "guests", "Difference"}
-        assert {step.part for step in found} - left == {
-            "learned shares",
-            "Exchange",
-            "several leaders",
-        }
+        assert {step.part for step in found} - left == {"learned shares", "Exchange"}
         assert moves == {"Exchange", "NeighbourDifference", "ModelStep"}
 
     def test_what_leaving_may_have_cost(self, outcome):
@@ -784,9 +782,9 @@ class TestNumbersOfThePeers:
         for case in [("IGD", 10_000), ("IGD", 25_000), ("hypervolume", 10_000)]:
             assert rows[beaten + case[0], case[1]][-1] == "yes"
         missed = rows[beaten + "hypervolume", 25_000][3]
-        assert missed == "not: SMS-EMOA (p = 0.10, 15:9)"
+        assert missed == "not: SMS-EMOA (p = 0.11, 15:9)"
         assert (
-            "larger hypervolume on 15, the smaller on 9, which is within chance (p = 0.10)" in WORDS
+            "larger hypervolume on 15, the smaller on 9, which is within chance (p = 0.11)" in WORDS
         )
         faithful = f"never worse than {FAITHFUL} beyond the noise"
         worse = rows[faithful, 10_000][2]
