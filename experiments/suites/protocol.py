@@ -81,8 +81,8 @@ hypervolume up to 1.1 in normalised objectives and, where the front is known in 
 of at most 100 solutions. Ranks are those of medians over the seeds; tests are Wilcoxon's signed
 ranks over problems, corrected after Holm.
 
-Demands, besides: own time per generation at most half of NSGA-II's, which ``experiments benchmark``
-measures.
+Demands, besides: own time per generation at most half of NSGA-II's, which
+``python -m experiments.suites.own_time`` measures.
 """
 
 from __future__ import annotations

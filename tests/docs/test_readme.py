@@ -696,7 +696,7 @@ class TestNumbersOfTheSuites:
             f"guests the swarm was feasible in {said[0]} runs on MW; with `Difference` left out"
             in WORDS
         )
-        assert f"which is the swarm of today, in {said[1]}." in WORDS
+        assert f"which is the present swarm, in {said[1]}." in WORDS
 
     def test_own_time(self):
         rows = {(row[0], row[1]): row[3:] for row in own_time_table().rows}
