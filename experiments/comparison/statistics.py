@@ -37,9 +37,10 @@ def wilcoxon_p(first: ArrayLike, second: ArrayLike) -> float:
     difference = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)
     if np.isnan(difference).any():
         return float("nan")
-    if not difference.any():
+    differing = difference[difference != 0.0]
+    if not len(differing):
         return 1.0
-    return float(wilcoxon(difference).pvalue)
+    return float(wilcoxon(differing).pvalue)
 
 
 def effect_size(first: ArrayLike, second: ArrayLike) -> float:

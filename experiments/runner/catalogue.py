@@ -147,7 +147,7 @@ EXPERIMENTS = (
         "suites",
         "suites.experiment",
         "The swarms on bbob-biobj and other suites that they were not tuned on",
-        "Is the swarm the best on suites that it has never seen?",
+        "Is the swarm the best on suites that no setting was chosen on?",
         reads_outcome=True,
         has_small_version=True,
     ),

@@ -133,7 +133,10 @@ ON_PLAIN, ON_CONSTRAINED = (
     ("without ModelStep", GROWTH, *_OF_ALL),
     (*_OF_CONSTRAINED, *_OF_ALL),
 )
-"""Those that lack something which counts without and with constraints; models do not with any."""
+"""Those that lack something which counts without constraints, and with them.
+
+`ModelStep` counts on problems without constraints only.
+"""
 WHOLE = "with all parts"
 SPREAD = "with quality=spread"
 

@@ -1,8 +1,9 @@
-"""Parts leave the swarm, one after another, by the rule of `protocol`.
+"""Remove parts from the swarm one after another, by the rule of `protocol`.
 
-``python -m experiments.suites.rule OUT`` runs every swarm that the rule comes to and keeps
-the runs in ``OUT/runs/ORIGIN``, where `gather` finds them; a further call goes on, and ``--done``
-names further such folders. Of a swarm that is found worse somewhere the rest is not run.
+``python -m experiments.suites.rule OUT`` runs the swarms that the rule needs and stores the runs in
+``OUT/runs/ORIGIN``, from which `gather` reads them. If it is interrupted, call it again and it
+continues; ``--done`` names further folders with stored runs. As soon as a swarm is found worse on
+one group of problems, its runs on the others are skipped.
 """
 
 from __future__ import annotations

@@ -208,7 +208,7 @@ def _shares_in_short(outcome: Outcome, dimension: int) -> tuple[str | None, ...]
     for budget in BUDGETS:
         share, cited = reached(outcome, dimension, budget), CITED.get((dimension, budget))
         beside = "" if cited is None else f" ({BEST} {cited:.3f})"
-        cells.append(None if share is None else f"{share:.3f}{beside}")
+        cells.append(None if share is None else f"{share:.4f}{beside}")
     return tuple(cells)
 
 

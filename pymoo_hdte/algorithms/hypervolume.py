@@ -33,7 +33,7 @@ def most_hypervolume(
     tenth of the range beyond the largest values, and the row with the largest value of each
     objective stays as long as so many may, unless ``keep_ends`` is false. Without that, a swarm
     whose points nearly all have the least value of an objective loses the few others, which add
-    little in the ranges of today, and never finds what lies beyond. Of equal contributions the
+    little in the present ranges, and never finds what lies beyond. Of equal contributions the
     first row leaves. With four or more objectives contributions take too long, and `most_spread`
     decides.
     """

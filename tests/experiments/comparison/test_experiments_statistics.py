@@ -42,6 +42,11 @@ def test_wilcoxon_is_symmetric_and_one_for_equal_runs():
     assert wilcoxon_p(a, a) == 1.0
 
 
+def test_equal_pairs_are_dropped():
+    differences = np.concatenate([np.arange(1.0, 6.0), np.zeros(12)])
+    assert wilcoxon_p(differences, np.zeros(17)) == pytest.approx(2.0 / 2**5, rel=1e-12)
+
+
 def test_wilcoxon_of_an_undefined_run_is_undefined():
     assert np.isnan(wilcoxon_p([1.0, np.nan, 2.0], [0.0, 1.0, 1.0]))
 
