@@ -2,7 +2,7 @@
 
 Source: S. Zapotecas-Martinez, C. A. Coello Coello, H. E. Aguirre, K. Tanaka, Challenging test
 problems for multi- and many-objective optimization, Swarm and Evolutionary Computation 81, 2023,
-101350; the same values as pymoo's `ZCAT`, for whole arrays. Thirty variables, x_i within i / 2 of
+101350; the same values as pymoo's ZCAT, for whole arrays. Thirty variables, x_i within i / 2 of
 zero. A point of the front follows from the first ones; what the others miss on a curve over these
 is added to the objectives, by one of four levels: squares, the largest, waves on squares, waves on
 the largest. Neither bias nor imbalance.
