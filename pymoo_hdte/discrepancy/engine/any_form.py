@@ -134,7 +134,7 @@ class AnyForm:
         found = [reduced(each, rest.directions, rest.residual) for each in known]
         found.sort(key=lambda each: -each.reduction)
         asked = [(each, self._least(one, (each.candidate,), rest)) for each in found]
-        if not self._quiet(one):
+        if not self._to_noise(one):
             asked = [(each, least) for each, least in asked if rest.excess >= least]
         ranked = [each for each, _ in asked]
         hopeful = [each for each, least in asked if each.reduction >= least]
@@ -148,22 +148,23 @@ class AnyForm:
     def _least(self, one: Hypothesis, member: Sequence[Candidate], rest: Rest) -> float:
         """Return what a further member has to remove beyond the forms of a set.
 
-        Where the listed forms leave no more than noise, so does the model's own error, unless it is
-        that of a law with memory, and what noise alone does not give is enough.
+        If the listed forms leave no more than noise, the model's own error is no larger than that
+        of exact forms, except for laws with memory; a gain that noise alone does not give is then
+        enough.
         """
-        rules, quiet = self.data.rules, self._quiet(one)
+        rules, to_noise = self.data.rules, self._to_noise(one)
         error = rules.exact_model_accuracy**2
         if not one.exact:
             # At one port the corrections of a form need not hold all that a real law does.
             ports = {each.port for each in one.candidates}
             if any(each.port in ports for each in member):
                 error = rules.second_form_share
-            elif not quiet or any(each.remembers for each in one.candidates):
+            elif not to_noise or any(each.remembers for each in one.candidates):
                 error = self.data.remainder
         least = max(rules.single_effect_gain, error * (self.base.chi_square - self._freedom))
-        return least if quiet else max(least, rules.explained_part_share * rest.excess)
+        return least if to_noise else max(least, rules.explained_part_share * rest.excess)
 
-    def _quiet(self, one: Hypothesis) -> bool:
+    def _to_noise(self, one: Hypothesis) -> bool:
         return down_to_noise(one.fit, self._freedom, self.data.rules)
 
     def _rest(self, fitted: Fit) -> Rest | None:
