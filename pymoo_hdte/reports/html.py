@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from decimal import ROUND_CEILING, Decimal
+from html import unescape
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,8 @@ def page(package: str, template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {one.__name__: one for one in (change, number, percent, with_error)}
+    filters = (change, number, percent, with_error, without_tags)
+    environment.filters |= {one.__name__: one for one in filters}
     environment.globals |= {"digits": digits, "terms_in": terms_in}
     return environment.get_template(template).render(**values)
 
@@ -90,3 +93,12 @@ def digits(lower: float | None, upper: float | None) -> int:
         return 4
     places = np.log10(max(abs(lower), abs(upper)) / (upper - lower))
     return int(np.clip(np.ceil(places) + 2, 2, 12)) if np.isfinite(places) else 4
+
+
+def without_tags(markup: str) -> str:
+    """Return the text of a page, in which tags part words.
+
+    >>> without_tags("<b>found</b>The stiffness").split()
+    ['found', 'The', 'stiffness']
+    """
+    return unescape(re.sub("<[^>]*>", " ", markup))

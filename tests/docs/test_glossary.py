@@ -62,6 +62,7 @@ def test_a_page_that_says_everything_has_every_term(chapter):
         ("Named.", []),
         ("<i class='gap'>Records</i>", ["record"]),
         ("recording", []),
+        ("<b>nothing missing</b>The rest.", ["adequate", "believed", "record"]),
     ],
 )
 def test_a_page_has_the_terms_it_uses_and_those_of_their_meanings(text, terms):
