@@ -15,7 +15,8 @@ def in_one_sentence(outcomes: Sequence[Outcome]) -> str:
         return "No case was run."
     plain, wrong = _plain_answers(outcomes)
     return (
-        f"Of {len(outcomes)} campaigns {plain} had a plain answer, {wrong} of them wrong; "
+        f"Of {len(outcomes)} campaigns {plain} had an answer without reservation, {wrong} of them "
+        "wrong; "
         f"{_found(outcomes)}."
     )
 
@@ -25,7 +26,8 @@ def of_the_first_page(outcomes: Sequence[Outcome]) -> str:
     plain, wrong = _plain_answers(outcomes)
     return (
         "a workflow that says what a drive model lacks beside measurements: on simulated campaigns "
-        f"that it had not seen, {wrong} of {plain} plain answers were wrong, and {_found(outcomes)}"
+        f"that it had not seen, {wrong} of {plain} answers without reservation were wrong, and "
+        f"{_found(outcomes)}"
     )
 
 
@@ -40,5 +42,5 @@ def _found(outcomes: Sequence[Outcome]) -> str:
     for kind, what in (("single", "single effects"), ("pair", "pairs")):
         of_kind = select(outcomes, kind)
         shares.append(f"{sum(one.right_answer for one in of_kind)} of {len(of_kind)} {what}")
-    how = f"alone, in part or in a class of at most {MOST_IN_CLASS}"
-    return f"{shares[0]}, and both effects in {shares[1]}, were named, {how}"
+    how = f"or stood in a list of at most {MOST_IN_CLASS} candidates"
+    return f"{shares[0]}, and both effects in {shares[1]}, were named {how}"
