@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.core.algorithm import Algorithm
-from pymoo.core.evaluator import Evaluator
 from tqdm import tqdm
 
 from experiments.comparison.runs import robust_problem
 from experiments.measured.cpu_time import measured_cpu
 from experiments.paper.models import models_of
 from experiments.runner.machine import machine_table
+from experiments.runner.own_time import seconds_of_run
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
@@ -136,22 +136,6 @@ def _integration_time(model: DriveModel, designs: NDArray[np.float64], method: s
     return time.perf_counter() - begin
 
 
-class TimedEvaluator(Evaluator):
-    """Adds up the seconds spent on evaluating, which are not the algorithm's own."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.seconds = 0.0
-
-    def eval(self, *args: object, **kwargs: object) -> object:
-        """Evaluate as pymoo does, with the clock running."""
-        begin = time.perf_counter()
-        try:
-            return super().eval(*args, **kwargs)
-        finally:
-            self.seconds += time.perf_counter() - begin
-
-
 def _algorithms() -> Iterator[Ratio]:
     problem = robust_problem("calibrated")
     makers: dict[str, Callable[[], Algorithm]] = {
@@ -185,11 +169,8 @@ def _algorithms() -> Iterator[Ratio]:
 def _seconds_per_generation(problem: RobustDTE, algorithm: Algorithm) -> tuple[float, float]:
     """Return the seconds per generation without and with evaluation."""
     algorithm.setup(problem, termination=("n_gen", GENERATIONS), seed=1)
-    algorithm.evaluator = TimedEvaluator()
-    begin = time.perf_counter()
-    algorithm.run()
-    total = time.perf_counter() - begin
-    return (total - algorithm.evaluator.seconds) / GENERATIONS, total / GENERATIONS
+    own, total = seconds_of_run(algorithm, time.perf_counter)
+    return own / GENERATIONS, total / GENERATIONS
 
 
 def _agreement() -> Iterator[tuple[str, str, float, float]]:
