@@ -95,6 +95,8 @@ from experiments.suites.jobs import BbobRun, SuiteRun
 from experiments.suites.peers import BBOB_PEERS, ON_SUITES, OURS, PEERS, takes
 from experiments.suites.problems import SUITES, TUNING, problem_of
 from experiments.suites.reduced import (
+    CANDIDATES,
+    LEFT,
     ON_CONSTRAINED,
     ON_PLAIN,
     SPREAD,
@@ -222,16 +224,17 @@ def where_parts_leave(name: str) -> Iterable[tuple[SuitePart | BbobPart, ...]]:
     yield (BbobPart(name, (10_000,), (OF_PARTS,)),)
 
 
-_LEFT = ("Attraction", "tolerance", "guests", "Difference")
+_GUESTS, _SHARES, _EXCHANGE, _DIFFERENCE, _LEADERS = CANDIDATES
+_GONE = (*LEFT, _GUESTS, _DIFFERENCE)
 """What left by the rule, in this order."""
-_STAY = ((*_LEFT[:3], "learned shares"), (*_LEFT[:3], "Exchange"), (*_LEFT, "several leaders"))
+_STAY = ((*_GONE[:3], _SHARES), (*_GONE[:3], _EXCHANGE), (*_GONE, _LEADERS))
 """Without what left and the last of each, the swarm is worse on constrained suites."""
 
 LEAVING: tuple[SuitePart | BbobPart, ...] = (
-    SuitePart(TUNING, (WHOLE, without_all(_LEFT[:1])), BUDGETS[1:2], SUITE_SEEDS[TUNING]),
-    *(part for gone in (_LEFT[:2], _LEFT[:3], *_STAY)
+    SuitePart(TUNING, (WHOLE, without_all(_GONE[:1])), BUDGETS[1:2], SUITE_SEEDS[TUNING]),
+    *(part for gone in (_GONE[:2], _GONE[:3], *_STAY)
       for part in next(iter(where_parts_leave(without_all(gone))))),
-    *(part for place in where_parts_leave(without_all(_LEFT)) for part in place),
+    *(part for place in where_parts_leave(without_all(_GONE)) for part in place),
 )  # fmt: skip
 """What the rule came to, beside `PARTS`; swarms alike without constraints are run once there."""
 
