@@ -56,9 +56,9 @@ class MaxwellSlip(Aperiodic):
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents along the whole path of the port, from rest."""
-        stretch, sticking = slip_along(state.path(state.position), self._slips)
-        torque = np.tensordot(self._stiffnesses, stretch, axes=1)
-        slope = np.tensordot(self._stiffnesses, sticking, axes=1)
+        path = np.ascontiguousarray(state.path(state.position))
+        torque, slope = np.zeros_like(path), np.zeros_like(path)
+        _pull(path, self._slips, self._stiffnesses, torque, slope)
         return Response(state.back(torque), state.back(slope))
 
     def recall(self, path: Values) -> tuple[Values, NDArray[np.int_]]:
@@ -147,3 +147,22 @@ def _slip(path: Values, slips: Values, stretch: Values, sticking: Values) -> Non
                 stretch[spring, row, step] = now
                 sticking[spring, row, step] = 1.0 if now == moved else 0.0
                 before = path[row, step]
+
+
+@compiled
+def _pull(path: Values, slips: Values, stiffnesses: Values, torque: Values, slope: Values) -> None:
+    """Add torque and slope, (n, steps), of all springs; that is faster than one after the other."""
+    rows, steps = path.shape
+    stretch = np.zeros(len(slips))
+    for row in range(rows):
+        stretch[:] = 0.0
+        before = 0.0
+        for step in range(steps):
+            for spring in range(len(slips)):
+                moved = stretch[spring] + path[row, step] - before
+                now = min(max(moved, -slips[spring]), slips[spring])
+                stretch[spring] = now
+                torque[row, step] += stiffnesses[spring] * now
+                if now == moved:
+                    slope[row, step] += stiffnesses[spring]
+            before = path[row, step]

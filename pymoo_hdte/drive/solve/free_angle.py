@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.newton import Matrix, Place, nearer
+from pymoo_hdte.drive.solve.newton import Matrix, Place, factored, nearer
 from pymoo_hdte.drive.solve.steady_motion import (
     BY_CASE,
     CONSTANT_TORQUE,
+    Factors,
     SpeedLoop,
     SteadyMotion,
     Tangents,
@@ -136,20 +137,20 @@ def harmonic_balance(
         solver = _Solver(equations, None if start is None else start.rows(rows))
         # A row that diverges is marked as not converged; its values are meaningless.
         with np.errstate(over="ignore", invalid="ignore"):
-            solver.solve(tolerance, steps, _inverses(start, rows, len(equations.speed)))
+            solver.solve(tolerance, steps, _factors(start, rows, len(equations.speed)))
         solvers.append(solver)
     parts = [solver.result() for solver in solvers]
     values = [np.concatenate([getattr(part, name) for part in parts]) for name in BY_CASE]
-    kept = Tangents(_Solved(solvers).inverted, np.arange(n)) if tangents else None
+    kept = Tangents(_Solved(solvers).factored, np.arange(n)) if tangents else None
     return SteadyMotion(torus, *values, tangents=kept)
 
 
-def _inverses(start: SteadyMotion | None, rows: slice, count: int) -> list[Matrix | None]:
-    """Return the inverse matrix of the case from which each row begins; None without one."""
+def _factors(start: SteadyMotion | None, rows: slice, count: int) -> list[Factors | None]:
+    """Return the factored matrix of the case from which each row begins; None without one."""
     if start is None or start.tangents is None:
         return [None] * count
     ended = start.converged[rows]
-    found = iter(start.tangents.rows(rows).rows(ended).inverses())
+    found = iter(start.tangents.rows(rows).rows(ended).factors())
     return [next(found) if good else None for good in ended]
 
 
@@ -204,10 +205,10 @@ class _Solver:
         if near is not None:
             self.energy = equations.at_wanted_speed(self.energy)
 
-    def solve(self, tolerance: float, steps: int, inverses: list[Matrix | None]) -> None:
+    def solve(self, tolerance: float, steps: int, factors: list[Factors | None]) -> None:
         """Iterate until the torsion converges; rows that do not are marked.
 
-        Steps are taken with the ``inverses`` of nearby cases as long as they shrink fast.
+        Steps are taken with the matrices of nearby cases, ``factors``, as long as they shrink fast.
         """
         equations, left = self.equations, np.arange(len(self.torsion))
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
@@ -215,11 +216,11 @@ class _Solver:
         before, least = np.full(len(left), np.inf), np.full(len(left), np.inf)
         waited = np.zeros(len(left), dtype=int)
         for _ in range(steps):
-            change, energy_change = at.newton_step(size[left], inverses)
+            change, energy_change = at.newton_step(size[left], factors)
             longest = np.abs(change).max(axis=1)
             shrinks = longest <= _SHRINKS * before
             # With the matrix of another case a short step alone does not tell that it has arrived.
-            own = np.array([inverse is None for inverse in inverses], dtype=bool)
+            own = np.array([one is None for one in factors], dtype=bool)
             settled = (longest <= tolerance * size[left, 0]) & (shrinks | own)
             self.converged[left] = settled
             if np.all(settled):
@@ -228,7 +229,7 @@ class _Solver:
                 break
             at = nearer(at, change, energy_change, settled)
             self.torsion[left], self.energy[left] = at.torsion, at.energy
-            inverses = [one if ok else None for one, ok in zip(inverses, shrinks, strict=True)]
+            factors = [one if ok else None for one, ok in zip(factors, shrinks, strict=True)]
             before = longest
             distance = at.distance[:, 0]
             halved = distance <= least / 2.0
@@ -241,7 +242,7 @@ class _Solver:
             # half of the rows have settled, only the others are iterated further.
             if np.any(lost) or 2 * np.sum(settled) >= len(left):
                 kept = np.flatnonzero(~(settled | lost))
-                left, before, inverses = left[kept], before[kept], [inverses[one] for one in kept]
+                left, before, factors = left[kept], before[kept], [factors[one] for one in kept]
                 least, waited = least[kept], waited[kept]
                 equations = self.equations.rows(left)
                 at = Place(equations, self.torsion[left], self.energy[left])
@@ -278,8 +279,8 @@ class _Solved:
 
     solvers: Sequence[_Solver]
 
-    def inverted(self, places: NDArray[np.int_]) -> Sequence[Matrix | None]:
-        """Return the inverse matrices (2 H, 2 H) at some rows, in rising order."""
+    def factored(self, places: NDArray[np.int_]) -> Sequence[Factors | None]:
+        """Return the factored matrices (2 H, 2 H) at some rows, in rising order."""
         of_blocks = places // _ROWS_AT_ONCE
         matrices = [
             solver.matrix(places[of_blocks == block] % _ROWS_AT_ONCE)
@@ -289,4 +290,4 @@ class _Solved:
         found = [matrix for matrix in matrices if matrix is not None]
         if len(found) < len(matrices):
             return [None] * len(places)
-        return [*np.linalg.inv(np.concatenate(found))]
+        return [factored(one) for one in np.concatenate(found)]

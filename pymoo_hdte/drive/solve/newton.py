@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values, mean
-from pymoo_hdte.drive.solve.steady_motion import Phasors
+from pymoo_hdte.drive.solve.steady_motion import Factors, Phasors
 from pymoo_hdte.drive.solve.torus import multiplication, stacked, unstacked
 
 Matrix = NDArray[np.float64]
@@ -61,14 +62,14 @@ class Place:
         return Place(self.equations, self.torsion + change, energy)
 
     def newton_step(
-        self, size: Values, inverses: Sequence[Matrix | None]
+        self, size: Values, factors: Sequence[Factors | None]
     ) -> tuple[Phasors, Phasors]:
         """Return a step of torsion and E together, at most ``size`` (n, 1) of the torsion.
 
-        It is taken with the given inverse of a nearby place for each row, or with the row's own
-        matrix where that is None.
+        It is taken with the given matrix of a nearby place for each row, which is factored, or with
+        the row's own matrix where that is None.
         """
-        change = self._torsion_change(inverses)
+        change = self._torsion_change(factors)
         # Where a law removes the stiffness, a full step may be far too long.
         longest = np.abs(change).max(axis=1, keepdims=True)
         change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
@@ -80,16 +81,16 @@ class Place:
         energy_change *= np.minimum(1.0, slowest / np.maximum(largest, 1e-300))
         return change, energy_change
 
-    def _torsion_change(self, inverses: Sequence[Matrix | None]) -> Phasors:
+    def _torsion_change(self, factors: Sequence[Factors | None]) -> Phasors:
         """Return the change of the torsion by the linearised mesh, its memory included."""
-        own = np.array([row for row, inverse in enumerate(inverses) if inverse is None], dtype=int)
+        own = np.array([row for row, one in enumerate(factors) if one is None], dtype=int)
         real = stacked(self._left)
         # The mean has no imaginary part.
         real[:, self._left.shape[1]] = 0.0
         found = np.empty_like(real)
-        for row, inverse in enumerate(inverses):
-            if inverse is not None:
-                found[row] = inverse @ real[row]
+        for row, one in enumerate(factors):
+            if one is not None:
+                found[row] = scipy.linalg.lapack.dgetrs(*one, real[row])[0]
         if own.size:
             matrix = self.matrix(own)
             if matrix is None:
@@ -118,6 +119,12 @@ class Place:
         empty = len(equations.torus.orders)
         matrix[:, empty, empty] = np.abs(matrix[:, 0, 0])
         return matrix
+
+
+def factored(matrix: Matrix) -> Factors:
+    """Return the factors of a matrix (m, m); of a singular one they lead nowhere, to NaN."""
+    triangles, pivots, _ = scipy.linalg.lapack.dgetrf(matrix)
+    return triangles, pivots
 
 
 def nearer(at: Place, change: Phasors, energy_change: Phasors, settled: NDArray[np.bool_]) -> Place:

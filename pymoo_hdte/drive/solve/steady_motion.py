@@ -12,6 +12,8 @@ from pymoo_hdte.drive.solve.order_spectrum import OrderSpectrum
 from pymoo_hdte.drive.solve.torus import Torus
 
 Phasors = NDArray[np.complex128]
+Factors = tuple[NDArray[np.float64], NDArray[np.int_]]
+"""A matrix of Newton's method as the product of triangles, and the order of its rows."""
 
 
 @dataclass(frozen=True)
@@ -47,30 +49,30 @@ CONSTANT_TORQUE = SpeedLoop()
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """Inverse matrices of Newton's method at steady states, computed when first asked for.
+    """Factored matrices of Newton's method at steady states, computed when first asked for.
 
     Attributes
     ----------
-    inverted : callable
-        From places (m,) of solved cases to the inverse (2 H, 2 H) of each; None where the step
-        needs no matrix.
+    factored : callable
+        From places (m,) of solved cases to the factors of the matrix (2 H, 2 H) of each; None where
+        the step needs no matrix.
     places : ndarray of int, shape (n,)
         Of each row among the solved cases.
     """
 
-    inverted: Callable[[NDArray[np.int_]], Sequence[NDArray[np.float64] | None]]
+    factored: Callable[[NDArray[np.int_]], Sequence[Factors | None]]
     places: NDArray[np.int_]
-    _known: dict[int, NDArray[np.float64] | None] = field(default_factory=dict)
+    _known: dict[int, Factors | None] = field(default_factory=dict)
 
     def rows(self, rows: NDArray[np.int_] | NDArray[np.bool_] | slice) -> Tangents:
         """Return those of some of the rows, which share what is computed."""
-        return Tangents(self.inverted, self.places[rows], self._known)
+        return Tangents(self.factored, self.places[rows], self._known)
 
-    def inverses(self) -> list[NDArray[np.float64] | None]:
-        """Return the inverse (2 H, 2 H) of each row."""
+    def factors(self) -> list[Factors | None]:
+        """Return the factors of the matrix (2 H, 2 H) of each row."""
         new = np.array(sorted({*self.places.tolist()} - self._known.keys()), dtype=int)
         if new.size:
-            self._known.update(zip(new.tolist(), self.inverted(new), strict=True))
+            self._known.update(zip(new.tolist(), self.factored(new), strict=True))
         return [self._known[place] for place in self.places.tolist()]
 
     @classmethod
@@ -85,19 +87,19 @@ class Tangents:
         Returns
         -------
         Tangents
-            Of n_1 + n_2 + ... rows; each part computes its own inverses.
+            Of n_1 + n_2 + ... rows; each part computes its own factors.
         """
         ends = np.cumsum([0, *(len(part.places) for part in parts)])
 
-        def inverted(places: NDArray[np.int_]) -> list[NDArray[np.float64] | None]:
+        def factored(places: NDArray[np.int_]) -> list[Factors | None]:
             """Ask each part for its own; places rise."""
-            found: list[NDArray[np.float64] | None] = []
+            found: list[Factors | None] = []
             for part, first, last in zip(parts, ends[:-1], ends[1:], strict=True):
                 own = places[(first <= places) & (places < last)] - first
-                found += part.rows(own).inverses()
+                found += part.rows(own).factors()
             return found
 
-        return cls(inverted, np.arange(ends[-1]))
+        return cls(factored, np.arange(ends[-1]))
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,6 @@ from pymoo_hdte.checks import InvalidInput
 Matrices = NDArray[np.float64]
 
 _TOLERANCE = 1e-8
-_DENSE = 140
-"""Harmonics up to which a matrix product is faster than a fast Fourier transform of the grid."""
 _LARGEST_MULTIPLE = 4
 """An order whose fraction is at most this multiple of a known one needs no angle of its own."""
 
@@ -115,14 +113,12 @@ class Torus:
         lines = self._multiples
         self._differences = self._flat(lines[:, None] - lines, self._shape)
         self._sums = self._flat(lines[:, None] + lines, self._shape)
-        # The real transform has the lines whose last multiple is not negative, the others by their
-        # conjugates; of a line at 0 in that multiple both halves have a place.
-        self._half_shape = (*self._shape[:-1], self._shape[-1] // 2 + 1)
-        self._reversed = lines[:, -1] < 0
-        positive = np.where(self._reversed[:, None], -lines, lines)
-        self._kept = self._flat(positive, self._half_shape)
-        self._twice = np.flatnonzero(lines[:, -1] == 0)
-        self._conjugates = self._flat(-lines[self._twice], self._half_shape)
+        # A product of the first angle and all others: a signal is summed over the others first.
+        # Of a line and its conjugate one is kept, so that the first multiple is never negative
+        # and half of those with multiple 0 are missing.
+        self._turns = self.highest[0] + 1
+        self._beats = int(np.prod([2 * most + 1 for most in self.highest[1:]]))
+        self._missing = (self._beats - 1) // 2
         self._axes = tuple(range(1, 1 + len(self._shape)))
         self._places: dict[float, tuple[int, bool] | None] = {}
         self._rate = 1j * self.orders
@@ -130,29 +126,44 @@ class Torus:
         self._divisor = np.where(self._moving, self._rate, 1.0)
 
     @cached_property
-    def _synthesis(self) -> NDArray[np.float64]:
-        """Values on the grid by harmonics, (2 H, G); a large torus needs it for memories only.
+    def _of_beats(self) -> Matrices:
+        """Harmonics of all angles but the first on their grid, (2 beats, 2 points).
 
-        Real and imaginary part of a harmonic are side by side, as complex numbers lie in memory.
+        Real and imaginary part of a harmonic are side by side, as complex numbers lie in memory;
+        all real values on the grid come before the imaginary ones.
         """
-        argument = self._multiples @ self._phases
-        return np.stack([np.cos(argument), -np.sin(argument)], axis=1).reshape(-1, self.size)
+        multiples = self._multiples[self._missing + 1 :][: self._beats, 1:]
+        argument = multiples @ self._phases[1:, : self.size // self._shape[0]]
+        cosine, sine = np.cos(argument), np.sin(argument)
+        rows = [np.hstack([cosine, sine]), np.hstack([-sine, cosine])]
+        return np.stack(rows, axis=1).reshape(2 * self._beats, -1)
 
     @cached_property
-    def _analysis(self) -> NDArray[np.float64]:
-        """Harmonics by values on the grid, (G, 2 H), as `_synthesis` has them."""
-        weights = np.full(len(self.orders), 2.0 / self.size)
-        weights[0] = 1.0 / self.size
-        return np.ascontiguousarray((np.repeat(weights, 2)[:, None] * self._synthesis).T)
+    def _of_turns(self) -> Matrices:
+        """Harmonics of the first angle, real before imaginary part of each, on its grid.
+
+        Shape (points, 2 turns).
+        """
+        angle = self._phases[0, :: self.size // self._shape[0]]
+        argument = np.outer(angle, np.arange(self._turns))
+        parts = np.stack([np.cos(argument), -np.sin(argument)], axis=2)
+        return parts.reshape(len(angle), -1)
 
     @cached_property
-    def _by_parts(self) -> tuple[Matrices, Matrices]:
-        """Both with all real parts first, as `stacked` has them: (G, 2 H) and (2 H, G)."""
-        synthesis, analysis = self._synthesis, self._analysis
-        return (
-            np.concatenate([synthesis[::2], synthesis[1::2]]).T,
-            np.concatenate([analysis[:, ::2], analysis[:, 1::2]], axis=1).T,
-        )
+    def _to_turns(self) -> Matrices:
+        """Values on the grid to harmonics of the first angle: (2 turns, points)."""
+        return np.ascontiguousarray(self._of_turns.T)
+
+    @cached_property
+    def _to_beats(self) -> Matrices:
+        """Values on the grid of the other angles to their harmonics: (2 points, 2 beats)."""
+        return np.ascontiguousarray((2.0 / self.size) * self._of_beats.T)
+
+    @cached_property
+    def _synthesis(self) -> Matrices:
+        """Values on the grid, (G, 2 H), by all real parts of harmonics, then all imaginary."""
+        argument = self._phases.T @ self._multiples.T
+        return np.hstack([np.cos(argument), -np.sin(argument)])
 
     def _flat(self, multiples: NDArray[np.int_], shape: tuple[int, ...]) -> NDArray[np.int_]:
         """Return the indices of multiples (..., n_angles) in a flattened transform of a shape."""
@@ -205,24 +216,20 @@ class Torus:
 
     def signal(self, phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return values on the grid, shape (n, G), of Re sum phasor exp(i order alpha)."""
-        if len(self.orders) <= _DENSE:
-            return np.ascontiguousarray(phasors).view(float) @ self._synthesis
-        spectrum = np.zeros((len(phasors), *self._half_shape), dtype=complex)
-        flat = spectrum.reshape(len(phasors), -1)
-        half = 0.5 * phasors
-        flat[:, self._kept] = np.where(self._reversed, half.conj(), half)
-        flat[:, self._conjugates] += half[:, self._twice].conj()
-        values = fft.irfftn(spectrum, s=self._shape, axes=self._axes, norm="forward")
-        return np.asarray(values).reshape(len(phasors), self.size)
+        n = len(phasors)
+        whole = np.zeros((n, self._turns * self._beats), dtype=complex)
+        whole[:, self._missing :] = phasors
+        over_beats = whole.view(float).reshape(n * self._turns, -1) @ self._of_beats
+        return (self._of_turns @ over_beats.reshape(n, 2 * self._turns, -1)).reshape(n, self.size)
 
     def phasors(self, values: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the kept harmonics, shape (n, n_harmonics), of values on the grid."""
-        if len(self.orders) <= _DENSE:
-            return (values @ self._analysis).view(complex)
-        spectrum = fft.rfftn(values.reshape(-1, *self._shape), axes=self._axes, norm="forward")
-        found = 2.0 * spectrum.reshape(len(values), -1)[:, self._kept]
+        n = len(values)
+        of_turns = self._to_turns @ values.reshape(n, self._shape[0], -1)
+        whole = of_turns.reshape(n * self._turns, -1) @ self._to_beats
+        found = whole.view(complex).reshape(n, -1)[:, self._missing :]
         found[:, 0] *= 0.5
-        return np.where(self._reversed, found.conj(), found)
+        return found
 
     def derivative(self, phasors: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the harmonics of the derivative by the input angle."""
@@ -258,17 +265,26 @@ class Torus:
         ``weights`` and ``places`` have shape (terms, n, G); the terms are summed. Matrices act as
         those of `product_matrix`.
         """
-        synthesis, analysis = self._by_parts
         terms, n, size = weights.shape
-        ends = np.arange(0, terms * size + 1, terms)
-        found = np.empty((n, len(analysis), len(analysis)))
+        half = len(self.orders)
+        found = np.empty((n, 2 * half, 2 * half))
         for row in range(n):
-            # Only at points where anything is recalled: a slipping spring has forgotten.
-            weight, place = weights[:, row].T, places[:, row].T
-            held = np.flatnonzero(weight.any(axis=1))
-            recall = csr_array((weight.ravel(), place.ravel(), ends), shape=(size, size))
-            found[row] = analysis[:, held] @ (recall[held] @ synthesis)
+            weight, place = weights[:, row].T.ravel(), places[:, row].T.ravel()
+            ends = np.arange(0, terms * size + 1, terms)
+            recall = csr_array((weight, place, ends), shape=(size, size))
+            # A slipping spring has forgotten.
+            recall.eliminate_zeros()
+            found[row] = self._stacked_harmonics(recall @ self._synthesis)
         return found
+
+    def _stacked_harmonics(self, columns: Matrices) -> Matrices:
+        """Return the harmonics (2 H, m), real parts first, of m signals on the grid, (G, m)."""
+        m = columns.shape[1]
+        of_turns = self._to_turns @ columns.reshape(self._shape[0], -1)
+        whole = self._to_beats.T @ of_turns.reshape(self._turns, -1, m)
+        parts = whole.reshape(self._turns * self._beats, 2, m)[self._missing :]
+        parts[0] *= 0.5
+        return parts.swapaxes(0, 1).reshape(-1, m)
 
 
 def stacked(phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
