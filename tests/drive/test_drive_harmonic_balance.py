@@ -27,14 +27,12 @@ from pymoo_hdte.drive.effects import (
     effect_from_fields,
 )
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
+from pymoo_hdte.drive.solve.newton import multiplication, stacked, unstacked
 from pymoo_hdte.drive.solve.steady_motion import SpeedLoop
 from pymoo_hdte.drive.solve.torus import (
     Torus,
     fundamental_orders,
     multiples_of,
-    multiplication,
-    stacked,
-    unstacked,
 )
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
@@ -441,7 +439,6 @@ def test_places_of_orders():
 
 @pytest.mark.parametrize("highest", [(4, 2), (9, 2, 3)])
 def test_harmonics_on_a_grid_are_their_sum_there_and_come_back(highest, rng):
-    """The larger torus goes by fast Fourier transforms."""
     torus = Torus((1.0, 0.02, 0.37)[: len(highest)], highest)
     phasors = rng.standard_normal((3, len(torus.orders), 2)) @ [1.0, 1j]
     phasors[:, 0] = phasors[:, 0].real
@@ -449,3 +446,31 @@ def test_harmonics_on_a_grid_are_their_sum_there_and_come_back(highest, rng):
     values = torus.signal(phasors)
     assert values == pytest.approx((phasors @ np.exp(1j * phases)).real, abs=1e-10)
     assert np.abs(torus.phasors(values) - phasors).max() < 1e-12
+
+
+@pytest.mark.parametrize("highest", [(3,), (4, 2), (3, 2, 1)])
+def test_a_recalled_signal_is_that_of_the_points_where_it_was(highest, rng):
+    torus = Torus((1.0, 0.02, 0.37)[: len(highest)], highest)
+    terms, n = 3, 2
+    phasors = rng.standard_normal((n, len(torus.orders), 2)) @ [1.0, 1j]
+    phasors[:, 0] = phasors[:, 0].real
+    weights = rng.standard_normal((terms, n, torus.size))
+    # Where a spring slips it recalls nothing.
+    weights *= rng.random(weights.shape) < 0.5
+    places = rng.integers(0, torus.size, weights.shape)
+    values = torus.signal(phasors)
+    elsewhere = np.take_along_axis(np.broadcast_to(values, places.shape), places, axis=2)
+    recalled = torus.phasors((weights * elsewhere).sum(axis=0))
+    product = np.einsum("nij,nj->ni", torus.recall_matrix(weights, places), stacked(phasors))
+    assert np.abs(unstacked(product) - recalled).max() < 1e-12
+
+
+def test_springs_together_pull_as_much_as_one_after_the_other(rng):
+    path = np.cumsum(rng.standard_normal((3, 200)), axis=1)
+    law = MaxwellSlip(2.0, 1.5, 1.3)
+    state = PortState(path, path, None, None, lambda along: along, lambda along: along)
+    found = law.respond(state)
+    stretch, sticking = slip_along(path, law._slips)
+    weights = law.force / (4 * law._slips)
+    assert found.torque == pytest.approx(np.tensordot(weights, stretch, axes=1))
+    assert found.slope == pytest.approx(np.tensordot(weights, sticking, axes=1))

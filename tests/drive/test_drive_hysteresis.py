@@ -9,8 +9,7 @@ from scipy.optimize import least_squares
 from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations
 from pymoo_hdte.drive.solve.free_angle import torus_of
-from pymoo_hdte.drive.solve.newton import Place
-from pymoo_hdte.drive.solve.torus import stacked, unstacked
+from pymoo_hdte.drive.solve.newton import Place, stacked, unstacked
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState

@@ -214,13 +214,15 @@ class _Solver:
         size = np.abs(self.torsion[:, :1]) + np.abs(equations.static).sum(axis=1)[:, None] + 1e-9
         at = Place(equations, self.torsion, self.energy)
         before, least = np.full(len(left), np.inf), np.full(len(left), np.inf)
-        waited = np.zeros(len(left), dtype=int)
+        distance, waited = at.distance[:, 0], np.zeros(len(left), dtype=int)
         for _ in range(steps):
+            own = np.array([one is None for one in factors], dtype=bool)
+            for row, one in zip(np.flatnonzero(own), at.factors(np.flatnonzero(own)), strict=True):
+                factors[row] = one
             change, energy_change = at.newton_step(size[left], factors)
             longest = np.abs(change).max(axis=1)
             shrinks = longest <= _SHRINKS * before
-            # With the matrix of another case a short step alone does not tell that it has arrived.
-            own = np.array([one is None for one in factors], dtype=bool)
+            # With the matrix of another place a short step alone does not tell that it has arrived.
             settled = (longest <= tolerance * size[left, 0]) & (shrinks | own)
             self.converged[left] = settled
             if np.all(settled):
@@ -229,9 +231,11 @@ class _Solver:
                 break
             at = nearer(at, change, energy_change, settled)
             self.torsion[left], self.energy[left] = at.torsion, at.energy
-            factors = [one if ok else None for one, ok in zip(factors, shrinks, strict=True)]
             before = longest
-            distance = at.distance[:, 0]
+            distance, was = at.distance[:, 0], distance
+            nearer_by_far = distance <= _SHRINKS * was
+            kept = np.where(own, nearer_by_far, shrinks)
+            factors = [one if ok else None for one, ok in zip(factors, kept, strict=True)]
             halved = distance <= least / 2.0
             least = np.where(halved, distance, least)
             waited = np.where(halved, 0, waited + 1)
@@ -243,7 +247,7 @@ class _Solver:
             if np.any(lost) or 2 * np.sum(settled) >= len(left):
                 kept = np.flatnonzero(~(settled | lost))
                 left, before, factors = left[kept], before[kept], [factors[one] for one in kept]
-                least, waited = least[kept], waited[kept]
+                least, waited, distance = least[kept], waited[kept], distance[kept]
                 equations = self.equations.rows(left)
                 at = Place(equations, self.torsion[left], self.energy[left])
 

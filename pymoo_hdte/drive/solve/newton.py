@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values, mean
 from pymoo_hdte.drive.solve.steady_motion import Factors, Phasors
-from pymoo_hdte.drive.solve.torus import multiplication, stacked, unstacked
 
 Matrix = NDArray[np.float64]
 
@@ -66,8 +65,8 @@ class Place:
     ) -> tuple[Phasors, Phasors]:
         """Return a step of torsion and E together, at most ``size`` (n, 1) of the torsion.
 
-        It is taken with the given matrix of a nearby place for each row, which is factored, or with
-        the row's own matrix where that is None.
+        It is taken with the given factors of a matrix for each row, or, where these are None, by
+        each harmonic for itself.
         """
         change = self._torsion_change(factors)
         # Where a law removes the stiffness, a full step may be far too long.
@@ -83,21 +82,19 @@ class Place:
 
     def _torsion_change(self, factors: Sequence[Factors | None]) -> Phasors:
         """Return the change of the torsion by the linearised mesh, its memory included."""
-        own = np.array([row for row, one in enumerate(factors) if one is None], dtype=int)
+        found = stacked(self._left / (self._level + self._viscous))
         real = stacked(self._left)
         # The mean has no imaginary part.
         real[:, self._left.shape[1]] = 0.0
-        found = np.empty_like(real)
         for row, one in enumerate(factors):
             if one is not None:
                 found[row] = scipy.linalg.lapack.dgetrs(*one, real[row])[0]
-        if own.size:
-            matrix = self.matrix(own)
-            if matrix is None:
-                found[own] = stacked((self._left / (self._level + self._viscous))[own])
-            else:
-                found[own] = np.linalg.solve(matrix, real[own, :, None])[:, :, 0]
         return unstacked(found)
+
+    def factors(self, rows: NDArray[np.int_]) -> list[Factors | None]:
+        """Return the factors of the `matrix` of some rows; None where there is none."""
+        matrices = self.matrix(rows) if rows.size else None
+        return [None] * len(rows) if matrices is None else [factored(one) for one in matrices]
 
     def matrix(self, rows: NDArray[np.int_]) -> Matrix | None:
         """Return the derivative (m, 2 H, 2 H) of what is left of some rows by their torsion.
@@ -146,3 +143,25 @@ def nearer(at: Place, change: Phasors, energy_change: Phasors, settled: NDArray[
     if np.array_equal(best, parts):
         return there
     return at.moved(best * change, best * energy_change)
+
+
+def stacked(phasors: Phasors) -> NDArray[np.float64]:
+    """Return real and imaginary parts side by side, shape (n, 2 H)."""
+    return np.concatenate([phasors.real, phasors.imag], axis=-1)
+
+
+def unstacked(values: NDArray[np.float64]) -> Phasors:
+    """Undo `stacked`."""
+    real, imaginary = np.split(values, 2, axis=-1)
+    return real + 1j * imaginary
+
+
+def multiplication(factor: Phasors) -> NDArray[np.float64]:
+    """Return the real matrices, (n, 2 H, 2 H), that multiply each harmonic by its ``factor``."""
+    n, size = factor.shape
+    matrix = np.zeros((n, 2 * size, 2 * size))
+    place = np.arange(size)
+    matrix[:, place, place] = matrix[:, place + size, place + size] = factor.real
+    matrix[:, place, place + size] = -factor.imag
+    matrix[:, place + size, place] = factor.imag
+    return matrix

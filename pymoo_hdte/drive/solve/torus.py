@@ -119,6 +119,8 @@ class Torus:
         self._turns = self.highest[0] + 1
         self._beats = int(np.prod([2 * most + 1 for most in self.highest[1:]]))
         self._missing = (self._beats - 1) // 2
+        # Points of the other angles at each of the first.
+        self._points = self.size // self._shape[0]
         self._axes = tuple(range(1, 1 + len(self._shape)))
         self._places: dict[float, tuple[int, bool] | None] = {}
         self._rate = 1j * self.orders
@@ -133,7 +135,7 @@ class Torus:
         all real values on the grid come before the imaginary ones.
         """
         multiples = self._multiples[self._missing + 1 :][: self._beats, 1:]
-        argument = multiples @ self._phases[1:, : self.size // self._shape[0]]
+        argument = multiples @ self._phases[1:, : self._points]
         cosine, sine = np.cos(argument), np.sin(argument)
         rows = [np.hstack([cosine, sine]), np.hstack([-sine, cosine])]
         return np.stack(rows, axis=1).reshape(2 * self._beats, -1)
@@ -144,7 +146,7 @@ class Torus:
 
         Shape (points, 2 turns).
         """
-        angle = self._phases[0, :: self.size // self._shape[0]]
+        angle = self._phases[0, :: self._points]
         argument = np.outer(angle, np.arange(self._turns))
         parts = np.stack([np.cos(argument), -np.sin(argument)], axis=2)
         return parts.reshape(len(angle), -1)
@@ -219,15 +221,16 @@ class Torus:
         n = len(phasors)
         whole = np.zeros((n, self._turns * self._beats), dtype=complex)
         whole[:, self._missing :] = phasors
-        over_beats = whole.view(float).reshape(n * self._turns, -1) @ self._of_beats
-        return (self._of_turns @ over_beats.reshape(n, 2 * self._turns, -1)).reshape(n, self.size)
+        parts = whole.view(float).reshape(n * self._turns, 2 * self._beats)
+        over_beats = (parts @ self._of_beats).reshape(n, 2 * self._turns, self._points)
+        return (self._of_turns @ over_beats).reshape(n, self.size)
 
     def phasors(self, values: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Return the kept harmonics, shape (n, n_harmonics), of values on the grid."""
         n = len(values)
-        of_turns = self._to_turns @ values.reshape(n, self._shape[0], -1)
-        whole = of_turns.reshape(n * self._turns, -1) @ self._to_beats
-        found = whole.view(complex).reshape(n, -1)[:, self._missing :]
+        of_turns = self._to_turns @ values.reshape(n, self._shape[0], self._points)
+        whole = of_turns.reshape(n * self._turns, 2 * self._points) @ self._to_beats
+        found = whole.view(complex).reshape(n, self._turns * self._beats)[:, self._missing :]
         found[:, 0] *= 0.5
         return found
 
@@ -285,25 +288,3 @@ class Torus:
         parts = whole.reshape(self._turns * self._beats, 2, m)[self._missing :]
         parts[0] *= 0.5
         return parts.swapaxes(0, 1).reshape(-1, m)
-
-
-def stacked(phasors: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return real and imaginary parts side by side, shape (n, 2 H)."""
-    return np.concatenate([phasors.real, phasors.imag], axis=-1)
-
-
-def unstacked(values: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Undo `stacked`."""
-    real, imaginary = np.split(values, 2, axis=-1)
-    return real + 1j * imaginary
-
-
-def multiplication(factor: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return the real matrices, (n, 2 H, 2 H), that multiply each harmonic by its ``factor``."""
-    n, size = factor.shape
-    matrix = np.zeros((n, 2 * size, 2 * size))
-    place = np.arange(size)
-    matrix[:, place, place] = matrix[:, place + size, place + size] = factor.real
-    matrix[:, place, place + size] = -factor.imag
-    matrix[:, place + size, place] = factor.imag
-    return matrix

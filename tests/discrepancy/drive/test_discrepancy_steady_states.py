@@ -9,6 +9,7 @@ from planted_features import known_data
 from pymoo_hdte.discrepancy.drive.steady_states import merged
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.drive.effects import LawAtPort
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import SoftWindup
 
 
@@ -41,9 +42,11 @@ def test_a_record_without_a_steady_state_makes_no_slope_of_the_jump(data, soften
     assert data.prediction(values, softening, start).balance.converged.all()
 
 
-def test_merged_rows_keep_their_own_tangents(data, softening):
+def test_merged_rows_keep_their_own_tangents(data):
     values = Layout(data.base).array("start")[None]
-    whole = data.prediction(values, softening).balance
+    # Memory needs a matrix for every row.
+    springs = (LawAtPort("hysteresis", "mesh", MaxwellSlip(5.0, 1e-4)),)
+    whole = data.prediction(values, springs).balance
     places = [np.array([0, 3]), np.array([1, 2])]
     found = merged([whole.rows(rows) for rows in places], places)
     for mine, own in zip(found.tangents.factors(), whole.tangents.factors()[:4], strict=True):
