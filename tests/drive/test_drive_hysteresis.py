@@ -89,7 +89,7 @@ def test_matrices_of_nearby_cases_lead_to_the_same_states(monkeypatch):
     start = harmonic_balance(
         coefficients, input_speed=speed, load_torque=load, motor=motor, tangents=True
     )
-    rows = np.array([*range(69, -1, -1), 3, 3, 66])
+    rows = np.array([*range(69, -1, -1), *range(70), 3, 3, 66])
     nearby = replace(coefficients.rows(rows), stiffness=1.001 * coefficients.stiffness[rows])
     made = []
     matrix = Place.matrix
@@ -108,7 +108,7 @@ def test_matrices_of_nearby_cases_lead_to_the_same_states(monkeypatch):
     scale = np.abs(with_own.torsion).max()
     assert with_those.torsion == pytest.approx(with_own.torsion, abs=1e-10 * scale)
     assert few == 70
-    assert many > 2 * len(rows)
+    assert many >= len(rows) > 2 * few
 
 
 def test_springs_that_slip_bear_their_force():
