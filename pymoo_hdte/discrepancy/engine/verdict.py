@@ -167,11 +167,15 @@ def judge(
 def _best(search: Search) -> Hypothesis:
     """Return the set of least BIC of those that explain the misfit, of all if none does.
 
-    A set of several effects counts only if each of them is earned.
+    A set of several effects counts only if each of them is earned. What is fitted without one of
+    them counts too.
     """
-    found = search.found
-    explaining = (one for one in found if _explains(search, one) and search.earned(one))
-    return next(explaining, None) or next(one for one in found if search.earned(one))
+    found: list[Hypothesis] = []
+    while len(found) < len(search.found):
+        found = search.found
+        explaining = (one for one in found if _explains(search, one) and search.earned(one))
+        best = next(explaining, None) or next(one for one in found if search.earned(one))
+    return best
 
 
 def _special_case(search: Search, best: Hypothesis) -> Hypothesis:

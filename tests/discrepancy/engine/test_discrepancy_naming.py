@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import adequate
 from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.discrepancy.report.document import sentence
 from pymoo_hdte.units import ARCSEC
@@ -168,6 +169,23 @@ def test_two_effects_are_both_named():
     verdict = verdict_on(data, FEW)
     assert verdict.status == "named"
     assert labels_of(verdict) == {RIPPLE, LINE}
+
+
+def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
+    """Beside the first effect another one looks better than the second, which makes it needless."""
+    ways = {(RIPPLE,): [DRAG], (RIPPLE, DRAG): [SOFT]}
+
+    def hopeful(data, fitted, others, *known):
+        there = tuple(one.label for one in fitted.candidates)
+        return [one for one in screen(data, fitted, others) if one.candidate.label in ways[there]]
+
+    monkeypatch.setattr(search, "most_hopeful", hopeful)
+    monkeypatch.setattr(search.AnyForm, "beside", lambda *_: [])
+    monkeypatch.setattr(search.Search, "_exchange", lambda *_: None)
+    data = planted({RIPPLE: (0.003, 0.001), SOFT: (0.3, 5e-4, 4.0)})
+    verdict = verdict_on(data, [RIPPLE, DRAG, SOFT])
+    assert verdict.status == "named"
+    assert labels_of(verdict) == {RIPPLE, SOFT}
 
 
 def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():
