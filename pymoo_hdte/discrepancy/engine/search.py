@@ -209,10 +209,11 @@ class Search:
         for one in needed:
             if one.frees in alone:
                 self._fit((one,), values)
-        for one in freed:
-            if one.frees not in alone:
-                # An effect covers it under another name.
-                self._by_label.pop(label_of((one,)), None)
+        covered = {one.label for one in freed if one.frees not in alone}
+        for label in [one for one in self._by_label if one & covered]:
+            # An effect covers it under another name, with what proved needless beside it.
+            if len(label) == 1 or label_of(needed) < label:
+                self._by_label.pop(label)
 
     def _pruned(self, one: Hypothesis) -> Effects:
         """Return the parameters of a set whose removal would cost more than they do."""

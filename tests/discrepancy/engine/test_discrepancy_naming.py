@@ -208,6 +208,14 @@ def test_a_parameter_out_of_tolerance_does_not_hide_an_effect_beside_it():
     assert status("parameter", "torque_ripple") == "named"
 
 
+@pytest.mark.parametrize(("label", "value"), [(INERTIA, 0.02), ("damping_reference:mesh", 3.0)])
+def test_an_effect_has_no_rival_in_the_base_parameter_that_it_changes(label, value):
+    """Not even where another parameter ended at its bound as well, before the effect was found."""
+    verdict = verdict_on(planted({label: (value,)}), [label, RIPPLE])
+    assert (verdict.status, labels_of(verdict)) == ("named", {label})
+    assert verdict.probability == pytest.approx(RULES.named_right, abs=0.01)
+
+
 def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
     label = "eccentricity:sensor@0.009901"
     seen = [1.0 / 101.0]
