@@ -10,7 +10,7 @@ from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, explains
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.search import Search
 
@@ -20,12 +20,10 @@ NOT_PROVEN = "the error on the records kept out of the fit does not shrink"
 def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
     """Return what forbids to name a set plainly, in words; nothing if it may be named."""
     found, fitted = [], chosen.fit
-    for (candidate, bounded), (_, place) in zip(
-        bounded_unknowns(fitted), fitted.places, strict=True
-    ):
+    for candidate, bounded in bounded_unknowns(fitted):
         if bounded:
             found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
-        elif not strength_is_certain(fitted, candidate, place, search.data.rules):
+        elif candidate in uncertain(fitted, search.data.rules):
             found.append(f"the interval of {candidate.label} contains nothing")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
@@ -41,6 +39,32 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
     if per_degree > search.data.rules.contradicting_chi_square:
         found.append(left_by(per_degree))
     return found
+
+
+def other_forms(search: Search, chosen: Hypothesis) -> list[str]:
+    """Return in words which members stand for what their listed forms do not explain.
+
+    All together where the listed forms contradict a part of the data and only others do not.
+    """
+    members = chosen.members if len(chosen.members) > 1 else []
+    found = [
+        "+".join(one.label for one in member)
+        for member in members
+        if search.forms.only_in_another(chosen, search.without(chosen, member))
+    ]
+    if not found and not explains_as_listed(search, chosen) and search.forms.explains(chosen):
+        found = [chosen.label]
+    return [f"{one} has to have another form to explain what is left" for one in found]
+
+
+def explains_in_any_form(search: Search, one: Hypothesis) -> bool:
+    """Tell whether a set explains the misfit, in the listed forms of its laws or in others."""
+    return explains_as_listed(search, one) or search.forms.explains(one)
+
+
+def explains_as_listed(search: Search, one: Hypothesis) -> bool:
+    """Tell whether a set explains the misfit in the listed forms of its laws."""
+    return explains(search.data, one, search.base, search.degrees_of_freedom)
 
 
 def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[str]:
@@ -77,6 +101,13 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
                 names.append(parameter.name)
         found.append((candidate, names))
     return found
+
+
+def uncertain(fitted: Fit, rules: Rules) -> list[Candidate]:
+    """Return the candidates of a fit whose strength may be nothing."""
+    return [
+        one for one, place in fitted.places if not strength_is_certain(fitted, one, place, rules)
+    ]
 
 
 def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: Rules) -> bool:

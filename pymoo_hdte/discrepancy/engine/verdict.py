@@ -18,7 +18,10 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     NOT_PROVEN,
     bounded_unknowns,
     doubts_of,
+    explains_in_any_form,
     left_by,
+    other_forms,
+    uncertain,
 )
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
@@ -26,7 +29,6 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     alike,
     contains,
     down_to_noise,
-    explains,
     gains_enough,
     label_of,
 )
@@ -129,7 +131,7 @@ def judge(
         search.singles(screened)
         search.grow()
     chosen = _confirmed(search, _special_case(search, _best(search)))
-    certain = _explains(search, chosen)
+    certain = explains_in_any_form(search, chosen)
     if not certain:
         chosen = _simpler_law(search, chosen)
     others = [one for one in search.found if one is not chosen]
@@ -139,7 +141,7 @@ def judge(
         chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
     vote = data.held_out_vote(base, chosen.fit)
     shown = vote is None or vote.counts(rules)
-    doubts = doubts_of(search, chosen, vote if shown else None) + _other_forms(search, chosen)
+    doubts = doubts_of(search, chosen, vote if shown else None) + other_forms(search, chosen)
     if not certain and _stands_out(search, chosen):
         certain, left = True, left_by(chosen.fit.chi_square / degrees_of_freedom)
         doubts += [left] if left not in doubts else []
@@ -173,7 +175,9 @@ def _best(search: Search) -> Hypothesis:
     found: list[Hypothesis] = []
     while len(found) < len(search.found):
         found = search.found
-        explaining = (one for one in found if _explains(search, one) and search.earned(one))
+        explaining = (
+            one for one in found if explains_in_any_form(search, one) and search.earned(one)
+        )
         best = next(explaining, None) or next(one for one in found if search.earned(one))
     return best
 
@@ -191,31 +195,29 @@ def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
         for one in search.found
         if one.names != best.names and contains(best, one) and search.enough(one)
     )
-    return next((one for one in simpler if _explains(search, one) and search.earned(one)), best)
+    return next(
+        (one for one in simpler if explains_in_any_form(search, one) and search.earned(one)), best
+    )
 
 
 def _confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
-    """Return a set without small members that held-out records deny.
+    """Return a set without small members that held-out records or their own intervals deny.
 
     What a member removes beside others that leave no more than noise, fitted and held-out records
-    taken together, has to be more than noise gives.
+    taken together, has to be more than noise gives, and its strength has to differ from nothing.
     """
     data = search.data
+    doubted = uncertain(chosen.fit, data.rules)
     for member in chosen.members if len(chosen.members) > 1 else ():
         rest = search.without(chosen, member)
-        vote = data.held_out_vote(rest.fit, chosen.fit) if search.enough(rest) else None
+        if not search.enough(rest):
+            continue
+        vote = data.held_out_vote(rest.fit, chosen.fit)
         gain = rest.fit.chi_square - chosen.fit.chi_square
-        if vote and gain + vote.before - vote.after < data.rules.single_effect_gain:
+        denied = vote and gain + vote.before - vote.after < data.rules.single_effect_gain
+        if denied or any(one in doubted for one in member):
             return _confirmed(search, rest)
     return chosen
-
-
-def _explains(search: Search, one: Hypothesis) -> bool:
-    return _as_listed(search, one) or search.forms.explains(one)
-
-
-def _as_listed(search: Search, one: Hypothesis) -> bool:
-    return explains(search.data, one, search.base, search.degrees_of_freedom)
 
 
 def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
@@ -227,25 +229,9 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
     return (
         alike(one, chosen, search.degrees_of_freedom, search.data.rules)
         and not (contains(one, chosen) and any(bounded for _, bounded in bounded_unknowns(one.fit)))
-        and _explains(search, one)
+        and explains_in_any_form(search, one)
         and search.earned(one)
     )
-
-
-def _other_forms(search: Search, chosen: Hypothesis) -> list[str]:
-    """Return in words which members stand for what their listed forms do not explain.
-
-    All together where the listed forms contradict a part of the data and only others do not.
-    """
-    members = chosen.members if len(chosen.members) > 1 else []
-    found = [
-        "+".join(one.label for one in member)
-        for member in members
-        if search.forms.only_in_another(chosen, search.without(chosen, member))
-    ]
-    if not found and not _as_listed(search, chosen) and search.forms.explains(chosen):
-        found = [chosen.label]
-    return [f"{one} has to have another form to explain what is left" for one in found]
 
 
 def _stands_out(search: Search, chosen: Hypothesis) -> bool:

@@ -12,7 +12,7 @@ from pymoo_hdte.discrepancy.drive.forms.corrections import (
     AnyForceOfLoad,
     Correction,
 )
-from pymoo_hdte.discrepancy.engine import verdict
+from pymoo_hdte.discrepancy.engine import doubts, verdict
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.fitting import Vote, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import down_to_noise, hypothesis_of
@@ -108,6 +108,21 @@ def test_a_small_effect_that_held_out_records_deny_is_not_named(monkeypatch, wor
     assert (DRIFT in {one.label for one in found.chosen.candidates}) == named
 
 
+@pytest.mark.parametrize("certain", [True, False])
+def test_a_small_effect_whose_interval_contains_nothing_is_not_named(monkeypatch, certain):
+    """As the friction beside a reaction with a lag, whose level the damping takes as well."""
+    (law,) = of_labels("coulomb_friction:output")
+    (drift,) = of_labels(DRIFT)
+    data = planted(*law.build((6.0,)), *drift.build((2e-8, 500.0)))
+    of_drift = {DRIFT: certain}
+    monkeypatch.setattr(
+        doubts, "strength_is_certain", lambda _, one, *__: of_drift.get(one.label, True)
+    )
+    found = judge(data, fit(data), [law, drift])
+    assert found.status == "named"
+    assert (DRIFT in {one.label for one in found.chosen.candidates}) == certain
+
+
 COARSE = replace(DATA.rules, model_accuracy=0.5)
 """As if models were off by half, so that no small effect could count beside one."""
 
@@ -193,7 +208,7 @@ def test_laws_of_exact_form_may_have_no_other():
 
 def test_a_law_whose_listed_form_contradicts_a_part_is_not_named_plainly(monkeypatch):
     """As where it explains the whole but for one channel, which only another form follows."""
-    monkeypatch.setattr(verdict, "explains", lambda *arguments: False)
+    monkeypatch.setattr(doubts, "explains", lambda *arguments: False)
     data = planted(FOREIGN[SPRING], seed=2)
     found = judge(data, fit(data), of_labels(SPRING))
     assert AnyForm(data, found.base).explains(found.chosen)

@@ -110,7 +110,7 @@ def test_the_special_case_that_does_as_well_stands_for_a_law_at_its_bound(
     bounded, left, name, monkeypatch
 ):
     """On a linear axis (EMPS) friction fell within less than the slowest speed."""
-    monkeypatch.setattr(verdict, "_explains", lambda search, one: True)
+    monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
     best, simple = (
         law("stribeck_friction", bounded=bounded),
         law("coulomb_friction", chi_square=left),
