@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.doubts import (
@@ -183,17 +185,20 @@ def _best(search: Search) -> Hypothesis:
 
 
 def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the special case of a set that does as well, if the set itself ended at a bound.
+    """Return the special case of a set that does as well as the forms of laws allow to tell.
 
-    At the bound of a law lies a simpler one, or one that these data do not show: dry friction that
-    falls within less than the slowest speed is dry friction.
+    What it leaves beyond the set is then the model's own error, or the set ended at a bound: there
+    lies a simpler law, or one that these data do not show. Dry friction that falls within less than
+    the slowest speed is dry friction, and so is one that falls by a hundredth.
     """
-    if not any(bounded for _, bounded in bounded_unknowns(best.fit)):
-        return best
+    error = search.data.remainder * search.excess
+    if any(bounded for _, bounded in bounded_unknowns(best.fit)):
+        error = np.inf
     simpler = (
         one
         for one in search.found
         if one.names != best.names and contains(best, one) and search.enough(one)
+        if one.fit.chi_square - best.fit.chi_square <= error
     )
     return next(
         (one for one in simpler if explains_in_any_form(search, one) and search.earned(one)), best

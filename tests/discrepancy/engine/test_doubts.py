@@ -99,15 +99,19 @@ def law(name, *, bounded=False, chi_square=1000.0):
 
 
 @pytest.mark.parametrize(
-    ("bounded", "left", "name"),
+    ("bounded", "left", "removed", "name"),
     [
-        (True, 1000.0, "coulomb_friction"),
-        (True, 5000.0, "stribeck_friction"),
-        (False, 1000.0, "stribeck_friction"),
+        (True, 1000.0, 1e4, "coulomb_friction"),
+        (True, 5000.0, 1e4, "stribeck_friction"),
+        (False, 1000.0, 1e4, "coulomb_friction"),
+        (False, 1050.0, 1e4, "stribeck_friction"),
+        # What is left is then no more than a form that is off by two hundredths.
+        (False, 1050.0, 1e6, "coulomb_friction"),
+        (False, 5000.0, 1e8, "stribeck_friction"),
     ],
 )
-def test_the_special_case_that_does_as_well_stands_for_a_law_at_its_bound(
-    bounded, left, name, monkeypatch
+def test_the_special_case_that_does_as_well_stands_for_its_law(
+    bounded, left, removed, name, monkeypatch
 ):
     """On a linear axis (EMPS) friction fell within less than the slowest speed."""
     monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
@@ -119,6 +123,8 @@ def test_the_special_case_that_does_as_well_stands_for_a_law_at_its_bound(
         found=[best, simple],
         enough=lambda one: one.fit.chi_square < 1100.0,
         earned=lambda one: True,
+        excess=removed,
+        data=SimpleNamespace(remainder=RULES.model_accuracy**2),
     )
     ((chosen, _),) = verdict._special_case(search, best).names
     assert chosen == name
