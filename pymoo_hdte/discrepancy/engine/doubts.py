@@ -27,6 +27,8 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
             found.append(f"the interval of {candidate.label} contains nothing")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
+    for name in _contradicted(fitted, search.data.rules):
+        found.append(f"{name.replace('_', ' ')} ended far beyond what is stated of it")
     curves = [one.label for one in chosen.candidates if not one.exact]
     freed = any(one.frees is not None for one in chosen.candidates)
     if not search.enough(chosen):
@@ -101,6 +103,20 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
                 names.append(parameter.name)
         found.append((candidate, names))
     return found
+
+
+def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
+    """Return what is stated with a standard deviation, such as the zero of a sensor, and is not so.
+
+    It then takes what the effects leave, and what they are is not known.
+    """
+    return [
+        one.name
+        for one, side, value in zip(
+            fitted.parameters, fitted.bound_sides, fitted.values, strict=True
+        )
+        if side != 0.0 and abs(value - one.start) > rules.false_alarm_deviations * one.prior
+    ]
 
 
 def uncertain(fitted: Fit, rules: Rules) -> list[Candidate]:

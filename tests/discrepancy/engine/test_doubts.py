@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.discrepancy.engine import verdict
-from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.hypothesis import contains
 from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.effects.unknowns import Parameter
 
 FREEDOM = 1000
 
@@ -23,12 +24,15 @@ def one(label, *, exact, frees=None):
     return SimpleNamespace(label=label, exact=exact, frees=frees, parameters=(), **of_place)
 
 
-def doubts(chi_square_per_degree, *candidates):
+def doubts(chi_square_per_degree, *candidates, base=(), values=()):
     """Doubts about a set that leaves so much, with no held-out record."""
+    layout = Layout(base)
     fitted = SimpleNamespace(
         chi_square=chi_square_per_degree * FREEDOM,
         at_bounds=(),
-        bound_sides=np.zeros(0),
+        parameters=base,
+        values=np.array(values),
+        bound_sides=1.0 * (values >= layout.array("upper")) if base else np.zeros(0),
         places=[(each, slice(0, 0)) for each in candidates],
     )
     quiet = chi_square_per_degree < 1.1
@@ -78,6 +82,16 @@ def test_a_harmonic_of_another_effect_is_not_certain(left, label, doubtful):
     line = one(label, exact=True)
     assert bool(doubts(left, CLEARANCE, line)) == doubtful
     assert bool(doubts(left, line, CLEARANCE)) == doubtful
+
+
+@pytest.mark.parametrize(
+    ("prior", "value", "doubtful"),
+    [(0.1, 1.0, True), (0.1, 0.9, False), (0.5, 1.0, False), (np.inf, 1.0, False)],
+)
+def test_a_sensor_far_beyond_what_is_stated_of_it_is_a_doubt(prior, value, doubtful):
+    """Friction of the load that begins slowly was named with a dry one and a zero of ten times."""
+    zero = Parameter("output_torque_zero", 0.0, -1.0, 1.0, 0.1, prior=prior)
+    assert bool(doubts(1.0, FRICTION, base=(zero,), values=(value,))) == doubtful
 
 
 def test_what_is_left_in_multiples_of_the_noise_is_a_doubt():
