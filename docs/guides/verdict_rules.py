@@ -176,15 +176,26 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #        distances above. Where even the chosen form leaves more than noise, that of the evidence is
 #        stretched by :math:`\chi^2 / \nu`.
 #    * - ``named``
-#      - A set explains it, and no other comes near. A law that contains the named one is no other.
+#      - A set explains it, and no other comes near. A law that contains the named one and ended at
+#        a bound is no other.
 #    * - ``partial``
 #      - As before, but one of its values ended at a bound, the interval of a strength contains
-#        nothing, values out of tolerance stand beside a curve that leaves more than noise, or more
-#        than three times the noise is left.
+#        nothing, a sensor's zero or gain ended far beyond what is stated of it, values out of
+#        tolerance stand beside a curve that leaves more than noise, or more than three times the
+#        noise is left.
 #    * - ``parameter``
 #      - The set that explains it is no effect but a base parameter beyond its tolerance.
 
 print(", ".join(STATUSES))
+
+# %%
+# Two of these rules make a set smaller before it is judged. A law gives way to its special case if
+# that leaves no more than noise, and no more beyond the law than the share of the misfit by which
+# the forms of laws are off: dry friction that falls by a hundredth is dry friction. And beside
+# effects that leave no more than noise, a further one is dropped if its strength may be nothing, or
+# if the records kept out of the fit deny it.
+
+print(f"forms of laws are off by                   {RULES.model_accuracy:g}")
 
 # %%
 # Probability
