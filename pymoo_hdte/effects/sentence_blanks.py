@@ -13,6 +13,7 @@ from pymoo_hdte.checks import InvalidInput, one_of
 
 BLANKS = ("port", "order", "force")
 """What a sentence may leave open: the port, the orders, and the word for what acts there."""
+_OUT = " lies outside its tolerance."
 _PORT = r"([A-Za-z]\w*(?:\.\w+)*(?: of \w+)?)"
 _LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
 
@@ -57,7 +58,20 @@ def sentence_at(sentence: str, port: str, orders: str, force: str) -> str:
 
 def out_of_tolerance_sentence(parameter: str) -> str:
     """Return the sentence for a base parameter, given in words, that is out of tolerance."""
-    return f"The {parameter} lies outside its tolerance."
+    return f"The {parameter}{_OUT}"
+
+
+def joined_sentences(sentences: Sequence[str]) -> str:
+    """Return sentences one after the other, all that are of values out of tolerance as one.
+
+    >>> joined_sentences([out_of_tolerance_sentence(one) for one in ("stiffness", "damping")])
+    'The stiffness and damping lie outside their tolerances.'
+    """
+    values = [one.removeprefix("The ").removesuffix(_OUT) for one in sentences if _OUT in one]
+    if len(values) < 2:
+        return " ".join(sentences)
+    of_values = f"The {listed(values)} lie outside their tolerances."
+    return " ".join([*(one for one in sentences if _OUT not in one), of_values])
 
 
 def listed(words: Sequence[str]) -> str:
@@ -83,5 +97,7 @@ def _words(label: re.Match[str]) -> str:
     name, form, port, order = label.groups()
     # Dots stand between the words of a known effect's number, and in its order.
     port = re.sub(r"_|(?<!\d)\.|\.(?!\d)", " ", port)
+    if name == "parameter":
+        return f"{port} (out of tolerance)"
     details = [port, form, None if order is None else f"order {order}"]
     return f"{name.replace('_', ' ')} ({', '.join(one for one in details if one)})"

@@ -20,7 +20,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.effects.sentence_blanks import in_words, joined_sentences
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter, line_with_variance
 
 SCHEMA_VERSION = 1
@@ -106,7 +106,7 @@ def sentence(verdict: Verdict) -> str:
         return "Nothing is missing: the believed drive explains the records within its tolerances."
     if chosen is None:
         return "Something is missing that no known effect explains."
-    what = " ".join(candidate.sentence for candidate in chosen.candidates)
+    what = joined_sentences([candidate.sentence for candidate in chosen.candidates])
     if not chosen.listed:
         return f"Something is missing that is none of the known effects. {what}"
     if verdict.status == "unlisted":

@@ -146,7 +146,7 @@ def test_numbers_have_names_words_and_units():
         "amplitude of the kinematic error of order 3.7"
     )
     said = in_words("the nearest is parameter:kinematic_error.3.7.amplitude.")
-    assert said == "the nearest is parameter (kinematic error 3.7 amplitude)."
+    assert said == "the nearest is kinematic error 3.7 amplitude (out of tolerance)."
     assert base_unit("kinematic_error.3.7.amplitude") == "rad"
     assert base_unit("hysteresis.mesh.torsion") == "rad"
     assert not any(name.endswith(("order", "phase")) for name in known_values(effects))
