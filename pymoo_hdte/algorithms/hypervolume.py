@@ -49,7 +49,8 @@ def most_hypervolume(
         kept = _kept_of_two if COMPILES else _kept_of_two_in_numpy
         return np.sort(order[kept(scaled[order], order, size)])
     safe = np.zeros(n, dtype=bool)
-    ends = np.unique(scaled.argmax(axis=0))
+    # An objective that is the same everywhere has no end.
+    ends = np.unique(scaled[:, span > 0].argmax(axis=0))
     if keep_ends and len(ends) <= size:
         safe[ends] = True
     return _kept_of_three(scaled, size, safe)

@@ -30,6 +30,14 @@ def by_definition(F, size, reference, safe=()):
     return rows
 
 
+def test_an_objective_that_is_the_same_everywhere_keeps_no_row():
+    """The first row stayed, whatever it was, as an end of it."""
+    F = np.column_stack([front(20, 2, 3), np.full(20, 4.0)])
+    order = np.random.default_rng(1).permutation(20)
+    kept = most_hypervolume(F[order], 8)
+    np.testing.assert_array_equal(np.sort(order[kept]), most_hypervolume(F, 8))
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_the_row_that_adds_least_leaves(seed):
     # So far a reference point never loses an end of two objectives.
