@@ -9,3 +9,12 @@ DOCS = ROOT / "docs"
 STORED = ROOT / "tests" / "stored"
 SHARED = ROOT.parent / "shared"
 """Campaigns and measurements, which are no part of the project; tests without them are skipped."""
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = "\n\n".join(
+    (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    for name in ("model_and_measurements", "command_line", "paper", "which_algorithm")
+)
+"""Pages that the README leaves the details to."""
+WORDS = " ".join((README + PAGES).split())
+"""Both, with single spaces."""

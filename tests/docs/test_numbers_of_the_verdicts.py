@@ -1,0 +1,46 @@
+"""Numbers of README and its pages about blind campaigns."""
+
+import re
+
+from places import README, WORDS
+
+from experiments.blind.cases import all_cases
+from experiments.blind.data import read_outcomes
+from experiments.blind.experiment import OUTCOMES, SECONDS
+from experiments.runner.committed import DATA
+
+
+def test_blind_scores_are_those_of_the_committed_cases():
+    outcomes = read_outcomes(DATA / OUTCOMES, DATA / SECONDS)
+    singles, pairs, clean = (
+        [one for one in outcomes if one.case.kind == kind] for kind in ("single", "pair", "none")
+    )
+    stated = re.search(
+        r"Of the (\d+) blind campaigns .* cases (\d+) to (\d+) have .* (\d+) of (\d+) plain "
+        r"answers were wrong, (\d+) of (\d+) single effects .* both effects of (\d+) of (\d+) pairs"
+        r".* (\d+) of (\d+) campaigns that hide nothing",
+        WORDS,
+    )
+    assert stated is not None
+    first = all_cases().index(outcomes[0].case) + 1
+    assert [int(one) for one in stated.groups()] == [
+        *(len(all_cases()), first, first + len(outcomes) - 1),
+        *(sum(one.wrong_confident for one in outcomes), sum(one.confident for one in outcomes)),
+        *(sum(one.right for one in singles), len(singles)),
+        *(sum(one.all_named for one in pairs), len(pairs)),
+        *(sum(one.status != "adequate" for one in clean), len(clean)),
+    ]
+
+
+def test_the_readme_says_what_came_of_the_blind_campaigns():
+    outcomes = read_outcomes(DATA / OUTCOMES, DATA / SECONDS)
+    plain = [one for one in outcomes if one.confident]
+    pairs = [one for one in outcomes if one.case.kind == "pair"]
+    said = " ".join(README.split())
+    assert f"Of the last {len(outcomes)} blind campaigns" in said
+    wrong = sum(one.wrong_confident for one in plain)
+    assert f"{wrong or 'none'} of {len(plain)} plain answers was wrong" in said
+    singles = [one for one in outcomes if one.case.kind == "single"]
+    assert f"of {len(singles)} single effects it found {sum(one.right for one in singles)}" in said
+    both = sum(one.all_named for one in pairs)
+    assert f"it named both in {both} of {len(pairs)}" in said
