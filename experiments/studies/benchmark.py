@@ -20,6 +20,7 @@ from experiments.runner.own_time import seconds_of_run
 from experiments.runner.registry import Context
 from experiments.runner.result import Column, Finding, Result, Table
 from experiments.studies.benchmark_parts import ratios_of_parts
+from experiments.studies.benchmark_verdicts import verdict_times
 from experiments.studies.benchmark_workers import ratios_of_workers, virtual_table
 from experiments.studies.timing import Ratio, best_time, ratio_table
 from pymoo_hdte.algorithms import AMPMOPSO, CompactSwarm, ElitistSwarm
@@ -72,6 +73,7 @@ def run(context: Context) -> Result:
             ratio_table(ratios),
             virtual_table(),
             *measured_cpu(),
+            *verdict_times(),
             machine_table(),
             _agreement_table(agreement),
         ),
