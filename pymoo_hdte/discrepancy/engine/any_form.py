@@ -63,11 +63,19 @@ class AnyForm:
     data : Evidence
     base : Fit
         Without effects.
+
+    Attributes
+    ----------
+    degrees_of_freedom : int
+        Of the base.
+    excess : float
+        Chi-square of the base beyond them.
     """
 
     def __init__(self, data: Evidence, base: Fit) -> None:
         self.data, self.base = data, base
-        self._freedom = len(base.residuals) - len(base.values)
+        self.degrees_of_freedom = len(base.residuals) - len(base.values)
+        self.excess = base.chi_square - self.degrees_of_freedom
         self._rests: dict[Fit, Rest | None] = {}
         self._by_place: dict[tuple[str, str, float | None], NDArray[np.float64]] = {}
 
@@ -134,7 +142,7 @@ class AnyForm:
         found = [reduced(each, rest.directions, rest.residual) for each in known]
         found.sort(key=lambda each: -each.reduction)
         asked = [(each, self._least(one, (each.candidate,), rest)) for each in found]
-        if not self._to_noise(one):
+        if not self.leaves_noise(one):
             asked = [(each, least) for each, least in asked if rest.excess >= least]
         ranked = [each for each, _ in asked]
         hopeful = [each for each, least in asked if each.reduction >= least]
@@ -152,7 +160,7 @@ class AnyForm:
         of exact forms, except for laws with memory; a gain that noise alone does not give is then
         enough.
         """
-        rules, to_noise = self.data.rules, self._to_noise(one)
+        rules, to_noise = self.data.rules, self.leaves_noise(one)
         error = rules.exact_model_accuracy**2
         if not one.exact:
             # At one port the corrections of a form need not hold all that a real law does.
@@ -161,11 +169,12 @@ class AnyForm:
                 error = rules.second_form_share
             elif not to_noise or any(each.remembers for each in one.candidates):
                 error = self.data.remainder
-        least = max(rules.single_effect_gain, error * (self.base.chi_square - self._freedom))
+        least = max(rules.single_effect_gain, error * self.excess)
         return least if to_noise else max(least, rules.explained_part_share * rest.excess)
 
-    def _to_noise(self, one: Hypothesis) -> bool:
-        return down_to_noise(one.fit, self._freedom, self.data.rules)
+    def leaves_noise(self, one: Hypothesis) -> bool:
+        """Tell whether a set explains the data down to the noise, in its listed forms."""
+        return down_to_noise(one.fit, self.degrees_of_freedom, self.data.rules)
 
     def _rest(self, fitted: Fit) -> Rest | None:
         forms = [self.data.corrections(one) for one in fitted.candidates]

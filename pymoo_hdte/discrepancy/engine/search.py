@@ -16,7 +16,6 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
-    down_to_noise,
     hypothesis_of,
     label_of,
     leave_the_same,
@@ -49,8 +48,8 @@ class Search:
     def __init__(self, data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> None:
         self.data, self.base, self.candidates = data, base, candidates
         self.forms = AnyForm(data, base)
-        self.degrees_of_freedom = len(base.residuals) - len(base.values)
-        self.excess = base.chi_square - self.degrees_of_freedom
+        self.degrees_of_freedom = self.forms.degrees_of_freedom
+        self.excess = self.forms.excess
         self._by_label: dict[frozenset[str], Hypothesis] = {}
         self._finished: set[frozenset[str]] = set()
         self._from_all_starts: set[frozenset[str]] = set()
@@ -112,7 +111,7 @@ class Search:
 
     def enough(self, one: Hypothesis) -> bool:
         """Tell whether a set explains the data down to the noise."""
-        return down_to_noise(one.fit, self.degrees_of_freedom, self.data.rules)
+        return self.forms.leaves_noise(one)
 
     def earned(self, one: Hypothesis) -> bool:
         """Tell whether each member of a set is earned: without it the rest explains clearly less.
