@@ -57,7 +57,7 @@ class MaxwellSlip(Aperiodic):
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents along the whole path of the port, from rest."""
         path = np.ascontiguousarray(state.path(state.position))
-        torque, slope = np.zeros_like(path), np.zeros_like(path)
+        torque, slope = np.zeros(path.shape), np.zeros(path.shape)
         _pull(path, self._slips, self._stiffnesses, torque, slope)
         return Response(state.back(torque), state.back(slope))
 

@@ -20,10 +20,11 @@ NOT_PROVEN = "the error on the records kept out of the fit does not shrink"
 def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str]:
     """Return what forbids to name a set plainly, in words; nothing if it may be named."""
     found, fitted = [], chosen.fit
+    unsure = uncertain(fitted, search.data.rules)
     for candidate, bounded in bounded_unknowns(fitted):
         if bounded:
             found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
-        elif candidate in uncertain(fitted, search.data.rules):
+        elif candidate in unsure:
             found.append(f"the interval of {candidate.label} contains nothing")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
@@ -106,7 +107,7 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
-    """Return what is stated with a standard deviation, such as the zero of a sensor, and is not so.
+    """Return what ended at a bound far beyond its stated deviation: a sensor's zero or gain.
 
     It then takes what the effects leave, and what they are is not known.
     """

@@ -46,7 +46,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules):
         4.0,
         "standard deviations",
         "A model is adequate while its chi-square exceeds the degrees of freedom by no more than "
-        "this many standard deviations, sqrt(2 x degrees of freedom).",
+        "this many standard deviations, sqrt(2 x degrees of freedom). A sensor's zero or gain "
+        "contradicts what is stated of it if it ended at a bound more than so many of its own off.",
         "Test level: noise alone exceeds it with a chance of 3e-4 (100 degrees of freedom) to 6e-5 "
         "(1400), by the chi-square distribution.",
     )
@@ -129,7 +130,7 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules):
         "relative amplitude",
         "Up to here what a first effect of no exact form leaves of a drive is its model's own "
         "error and no second effect at another port, where it leaves more than noise or has "
-        "memory.",
+        "memory; and what the special case of a law leaves beyond it is none of the law's.",
         "Simulation: with three times as many harmonics what the drive model predicts for an "
         "effect changes by up to 1.9e-2 (springs of a fortieth of the load that slip at a tenth of "
         "the wind-up; others 2e-5 or less).",
@@ -275,7 +276,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules):
     certain_deviations: float = rule(
         1.959964,
         "standard deviations",
-        "Strength of an effect below which its interval contains nothing.",
+        "Strength of an effect below which its interval contains nothing: no plain name, and no "
+        "name at all beside effects that leave no more than noise.",
         "Test level: half-width of the 95 % interval of a normal value, which reports print.",
     )
     most_seconds: int = rule(

@@ -131,7 +131,7 @@ class Search:
     def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
         """Return a set without one of its members, fitted to the end."""
         kept = tuple(other for other in one.candidates if other not in member)
-        return self._finish(self._fit(kept, one.values_of(kept)))
+        return self.finished(self._fit(kept, one.values_of(kept)))
 
     def _of_size(self, size: int) -> list[Hypothesis]:
         """Return the sets of a number of members, by rising BIC."""
@@ -150,10 +150,10 @@ class Search:
         for one in sets:
             starts = other_starts(one, self.base.values)
             if starts and (label := label_of(one.candidates)) not in self._from_all_starts:
-                self._finish(one, *starts)
+                self.finished(one, *starts)
                 self._from_all_starts.add(label)
 
-    def _finish(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
+    def finished(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
         """Return a set fitted to the end: from its values, the believed base and other starts.
 
         A resumed search needs no other starts, from which its sets come.
@@ -177,7 +177,7 @@ class Search:
             near = rules.refit_margin * rules.evidence_distance
             misfit = max(best.fit.chi_square / self.degrees_of_freedom, 1.0)
             if place < rules.most_firsts or one.bic - best.bic < near * misfit:
-                self._finish(one)
+                self.finished(one)
 
     def _parameters(self) -> None:
         """Fit all base parameters that want to leave their tolerances together.
@@ -209,8 +209,8 @@ class Search:
             if one.frees in alone:
                 self._fit((one,), values)
         covered = {one.label for one in freed if one.frees not in alone}
+        # An effect covers these under another name, with what proved needless beside them.
         for label in [one for one in self._by_label if one & covered]:
-            # An effect covers it under another name, with what proved needless beside it.
             if len(label) == 1 or label_of(needed) < label:
                 self._by_label.pop(label)
 

@@ -172,11 +172,11 @@ def _best(search: Search) -> Hypothesis:
     """Return the set of least BIC of those that explain the misfit, of all if none does.
 
     A set of several effects counts only if each of them is earned. What is fitted without one of
-    them counts too.
+    them, or fitted further, counts too.
     """
     found: list[Hypothesis] = []
-    while len(found) < len(search.found):
-        found = search.found
+    while found != (now := search.found):
+        found = now
         explaining = (
             one for one in found if explains_in_any_form(search, one) and search.earned(one)
         )
@@ -189,19 +189,23 @@ def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
 
     What it leaves beyond the set is then the model's own error, or the set ended at a bound: there
     lies a simpler law, or one that these data do not show. Dry friction that falls within less than
-    the slowest speed is dry friction, and so is one that falls by a hundredth.
+    the slowest speed is dry friction; one that falls by a hundredth may be, and is in its class.
     """
-    error = search.data.remainder * search.excess
+    error = search.data.rules.model_accuracy**2 * search.excess
     if any(bounded for _, bounded in bounded_unknowns(best.fit)):
         error = np.inf
     simpler = (
-        one
+        search.finished(one)
         for one in search.found
-        if one.names != best.names and contains(best, one) and search.enough(one)
-        if one.fit.chi_square - best.fit.chi_square <= error
+        if one.names != best.names and contains(best, one)
+    )
+    good = (
+        one
+        for one in simpler
+        if search.enough(one) and one.fit.chi_square - best.fit.chi_square <= error
     )
     return next(
-        (one for one in simpler if explains_in_any_form(search, one) and search.earned(one)), best
+        (one for one in good if explains_in_any_form(search, one) and search.earned(one)), best
     )
 
 
@@ -211,18 +215,19 @@ def _confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
     What a member removes beside others that leave no more than noise, fitted and held-out records
     taken together, has to be more than noise gives, and its strength has to differ from nothing.
     """
-    data = search.data
-    doubted = uncertain(chosen.fit, data.rules)
+    rules, smaller = search.data.rules, []
+    doubted = uncertain(chosen.fit, rules)
     for member in chosen.members if len(chosen.members) > 1 else ():
         rest = search.without(chosen, member)
         if not search.enough(rest):
             continue
-        vote = data.held_out_vote(rest.fit, chosen.fit)
+        vote = search.data.held_out_vote(rest.fit, chosen.fit)
         gain = rest.fit.chi_square - chosen.fit.chi_square
-        denied = vote and gain + vote.before - vote.after < data.rules.single_effect_gain
-        if denied or any(one in doubted for one in member):
-            return _confirmed(search, rest)
-    return chosen
+        denied = vote and gain + vote.before - vote.after < rules.single_effect_gain
+        unsure = any(one in doubted for one in member)
+        if denied or (unsure and explains_in_any_form(search, rest)):
+            smaller.append(rest)
+    return _confirmed(search, min(smaller, key=lambda one: one.bic)) if smaller else chosen
 
 
 def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:

@@ -234,8 +234,8 @@ class _Solver:
             before = longest
             distance, was = at.distance[:, 0], distance
             nearer_by_far = distance <= _SHRINKS * was
-            kept = np.where(own, nearer_by_far, shrinks)
-            factors = [one if ok else None for one, ok in zip(factors, kept, strict=True)]
+            serves = np.where(own, nearer_by_far, shrinks)
+            factors = [one if ok else None for one, ok in zip(factors, serves, strict=True)]
             halved = distance <= least / 2.0
             least = np.where(halved, distance, least)
             waited = np.where(halved, 0, waited + 1)

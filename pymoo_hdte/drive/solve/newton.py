@@ -119,7 +119,7 @@ class Place:
 
 
 def factored(matrix: Matrix) -> Factors:
-    """Return the factors of a matrix (m, m); of a singular one they lead nowhere, to NaN."""
+    """Return the factors of a matrix (m, m); a singular one leads its row to no number."""
     triangles, pivots, _ = scipy.linalg.lapack.dgetrf(matrix)
     return triangles, pivots
 

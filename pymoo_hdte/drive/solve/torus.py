@@ -111,8 +111,8 @@ class Torus:
         self._phases = np.array([axis.ravel() for axis in mesh])
         self.size = self._phases.shape[1]
         lines = self._multiples
-        self._differences = self._flat(lines[:, None] - lines, self._shape)
-        self._sums = self._flat(lines[:, None] + lines, self._shape)
+        self._differences = self._flat(lines[:, None] - lines)
+        self._sums = self._flat(lines[:, None] + lines)
         # A product of the first angle and all others: a signal is summed over the others first.
         # Of a line and its conjugate one is kept, so that the first multiple is never negative
         # and half of those with multiple 0 are missing.
@@ -167,10 +167,10 @@ class Torus:
         argument = self._phases.T @ self._multiples.T
         return np.hstack([np.cos(argument), -np.sin(argument)])
 
-    def _flat(self, multiples: NDArray[np.int_], shape: tuple[int, ...]) -> NDArray[np.int_]:
-        """Return the indices of multiples (..., n_angles) in a flattened transform of a shape."""
+    def _flat(self, multiples: NDArray[np.int_]) -> NDArray[np.int_]:
+        """Return the indices of multiples (..., n_angles) in a flattened transform of the grid."""
         wrapped = np.moveaxis(multiples % np.array(self._shape), -1, 0)
-        return np.asarray(np.ravel_multi_index(tuple(wrapped), shape))
+        return np.asarray(np.ravel_multi_index(tuple(wrapped), self._shape))
 
     def phase(self, order: float) -> NDArray[np.float64]:
         """Return ``order`` times the input angle on the grid, shape (G,), up to whole turns."""

@@ -216,6 +216,18 @@ def test_an_effect_has_no_rival_in_the_base_parameter_that_it_changes(label, val
     assert verdict.probability == pytest.approx(RULES.named_right, abs=0.01)
 
 
+def test_friction_that_hardly_falls_is_in_one_class_with_dry_friction():
+    """Another rounding of dry friction looks like that; far more fall is Stribeck's alone."""
+    labels = ["coulomb_friction:input", "stribeck_friction:input"]
+    hardly, plainly = (
+        verdict_on(planted({labels[1]: (0.5, fall, 50.0)}), labels) for fall in (4.6e-3, 0.03)
+    )
+    assert (hardly.status, hardly.chosen.label) == ("class", labels[0])
+    assert [one.label for one in hardly.equivalent] == labels[1:]
+    assert hardly.chosen.fit.chi_square - hardly.equivalent[0].fit.chi_square > 30.0
+    assert (plainly.status, plainly.chosen.label) == ("named", labels[1])
+
+
 def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
     label = "eccentricity:sensor@0.009901"
     seen = [1.0 / 101.0]

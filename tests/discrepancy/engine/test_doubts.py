@@ -138,10 +138,44 @@ def test_the_special_case_that_does_as_well_stands_for_its_law(
         enough=lambda one: one.fit.chi_square < 1100.0,
         earned=lambda one: True,
         excess=removed,
-        data=SimpleNamespace(remainder=RULES.model_accuracy**2),
+        finished=lambda one: one,
+        data=SimpleNamespace(rules=RULES),
     )
     ((chosen, _),) = verdict._special_case(search, best).names
     assert chosen == name
+
+
+def test_a_set_that_is_fitted_further_while_others_are_judged_is_judged_itself(monkeypatch):
+    monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
+    pair, trial, other, ended = (object() for _ in range(4))
+    search = SimpleNamespace(found=[pair, other, trial])
+
+    def earned(one):
+        # Without one of its members the pair is what was only tried so far.
+        if one is pair:
+            search.found = [ended, pair, other]
+        return one is not pair
+
+    search.earned = earned
+    assert verdict._best(search) is ended
+
+
+def test_the_smaller_set_of_least_bic_is_left_of_two_members_in_doubt(monkeypatch):
+    monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
+    monkeypatch.setattr(verdict, "uncertain", lambda fitted, rules: ["first", "second"])
+
+    def of(bic, *members):
+        return SimpleNamespace(
+            bic=bic, fit=SimpleNamespace(chi_square=bic), members=[(one,) for one in members]
+        )
+
+    both, alone = of(900.0, "first", "second"), {"first": of(1150.0, "f"), "second": of(990.0, "s")}
+    search = SimpleNamespace(
+        data=SimpleNamespace(rules=RULES, held_out_vote=lambda before, after: None),
+        without=lambda one, member: alone["second" if member == ("first",) else "first"],
+        enough=lambda one: True,
+    )
+    assert verdict._confirmed(search, both) is alone["second"]
 
 
 def test_two_lines_of_one_name_are_no_special_case_of_one_of_them_and_another():
