@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given
 from hypothesis import strategies as st
 from law_cases import EFFECTS, LAWS, memoryless
@@ -27,7 +28,7 @@ from pymoo_hdte.drive.effects import (
     effect_from_fields,
 )
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
-from pymoo_hdte.drive.solve.newton import multiplication, stacked, unstacked
+from pymoo_hdte.drive.solve.newton import factored, multiplication, stacked, unstacked
 from pymoo_hdte.drive.solve.steady_motion import SpeedLoop
 from pymoo_hdte.drive.solve.torus import (
     Torus,
@@ -279,6 +280,11 @@ def test_springs_integrated_over_time_are_those_laid_out_along_the_path():
     assert [law.torque(springs) for springs in found.y.T] == pytest.approx(expected, abs=5e-3)
 
 
+def along(path):
+    """The state of a port that passes these points once."""
+    return PortState(path, path, None, None, lambda values: values, lambda values: values)
+
+
 @given(st.floats(0.1, 5.0), st.floats(1e-5, 1e-3), st.floats(0.05, 3.0))
 def test_maxwell_slip_obeys_masing(force, torsion, reach):
     """A loop between +-A is the virgin curve at twice the scale, from either end."""
@@ -290,8 +296,7 @@ def test_maxwell_slip_obeys_masing(force, torsion, reach):
 
     end = reach * torsion
     up, down = np.linspace(0.0, end, 50), np.linspace(end, -end, 99)
-    stretch, _ = slip_along(np.concatenate([up, down])[None], slips)
-    torque = np.tensordot(stiffnesses, stretch, axes=1)[0]
+    torque = law.respond(along(np.concatenate([up, down])[None])).torque[0]
     assert torque[:50] == pytest.approx([virgin(d) for d in up], abs=1e-9 * force)
     masing = [virgin(end) - 2.0 * virgin((end - d) / 2.0) for d in down]
     assert torque[50:] == pytest.approx(masing, abs=1e-9 * force)
@@ -468,9 +473,13 @@ def test_a_recalled_signal_is_that_of_the_points_where_it_was(highest, rng):
 def test_springs_together_pull_as_much_as_one_after_the_other(rng):
     path = np.cumsum(rng.standard_normal((3, 200)), axis=1)
     law = MaxwellSlip(2.0, 1.5, 1.3)
-    state = PortState(path, path, None, None, lambda along: along, lambda along: along)
-    found = law.respond(state)
+    found = law.respond(along(path))
     stretch, sticking = slip_along(path, law._slips)
     weights = law.force / (4 * law._slips)
     assert found.torque == pytest.approx(np.tensordot(weights, stretch, axes=1))
     assert found.slope == pytest.approx(np.tensordot(weights, sticking, axes=1))
+
+
+def test_a_singular_matrix_leads_to_no_number():
+    triangles, pivots = factored(np.array([[1.0, 2.0], [2.0, 4.0]]))
+    assert not np.isfinite(scipy.linalg.lapack.dgetrs(triangles, pivots, np.ones(2))[0]).any()
