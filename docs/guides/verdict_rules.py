@@ -189,13 +189,13 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 print(", ".join(STATUSES))
 
 # %%
-# Two of these rules make a set smaller before it is judged. A law gives way to its special case if
-# that leaves no more than noise, and no more beyond the law than the share of the misfit by which
-# the forms of laws are off: dry friction that falls by a hundredth is dry friction. And beside
-# effects that leave no more than noise, a further one is dropped if its strength may be nothing, or
-# if the records kept out of the fit deny it.
+# Two of these rules make a set simpler before it is judged. A law gives way to its special case if
+# it ended at a bound, or if the special case leaves no more than noise and no more beyond the law
+# than a model is off by: friction that falls by a hundredth may be dry friction, and both are in
+# one class. And beside effects that leave no more than noise, a further one is dropped if its
+# strength may be nothing, or if the records kept out of the fit deny it.
 
-print(f"forms of laws are off by                   {RULES.model_accuracy:g}")
+print(f"a model is off by                          {RULES.model_accuracy:g} of an amplitude")
 
 # %%
 # Probability
@@ -277,12 +277,12 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 
 # %%
 # Of another machine than a drive, no model meets the noise of its sensors. There all of this
-# is measured in units of the *rest*, which is what up to three effects leave, and four rules are
+# is measured in units of the *rest*, which is what up to three effects leave, and three rules are
 # added (``pymoo_hdte.discrepancy.mechanism.naming``): a named effect removes at least half of the
 # power of the misfit beyond the noise of the sensors; of models that leave about as much, the one
-# with the fewest unknowns is named; a law that ended at a bound gives way to its special case; and
-# a law that merely contains the named one is no other explanation. The effects that define the rest
-# are compared as well if the search finds nothing to name, and the largest force is named first.
+# with the fewest unknowns is named; and a law that merely contains the named one is no other
+# explanation. The effects that define the rest are compared as well if the search finds nothing to
+# name, and the largest force is named first.
 
 # %%
 # Change a rule
