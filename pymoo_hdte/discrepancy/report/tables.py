@@ -60,7 +60,7 @@ class ParameterRow:
 
 @dataclass(frozen=True)
 class EffectRow:
-    """A parameter of a named effect with its 95 % interval."""
+    """A parameter of a named effect with its 95 % interval; of none if it is a believed value."""
 
     effect: str
     parameter: str
@@ -87,13 +87,15 @@ def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
     rows = []
     for effect in effects:
         where = "" if effect["order"] is None else f", order {effect['order']:.4g}"
+        label = f"{effect['name'].replace('_', ' ')} ({effect['port']}{where})"
+        if effect["name"] == "parameter":
+            label = ""
         for name, quantity in effect["parameters"].items():
             angle = quantity["unit"] == "rad" and not name.endswith("phase")
             size, unit = (ARCSEC, "arcsec") if angle else (1.0, _shown(quantity["unit"]))
             value, low, high = (
                 number / size for number in (quantity["value"], *quantity["interval95"])
             )
-            label = f"{effect['name'].replace('_', ' ')} ({effect['port']}{where})"
             rows.append(EffectRow(label, name.replace("_", " "), value, low, high, unit))
     return rows
 

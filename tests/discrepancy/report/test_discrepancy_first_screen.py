@@ -12,6 +12,7 @@ from pymoo_hdte.discrepancy.drive.gap import Gap
 from pymoo_hdte.discrepancy.drive.misfit.relevance import Relevance, largest_change, relevance
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
+from pymoo_hdte.discrepancy.report.tables import effect_rows
 from pymoo_hdte.units import ARCSEC
 
 NAMED = SimpleNamespace(
@@ -178,3 +179,16 @@ def test_nothing_named_or_nothing_stated_is_not_compared():
 @pytest.mark.parametrize(("status", "more"), [("partial", False), ("named", True)])
 def test_what_is_left_is_not_counted_as_irrelevant(status, more):
     assert not relevance(finding((7.0, 0.3), status, more), changed()).whole
+
+
+def test_a_believed_value_is_told_without_the_name_of_an_effect():
+    value = {"value": 1.1, "interval95": [1.0, 1.2], "unit": "N.m"}
+    (believed,), (effect,) = (
+        effect_rows([{"name": name, "port": port, "order": None, "parameters": {number: value}}])
+        for name, port, number in (
+            ("parameter", "input_inertia", "input_inertia"),
+            ("coulomb_friction", "input", "level"),
+        )
+    )
+    assert (believed.effect, believed.parameter) == ("", "input inertia")
+    assert (effect.effect, effect.parameter) == ("coulomb friction (input)", "level")
