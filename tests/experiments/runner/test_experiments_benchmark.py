@@ -58,7 +58,7 @@ def test_the_time_of_measured_rigs_is_shown_beside_what_is_allowed(tmp_path, mon
 
 
 def test_the_time_of_verdicts_is_shown_beside_what_is_allowed(monkeypatch):
-    pytest.importorskip("pysindy", reason="scored on the same campaigns")
+    pytest.importorskip("pysindy", reason="needs the extra blind")
     clean = [case for case in CASES if case.kind == "none"][:1]
     (table,) = verdict_times(tuple(clean))
     ((_, _, cases, _, seconds, *_),) = table.rows
