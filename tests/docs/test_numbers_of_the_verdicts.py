@@ -39,7 +39,8 @@ def test_the_readme_says_what_came_of_the_blind_campaigns():
     said = " ".join(README.split())
     assert f"Of the last {len(outcomes)} blind campaigns" in said
     wrong = sum(one.wrong_confident for one in plain)
-    assert f"{wrong or 'none'} of {len(plain)} plain answers was wrong" in said
+    verb = "was" if wrong < 2 else "were"
+    assert f"{wrong or 'none'} of {len(plain)} plain answers {verb} wrong" in said
     singles = [one for one in outcomes if one.case.kind == "single"]
     assert f"of {len(singles)} single effects it found {sum(one.right for one in singles)}" in said
     both = sum(one.all_named for one in pairs)
