@@ -147,9 +147,8 @@ def judge(
     if not certain and _stands_out(search, chosen):
         certain, left = True, left_by(chosen.fit.chi_square / degrees_of_freedom)
         doubts += [left] if left not in doubts else []
-    if certain and not down_to_noise(chosen.fit, degrees_of_freedom, rules):
-        # The rules of earning may pass over a set for which the evidence speaks. Where the chosen
-        # one leaves more than noise, both are told; where it leaves noise, nothing speaks against.
+    if certain:
+        # The rules of earning may pass over a set for which the evidence speaks: both are told.
         equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
     status = _status(chosen, certain, equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()

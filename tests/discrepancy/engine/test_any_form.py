@@ -159,16 +159,22 @@ def test_without_forms_a_small_effect_beside_another_form_is_hidden(monkeypatch)
     assert {one.label for one in found.chosen.candidates} == {SPRING}
 
 
-def test_another_form_alone_is_one_effect_unless_the_evidence_speaks_for_another(monkeypatch):
-    data = planted(FOREIGN[SPRING], seed=2)
+@pytest.mark.parametrize("listed", [True, False])
+def test_one_effect_is_named_alone_unless_the_evidence_speaks_for_another(monkeypatch, listed):
+    """A drag was named with a damping out of tolerance at a probability of 1e-19."""
+    (law,) = of_labels(SPRING)
+    data = planted(*(law.build(law.starts[0]) if listed else (FOREIGN[SPRING],)), seed=2)
     base, laws = fit(data), of_labels(SPRING, DRIFT)
     found = judge(data, base, laws)
     assert (found.status, found.chosen.label) == ("named", SPRING)
-    # It leaves more than noise: a set of more evidence that was compared is told as a rival.
-    monkeypatch.setattr(verdict.probability, "likelier", lambda chosen, *_: [found.alternatives[0]])
+    assert down_to_noise(found.chosen.fit, found.degrees_of_freedom, data.rules) == listed
+    (drift,) = of_labels(DRIFT)
+    other = fit(data, (drift,), np.append(base.values, drift.starts[0]))
+    rival = hypothesis_of(other, base.chi_square - found.degrees_of_freedom)
+    monkeypatch.setattr(verdict.probability, "likelier", lambda chosen, *_: [rival])
     again = judge(data, base, laws)
     assert (again.status, again.chosen.label) == ("class", SPRING)
-    assert again.equivalent == (found.alternatives[0],)
+    assert again.equivalent == (rival,)
 
 
 def left_by(data, laws):
