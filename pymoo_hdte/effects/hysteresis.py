@@ -136,16 +136,23 @@ def slip_along(path: Values, slips: Values) -> tuple[Values, Values]:
 
 
 @compiled
+def _followed(stretch: float, before: float, position: float, bound: float) -> tuple[float, bool]:
+    """Return the stretch of a spring that has followed the path a step, and whether it sticks."""
+    moved = stretch + position - before
+    now = min(max(moved, -bound), bound)
+    return now, now == moved
+
+
+@compiled
 def _slip(path: Values, slips: Values, stretch: Values, sticking: Values) -> None:
     springs, rows, steps = stretch.shape
     for row in range(rows):
         for spring in range(springs):
             now, before, bound = 0.0, 0.0, slips[spring]
             for step in range(steps):
-                moved = now + path[row, step] - before
-                now = min(max(moved, -bound), bound)
+                now, sticks = _followed(now, before, path[row, step], bound)
                 stretch[spring, row, step] = now
-                sticking[spring, row, step] = 1.0 if now == moved else 0.0
+                sticking[spring, row, step] = 1.0 if sticks else 0.0
                 before = path[row, step]
 
 
@@ -159,10 +166,9 @@ def _pull(path: Values, slips: Values, stiffnesses: Values, torque: Values, slop
         before = 0.0
         for step in range(steps):
             for spring in range(len(slips)):
-                moved = stretch[spring] + path[row, step] - before
-                now = min(max(moved, -slips[spring]), slips[spring])
+                now, sticks = _followed(stretch[spring], before, path[row, step], slips[spring])
                 stretch[spring] = now
                 torque[row, step] += stiffnesses[spring] * now
-                if now == moved:
+                if sticks:
                     slope[row, step] += stiffnesses[spring]
             before = path[row, step]

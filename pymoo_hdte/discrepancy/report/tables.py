@@ -87,9 +87,8 @@ def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
     rows = []
     for effect in effects:
         where = "" if effect["order"] is None else f", order {effect['order']:.4g}"
-        label = f"{effect['name'].replace('_', ' ')} ({effect['port']}{where})"
-        if effect["name"] == "parameter":
-            label = ""
+        of_effect = f"{effect['name'].replace('_', ' ')} ({effect['port']}{where})"
+        label = "" if effect["name"] == "parameter" else of_effect
         for name, quantity in effect["parameters"].items():
             angle = quantity["unit"] == "rad" and not name.endswith("phase")
             size, unit = (ARCSEC, "arcsec") if angle else (1.0, _shown(quantity["unit"]))

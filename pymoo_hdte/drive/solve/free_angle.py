@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations, Values
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.newton import Matrix, Place, factored, nearer
+from pymoo_hdte.drive.solve.newton import Place, nearer
 from pymoo_hdte.drive.solve.steady_motion import (
     BY_CASE,
     CONSTANT_TORQUE,
@@ -217,7 +217,8 @@ class _Solver:
         distance, waited = at.distance[:, 0], np.zeros(len(left), dtype=int)
         for _ in range(steps):
             own = np.array([one is None for one in factors], dtype=bool)
-            for row, one in zip(np.flatnonzero(own), at.factors(np.flatnonzero(own)), strict=True):
+            missing = np.flatnonzero(own)
+            for row, one in zip(missing, at.factors(missing), strict=True):
                 factors[row] = one
             change, energy_change = at.newton_step(size[left], factors)
             longest = np.abs(change).max(axis=1)
@@ -251,10 +252,10 @@ class _Solver:
                 equations = self.equations.rows(left)
                 at = Place(equations, self.torsion[left], self.energy[left])
 
-    def matrix(self, rows: NDArray[np.int_]) -> Matrix | None:
-        """Return the matrices (m, 2 H, 2 H) of Newton's method of some rows as they are now."""
+    def factors(self, rows: NDArray[np.int_]) -> list[Factors | None]:
+        """Return the factored matrices of Newton's method of some rows as they are now."""
         equations = self.equations.rows(rows)
-        return Place(equations, self.torsion[rows], self.energy[rows]).matrix(np.arange(len(rows)))
+        return Place(equations, self.torsion[rows], self.energy[rows]).factors(np.arange(len(rows)))
 
     def result(self) -> SteadyMotion:
         """Return the steady state as it is now."""
@@ -286,12 +287,10 @@ class _Solved:
     def factored(self, places: NDArray[np.int_]) -> Sequence[Factors | None]:
         """Return the factored matrices (2 H, 2 H) at some rows, in rising order."""
         of_blocks = places // _ROWS_AT_ONCE
-        matrices = [
-            solver.matrix(places[of_blocks == block] % _ROWS_AT_ONCE)
+        found = [
+            one
             for block, solver in enumerate(self.solvers)
             if np.any(of_blocks == block)
+            for one in solver.factors(places[of_blocks == block] % _ROWS_AT_ONCE)
         ]
-        found = [matrix for matrix in matrices if matrix is not None]
-        if len(found) < len(matrices):
-            return [None] * len(places)
-        return [factored(one) for one in np.concatenate(found)]
+        return [None] * len(places) if None in found else found
