@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +102,50 @@ class AnyForm:
         rest = self.rest(one.fit)
         return rest is not None and rest.is_noise
 
+    def explains_in_another(self, one: Hypothesis) -> bool:
+        """Tell whether a set explains the misfit in another form, however little as listed.
+
+        The base may imitate what the listed form shares with others: of a friction that grows with
+        a power of the load nearly all is a gain of the torque sensor, and the power is the misfit.
+        Every curve and harmonic of the form counts as an unknown.
+        """
+        rest = self.rest(one.fit)
+        if rest is None or not rest.is_noise:
+            return False
+        removed = self.excess - rest.excess
+        unknowns = rest.directions.shape[1] - self._of_base.shape[1]
+        gain = removed - unknowns * np.log(len(rest.residual))
+        rules = self.data.rules
+        return removed >= rules.partial_share * self.excess and bool(gain >= rules.bic_gain)
+
+    def hopeful_in_another(self, known: Sequence[Screened]) -> list[Screened]:
+        """Return the effects that may explain the misfit of the base in some form of their laws.
+
+        To first order beside the base: what comes nearest to it, and what comes about as near.
+
+        Parameters
+        ----------
+        known : sequence of Screened
+            Effects with their signatures beside the base.
+        """
+        rules = self.data.rules
+        columns = [
+            np.column_stack([self._of_base, each.signatures.T, self._forms_of(each.candidate).T])
+            for each in known
+        ]
+        rests = [self._beyond(each, self.base.residuals) for each in columns]
+        left = np.array([np.inf if one is None else one.excess for one in rests])
+        noise = (adequate(self.degrees_of_freedom, rules) - 1.0) * self.degrees_of_freedom
+        near = rules.form_ratio * max(float(left.min(initial=np.inf)), noise)
+        most = min(near, (1.0 - rules.second_hope_share) * self.excess)
+        found = [known[k] for k in np.argsort(left) if left[k] <= most]
+        return varied(found, rules.most_of_one_name)[: rules.most_fitted]
+
+    @cached_property
+    def _of_base(self) -> NDArray[np.float64]:
+        """What the base's parameters can do, orthonormal, shape (n, k)."""
+        return _orthonormal(self.base.jacobian[:, self.base.bound_sides == 0.0])
+
     def earns(self, one: Hypothesis, without: Hypothesis) -> bool:
         """Tell whether a member is earned: what is left without it is no error of form.
 
@@ -186,8 +231,12 @@ class AnyForm:
         # A bound of an effect's own unknowns limits the listed form only.
         free[fitted.n_base :] = True
         parameters = fitted.jacobian[:, free]
-        directions = _orthonormal(np.column_stack([parameters, *columns]))
-        residual = fitted.residuals - directions @ (directions.T @ fitted.residuals)
+        return self._beyond(np.column_stack([parameters, *columns]), fitted.residuals)
+
+    def _beyond(self, columns: NDArray[np.float64], residuals: NDArray[np.float64]) -> Rest | None:
+        """Return what residuals (n,) hold beyond columns (n, m); None if these follow any data."""
+        directions = _orthonormal(columns)
+        residual = residuals - directions @ (directions.T @ residuals)
         freedom = len(residual) - directions.shape[1]
         if freedom < 1:
             return None

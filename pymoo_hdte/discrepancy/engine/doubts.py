@@ -55,7 +55,9 @@ def other_forms(search: Search, chosen: Hypothesis) -> list[str]:
         for member in members
         if search.forms.only_in_another(chosen, search.without(chosen, member))
     ]
-    if not found and not explains_as_listed(search, chosen) and search.forms.explains(chosen):
+    forms = search.forms
+    in_another = forms.explains(chosen) or forms.explains_in_another(chosen)
+    if not found and not explains_as_listed(search, chosen) and in_another:
         found = [chosen.label]
     return [f"{one} has to have another form to explain what is left" for one in found]
 

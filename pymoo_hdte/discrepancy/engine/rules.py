@@ -1,9 +1,9 @@
 """All thresholds of the verdict in one place: `Rules`, each with its meaning, unit and derivation.
 
-The rules for adequacy, false alarms and names are here. Requirements on records, and thresholds at
-which a line counts as seen, are in `rules_of_records`; what makes a row faulty or a stated noise
-wrong in `rules_of_rows`; what machines other than a drive need in `rules_of_mechanisms`; what a
-report flags and shows as certain in `rules_of_report`. `Rules` has them all.
+The rules for adequacy, false alarms and names are here. `thresholds` holds the others: what records
+have to hold, and when a line counts as seen, in ``of_records``; when a row is faulty or a stated
+noise wrong in ``of_rows``; what machines other than a drive need in ``of_mechanisms``; what a
+report flags and shows as certain in ``of_report``. `Rules` has them all.
 
 Steps of difference quotients, orders of filters and tolerances of solvers are no rules. They are
 kept beside the code that needs them, since finer ones change the digits of a result but not the
@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pymoo_hdte.discrepancy.engine.rule_fields import BY_HAND, rule
-from pymoo_hdte.discrepancy.engine.rules_of_mechanisms import MechanismRules
-from pymoo_hdte.discrepancy.engine.rules_of_records import RecordRules
-from pymoo_hdte.discrepancy.engine.rules_of_report import ReportRules
-from pymoo_hdte.discrepancy.engine.rules_of_rows import RowRules
+from pymoo_hdte.discrepancy.engine.thresholds.fields import BY_HAND, rule
+from pymoo_hdte.discrepancy.engine.thresholds.of_mechanisms import MechanismRules
+from pymoo_hdte.discrepancy.engine.thresholds.of_records import RecordRules
+from pymoo_hdte.discrepancy.engine.thresholds.of_report import ReportRules
+from pymoo_hdte.discrepancy.engine.thresholds.of_rows import RowRules
 
 
 @dataclass(frozen=True, kw_only=True)

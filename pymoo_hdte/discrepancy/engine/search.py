@@ -69,7 +69,7 @@ class Search:
         least = rules.promising_share * screened[0].reduction
         promising = [one for one in screened if one.reduction >= least]
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
-            self._fit((one.candidate,), np.append(self.base.values, one.start))
+            self.alone(one)
         if self._by_label and self.found[0].explained < rules.explained_share:
             self._from_other_starts(self._of_size(1))
         self._parameters()
@@ -100,6 +100,10 @@ class Search:
                     self._exchange(one)
                 self._special_cases(one)
             self._finish_near(size + 1)
+
+    def alone(self, one: Screened) -> Hypothesis:
+        """Return a single effect, fitted so far as to rank it."""
+        return self._fit((one.candidate,), np.append(self.base.values, one.start))
 
     def resume(self, known: Sequence[Hypothesis]) -> None:
         """Fit sets that another search has found on nearly the same data, from their values."""
@@ -154,10 +158,7 @@ class Search:
                 self._from_all_starts.add(label)
 
     def finished(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
-        """Return a set fitted to the end: from its values, the believed base and other starts.
-
-        A resumed search needs no other starts, from which its sets come.
-        """
+        """Return a set fitted to the end: from its values and, unless resumed, other starts."""
         label = label_of(one.candidates)
         if label not in self._finished or starts:
             if self._resumed:

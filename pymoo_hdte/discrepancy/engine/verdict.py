@@ -12,10 +12,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.choice import (
+    best_set,
+    confirmed,
+    in_another_form,
+    left_beyond_noise,
+    simpler_law,
+    special_case,
+)
 from pymoo_hdte.discrepancy.engine.doubts import (
     NOT_PROVEN,
     bounded_unknowns,
@@ -23,7 +29,6 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     explains_in_any_form,
     left_by,
     other_forms,
-    uncertain,
 )
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
@@ -132,12 +137,15 @@ def judge(
     else:
         search.singles(screened)
         search.grow()
-    chosen = _confirmed(search, _special_case(search, _best(search)))
+    chosen = confirmed(search, special_case(search, best_set(search)))
     certain = explains_in_any_form(search, chosen)
     if not certain:
-        chosen = _simpler_law(search, chosen)
+        chosen = simpler_law(search, chosen)
+    foreign = [] if certain and chosen.listed else in_another_form(search, screened)
+    if foreign:
+        chosen, certain = foreign[0], True
     others = [one for one in search.found if one is not chosen]
-    equivalent = [one for one in others if _is_rival(search, one, chosen)]
+    equivalent = foreign[1:] or [one for one in others if _is_rival(search, one, chosen)]
     if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
         equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
         chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
@@ -147,12 +155,14 @@ def judge(
     if not certain and _stands_out(search, chosen):
         certain, left = True, left_by(chosen.fit.chi_square / degrees_of_freedom)
         doubts += [left] if left not in doubts else []
-    if certain:
+    if certain and not foreign:
         # The rules of earning may pass over a set for which the evidence speaks: both are told.
         equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
+    equivalent = _distinct(chosen, equivalent)
     status = _status(chosen, certain, equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()
-    sure = probability.of_names(status, chosen, rivals, search.found, degrees_of_freedom, rules)
+    compared = (chosen, *rivals) if foreign else search.found
+    sure = probability.of_names(status, chosen, rivals, compared, degrees_of_freedom, rules)
     return Verdict(
         status,
         base,
@@ -167,68 +177,6 @@ def judge(
     )
 
 
-def _best(search: Search) -> Hypothesis:
-    """Return the set of least BIC of those that explain the misfit, of all if none does.
-
-    A set of several effects counts only if each of them is earned. What is fitted without one of
-    them, or fitted further, counts too.
-    """
-    found: list[Hypothesis] = []
-    while found != (now := search.found):
-        found = now
-        explaining = (
-            one for one in found if explains_in_any_form(search, one) and search.earned(one)
-        )
-        best = next(explaining, None) or next(one for one in found if search.earned(one))
-    return best
-
-
-def _special_case(search: Search, best: Hypothesis) -> Hypothesis:
-    """Return the special case of a set that does as well as the forms of laws allow to tell.
-
-    What it leaves beyond the set is then the model's own error, or the set ended at a bound: there
-    lies a simpler law, or one that these data do not show. Dry friction that falls within less than
-    the slowest speed is dry friction; one that falls by a hundredth may be, and is in its class.
-    """
-    error = search.data.rules.model_accuracy**2 * search.excess
-    if any(bounded for _, bounded in bounded_unknowns(best.fit)):
-        error = np.inf
-    simpler = (
-        search.finished(one)
-        for one in search.found
-        if one.names != best.names and contains(best, one)
-    )
-    good = (
-        one
-        for one in simpler
-        if search.enough(one) and one.fit.chi_square - best.fit.chi_square <= error
-    )
-    return next(
-        (one for one in good if explains_in_any_form(search, one) and search.earned(one)), best
-    )
-
-
-def _confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
-    """Return a set without small members that held-out records or their own intervals deny.
-
-    What a member removes beside others that leave no more than noise, fitted and held-out records
-    taken together, has to be more than noise gives, and its strength has to differ from nothing.
-    """
-    rules, smaller = search.data.rules, []
-    doubted = uncertain(chosen.fit, rules)
-    for member in chosen.members if len(chosen.members) > 1 else ():
-        rest = search.without(chosen, member)
-        if not search.enough(rest):
-            continue
-        vote = search.data.held_out_vote(rest.fit, chosen.fit)
-        gain = rest.fit.chi_square - chosen.fit.chi_square
-        denied = vote and gain + vote.before - vote.after < rules.single_effect_gain
-        unsure = any(one in doubted for one in member)
-        if denied or (unsure and explains_in_any_form(search, rest)):
-            smaller.append(rest)
-    return _confirmed(search, min(smaller, key=lambda one: one.bic)) if smaller else chosen
-
-
 def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
     """Tell whether a set explains the data as well as the chosen one by something else.
 
@@ -241,6 +189,12 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
         and explains_in_any_form(search, one)
         and search.earned(one)
     )
+
+
+def _distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Return the sets that name other effects, each once: one order or another is one effect."""
+    of_names = {one.names: one for one in reversed(equivalent) if one.names != chosen.names}
+    return list(reversed(of_names.values()))
 
 
 def _stands_out(search: Search, chosen: Hypothesis) -> bool:
@@ -260,28 +214,8 @@ def _stands_out(search: Search, chosen: Hypothesis) -> bool:
         and not label_of(one.candidates) > label_of(chosen.candidates)
     )
     enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
-    least = rules.form_ratio * _left(search, chosen)
-    return enough and all(_left(search, one) >= least for one in others)
-
-
-def _simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
-    """Return the special case of a set that leaves about as little, where neither explains enough.
-
-    A law with more unknowns follows more of the form of any other law: that it leaves less of a
-    misfit that is no noise does not show it.
-    """
-    most = search.data.rules.form_ratio * _left(search, chosen)
-    special = (
-        one
-        for one in search.found
-        if one.names != chosen.names and contains(chosen, one) and _left(search, one) < most
-    )
-    return next((one for one in special if search.earned(one)), chosen)
-
-
-def _left(search: Search, one: Hypothesis) -> float:
-    """Return the excess chi-square that a set leaves."""
-    return one.fit.chi_square - search.degrees_of_freedom
+    least = rules.form_ratio * left_beyond_noise(search, chosen)
+    return enough and all(left_beyond_noise(search, one) >= least for one in others)
 
 
 def _status(

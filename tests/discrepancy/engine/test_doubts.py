@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pymoo_hdte.discrepancy.engine import verdict
+from pymoo_hdte.discrepancy.engine import choice, verdict
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.hypothesis import contains
@@ -128,7 +128,7 @@ def test_the_special_case_that_does_as_well_stands_for_its_law(
     bounded, left, removed, name, monkeypatch
 ):
     """On a linear axis (EMPS) friction fell within less than the slowest speed."""
-    monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
+    monkeypatch.setattr(choice, "explains_in_any_form", lambda search, one: True)
     best, simple = (
         law("stribeck_friction", bounded=bounded),
         law("coulomb_friction", chi_square=left),
@@ -141,12 +141,12 @@ def test_the_special_case_that_does_as_well_stands_for_its_law(
         finished=lambda one: one,
         data=SimpleNamespace(rules=RULES),
     )
-    ((chosen, _),) = verdict._special_case(search, best).names
+    ((chosen, _),) = choice.special_case(search, best).names
     assert chosen == name
 
 
 def test_a_set_that_is_fitted_further_while_others_are_judged_is_judged_itself(monkeypatch):
-    monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
+    monkeypatch.setattr(choice, "explains_in_any_form", lambda search, one: True)
     pair, trial, other, ended = (object() for _ in range(4))
     search = SimpleNamespace(found=[pair, other, trial])
 
@@ -157,12 +157,12 @@ def test_a_set_that_is_fitted_further_while_others_are_judged_is_judged_itself(m
         return one is not pair
 
     search.earned = earned
-    assert verdict._best(search) is ended
+    assert choice.best_set(search) is ended
 
 
 def test_the_smaller_set_of_least_bic_is_left_of_two_members_in_doubt(monkeypatch):
-    monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
-    monkeypatch.setattr(verdict, "uncertain", lambda fitted, rules: ["first", "second"])
+    monkeypatch.setattr(choice, "explains_in_any_form", lambda search, one: True)
+    monkeypatch.setattr(choice, "uncertain", lambda fitted, rules: ["first", "second"])
 
     def of(bic, *members):
         return SimpleNamespace(
@@ -175,7 +175,7 @@ def test_the_smaller_set_of_least_bic_is_left_of_two_members_in_doubt(monkeypatc
         without=lambda one, member: alone["second" if member == ("first",) else "first"],
         enough=lambda one: True,
     )
-    assert verdict._confirmed(search, both) is alone["second"]
+    assert choice.confirmed(search, both) is alone["second"]
 
 
 def test_two_lines_of_one_name_are_no_special_case_of_one_of_them_and_another():
@@ -249,5 +249,5 @@ def test_a_richer_law_that_leaves_a_misfit_is_no_more_certain_than_its_special_c
     monkeypatch.setattr(Candidate, "holds", lambda one, other: one.name == "richer")
     rich = set_of(a_law("richer"), left=5.0)
     special = set_of(a_law("hysteresis"), left=special_left)
-    ((chosen, _),) = verdict._simpler_law(search_among(rich, special), rich).names
+    ((chosen, _),) = choice.simpler_law(search_among(rich, special), rich).names
     assert chosen == name

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pymoo_hdte.discrepancy.engine.rule_fields import BY_HAND, RuleSet, rule
+from pymoo_hdte.discrepancy.engine.thresholds.fields import BY_HAND, RuleSet, rule
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,124 @@
+"""Which of the sets that a search has found a verdict chooses.
+
+The one of least BIC that explains the misfit, or a special case of it that does as well, without
+small members that the data deny. Where none explains the misfit, the one effect that does so in
+another form of its law than the library holds: the listed form may remove next to nothing of what
+another form does, where the base imitates what most forms of the law share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.engine.doubts import (
+    bounded_unknowns,
+    explains_in_any_form,
+    uncertain,
+)
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
+from pymoo_hdte.discrepancy.engine.screening import Screened
+from pymoo_hdte.discrepancy.engine.search import Search
+
+
+def best_set(search: Search) -> Hypothesis:
+    """Return the set of least BIC of those that explain the misfit, of all if none does.
+
+    A set of several effects counts only if each of them is earned. What is fitted without one of
+    them, or fitted further, counts too.
+    """
+    found: list[Hypothesis] = []
+    while found != (now := search.found):
+        found = now
+        explaining = (
+            one for one in found if explains_in_any_form(search, one) and search.earned(one)
+        )
+        best = next(explaining, None) or next(one for one in found if search.earned(one))
+    return best
+
+
+def special_case(search: Search, best: Hypothesis) -> Hypothesis:
+    """Return the special case of a set that does as well as the forms of laws allow to tell.
+
+    What it leaves beyond the set is then the model's own error, or the set ended at a bound: there
+    lies a simpler law, or one that these data do not show. Dry friction that falls within less than
+    the slowest speed is dry friction; one that falls by a hundredth may be, and is in its class.
+    """
+    error = search.data.rules.model_accuracy**2 * search.excess
+    if any(bounded for _, bounded in bounded_unknowns(best.fit)):
+        error = np.inf
+    simpler = (
+        search.finished(one)
+        for one in search.found
+        if one.names != best.names and contains(best, one)
+    )
+    good = (
+        one
+        for one in simpler
+        if search.enough(one) and one.fit.chi_square - best.fit.chi_square <= error
+    )
+    return next(
+        (one for one in good if explains_in_any_form(search, one) and search.earned(one)), best
+    )
+
+
+def confirmed(search: Search, chosen: Hypothesis) -> Hypothesis:
+    """Return a set without small members that held-out records or their own intervals deny.
+
+    What a member removes beside others that leave no more than noise, fitted and held-out records
+    taken together, has to be more than noise gives, and its strength has to differ from nothing.
+    """
+    rules, smaller = search.data.rules, []
+    doubted = uncertain(chosen.fit, rules)
+    for member in chosen.members if len(chosen.members) > 1 else ():
+        rest = search.without(chosen, member)
+        if not search.enough(rest):
+            continue
+        vote = search.data.held_out_vote(rest.fit, chosen.fit)
+        gain = rest.fit.chi_square - chosen.fit.chi_square
+        denied = vote and gain + vote.before - vote.after < rules.single_effect_gain
+        unsure = any(one in doubted for one in member)
+        if denied or (unsure and explains_in_any_form(search, rest)):
+            smaller.append(rest)
+    return confirmed(search, min(smaller, key=lambda one: one.bic)) if smaller else chosen
+
+
+def simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
+    """Return the special case of a set that leaves about as little, where neither explains enough.
+
+    A law with more unknowns follows more of the form of any other law: that it leaves less of a
+    misfit that is no noise does not show it.
+    """
+    most = search.data.rules.form_ratio * left_beyond_noise(search, chosen)
+    special = (
+        one
+        for one in search.found
+        if one.names != chosen.names
+        and contains(chosen, one)
+        and left_beyond_noise(search, one) < most
+    )
+    return next((one for one in special if search.earned(one)), chosen)
+
+
+def left_beyond_noise(search: Search, one: Hypothesis) -> float:
+    """Return the excess chi-square that a set leaves."""
+    return one.fit.chi_square - search.degrees_of_freedom
+
+
+def in_another_form(search: Search, screened: Sequence[Screened]) -> list[Hypothesis]:
+    """Return the single effects that explain the misfit in another form, the best as listed first.
+
+    Parameters
+    ----------
+    search : Search
+        In which no set explains the misfit.
+    screened : sequence of Screened
+        All candidates beside its base; none if only the sets that it knows are compared.
+    """
+    effects = [one for one in screened if one.candidate.frees is None]
+    for one in search.forms.hopeful_in_another(effects) if effects else ():
+        search.alone(one)
+    singles = [one for one in search.found if len(one.candidates) == 1 and one.listed]
+    found = [search.finished(one) for one in singles]
+    return [one for one in found if search.forms.explains_in_another(one)]
