@@ -15,6 +15,8 @@ from pymoo_hdte.drive.effects import DriveEffect, DriveSizes, LawAtPort, drive_e
 from pymoo_hdte.effects.effect import effect_named, place_of
 from pymoo_hdte.effects.unknowns import Parameter
 
+_ACTING_AT = {"input_damping": "input", "output_damping": "output"}
+"""Ports at which base parameters are friction, as a law there is."""
 _OF_THEIR_OWN = ("load_inertia", "damping")
 """Base parameters that an effect in the library covers under another name."""
 
@@ -56,7 +58,7 @@ def out_of_tolerance(
     """
     believed, known = {one.name: one.start for one in base}, known_values(effects)
     found = [
-        candidate.out_of_tolerance(name, words_of(name, error_orders))
+        candidate.out_of_tolerance(name, words_of(name, error_orders), _ACTING_AT.get(name, ""))
         for name in at_bounds
         if (name in MECHANICAL or name.startswith("error_amplitude_") or name in known)
         and believed[name] > 0.0

@@ -182,6 +182,7 @@ def _ranges_of(data: Data) -> Ranges:
         believed.ratio,
         believed.stiffness,
         believed.damping,
+        max(believed.load_inertia, believed.output_inertia),
         tuple(order for order, amplitude in lines if amplitude > 0.0),
         tuple(data.features.orders.tolist()),
         data.rules.form_terms,

@@ -209,8 +209,7 @@ class AnyForm:
         error = rules.exact_model_accuracy**2
         if not one.exact:
             # At one port the corrections of a form need not hold all that a real law does.
-            ports = {each.port for each in one.candidates}
-            if any(each.port in ports for each in member):
+            if any(each.beside(other) for each in member for other in one.candidates):
                 error = rules.second_form_share
             elif not to_noise or any(each.remembers for each in one.candidates):
                 error = self.data.remainder

@@ -44,6 +44,8 @@ class Candidate:
         being attributed to another effect.
     frees : str or None
         Base parameter that it frees of its tolerance.
+    acts_at : str
+        Port at which that parameter makes a torque, if it is at a port.
     form : str
         In a word, where the library holds several forms of one effect.
     remembers : bool
@@ -64,6 +66,7 @@ class Candidate:
     exact: bool = False
     listed: bool = True
     frees: str | None = None
+    acts_at: str = ""
     form: str = ""
     remembers: bool = False
     instead_of: str = ""
@@ -84,6 +87,10 @@ class Candidate:
     def goes_with(self, other: Candidate) -> bool:
         """Tell whether a drive may have both: no two of their effects are at one place."""
         return not self.places & other.places
+
+    def beside(self, other: Candidate) -> bool:
+        """Tell whether both act at one port, where one may stand for the form of the other."""
+        return (self.acts_at or self.port) == (other.acts_at or other.port)
 
     def holds(self, other: Candidate) -> bool:
         """Tell whether another effect is a special case of this one, or of this form of it."""
@@ -158,7 +165,7 @@ def candidate_of(
     )
 
 
-def out_of_tolerance(name: str, words: str) -> Candidate:
+def out_of_tolerance(name: str, words: str, acts_at: str = "") -> Candidate:
     """Return the candidate that frees a base parameter, called ``words``, of its tolerance."""
     return Candidate(
         "parameter",
@@ -169,6 +176,7 @@ def out_of_tolerance(name: str, words: str) -> Candidate:
         out_of_tolerance_sentence(words),
         exact=True,
         frees=name,
+        acts_at=acts_at,
     )
 
 

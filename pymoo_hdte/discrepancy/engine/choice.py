@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.doubts import (
     bounded_unknowns,
     explains_in_any_form,
@@ -106,19 +107,59 @@ def left_beyond_noise(search: Search, one: Hypothesis) -> float:
     return one.fit.chi_square - search.degrees_of_freedom
 
 
-def in_another_form(search: Search, screened: Sequence[Screened]) -> list[Hypothesis]:
-    """Return the single effects that explain the misfit in another form, the best as listed first.
+def in_another_form(
+    search: Search, chosen: Hypothesis, screened: Sequence[Screened]
+) -> list[Hypothesis]:
+    """Return what explains the misfit in another form, the best as listed first.
+
+    Single effects, or else the chosen set.
 
     Parameters
     ----------
     search : Search
         In which no set explains the misfit.
+    chosen : Hypothesis
+        The set that comes nearest to it.
     screened : sequence of Screened
         All candidates beside its base; none if only the sets that it knows are compared.
     """
     effects = [one for one in screened if one.candidate.frees is None]
     for one in search.forms.hopeful_in_another(effects) if effects else ():
         search.alone(one)
-    singles = [one for one in search.found if len(one.candidates) == 1 and one.listed]
-    found = [search.finished(one) for one in singles]
-    return [one for one in found if search.forms.explains_in_another(one)]
+    singles = [one for one in search.found if len(one.candidates) == 1]
+    finished = [search.finished(one) for one in singles if one.listed]
+    found = [one for one in finished if search.forms.explains_in_another(one)]
+    if not found and chosen.listed and search.forms.explains_in_another(chosen):
+        found = [chosen]
+    return found
+
+
+def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return single effects that explain in another form what a set has a curve and lines for.
+
+    A clearance that varies once in some angle need not do so as a cosine: its harmonics are lines
+    at its port, beside a play that does not vary.
+    """
+    found = []
+    for wide in search.candidates:
+        if wide.listed and wide.order is not None and _consists_of(chosen, wide, wide.order):
+            one = search.finished(search.alone(Screened(wide, 0.0, wide.starts[0])))
+            if search.forms.explains_in_another(one):
+                found.append(one)
+    return sorted(found, key=lambda one: one.bic)
+
+
+def _consists_of(chosen: Hypothesis, wide: Candidate, order: float) -> bool:
+    """Tell whether a set is a law or its special case and lines of harmonics at the same port."""
+    curves = [one for one in chosen.candidates if one.name == wide.name or wide.holds(one)]
+    lines = [one for one in chosen.candidates if one not in curves]
+    return (
+        len(curves) == 1
+        and bool(lines)
+        and all(one.port == wide.port for one in chosen.candidates)
+        and all(one.order is not None and _is_harmonic(one.order, order) for one in lines)
+    )
+
+
+def _is_harmonic(higher: float, order: float) -> bool:
+    return higher > order and bool(np.isclose(higher % order, 0.0))

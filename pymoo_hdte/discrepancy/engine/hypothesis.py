@@ -152,7 +152,9 @@ def alike(one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: R
     residual = chosen.fit.chi_square - degrees_of_freedom
     if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
         further = one.fit.chi_square - chosen.fit.chi_square
-        near = further < rules.form_accuracy**2 * (chosen.removed + residual)
+        same = all(mine.beside(other) for mine, other in differing(one, chosen))
+        accuracy = rules.form_share if same else rules.form_accuracy
+        near = further < accuracy**2 * (chosen.removed + residual)
     if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
         return near
     return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
@@ -171,12 +173,15 @@ def contains(one: Hypothesis, other: Hypothesis) -> bool:
     """
     if len(one.candidates) != len(other.candidates):
         return False
-    shared = Counter(_places(one)) & Counter(_places(other))
-    pairs = zip(
-        *(sorted(_beyond(each, shared), key=_port) for each in (one, other)),
-        strict=True,
-    )
+    pairs = differing(one, other)
     return all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
+
+
+def differing(one: Hypothesis, other: Hypothesis) -> list[tuple[Candidate, Candidate]]:
+    """Return in pairs the effects by which two sets of one size differ, by their ports."""
+    shared = Counter(_places(one)) & Counter(_places(other))
+    mine, theirs = (sorted(_beyond(each, shared), key=_port) for each in (one, other))
+    return list(zip(mine, theirs, strict=True))
 
 
 def _places(one: Hypothesis) -> list[tuple[str, str]]:

@@ -46,7 +46,7 @@ def is_earned(
     parts = ill_explained(before, alone, rules)
     if not parts:
         return False
-    same_port = any(a.port == b.port for a in member for b in rest.candidates)
+    same_port = any(a.beside(b) for a in member for b in rest.candidates)
     least = rules.second_form_share if same_port else data.remainder
     for part in (slice(None), parts[0]):
         whole, residual, after = (np.sum(each.of_parts[part]) for each in (before, alone, both))

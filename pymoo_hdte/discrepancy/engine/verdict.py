@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.engine.choice import (
     best_set,
     confirmed,
     in_another_form,
+    in_one_law,
     left_beyond_noise,
     simpler_law,
     special_case,
@@ -39,6 +40,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     gains_enough,
     label_of,
 )
+from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.search import Search
@@ -128,7 +130,10 @@ def judge(
     gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
-        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
+        if clean >= rules.least_adequate:
+            return Verdict(
+                "adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean
+            )
     if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
     search = Search(data, base, candidates)
@@ -141,7 +146,7 @@ def judge(
     certain = explains_in_any_form(search, chosen)
     if not certain:
         chosen = simpler_law(search, chosen)
-    foreign = [] if certain and chosen.listed else in_another_form(search, screened)
+    foreign = [] if certain and chosen.listed else in_another_form(search, chosen, screened)
     if foreign:
         chosen, certain = foreign[0], True
     others = [one for one in search.found if one is not chosen]
@@ -157,6 +162,7 @@ def judge(
         doubts += [left] if left not in doubts else []
     if certain and not foreign:
         # The rules of earning may pass over a set for which the evidence speaks: both are told.
+        equivalent += in_one_law(search, chosen)
         equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
     equivalent = _distinct(chosen, equivalent)
     status = _status(chosen, certain, equivalent, doubts)
@@ -183,8 +189,10 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
     A law that contains the chosen one and ends at its bound is the chosen one. Where its further
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
+    rules = search.data.rules
+    near = alike(one, chosen, search.degrees_of_freedom, rules) or undecided(one, chosen, rules)
     return (
-        alike(one, chosen, search.degrees_of_freedom, search.data.rules)
+        near
         and not (contains(one, chosen) and any(bounded for _, bounded in bounded_unknowns(one.fit)))
         and explains_in_any_form(search, one)
         and search.earned(one)

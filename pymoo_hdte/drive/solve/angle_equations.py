@@ -198,9 +198,18 @@ class AngleEquations:
         """Return the residual of the second equation, N.m."""
         return self.torus.phasors(
             self.output_inertia * motion.output_acceleration
+            + self.of_load_rates(motion)
             + self.delivered(motion)
             - motion.mesh_torque
         )
+
+    def of_load_rates(self, motion: TorsionMotion) -> Values | float:
+        """Return the torque of a load that is not rigidly coupled beyond that of its inertia."""
+        rates, torus = [motion.output_acceleration], self.torus
+        for _ in range(max((k for k, _ in self.coefficients.load_rates), default=0)):
+            slope = torus.signal(torus.derivative(torus.phasors(rates[-1])))
+            rates.append(motion.angular_speed * slope)
+        return sum(size * rates[k] for k, size in self.coefficients.load_rates)
 
     def delivered(self, motion: TorsionMotion) -> Values:
         """Return the torque, N.m, that the output passes on to load, bearings and laws there."""

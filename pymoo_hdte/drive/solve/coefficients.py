@@ -62,6 +62,10 @@ class Coefficients:
         Eq. (9), 1 by the principle of virtual work; dimensionless.
     temperature : float or ndarray, shape (n,)
         Of the drive in kelvin; NaN where it is not known.
+    load_rates : tuple of (int, float)
+        What a load that is not rigidly on the output adds to its inertia: numbers k with sizes s,
+        each a torque of s times the k-th time derivative of the output's acceleration, s in
+        N.m.s^(2 + k) per rad. The harmonic balance alone knows them; no effect has them.
 
     Examples
     --------
@@ -88,6 +92,7 @@ class Coefficients:
     laws: tuple[tuple[str, Law], ...] = ()
     reaction: float = 0.0
     temperature: float | NDArray[np.float64] = np.nan
+    load_rates: tuple[tuple[int, float], ...] = ()
 
     def rows(self, rows: slice | NDArray[np.int_]) -> Coefficients:
         """Return the coefficients of some of the designs.

@@ -271,7 +271,11 @@ class _Solver:
             transmission_error=equations.static + self.torsion,
             torsion=self.torsion,
             motor_torque=torus.phasors(loop_torque + constant),
-            coupling_torque=torus.phasors(equations.load + inertia * motion.output_acceleration),
+            coupling_torque=torus.phasors(
+                equations.load
+                + inertia * motion.output_acceleration
+                + equations.of_load_rates(motion)
+            ),
             lead=lead,
             energy=self.energy,
             converged=self.converged,

@@ -16,6 +16,7 @@ import numpy as np
 # Parts of SciPy load when they are first used: signals and statistics take longer than a study.
 from numpy.typing import NDArray
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
 from pymoo_hdte.effects.law import PORTS, Law, Memory, PortState, periodic_phase
@@ -67,6 +68,8 @@ def equations_of_motion(
     coefficients: Coefficients, start_up: StartUp, *, prescribed: bool
 ) -> Callable[[float, NDArray[np.float64]], list[float]]:
     """Return the right-hand side of Eq. (9) for the first design in ``coefficients``."""
+    if coefficients.load_rates:
+        raise InvalidInput("load_rates", coefficients.load_rates, "none in the time domain")
     ratio, load = coefficients.ratio, coefficients.load_torque
     stiffness, damping = float(coefficients.stiffness[0]), float(coefficients.damping[0])
     depth, phase = coefficients.stiffness_depth, coefficients.stiffness_phase

@@ -83,3 +83,27 @@ class DampingByRecord(DriveEffect):
             return coefficients
         factors = 1.0 + np.tile(self.shares, len(damping) // len(self.shares))
         return replace(coefficients, damping=damping * factors)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadRate(DriveEffect):
+    """A load that answers to a derivative of the output's acceleration: it is not rigidly there.
+
+    Of whatever couples it, springs, dampers or both, the torque is a series in these derivatives.
+
+    Attributes
+    ----------
+    derivative : int
+        1 or more.
+    size : float
+        N.m.s^(2 + derivative) per rad.
+    """
+
+    name = "load_rate"
+    derivative: int
+    size: float
+
+    def apply(self, coefficients: Coefficients) -> Coefficients:
+        """Return the coefficients with the torque, which the sensor at the output reads too."""
+        added = (self.derivative, self.size)
+        return replace(coefficients, load_rates=(*coefficients.load_rates, added))

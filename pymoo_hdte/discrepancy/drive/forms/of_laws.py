@@ -21,6 +21,7 @@ from pymoo_hdte.discrepancy.drive.forms.corrections import (
     Correction,
     DampingByRecord,
     Force,
+    LoadRate,
 )
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.drive import DriveEffect
@@ -43,6 +44,9 @@ _BENDS = tuple(np.geomspace(0.01, 1.0, 8).tolist())
 """Torsions, as shares of the largest, at which a stiffness may bend and springs may slip."""
 _PARTS = (0.0, np.pi / 2.0)
 """Phases of the two parts of a line."""
+_RATES = (1, 2, 3, 4)
+"""Derivatives of the load's acceleration. A coupling a third as fast as the fastest line, beyond
+which nothing is left of the load, needs no more for a hundredth of its torque."""
 _DRIFTS = (0.1, 0.3, 1.0, 3.0)
 """Time constants of a drift, as shares of the session."""
 
@@ -59,8 +63,8 @@ class Ranges:
         Largest at the output, and the torsion by it.
     duration : float
         Of the session.
-    ratio, stiffness, damping : float
-        Of the believed drive.
+    ratio, stiffness, damping, inertia : float
+        Of the believed drive; the inertia that of its load.
     lines : tuple of float
         Orders of the believed static error.
     shown : tuple of float
@@ -76,6 +80,7 @@ class Ranges:
     ratio: float
     stiffness: float
     damping: float
+    inertia: float
     lines: tuple[float, ...]
     shown: tuple[float, ...]
     terms: int
@@ -252,6 +257,12 @@ def _drift(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     return [ThermalDrift(_ANGLE / time, time) for time in times]
 
 
+def _load(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
+    """Return torques of a load that hangs on a spring, a damper or both: a series in the rate."""
+    fastest = ranges.speed.max()
+    return [LoadRate(k, _SHARE * ranges.inertia / fastest**k) for k in _RATES]
+
+
 _FORMS: dict[str, Callable[[Candidate, Ranges], list[DriveEffect]]] = {
     "coulomb_friction": _friction,
     "stribeck_friction": _friction,
@@ -270,5 +281,6 @@ _FORMS: dict[str, Callable[[Candidate, Ranges], list[DriveEffect]]] = {
     "kinematic_reaction": _reaction,
     "damping_reference": _damping,
     "damping": _damping,
+    "load_inertia": _load,
     "thermal_drift": _drift,
 }

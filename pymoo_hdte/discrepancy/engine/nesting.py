@@ -1,0 +1,67 @@
+"""Whether data tell a law from its special case: a play that varies from one that does not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains, differing
+from pymoo_hdte.discrepancy.engine.rules import Rules
+
+
+def undecided(one: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
+    """Tell whether a set and the chosen one are a law and its special case, and either may be true.
+
+    A special case is not shown where its law may vary as much as it is strong: flanks that are held
+    by a load show a play that varies as a line of the static error, which has a tolerance. And a
+    law is not shown by a part of it so small that its special case in another form has it too.
+    """
+    if contains(one, chosen):
+        pairs = differing(one, chosen)
+        return any(
+            _may_vary_as_much(one.fit, wide, chosen.fit, case, rules) for wide, case in pairs
+        )
+    if contains(chosen, one):
+        pairs = differing(chosen, one)
+        return any(_is_its_form(chosen.fit, wide, one.fit, case, rules) for wide, case in pairs)
+    return False
+
+
+def _may_vary_as_much(
+    of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rules: Rules
+) -> bool:
+    """Tell whether a line that a law adds may be as strong as its special case, by its interval."""
+    place, strength = _place(of_law, law), _strength(of_case, case)
+    for row, parameter in enumerate(law.parameters, place.start):
+        if parameter.name.endswith("_cosine"):
+            pair = np.array([row, row + 1])
+            spread = np.linalg.eigvalsh(of_law.covariance[np.ix_(pair, pair)])[-1] ** 0.5
+            largest = np.hypot(*of_law.values[pair]) + rules.certain_deviations * spread
+            if largest >= strength:
+                return True
+    return False
+
+
+def _is_its_form(of_law: Fit, law: Candidate, of_case: Fit, case: Candidate, rules: Rules) -> bool:
+    """Tell whether what a law has beyond its special case, other than lines, is a small part."""
+    shared = {one.name for one in case.parameters}
+    place = _place(of_law, law)
+    further = [
+        abs(value)
+        for one, value in zip(law.parameters, of_law.values[place], strict=True)
+        if one.lower <= 0.0 and one.name not in shared
+    ]
+    lines = any(one.name.endswith("_cosine") for one in law.parameters)
+    most = rules.form_share * _strength(of_case, case)
+    return bool(further) and not lines and max(further) <= most
+
+
+def _place(fitted: Fit, candidate: Candidate) -> slice:
+    """Return where the values of a candidate stand in a fit."""
+    return next(place for one, place in fitted.places if one is candidate)
+
+
+def _strength(fitted: Fit, candidate: Candidate) -> float:
+    """Return the fitted strength of an effect, the first of its unknowns."""
+    return abs(float(fitted.values[_place(fitted, candidate).start]))
