@@ -1,0 +1,258 @@
+"""A law that explains a misfit in another form, and laws that data cannot tell apart."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from planted_features import known_data, library, measured
+
+from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.drive.forms.corrections import (
+    AnyForce,
+    AnyForceOfLoad,
+    Correction,
+    LoadRate,
+)
+from pymoo_hdte.discrepancy.engine import choice, verdict
+from pymoo_hdte.discrepancy.engine.any_form import AnyForm
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.hypothesis import alike
+from pymoo_hdte.discrepancy.engine.membership import is_earned
+from pymoo_hdte.discrepancy.engine.nesting import undecided
+from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.search import Search
+from pymoo_hdte.discrepancy.engine.verdict import judge
+from pymoo_hdte.drive import LoadInertia
+from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.law import Response
+from pymoo_hdte.effects.unknowns import unknown, wave
+
+SPEEDS = (10.0, 40.0, 150.0, 500.0, 1200.0, 2000.0)
+LOADS = (5.0, 40.0, 20.0, 10.0, 30.0)
+DATA = known_data(
+    [(speed, LOADS[(2 * k + j) % 5]) for k, speed in enumerate(SPEEDS) for j in (0, 1)],
+    [1.0, 2.0, 2.02, 3.0],
+)
+OF_LOAD, LOAD = "load_dependent_friction:input", "load_inertia:output"
+
+
+def steep(state):
+    """Friction that grows with a power of the load; what most powers share looks like a gain."""
+    sign, sharp = smoothed_sign(state.speed)
+    size = 0.1 * np.abs(state.load) ** 1.6
+    return Response(size * sign, damping=size * sharp)
+
+
+CLUTCH = (LoadInertia(0.03), *(LoadRate(k, 0.03 * (-5e-4) ** k) for k in (1, 2, 3, 4)))
+"""Inertia in a viscous clutch, which brings it to speed within half a millisecond."""
+MISFITS = {OF_LOAD: (Correction("input", AnyForceOfLoad(steep)),), LOAD: CLUTCH}
+NEAREST = {OF_LOAD: "stribeck_friction:input", LOAD: "damping_reference:mesh"}
+
+
+def planted(label, seed=1):
+    return measured(MISFITS[label], np.random.default_rng(seed), DATA)[0]
+
+
+def judged(label, data):
+    laws = [one for one in library(DATA) if one.label in (label, NEAREST[label])]
+    return judge(data, fit(data), laws)
+
+
+@pytest.mark.parametrize("label", MISFITS)
+def test_a_law_is_named_in_part_whose_listed_form_explains_little(label):
+    """What the base and another effect imitate of it leaves nothing that the listed form has."""
+    data = planted(label)
+    found = judged(label, data)
+    assert (found.status, found.chosen.label) == ("partial", label)
+    assert found.chosen.explained < RULES.explained_share
+    assert any("another form" in one for one in found.doubts)
+    assert AnyForm(data, found.base).explains_in_another(found.chosen)
+
+
+@pytest.mark.parametrize("label", MISFITS)
+def test_without_its_forms_nothing_tells_that_such_a_law_has_another(label, monkeypatch):
+    monkeypatch.setattr(Data, "corrections", lambda self, candidate: [])
+    found = judged(label, planted(label))
+    assert found.status == ("partial" if label == LOAD else "unlisted")
+    assert not any("another form" in one for one in found.doubts)
+
+
+def test_a_force_of_another_argument_is_no_form_of_a_law():
+    """A torque that pulses with the torsion's sign at the input is neither of the two."""
+
+    def pulsing(state):
+        size = 0.02 * np.cos(state.phase(3.0)) ** 3
+        return Response(size)
+
+    data = measured([Correction("input", AnyForce(pulsing, (3.0, 9.0)))], None, DATA)[0]
+    forms = AnyForm(data, fit(data))
+    laws = [one for one in library(DATA) if one.label in (*MISFITS, *NEAREST.values())]
+    search = Search(data, forms.base, laws)
+    for law in laws:
+        start = np.append(forms.base.values, law.starts[0])
+        assert not search.forms.explains_in_another(search._fit((law,), start))
+
+
+def test_as_many_curves_as_a_misfit_has_parts_do_not_explain_it(monkeypatch):
+    """Each counts as an unknown: what is left is noise, and the criterion is no better."""
+    data = planted(OF_LOAD)
+    (law,) = [one for one in library(DATA) if one.label == OF_LOAD]
+    forms = AnyForm(data, fit(data))
+    one = Search(data, forms.base, [law])._fit((law,), np.append(forms.base.values, law.starts[0]))
+    assert forms.explains_in_another(one)
+    least = 1e3 * RULES.bic_gain + forms.excess
+    stricter = replace(data, rules=replace(RULES, bic_gain=least))
+    assert not AnyForm(stricter, forms.base).explains_in_another(one)
+
+
+def test_the_chosen_set_may_explain_in_another_form_where_no_single_effect_does():
+    members = {name: a_law(name) for name in ("first", "second")}
+    alone = {name: a_set(one) for name, one in members.items()}
+    both = a_set(*members.values())
+    search = SimpleNamespace(
+        found=[both, *alone.values()],
+        finished=lambda one: one,
+        forms=SimpleNamespace(explains_in_another=lambda one: one is both),
+    )
+    assert choice.in_another_form(search, both, ()) == [both]
+    search.forms.explains_in_another = lambda one: one is not alone["first"]
+    assert choice.in_another_form(search, both, ()) == [alone["second"]]
+
+
+def a_law(name, port="mesh", parameters=(), order=None, holds=()):
+    class Law(Candidate):
+        def holds(self, other):
+            return other.name in holds
+
+    start = tuple(one.start for one in parameters)
+    return Law(name, port, tuple(parameters), (start,), lambda values: (), "", order=order)
+
+
+def a_set(*members, values=(), spread=1e-3, chi_square=1000.0, removed=1e5):
+    """Members with fitted values, all of one spread."""
+    ends = np.cumsum([0, *(len(one.parameters) for one in members)]).tolist()
+    fitted = SimpleNamespace(
+        values=np.array(values),
+        covariance=spread**2 * np.eye(len(values)),
+        places=[(one, slice(*ends[k : k + 2])) for k, one in enumerate(members)],
+        chi_square=chi_square,
+        evidence=chi_square,
+    )
+    return SimpleNamespace(
+        candidates=members,
+        fit=fitted,
+        listed=True,
+        exact=False,
+        bic=chi_square,
+        removed=removed,
+        names=frozenset((one.name, one.port) for one in members),
+    )
+
+
+WIDTH = unknown("half_width", 0.0, 1.0, 0.1)
+PLAY = a_law("play", parameters=[WIDTH])
+VARYING = a_law(
+    "varying", parameters=[*wave("variation", 1.0, 0.1), WIDTH], order=1.0, holds=("play",)
+)
+
+
+@pytest.mark.parametrize(
+    ("variation", "spread", "open_to_both"),
+    [(0.0, 0.01, False), (0.0, 0.1, True), (0.15, 0.01, True), (0.05, 0.01, False)],
+)
+def test_a_play_that_may_vary_as_much_as_it_is_wide_is_not_shown_to_be_steady(
+    variation, spread, open_to_both
+):
+    """Held flanks show a varying play as a line of the static error, which has a tolerance."""
+    steady = a_set(PLAY, values=[0.1])
+    varies = a_set(VARYING, values=[0.0, variation, 0.1], spread=spread)
+    assert undecided(varies, steady, RULES) == open_to_both
+
+
+@pytest.mark.parametrize(("excess", "open_to_both"), [(0.004, True), (0.006, False)])
+def test_a_friction_that_falls_by_a_twentieth_may_be_dry(excess, open_to_both):
+    """Dry friction whose sign is a root was named one that falls with speed by a thirtieth."""
+    level, fading = unknown("level", 0.0, 1.0, 0.1), unknown("fading", 1.0, 100.0, 10.0)
+    falls = [level, unknown("excess", 0.0, 1.0, 0.1), fading]
+    dry = a_set(a_law("dry", "input", [level]), values=[0.1])
+    falling = a_set(a_law("falling", "input", falls, holds=("dry",)), values=[0.1, excess, 30.0])
+    assert undecided(dry, falling, RULES) == open_to_both
+
+
+def test_a_line_is_never_the_form_of_what_does_not_vary():
+    varies = a_set(VARYING, values=[0.001, 0.0, 0.1])
+    assert not undecided(a_set(PLAY, values=[0.1]), varies, RULES)
+
+
+@pytest.mark.parametrize(("port", "near"), [("mesh", True), ("output", False)])
+def test_forms_of_two_laws_at_one_port_overlap(port, near):
+    """A soft skin on one flank was named a soft wind-up, which left 3.1e-2 less of the whole."""
+    further = 2.0 * RULES.form_accuracy**2 * 1e5
+    soft = a_set(a_law("soft_windup"))
+    play = a_set(a_law("backlash", port), chi_square=1000.0 + further)
+    assert alike(play, soft, 1000, RULES) == near
+
+
+def test_one_effect_at_one_order_or_another_is_one_member_of_a_class():
+    """A play that varies once or twice in a turn made four of a class of three effects."""
+    soft, once, twice = a_set(a_law("soft")), *(a_set(a_law("varying", order=k)) for k in (1, 2))
+    same = a_set(a_law("soft", order=1.0))
+    assert verdict._distinct(soft, [once, twice, same]) == [once]
+
+
+@pytest.mark.parametrize(
+    ("order", "line_port", "in_one"),
+    [(4.0, "mesh", True), (3.5, "mesh", False), (4.0, "sensor", False), (1.0, "mesh", False)],
+)
+def test_a_play_with_a_line_may_be_a_play_that_varies_otherwise_than_as_a_cosine(
+    order, line_port, in_one
+):
+    """A clearance with a harmonic was named a kinematic error of order 4 with a backlash."""
+    line = a_law("kinematic_error", line_port, order=order)
+    wide = a_set(VARYING)
+    search = SimpleNamespace(
+        candidates=[PLAY, line, VARYING],
+        alone=lambda one: wide,
+        finished=lambda one: one,
+        forms=SimpleNamespace(explains_in_another=lambda one: one is wide),
+    )
+    assert choice.in_one_law(search, a_set(line, PLAY)) == ([wide] if in_one else [])
+    assert choice.in_one_law(search, a_set(PLAY)) == []
+
+
+@pytest.mark.parametrize(("acts_at", "earned"), [("input", False), ("mesh", True)])
+def test_a_damping_out_of_tolerance_may_be_the_form_of_a_drag_at_its_port(
+    acts_at, earned, monkeypatch
+):
+    """A fluid that thins was named a drag with a damping that had not changed."""
+    drag = a_law("drag", "input")
+    freed = Candidate("parameter", "b", (), ((),), lambda v: (), "", frees="b", acts_at=acts_at)
+    monkeypatch.setattr(
+        "pymoo_hdte.discrepancy.engine.membership.ill_explained", lambda *arguments: [0]
+    )
+    whole = {"base": 1e6, "rest": 4000.0, "both": 100.0}
+
+    def fitted(name):
+        return SimpleNamespace(name=name, chi_square=1000.0 + whole[name], residuals=np.zeros(1000))
+
+    base = fitted("base")
+    base.values = np.zeros(0)
+    data = SimpleNamespace(
+        rules=RULES,
+        remainder=RULES.model_accuracy**2,
+        excess=lambda fit: SimpleNamespace(of_parts=np.array([whole[fit.name]])),
+    )
+    rest = SimpleNamespace(fit=fitted("rest"), exact=False, candidates=(drag,))
+    both = SimpleNamespace(fit=fitted("both"), candidates=(drag, freed))
+    assert is_earned(data, base, both, rest, (freed,)) == earned
+
+
+@pytest.mark.parametrize(("probable", "status"), [(0.11, "adequate"), (0.09, "unlisted")])
+def test_nothing_is_missing_only_where_that_is_probable(probable, status, monkeypatch):
+    """Dry friction was called nothing at a probability of 0.02."""
+    data = measured((), np.random.default_rng(3), DATA)[0]
+    monkeypatch.setattr(verdict.probability, "of_nothing", lambda *arguments: probable)
+    laws = [one for one in library(DATA) if one.label == OF_LOAD]
+    assert judge(data, fit(data), laws).status == status
