@@ -167,14 +167,16 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #    * - status
 #      - rule
 #    * - ``adequate``
-#      - The base passes the limit, and no candidate would gain enough.
+#      - The base passes the limit, no candidate would gain enough, and the probability that nothing
+#        is missing is not too small.
 #    * - ``unlisted``
-#      - It does not, and the best set does not explain the misfit either, or the error on records
-#        kept out of the fit does not shrink with it.
+#      - It does not, and no set explains the misfit either, in the listed form of its laws or in
+#        another, or the error on records kept out of the fit does not shrink with it.
 #    * - ``class``
 #      - A set explains it, and another set of as many effects that explains it too lies within the
 #        distances above. Where even the chosen form leaves more than noise, that of the evidence is
-#        stretched by :math:`\chi^2 / \nu`.
+#        stretched by :math:`\chi^2 / \nu`. So are a law and its special case if the data leave
+#        both open.
 #    * - ``named``
 #      - A set explains it, and no other comes near. A law that contains the named one and ended at
 #        a bound is no other.
@@ -182,11 +184,23 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #      - As before, but one of its values ended at a bound, the interval of a strength contains
 #        nothing, a sensor's zero or gain ended far beyond what is stated of it, values out of
 #        tolerance stand beside a curve that leaves more than noise, or more than three times the
-#        noise is left.
+#        noise is left. Or it explains the misfit in another form of its law only.
 #    * - ``parameter``
 #      - The set that explains it is no effect but a base parameter beyond its tolerance.
 
 print(", ".join(STATUSES))
+
+# %%
+# *In another form*: no bearing has exactly the friction curve of a list, and no load is quite
+# rigidly coupled. To first order, other forms of a law are sums of curves of the same argument, of
+# harmonics of the same angle, or of rates of the load's acceleration. Where no set explains the
+# misfit, the one effect that leaves nothing but noise beyond them is named in part, however little
+# its listed form removes: each curve counts as an unknown. For how little, and where a law and its
+# special case are both open:
+
+print(f"share of the excess removed at least       {RULES.partial_share:g}")
+print(f"a law may be the form of its special case  {RULES.form_share:g} of its strength")
+print(f"probability that nothing is missing        {RULES.least_adequate:g} at least")
 
 # %%
 # Two of these rules make a set simpler before it is judged. A law gives way to its special case if

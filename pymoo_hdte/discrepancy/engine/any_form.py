@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
+from pymoo_hdte.discrepancy.engine.free_form import in_free_form
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     adequate,
@@ -109,13 +110,17 @@ class AnyForm:
         a power of the load nearly all is a gain of the torque sensor, and the power is the misfit.
         Every curve and harmonic of the form counts as an unknown.
         """
-        rest = self.rest(one.fit)
-        if rest is None or not rest.is_noise:
+        rules, rest = self.data.rules, self.rest(one.fit)
+        if rest is None:
+            return False
+        if not rest.is_noise and self.excess - rest.excess >= rules.explained_share * self.excess:
+            # Little is left to first order around the listed form, which the other may be far from.
+            rest = self.rest(in_free_form(self.data, one.fit)) or rest
+        if not rest.is_noise:
             return False
         removed = self.excess - rest.excess
         unknowns = rest.directions.shape[1] - self._of_base.shape[1]
         gain = removed - unknowns * np.log(len(rest.residual))
-        rules = self.data.rules
         return removed >= rules.partial_share * self.excess and bool(gain >= rules.bic_gain)
 
     def hopeful_in_another(self, known: Sequence[Screened]) -> list[Screened]:

@@ -14,11 +14,11 @@ from pymoo_hdte.discrepancy.drive.forms.corrections import (
     Correction,
     LoadRate,
 )
-from pymoo_hdte.discrepancy.engine import choice, verdict
+from pymoo_hdte.discrepancy.engine import any_form, choice, verdict
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.hypothesis import alike
+from pymoo_hdte.discrepancy.engine.hypothesis import alike, hypothesis_of
 from pymoo_hdte.discrepancy.engine.membership import is_earned
 from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES
@@ -77,6 +77,19 @@ def test_without_its_forms_nothing_tells_that_such_a_law_has_another(label, monk
     found = judged(label, planted(label))
     assert found.status == ("partial" if label == LOAD else "unlisted")
     assert not any("another form" in one for one in found.doubts)
+
+
+def test_a_form_far_from_the_listed_one_is_followed_there(monkeypatch):
+    """To first order around an inertia that is rigid a slow clutch leaves more than noise."""
+    slow = (LoadInertia(0.3), *(LoadRate(k, 0.3 * (-5e-4) ** k) for k in (1, 2, 3, 4)))
+    data = measured(slow, np.random.default_rng(1), DATA)[0]
+    forms = AnyForm(data, fit(data))
+    (law,) = [one for one in library(DATA) if one.label == LOAD]
+    found = fit(data, [law], np.append(forms.base.values, 0.3))
+    one = hypothesis_of(found, forms.excess)
+    assert forms.explains_in_another(one)
+    monkeypatch.setattr(any_form, "in_free_form", lambda data, fitted: fitted)
+    assert not forms.explains_in_another(one)
 
 
 def test_a_force_of_another_argument_is_no_form_of_a_law():

@@ -58,6 +58,16 @@ class Correction(DriveEffect):
     port: str
     law: Law
 
+    def times(self, factor: float) -> Correction | None:
+        """Return a larger one, or None for a law with memory."""
+        law, kind = self.law, AnyForceOfLoad if self.law.loaded else AnyForce
+
+        def force(state: PortState) -> Response:
+            one = law.respond(state)
+            return Response(factor * one.torque, factor * one.slope, factor * one.damping)
+
+        return None if law.states else Correction(self.port, kind(force, law.orders))
+
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with the law."""
         return replace(coefficients, laws=(*coefficients.laws, (self.port, self.law)))
@@ -75,6 +85,10 @@ class DampingByRecord(DriveEffect):
 
     name = "damping_by_record"
     shares: NDArray[np.float64]
+
+    def times(self, factor: float) -> DampingByRecord:
+        """Return a larger one."""
+        return DampingByRecord(factor * self.shares)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients; those of a sweep at rest, of one row, as they are."""
@@ -102,6 +116,10 @@ class LoadRate(DriveEffect):
     name = "load_rate"
     derivative: int
     size: float
+
+    def times(self, factor: float) -> LoadRate:
+        """Return a larger one."""
+        return LoadRate(self.derivative, factor * self.size)
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with the torque, which the sensor at the output reads too."""

@@ -1,0 +1,48 @@
+"""A fit in which the form of a law is free: the sizes of its corrections are unknowns, too.
+
+Corrections are small, so that their response around a listed form is linear. Where the true form is
+far from the listed one, as that of a load in a clutch, they have to be followed there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
+from pymoo_hdte.effects.unknowns import unknown
+
+_MOST = 1e3
+"""Largest size of a correction, in units of its own: the whole of what it corrects."""
+
+
+def in_free_form(data: Evidence, fitted: Fit) -> Fit:
+    """Return a set of effects fitted further with the sizes of its corrections as unknowns."""
+    freed = [_freed(each, data.corrections(each) or ()) for each in fitted.candidates]
+    start = [fitted.values[: fitted.n_base]]
+    for (each, place), more in zip(fitted.places, freed, strict=True):
+        start += [fitted.values[place], np.zeros(len(more.parameters) - len(each.parameters))]
+    return fit(data, freed, np.concatenate(start))
+
+
+def _freed(candidate: Candidate, corrections: Sequence[Any]) -> Candidate:
+    """Return a candidate with the sizes of its corrections as unknowns beside its own.
+
+    Those without ``times`` are lines and drifts, to which data are close to linear, or have memory.
+    """
+    own = len(candidate.parameters)
+    sized = [one for one in corrections if hasattr(one, "times") and one.times(1.0) is not None]
+    names = [f"correction_{number}" for number in range(len(sized))]
+    sizes = [unknown(name, -_MOST, _MOST, 1.0, linear=True) for name in names]
+
+    def build(values: Sequence[float]) -> tuple[Any, ...]:
+        added = zip(sized, values[own:], strict=True)
+        return (*candidate.build(values[:own]), *(one.times(size) for one, size in added if size))
+
+    starts = tuple((*start, *(0.0 for _ in sized)) for start in candidate.starts)
+    parameters = (*candidate.parameters, *sizes)
+    return replace(candidate, parameters=parameters, starts=starts, build=build)
