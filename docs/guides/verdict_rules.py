@@ -167,8 +167,7 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #    * - status
 #      - rule
 #    * - ``adequate``
-#      - The base passes the limit, no candidate would gain enough, and the probability that nothing
-#        is missing is not too small.
+#      - The base passes the limit, and no candidate would gain enough.
 #    * - ``unlisted``
 #      - It does not, and no set explains the misfit either, in the listed form of its laws or in
 #        another, or the error on records kept out of the fit does not shrink with it.
@@ -200,7 +199,6 @@ print(", ".join(STATUSES))
 
 print(f"share of the excess removed at least       {RULES.partial_share:g}")
 print(f"a law may be the form of its special case  {RULES.form_share:g} of its strength")
-print(f"probability that nothing is missing        {RULES.least_adequate:g} at least")
 
 # %%
 # Two of these rules make a set simpler before it is judged. A law gives way to its special case if

@@ -69,7 +69,7 @@ def test_the_sensor_at_the_output_reads_what_accelerates_the_load():
     assert read == pytest.approx(torque, rel=1e-3)
 
 
-def test_only_the_harmonic_balance_knows_such_a_load(monkeypatch):
+def test_only_the_harmonic_balance_knows_such_a_load():
     drive = in_a_clutch(small_motion(), 1)
     balance = harmonic_balance(drive)
     spectrum = hill_steady_state(drive)

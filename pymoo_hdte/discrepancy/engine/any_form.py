@@ -79,6 +79,7 @@ class AnyForm:
         self.degrees_of_freedom = len(base.residuals) - len(base.values)
         self.excess = base.chi_square - self.degrees_of_freedom
         self._rests: dict[Fit, Rest | None] = {}
+        self._free: dict[Fit, Fit] = {}
         self._by_place: dict[tuple[str, str, float | None], NDArray[np.float64]] = {}
 
     def rest(self, fitted: Fit) -> Rest | None:
@@ -110,18 +111,24 @@ class AnyForm:
         a power of the load nearly all is a gain of the torque sensor, and the power is the misfit.
         Every curve and harmonic of the form counts as an unknown.
         """
-        rules, rest = self.data.rules, self.rest(one.fit)
+        rules, fitted, rest = self.data.rules, one.fit, self.rest(one.fit)
         if rest is None:
             return False
         if not rest.is_noise and self.excess - rest.excess >= rules.explained_share * self.excess:
             # Little is left to first order around the listed form, which the other may be far from.
-            rest = self.rest(in_free_form(self.data, one.fit)) or rest
-        if not rest.is_noise:
+            fitted = self._in_free_form(one.fit)
+            rest = self.rest(fitted)
+        if rest is None or not rest.is_noise:
             return False
         removed = self.excess - rest.excess
-        unknowns = rest.directions.shape[1] - self._of_base.shape[1]
+        unknowns = rest.directions.shape[1] - np.sum(fitted.bound_sides[: fitted.n_base] == 0.0)
         gain = removed - unknowns * np.log(len(rest.residual))
         return removed >= rules.partial_share * self.excess and bool(gain >= rules.bic_gain)
+
+    def _in_free_form(self, fitted: Fit) -> Fit:
+        if fitted not in self._free:
+            self._free[fitted] = in_free_form(self.data, fitted)
+        return self._free[fitted]
 
     def hopeful_in_another(self, known: Sequence[Screened]) -> list[Screened]:
         """Return the effects that may explain the misfit of the base in some form of their laws.

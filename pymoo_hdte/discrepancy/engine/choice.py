@@ -123,15 +123,22 @@ def in_another_form(
     screened : sequence of Screened
         All candidates beside its base; none if only the sets that it knows are compared.
     """
+    if search.data.corrections(search.candidates[0]) is None:
+        return []
     effects = [one for one in screened if one.candidate.frees is None]
     for one in search.forms.hopeful_in_another(effects) if effects else ():
         search.alone(one)
-    singles = [one for one in search.found if len(one.candidates) == 1]
-    finished = [search.finished(one) for one in singles if one.listed]
+    singles = [one for one in search.found if one.listed and _is_effect(one)]
+    finished = [one if one is chosen else search.finished(one) for one in singles]
     found = [one for one in finished if search.forms.explains_in_another(one)]
     if not found and chosen.listed and search.forms.explains_in_another(chosen):
         found = [chosen]
-    return found
+    return sorted(found, key=lambda one: one.bic)
+
+
+def _is_effect(one: Hypothesis) -> bool:
+    """Tell whether a set is a single effect, and no base parameter."""
+    return len(one.candidates) == 1 and one.candidates[0].frees is None
 
 
 def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:

@@ -63,18 +63,6 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         "in 100 gave 18.",
     )
 
-    least_adequate: float = rule(
-        0.1,
-        "probability",
-        "A base that is adequate by both rules is not, if the probability that nothing is missing, "
-        "against every candidate, is less than this.",
-        "Literature: a ratio of ten to one is strong evidence (Kass and Raftery, J. Am. Stat. "
-        "Assoc. 90, 1995, Section 3.2). Of 84 simulated campaigns in which nothing was hidden the "
-        "least probability was 0.35.",
-        at_least=0.0,
-        at_most=1.0,
-    )
-
     # Which effect is it, and does it explain the misfit?
     bic_gain: float = rule(
         6.0,

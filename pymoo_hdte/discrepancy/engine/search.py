@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy.engine.freed_parameters import freed_together
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     hypothesis_of,
@@ -98,6 +99,7 @@ class Search:
             for one in self._of_size(size + 1)[:1]:
                 if size == 1:
                     self._exchange(one)
+                    self._past_resonances(first, one)
                 self._special_cases(one)
             self._finish_near(size + 1)
 
@@ -106,7 +108,7 @@ class Search:
         return self._fit((one.candidate,), np.append(self.base.values, one.start))
 
     def resume(self, known: Sequence[Hypothesis]) -> None:
-        """Fit sets that another search has found on nearly the same data, from their values."""
+        """Fit sets that another search has found on nearly the same data."""
         self._resumed = True
         for one in known:
             self._fit(one.candidates, one.fit.values)
@@ -118,10 +120,7 @@ class Search:
         return self.forms.leaves_noise(one)
 
     def earned(self, one: Hypothesis) -> bool:
-        """Tell whether each member of a set is earned: without it the rest explains clearly less.
-
-        Base parameters out of tolerance are values and no effects, and count as one member.
-        """
+        """Tell whether each member is earned: without it the rest explains clearly less."""
         members = one.members
         if len(members) == 1:
             return True
@@ -138,7 +137,6 @@ class Search:
         return self.finished(self._fit(kept, one.values_of(kept)))
 
     def _of_size(self, size: int) -> list[Hypothesis]:
-        """Return the sets of a number of members, by rising BIC."""
         return [one for one in self.found if len(one.members) == size]
 
     def _fit(self, effects: Effects, start: Vector) -> Hypothesis:
@@ -186,19 +184,8 @@ class Search:
         Those that stay within once others are free, or that gain nothing, keep their tolerances.
         If all of them together do no better than one effect, fewer are not tried.
         """
-        freed: Effects = ()
-        bounds, values = self.base.at_bounds, self.base.values
-        for _ in range(self.data.rules.most_freed_rounds):
-            names = {one.frees for one in freed}
-            free = self.data.out_of_tolerance(bounds, together=True)
-            more = [one for one in free if one.frees not in names]
-            if not more:
-                break
-            freed = (*freed, *more)
-            found = fit(self.data, freed, values)
-            bounds, values = found.at_bounds, found.values
-        if not freed:
-            return
+        freed, found = freed_together(self.data, self.base)
+        values = found.values
         needed = tuple(one for one in freed if one.outside(self.data.base, values))
         best = self.found[0].bic if self._by_label else np.inf
         if not needed or found.chi_square > best:
@@ -209,8 +196,8 @@ class Search:
         for one in needed:
             if one.frees in alone:
                 self._fit((one,), values)
-        covered = {one.label for one in freed if one.frees not in alone}
         # An effect covers these under another name, with what proved needless beside them.
+        covered = {one.label for one in freed if one.frees not in alone}
         for label in [one for one in self._by_label if one & covered]:
             if len(label) == 1 or label_of(needed) < label:
                 self._by_label.pop(label)
@@ -284,9 +271,21 @@ class Search:
                 self._fit((*one.candidates, *more), np.append(one.fit.values, start))
 
     def _exchange(self, one: Hypothesis) -> None:
-        """Fit sets in which one member is replaced by what would do as much beside the others."""
+        """Fit sets in which something else is in the place of one member."""
         for member in one.members:
             self._extend(self.without(one, member), by_part=False)
+
+    def _past_resonances(self, first: Hypothesis, best: Hypothesis) -> None:
+        """Fit the first effect with an inertia from all its starts, if the best pair fails plainly.
+
+        An inertia moves resonances past lines: to first order it does next to nothing for them.
+        """
+        plainly = self.data.rules.contradicting_chi_square * self.degrees_of_freedom
+        inertias = [one for one in self._further(first) if one.exact and len(one.parameters) == 1]
+        for more in inertias if best.fit.chi_square > plainly else ():
+            starts = [np.append(first.fit.values, start) for start in more.starts]
+            if len(starts) > 1:
+                self.finished(self._fit((*first.candidates, more), starts[0]), *starts[1:])
 
     def _special_cases(self, one: Hypothesis) -> None:
         """Fit sets in which one member is replaced by a special case of it at the same port."""

@@ -130,10 +130,7 @@ def judge(
     gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
-        if clean >= rules.least_adequate:
-            return Verdict(
-                "adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean
-            )
+        return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
     search = Search(data, base, candidates)
@@ -146,14 +143,22 @@ def judge(
     certain = explains_in_any_form(search, chosen)
     if not certain:
         chosen = simpler_law(search, chosen)
-    foreign = [] if certain and chosen.listed else in_another_form(search, chosen, screened)
+    foreign: list[Hypothesis] = []
+    if not (certain and chosen.listed):
+        foreign = in_another_form(search, chosen, () if known else screened)
+        again = best_set(search)
+        if not certain and explains_in_any_form(search, again):
+            # One of the effects that were fitted only now does so as it is listed.
+            chosen, certain, foreign = confirmed(search, special_case(search, again)), True, []
     if foreign:
+        equivalent = [*foreign[1:], *([chosen] if certain else [])]
         chosen, certain = foreign[0], True
-    others = [one for one in search.found if one is not chosen]
-    equivalent = foreign[1:] or [one for one in others if _is_rival(search, one, chosen)]
+    else:
+        others = [one for one in search.found if one is not chosen]
+        equivalent = [one for one in others if _is_rival(search, one, chosen)]
     if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
         equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
-        chosen, others = listed[0], [chosen, *(one for one in others if one is not listed[0])]
+        chosen = listed[0]
     vote = data.held_out_vote(base, chosen.fit)
     shown = vote is None or vote.counts(rules)
     doubts = doubts_of(search, chosen, vote if shown else None) + other_forms(search, chosen)
@@ -173,7 +178,7 @@ def judge(
         status,
         base,
         chosen,
-        tuple(others),
+        tuple(one for one in search.found if one is not chosen),
         rivals,
         degrees_of_freedom,
         rules,

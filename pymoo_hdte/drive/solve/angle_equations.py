@@ -264,7 +264,8 @@ class AngleEquations:
         """
         frequency = self.torus.orders * self.speed
         damping = self.output_damping + friction
-        inertia = self.output_inertia
+        rates = self.coefficients.load_rates
+        inertia = self.output_inertia + sum(size * (1j * frequency) ** k for k, size in rates)
         output = inertia * frequency**2 - 1j * frequency * damping
         coupling = 1j * self.torus.orders * inertia + damping / self.speed
         coupling = coupling / self.coefficients.ratio

@@ -65,7 +65,8 @@ class Coefficients:
     load_rates : tuple of (int, float)
         What a load that is not rigidly on the output adds to its inertia: numbers k with sizes s,
         each a torque of s times the k-th time derivative of the output's acceleration, s in
-        N.m.s^(2 + k) per rad. The harmonic balance alone knows them; no effect has them.
+        N.m.s^(2 + k) per rad. The harmonic balance alone knows them; no effect of the library
+        has them.
 
     Examples
     --------

@@ -59,14 +59,16 @@ class Correction(DriveEffect):
     law: Law
 
     def times(self, factor: float) -> Correction | None:
-        """Return a larger one, or None for a law with memory."""
-        law, kind = self.law, AnyForceOfLoad if self.law.loaded else AnyForce
+        """Return a larger one, or None for a law of the library: it does more than its force."""
+        law = self.law
+        if not isinstance(law, AnyForce):
+            return None
 
         def force(state: PortState) -> Response:
             one = law.respond(state)
             return Response(factor * one.torque, factor * one.slope, factor * one.damping)
 
-        return None if law.states else Correction(self.port, kind(force, law.orders))
+        return Correction(self.port, replace(law, force=force))
 
     def apply(self, coefficients: Coefficients) -> Coefficients:
         """Return the coefficients with the law."""

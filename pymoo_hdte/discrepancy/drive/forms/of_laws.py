@@ -45,8 +45,8 @@ _BENDS = tuple(np.geomspace(0.01, 1.0, 8).tolist())
 _PARTS = (0.0, np.pi / 2.0)
 """Phases of the two parts of a line."""
 _RATES = (1, 2, 3, 4)
-"""Derivatives of the load's acceleration. A coupling a third as fast as the fastest line, beyond
-which nothing is left of the load, needs no more for a hundredth of its torque."""
+"""Derivatives of the load's acceleration: a line that a coupling delays by a third of a radian
+needs no more for a hundredth of its torque."""
 _DRIFTS = (0.1, 0.3, 1.0, 3.0)
 """Time constants of a drift, as shares of the session."""
 
