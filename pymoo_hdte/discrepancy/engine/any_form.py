@@ -116,7 +116,7 @@ class AnyForm:
             return False
         if not rest.is_noise and self.excess - rest.excess >= rules.explained_share * self.excess:
             # Little is left to first order around the listed form, which the other may be far from.
-            fitted = self._in_free_form(one.fit)
+            fitted = self.in_free_form(one.fit)
             rest = self.rest(fitted)
         if rest is None or not rest.is_noise:
             return False
@@ -125,7 +125,8 @@ class AnyForm:
         gain = removed - unknowns * np.log(len(rest.residual))
         return removed >= rules.partial_share * self.excess and bool(gain >= rules.bic_gain)
 
-    def _in_free_form(self, fitted: Fit) -> Fit:
+    def in_free_form(self, fitted: Fit) -> Fit:
+        """Return a fit with the form of its laws free: see `free_form`."""
         if fitted not in self._free:
             self._free[fitted] = in_free_form(self.data, fitted)
         return self._free[fitted]

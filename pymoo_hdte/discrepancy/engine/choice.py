@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.doubts import (
     bounded_unknowns,
     explains_in_any_form,
+    strength_is_certain,
     uncertain,
 )
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
@@ -130,10 +131,25 @@ def in_another_form(
         search.alone(one)
     singles = [one for one in search.found if one.listed and _is_effect(one)]
     finished = [one if one is chosen else search.finished(one) for one in singles]
-    found = [one for one in finished if search.forms.explains_in_another(one)]
-    if not found and chosen.listed and search.forms.explains_in_another(chosen):
+    found = [one for one in finished if _explains(search, one)]
+    if not found and chosen.listed and _explains(search, chosen):
         found = [chosen]
     return sorted(found, key=lambda one: one.bic)
+
+
+def _explains(search: Search, one: Hypothesis) -> bool:
+    """Tell whether a set explains the misfit in another form, and is more than that form.
+
+    A load on a soft sensor moves as further inertia would in some form, of which none is there: the
+    strength of an effect of exact form has to be certain beside its corrections.
+    """
+    if not search.forms.explains_in_another(one):
+        return False
+    free, rules = search.forms.in_free_form(one.fit), search.data.rules
+    places = zip(one.candidates, free.places, strict=True)
+    return all(
+        strength_is_certain(free, own, place, rules) for own, (_, place) in places if own.exact
+    )
 
 
 def _is_effect(one: Hypothesis) -> bool:
@@ -151,7 +167,7 @@ def in_one_law(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     for wide in search.candidates:
         if wide.listed and wide.order is not None and _consists_of(chosen, wide, wide.order):
             one = search.finished(search.alone(Screened(wide, 0.0, wide.starts[0])))
-            if search.forms.explains_in_another(one):
+            if _explains(search, one):
                 found.append(one)
     return sorted(found, key=lambda one: one.bic)
 

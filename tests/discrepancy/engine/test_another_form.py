@@ -126,11 +126,11 @@ def test_the_chosen_set_may_explain_in_another_form_where_no_single_effect_does(
     alone = {name: a_set(one) for name, one in members.items()}
     both = a_set(*members.values())
     search = SimpleNamespace(
-        data=SimpleNamespace(corrections=lambda candidate: []),
+        data=SimpleNamespace(corrections=lambda candidate: [], rules=RULES),
         candidates=list(members.values()),
         found=[both, *alone.values()],
         finished=lambda one: one,
-        forms=SimpleNamespace(explains_in_another=lambda one: one is both),
+        forms=forms_that_explain(lambda one: one is both),
     )
     assert choice.in_another_form(search, both, ()) == [both]
     search.forms.explains_in_another = lambda one: one is not alone["first"]
@@ -168,6 +168,19 @@ def a_set(*members, values=(), spread=1e-3, chi_square=1000.0, removed=1e5):
         removed=removed,
         names=frozenset((one.name, one.port) for one in members),
     )
+
+
+def forms_that_explain(which):
+    return SimpleNamespace(explains_in_another=which, in_free_form=lambda fitted: fitted)
+
+
+@pytest.mark.parametrize(("inertia", "status"), [(0.03, "partial"), (0.0, "unlisted")])
+def test_a_form_of_an_inertia_that_is_not_there_names_none(inertia, status):
+    """A load on a soft sensor moves as further inertia would that hangs on a spring."""
+    loose = [LoadRate(2, 3e-8), LoadRate(1, -1.5e-5), LoadRate(4, 2e-15)]
+    effects = [*loose, *([LoadInertia(inertia)] if inertia else [])]
+    data = measured(effects, np.random.default_rng(1), DATA)[0]
+    assert judged(LOAD, data).status == status
 
 
 WIDTH = unknown("half_width", 0.0, 1.0, 0.1)
@@ -235,7 +248,8 @@ def test_a_play_with_a_line_may_be_a_play_that_varies_otherwise_than_as_a_cosine
         candidates=[PLAY, line, VARYING],
         alone=lambda one: wide,
         finished=lambda one: one,
-        forms=SimpleNamespace(explains_in_another=lambda one: one is wide),
+        forms=forms_that_explain(lambda one: one is wide),
+        data=SimpleNamespace(rules=RULES),
     )
     assert choice.in_one_law(search, a_set(line, PLAY)) == ([wide] if in_one else [])
     assert choice.in_one_law(search, a_set(PLAY)) == []
