@@ -96,10 +96,11 @@ class Search:
                 else:
                     self._extend(one)
             self._finish_near(size + 1)
+            if size == 1:
+                self._past_resonances(first)
             for one in self._of_size(size + 1)[:1]:
                 if size == 1:
                     self._exchange(one)
-                    self._past_resonances(first, one)
                 self._special_cases(one)
             self._finish_near(size + 1)
 
@@ -275,14 +276,14 @@ class Search:
         for member in one.members:
             self._extend(self.without(one, member), by_part=False)
 
-    def _past_resonances(self, first: Hypothesis, best: Hypothesis) -> None:
-        """Fit the first effect with an inertia from all its starts, if the best pair fails plainly.
+    def _past_resonances(self, first: Hypothesis) -> None:
+        """Fit the first effect with an inertia from all its starts, if all sets fail plainly.
 
         An inertia moves resonances past lines: to first order it does next to nothing for them.
         """
         plainly = self.data.rules.contradicting_chi_square * self.degrees_of_freedom
         inertias = [one for one in self._further(first) if one.exact and len(one.parameters) == 1]
-        for more in inertias if best.fit.chi_square > plainly else ():
+        for more in inertias if self.found[0].fit.chi_square > plainly else ():
             starts = [np.append(first.fit.values, start) for start in more.starts]
             if len(starts) > 1:
                 self.finished(self._fit((*first.candidates, more), starts[0]), *starts[1:])
