@@ -111,19 +111,31 @@ class AnyForm:
         a power of the load nearly all is a gain of the torque sensor, and the power is the misfit.
         Every curve and harmonic of the form counts as an unknown.
         """
-        rules, fitted, rest = self.data.rules, one.fit, self.rest(one.fit)
-        if rest is None:
-            return False
-        if not rest.is_noise and self.excess - rest.excess >= rules.explained_share * self.excess:
-            # Little is left to first order around the listed form, which the other may be far from.
-            fitted = self.in_free_form(one.fit)
-            rest = self.rest(fitted)
+        rules, (fitted, rest) = self.data.rules, self._nearest(one)
         if rest is None or not rest.is_noise:
             return False
         removed = self.excess - rest.excess
         unknowns = rest.directions.shape[1] - np.sum(fitted.bound_sides[: fitted.n_base] == 0.0)
         gain = removed - unknowns * np.log(len(rest.residual))
         return removed >= rules.partial_share * self.excess and bool(gain >= rules.bic_gain)
+
+    def share_in_another(self, one: Hypothesis) -> float:
+        """Return the share of the misfit that a set removes in another form of its laws, 0 to 1."""
+        _, rest = self._nearest(one)
+        left = self.excess if rest is None else np.clip(rest.excess, 0.0, self.excess)
+        return float(1.0 - left / self.excess)
+
+    def _nearest(self, one: Hypothesis) -> tuple[Fit, Rest | None]:
+        """Return the fit around which forms of a set leave least, and what they leave.
+
+        That of the listed form, unless little but more than noise is left to first order: the other
+        may be far from it.
+        """
+        rest, least = self.rest(one.fit), self.data.rules.explained_share * self.excess
+        if rest is None or rest.is_noise or self.excess - rest.excess < least:
+            return one.fit, rest
+        fitted = self.in_free_form(one.fit)
+        return fitted, self.rest(fitted)
 
     def in_free_form(self, fitted: Fit) -> Fit:
         """Return a fit with the form of its laws free: see `free_form`."""

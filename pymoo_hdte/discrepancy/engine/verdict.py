@@ -75,6 +75,9 @@ class Verdict:
         Whether the records kept out of the fit, if there are any, show what is chosen.
     probability : float or None
         That it is right: see `probability`. None where it names nothing, or nothing was compared.
+    in_another_form : float or None
+        Share of the misfit that another form of the named law removes, where only such a form
+        explains it.
     """
 
     status: str
@@ -87,6 +90,7 @@ class Verdict:
     doubts: tuple[str, ...] = ()
     shown_in_held_out: bool = True
     probability: float | None = None
+    in_another_form: float | None = None
 
     @property
     def accepted(self) -> Fit:
@@ -185,6 +189,7 @@ def judge(
         tuple(doubts),
         shown,
         sure,
+        search.forms.share_in_another(chosen) if foreign else None,
     )
 
 

@@ -123,6 +123,11 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
     if verdict.equivalent:
         shares = ", ".join(percent(hypothesis.explained) for hypothesis in verdict.equivalent)
         words.append(f"What these data cannot tell from it explains {shares}.")
+    elif verdict.in_another_form is not None:
+        words.append(
+            f"In another form of its law it explains {percent(verdict.in_another_form)}, and "
+            "nothing else that was compared comes down to the noise in any form."
+        )
     elif others:
         best = min(others, key=lambda hypothesis: hypothesis.bic)
         words.append(_next_best(best, chosen))

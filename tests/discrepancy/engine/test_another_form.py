@@ -69,6 +69,7 @@ def test_a_law_is_named_in_part_whose_listed_form_explains_little(label):
     assert found.chosen.explained < RULES.explained_share
     assert any("another form" in one for one in found.doubts)
     assert AnyForm(data, found.base).explains_in_another(found.chosen)
+    assert RULES.partial_share < found.in_another_form <= 1.0
 
 
 @pytest.mark.parametrize("label", MISFITS)
