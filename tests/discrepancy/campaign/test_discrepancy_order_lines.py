@@ -78,6 +78,26 @@ def test_planted_lines_come_back(rng, direction):
     )
 
 
+@pytest.mark.parametrize("wobble", [0.005, 0.02])
+def test_a_line_that_makes_the_speed_vary_is_not_mixed_with_its_double(wobble):
+    """Rows even in time are dense where the input is slow, so that the two are not orthogonal.
+
+    Without the double the line is off by the wobble, times its order, of the double's size.
+    """
+    order, double = 4.0, 2e-3
+    phasors = np.array([0.01, double], dtype=complex)
+    angle = ANGLE.copy()
+    for _ in range(40):
+        angle = ANGLE + wobble * np.cos(order * angle)
+    torque = waves(phasors, [order, 2.0 * order], angle)
+    quiet = 1e-6 * np.sin(angle)
+    lines = order_lines(record(quiet, 0.2 + torque, 20.0 + quiet, angle), RIG, RATIO, [1.0, order])
+    found = lines.phasors[1, 1]
+    assert abs(found - phasors[0]) < 1e-3 * wobble * order * double
+    assert lines.orders.tolist() == [1.0, order]
+    assert lines.covariance.shape == (4, 5, 5)
+
+
 def test_speed_fluctuation_is_the_lines_of_the_input_angle():
     # theta = Omega t + eps cos(2 theta), solved for theta.
     phasor = 1e-3 * np.exp(0.4j)
