@@ -82,6 +82,10 @@ class AnyForm:
         self._free: dict[Fit, Fit] = {}
         self._by_place: dict[tuple[str, str, float | None], NDArray[np.float64]] = {}
 
+    def known(self, candidates: Sequence[Candidate]) -> bool:
+        """Tell whether other forms of the laws of a machine are known, by any of its effects."""
+        return all(self.data.corrections(one) is not None for one in candidates[:1])
+
     def rest(self, fitted: Fit) -> Rest | None:
         """Return what a fit leaves; None where that says nothing.
 

@@ -137,13 +137,20 @@ def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int
     return one.explained >= share and not unexplained(data, base, one.fit).any()
 
 
-def alike(one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules) -> bool:
+def alike(
+    one: Hypothesis,
+    chosen: Hypothesis,
+    degrees_of_freedom: int,
+    rules: Rules,
+    overlap: bool = False,
+) -> bool:
     """Tell whether another hypothesis is indistinguishable from the chosen one with these data.
 
     The true form of an effect may differ from the listed one. Two laws of no exact form are
     therefore alike if what one leaves beyond the other is no more than such forms leave, unless one
     is a special case of the other. Where even the chosen form leaves more than noise, differences
-    of chi-square are compared with this residual.
+    of chi-square are compared with this residual. Other forms of two laws at one port ``overlap``
+    on machines whose laws have known other forms.
     """
     if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
         return False
@@ -153,7 +160,7 @@ def alike(one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: R
     if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
         further = one.fit.chi_square - chosen.fit.chi_square
         same = all(mine.beside(other) for mine, other in differing(one, chosen))
-        accuracy = rules.form_share if same else rules.form_accuracy
+        accuracy = rules.form_share if overlap and same else rules.form_accuracy
         near = further < accuracy**2 * (chosen.removed + residual)
     if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
         return near

@@ -161,12 +161,12 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
     form_share: float = rule(
         0.05,
         "relative amplitude",
-        "The same of two laws at one port, whose forms overlap. And up to this share of its "
-        "special case what a law has beyond that, as friction that falls with speed beyond dry "
-        "friction, may be the form of the special case, and both are a class.",
-        f"{BY_HAND}, after foreign forms on that bench: a play with a soft skin on one flank was "
-        "fitted better by a soft wind-up by 3.1e-2, and dry friction whose sign is a root was "
-        "named friction that falls by 2.4e-2 and 3.3e-2 of it.",
+        "The same of two laws at one port of a drive, whose forms overlap. And up to this share of "
+        "its special case's strength what a law has beyond that, as friction that falls with speed "
+        "beyond dry friction, may be the form of the special case, and both are a class.",
+        "Set by hand on 2026-11-26, after foreign forms on that bench: a play with a soft skin on "
+        "one flank was fitted better by a soft wind-up by 3.1e-2, and dry friction whose sign is a "
+        "root was named friction that falls by 2.4e-2 and 3.3e-2 of it.",
         at_least=0.0,
         at_most=1.0,
     )

@@ -199,8 +199,9 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
     A law that contains the chosen one and ends at its bound is the chosen one. Where its further
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
-    rules = search.data.rules
-    near = alike(one, chosen, search.degrees_of_freedom, rules) or undecided(one, chosen, rules)
+    rules, overlap = search.data.rules, search.forms.known(chosen.candidates)
+    near = alike(one, chosen, search.degrees_of_freedom, rules, overlap)
+    near = near or undecided(one, chosen, rules)
     return (
         near
         and not (contains(one, chosen) and any(bounded for _, bounded in bounded_unknowns(one.fit)))
