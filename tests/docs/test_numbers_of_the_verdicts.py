@@ -17,8 +17,8 @@ def test_blind_scores_are_those_of_the_committed_cases():
     )
     stated = re.search(
         r"Of the (\d+) blind campaigns .* cases (\d+) to (\d+) have .* (\d+) of (\d+) plain "
-        r"answers w(?:as|ere) wrong, (\d+) of (\d+) single effects .* both effects of (\d+) of (\d+) pairs"
-        r".* (\d+) of (\d+) campaigns that hide nothing",
+        r"answers w(?:as|ere) wrong, (\d+) of (\d+) single effects .* both effects of (\d+) of "
+        r"(\d+) pairs.* (\d+) of (\d+) campaigns that hide nothing",
         WORDS,
     )
     assert stated is not None

@@ -17,6 +17,7 @@ LOWEST_FIRST = (
     "validation",
     "identification",
     *(
+        "discrepancy.engine.thresholds",
         "discrepancy.engine",
         "discrepancy.campaign",
         "discrepancy.campaign.rows",

@@ -83,8 +83,8 @@ class AnyForm:
         self._by_place: dict[tuple[str, str, float | None], NDArray[np.float64]] = {}
 
     def known(self, candidates: Sequence[Candidate]) -> bool:
-        """Tell whether other forms of the laws of a machine are known, by any of its effects."""
-        return all(self.data.corrections(one) is not None for one in candidates[:1])
+        """Tell whether other forms of all these laws are known: not of an effect of one's own."""
+        return all(self.data.corrections(one) for one in candidates)
 
     def rest(self, fitted: Fit) -> Rest | None:
         """Return what a fit leaves; None where that says nothing.

@@ -124,7 +124,7 @@ def in_another_form(
     screened : sequence of Screened
         All candidates beside its base; none if only the sets that it knows are compared.
     """
-    if not search.forms.known(search.candidates):
+    if any(search.data.corrections(one) is None for one in search.candidates[:1]):
         return []
     effects = [one for one in screened if one.candidate.frees is None]
     for one in search.forms.hopeful_in_another(effects) if effects else ():

@@ -149,8 +149,8 @@ def alike(
     The true form of an effect may differ from the listed one. Two laws of no exact form are
     therefore alike if what one leaves beyond the other is no more than such forms leave, unless one
     is a special case of the other. Where even the chosen form leaves more than noise, differences
-    of chi-square are compared with this residual. Other forms of two laws at one port ``overlap``
-    on machines whose laws have known other forms.
+    of chi-square are compared with this residual. Two laws at one port ``overlap`` where other
+    forms of both are known.
     """
     if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
         return False

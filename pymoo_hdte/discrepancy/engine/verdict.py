@@ -199,7 +199,7 @@ def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
     A law that contains the chosen one and ends at its bound is the chosen one. Where its further
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
-    rules, overlap = search.data.rules, search.forms.known(chosen.candidates)
+    rules, overlap = search.data.rules, search.forms.known((*one.candidates, *chosen.candidates))
     near = alike(one, chosen, search.degrees_of_freedom, rules, overlap)
     near = near or undecided(one, chosen, rules)
     return (

@@ -127,7 +127,7 @@ def test_the_chosen_set_may_explain_in_another_form_where_no_single_effect_does(
     alone = {name: a_set(one) for name, one in members.items()}
     both = a_set(*members.values())
     search = SimpleNamespace(
-        data=SimpleNamespace(rules=RULES),
+        data=SimpleNamespace(corrections=lambda candidate: [], rules=RULES),
         candidates=list(members.values()),
         found=[both, *alone.values()],
         finished=lambda one: one,
@@ -137,7 +137,7 @@ def test_the_chosen_set_may_explain_in_another_form_where_no_single_effect_does(
     search.forms.explains_in_another = lambda one: one is not alone["first"]
     assert choice.in_another_form(search, both, ()) == [alone["second"]]
     # A machine whose laws have no known other forms.
-    search.forms.known = lambda candidates: False
+    search.data.corrections = lambda candidate: None
     assert choice.in_another_form(search, both, ()) == []
 
 
@@ -172,11 +172,7 @@ def a_set(*members, values=(), spread=1e-3, chi_square=1000.0, removed=1e5):
 
 
 def forms_that_explain(which):
-    return SimpleNamespace(
-        explains_in_another=which,
-        in_free_form=lambda fitted: fitted,
-        known=lambda candidates: True,
-    )
+    return SimpleNamespace(explains_in_another=which, in_free_form=lambda fitted: fitted)
 
 
 @pytest.mark.parametrize(("inertia", "status"), [(0.03, "partial"), (0.0, "unlisted")])
