@@ -48,6 +48,7 @@ def steep(state):
 CLUTCH = (LoadInertia(0.03), *(LoadRate(k, 0.03 * (-5e-4) ** k) for k in (1, 2, 3, 4)))
 """Inertia in a viscous clutch, which brings it to speed within half a millisecond."""
 MISFITS = {OF_LOAD: (Correction("input", AnyForceOfLoad(steep)),), LOAD: CLUTCH}
+LABELS = [OF_LOAD, pytest.param(LOAD, marks=pytest.mark.nightly)]
 NEAREST = {OF_LOAD: "stribeck_friction:input", LOAD: "damping_reference:mesh"}
 
 
@@ -60,7 +61,7 @@ def judged(label, data):
     return judge(data, fit(data), laws)
 
 
-@pytest.mark.parametrize("label", MISFITS)
+@pytest.mark.parametrize("label", LABELS)
 def test_a_law_is_named_in_part_whose_listed_form_explains_little(label):
     """What the base and another effect imitate of it leaves nothing that the listed form has."""
     data = planted(label)
@@ -72,7 +73,7 @@ def test_a_law_is_named_in_part_whose_listed_form_explains_little(label):
     assert RULES.partial_share < found.in_another_form <= 1.0
 
 
-@pytest.mark.parametrize("label", MISFITS)
+@pytest.mark.parametrize("label", LABELS)
 def test_without_its_forms_nothing_tells_that_such_a_law_has_another(label, monkeypatch):
     monkeypatch.setattr(Data, "corrections", lambda self, candidate: [])
     found = judged(label, planted(label))
@@ -175,7 +176,10 @@ def forms_that_explain(which):
     return SimpleNamespace(explains_in_another=which, in_free_form=lambda fitted: fitted)
 
 
-@pytest.mark.parametrize(("inertia", "status"), [(0.03, "partial"), (0.0, "unlisted")])
+@pytest.mark.parametrize(
+    ("inertia", "status"),
+    [pytest.param(0.03, "partial", marks=pytest.mark.nightly), (0.0, "unlisted")],
+)
 def test_a_form_of_an_inertia_that_is_not_there_names_none(inertia, status):
     """A load on a soft sensor moves as further inertia would that hangs on a spring."""
     loose = [LoadRate(2, 3e-8), LoadRate(1, -1.5e-5), LoadRate(4, 2e-15)]
