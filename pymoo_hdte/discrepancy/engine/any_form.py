@@ -164,9 +164,8 @@ class AnyForm:
         ]
         rests = [self._beyond(each, self.base.residuals) for each in columns]
         left = np.array([np.inf if one is None else one.excess for one in rests])
-        noise = (adequate(self.degrees_of_freedom, rules) - 1.0) * self.degrees_of_freedom
-        near = rules.form_ratio * max(float(left.min(initial=np.inf)), noise)
-        most = min(near, (1.0 - rules.second_hope_share) * self.excess)
+        least = max(left.min(initial=np.inf), self._noise(self.degrees_of_freedom))
+        most = min(rules.form_ratio * least, (1.0 - rules.second_hope_share) * self.excess)
         found = [known[k] for k in np.argsort(left) if left[k] <= most]
         return varied(found, rules.most_of_one_name)[: rules.most_fitted]
 
@@ -268,8 +267,12 @@ class AnyForm:
         freedom = len(residual) - directions.shape[1]
         if freedom < 1:
             return None
-        noise = (adequate(freedom, self.data.rules) - 1.0) * freedom
-        return Rest(directions, residual, float(residual @ residual) - freedom, noise)
+        excess = float(residual @ residual) - freedom
+        return Rest(directions, residual, excess, self._noise(freedom))
+
+    def _noise(self, freedom: int) -> float:
+        """Return the excess chi-square up to which so many degrees of freedom are noise."""
+        return (adequate(freedom, self.data.rules) - 1.0) * freedom
 
     def _in_any_form(self, one: Screened, rest: Rest) -> float:
         """Return what an effect removes in any form, less what noise gives so many unknowns."""

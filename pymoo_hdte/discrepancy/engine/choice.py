@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.doubts import (
     bounded_unknowns,
     explains_in_any_form,
+    is_harmonic,
     strength_is_certain,
     uncertain,
 )
@@ -180,9 +181,5 @@ def _consists_of(chosen: Hypothesis, wide: Candidate, order: float) -> bool:
         len(curves) == 1
         and bool(lines)
         and all(one.port == wide.port for one in chosen.candidates)
-        and all(one.order is not None and _is_harmonic(one.order, order) for one in lines)
+        and all(one.order is not None and is_harmonic(one.order, order) for one in lines)
     )
-
-
-def _is_harmonic(higher: float, order: float) -> bool:
-    return higher > order and bool(np.isclose(higher % order, 0.0))

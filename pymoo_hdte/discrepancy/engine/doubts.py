@@ -55,10 +55,10 @@ def other_forms(search: Search, chosen: Hypothesis) -> list[str]:
         for member in members
         if search.forms.only_in_another(chosen, search.without(chosen, member))
     ]
-    forms = search.forms
-    in_another = forms.explains(chosen) or forms.explains_in_another(chosen)
-    if not found and not explains_as_listed(search, chosen) and in_another:
-        found = [chosen.label]
+    if not found and not explains_as_listed(search, chosen):
+        forms = search.forms
+        if forms.explains(chosen) or forms.explains_in_another(chosen):
+            found = [chosen.label]
     return [f"{one} has to have another form to explain what is left" for one in found]
 
 
@@ -83,8 +83,13 @@ def _harmonics_of_another(candidates: Sequence[Candidate]) -> list[str]:
         for lower, higher in permutations(candidates, 2)
         if not lower.exact and lower.port == higher.port and lower.name != higher.name
         if lower.order is not None and higher.order is not None
-        if higher.order > lower.order and np.isclose(higher.order % lower.order, 0.0)
+        if is_harmonic(higher.order, lower.order)
     ]
+
+
+def is_harmonic(higher: float, order: float) -> bool:
+    """Tell whether an order is a multiple of a lower one."""
+    return higher > order and bool(np.isclose(higher % order, 0.0))
 
 
 def left_by(per_degree: float) -> str:

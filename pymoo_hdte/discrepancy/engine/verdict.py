@@ -150,8 +150,7 @@ def judge(
     foreign: list[Hypothesis] = []
     if not (certain and chosen.listed):
         foreign = in_another_form(search, chosen, () if known else screened)
-        again = best_set(search)
-        if not certain and explains_in_any_form(search, again):
+        if not certain and explains_in_any_form(search, again := best_set(search)):
             # One of the effects that were fitted only now does so as it is listed.
             chosen, certain, foreign = confirmed(search, special_case(search, again)), True, []
     if foreign:
