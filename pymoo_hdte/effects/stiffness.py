@@ -52,7 +52,7 @@ class HardeningStiffness(Aperiodic):
 
 def _sharpness() -> Parameter:
     """Guess the corner of a curve: from no corner to one that measured points cannot resolve."""
-    return unknown("sharpness", 1.0, 20.0, 3.0)
+    return unknown("sharpness", 1.0, 20.0, 3.0, open_above=True)
 
 
 _MOST_AT_PEAK = 10.0

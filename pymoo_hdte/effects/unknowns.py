@@ -36,6 +36,8 @@ class Parameter:
         Standard deviation around ``start``; infinite for a parameter with bounds only.
     linear : bool
         Whether a prediction is close to linear in it: part of a line, or a level.
+    open_above : bool
+        Whether larger values predict the same: one that ends at ``upper`` has then arrived.
     """
 
     name: str
@@ -45,13 +47,20 @@ class Parameter:
     scale: float
     prior: float = np.inf
     linear: bool = False
+    open_above: bool = False
 
 
 def unknown(
-    name: str, lower: float, upper: float, typical: float, linear: bool = False
+    name: str,
+    lower: float,
+    upper: float,
+    typical: float,
+    linear: bool = False,
+    open_above: bool = False,
 ) -> Parameter:
     """Return a parameter that starts at its typical size; the arguments as of `Parameter`."""
-    return Parameter(name, typical, lower, upper, abs(typical), linear=linear)
+    size = abs(typical)
+    return Parameter(name, typical, lower, upper, size, linear=linear, open_above=open_above)
 
 
 def wave(

@@ -239,8 +239,12 @@ class AnyForm:
             # At one port the corrections of a form need not hold all that a real law does.
             if any(each.beside(other) for each in member for other in one.candidates):
                 error = rules.second_form_share
-            elif not to_noise or any(each.remembers for each in one.candidates):
+            elif any(each.remembers for each in one.candidates):
                 error = self.data.remainder
+            elif not to_noise:
+                # Corrections are of first order: what they leave of a form is of the second.
+                left = (one.fit.chi_square - self.degrees_of_freedom) / self.excess
+                error = min(max(error, left**2), self.data.remainder)
         least = max(rules.single_effect_gain, error * self.excess)
         return least if to_noise else max(least, rules.explained_part_share * rest.excess)
 

@@ -100,14 +100,16 @@ def left_by(per_degree: float) -> str:
 def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
     """Return for each candidate of a fit which of its unknowns ended at a bound.
 
-    A level that ended at zero is a part that the effect does not have.
+    A level that ended at zero is a part that the effect does not have, and a corner that ended as
+    sharp as points can resolve is a sharp corner.
     """
     found = []
     for candidate, place in fitted.places:
         names = []
         for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
             none = parameter.linear and parameter.lower == 0.0 and side < 0.0
-            if side != 0.0 and not none:
+            arrived = none or (parameter.open_above and side > 0.0)
+            if side != 0.0 and not arrived:
                 names.append(parameter.name)
         found.append((candidate, names))
     return found

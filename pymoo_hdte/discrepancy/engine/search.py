@@ -87,13 +87,13 @@ class Search:
             self._extend_beyond_forms(first)
             return
         for size in range(1, rules.most_effects):
-            grown = self._of_size(size)[: rules.most_firsts if size == 1 else 1]
-            for one in grown:
-                if not self._could_count(one):
-                    return
-                if one is not grown[0] and leave_the_same(one, grown[0], rules):
+            grown = self._of_size(size)[: rules.most_firsts]
+            for place, one in enumerate(grown):
+                if place > 0 and leave_the_same(one, grown[0], rules):
                     self._extend_like(one, grown[0])
-                else:
+                elif place == 0 or size == 1:
+                    if not self._could_count(one):
+                        return
                     self._extend(one)
             self._finish_near(size + 1)
             if size == 1:

@@ -157,8 +157,7 @@ def judge(
         equivalent = [*foreign[1:], *([chosen] if certain else [])]
         chosen, certain = foreign[0], True
     else:
-        others = [one for one in search.found if one is not chosen]
-        equivalent = [one for one in others if _is_rival(search, one, chosen)]
+        equivalent = _rivals(search, chosen)
     if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
         equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
         chosen = listed[0]
@@ -190,6 +189,23 @@ def judge(
         sure,
         search.forms.share_in_another(chosen) if foreign else None,
     )
+
+
+def _rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return the sets that explain the data as well as the chosen one by something else.
+
+    What contains one of them is a further one only where it is a rival of that, too.
+    """
+    found = [one for one in search.found if one is not chosen and _is_rival(search, one, chosen)]
+    return [
+        one
+        for one in found
+        if all(
+            _is_rival(search, one, special)
+            for special in found
+            if special is not one and contains(one, special)
+        )
+    ]
 
 
 def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:

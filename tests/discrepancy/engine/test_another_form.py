@@ -245,6 +245,30 @@ def test_one_effect_at_one_order_or_another_is_one_member_of_a_class():
     assert verdict._distinct(soft, [once, twice, same]) == [once]
 
 
+@pytest.mark.parametrize(("evidence", "members"), [(1122.0, 1), (1105.0, 2)])
+def test_what_contains_a_member_of_a_class_has_to_be_a_rival_of_that(
+    evidence, members, monkeypatch
+):
+    """Two frictions beside three springs made a class of five, of which two had needless terms."""
+    monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
+    level, fading = unknown("level", 0.0, 1.0, 0.1), unknown("excess", 0.0, 1.0, 0.1)
+    dry = a_law("dry", "output", [level])
+    falling = a_law("falling", "output", [level, fading], holds=("dry",))
+    soft, play = a_law("soft_windup"), a_law("backlash")
+    chosen = a_set(dry, soft, values=[0.1])
+    rival = a_set(dry, play, values=[0.1], chi_square=1100.0)
+    further = a_set(falling, play, values=[0.1, 0.05], chi_square=1095.0)
+    further.fit.evidence, further.fit.bound_sides = evidence, np.zeros(2)
+    search = SimpleNamespace(
+        found=[chosen, rival, further],
+        degrees_of_freedom=1000,
+        data=SimpleNamespace(rules=RULES),
+        forms=SimpleNamespace(known=lambda laws: True),
+        earned=lambda one: True,
+    )
+    assert verdict._rivals(search, chosen) == [rival, further][:members]
+
+
 @pytest.mark.parametrize(
     ("order", "line_port", "in_one"),
     [(4.0, "mesh", True), (3.5, "mesh", False), (4.0, "sensor", False), (1.0, "mesh", False)],

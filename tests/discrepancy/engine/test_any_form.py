@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import down_to_noise, hypothesis_o
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.effects.friction import PeriodicTorque, smoothed_sign
 from pymoo_hdte.effects.law import Response
+from pymoo_hdte.effects.stiffness import PeriodicStiffness
 
 FRICTION, SPRING, DRIFT = (
     "stribeck_friction:input",
@@ -28,10 +29,8 @@ FRICTION, SPRING, DRIFT = (
 OF_LOAD = "load_dependent_friction:input"
 SPEEDS = (10.0, 40.0, 150.0, 500.0, 1200.0, 2000.0)
 LOADS = (5.0, 40.0, 20.0, 10.0, 30.0)
-DATA = known_data(
-    [(speed, LOADS[(2 * k + j) % 5]) for k, speed in enumerate(SPEEDS) for j in (0, 1)],
-    [1.0, 2.0, 2.02, 3.0],
-)
+CONDITIONS = [(speed, LOADS[(2 * k + j) % 5]) for k, speed in enumerate(SPEEDS) for j in (0, 1)]
+DATA = known_data(CONDITIONS, [1.0, 2.0, 2.02, 3.0])
 
 
 def exponential(state):
@@ -148,6 +147,19 @@ def test_a_small_effect_shows_beside_a_law_that_leaves_no_more_than_noise(label,
     assert down_to_noise(found.chosen.fit, found.degrees_of_freedom, rules)
     named_too = [law.label, DRIFT] if named else [law.label]
     assert [one.label for one in found.chosen.candidates] == named_too
+
+
+@pytest.mark.parametrize(("further", "named"), [(3e-4, True), (2e-3, False)])
+def test_a_form_is_known_to_the_square_of_what_its_listed_one_leaves(further, named):
+    """A small drift beside a stiffness whose crests are sharper than those of three lines."""
+    waving = "mesh_stiffness_variation:mesh@2"
+    empty = known_data(CONDITIONS, [1.0, 2.0, 2.02, 4.0, 6.0, 8.0])
+    law, drift = (listed(empty, label.partition(":")[0]) for label in (waving, DRIFT))
+    crest = Correction("mesh", PeriodicStiffness(8.0, 0.3, further))
+    hidden = (*law.build((0.03, 0.01, 0.0, 0.0, 0.0, 0.0)), crest, *drift.build((2e-8, 500.0)))
+    data = replace(measured(hidden, np.random.default_rng(1), empty)[0], rules=COARSE)
+    found = judge(data, fit(data), [law, drift])
+    assert {one.label for one in found.chosen.candidates} == {waving, DRIFT} if named else {waving}
 
 
 @pytest.mark.nightly

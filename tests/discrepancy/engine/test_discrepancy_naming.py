@@ -107,6 +107,8 @@ def test_a_clean_drive_within_its_tolerances_misses_nothing(seed):
     ("label", "values", "rivals"),
     [
         (SOFT, (0.3, 3e-4, 3.0), FEW),
+        # Straight pieces, as in catalogues: a corner sharper than any that points can resolve.
+        (SOFT, (0.3, 8e-4, 300.0), FEW),
         pytest.param(SOFT, (0.3, 3e-4, 3.0), None, marks=pytest.mark.nightly),
         pytest.param(REACTION, (1.0,), FEW, marks=pytest.mark.nightly),
         pytest.param(INERTIA, (0.03,), FEW, marks=pytest.mark.nightly),
@@ -241,6 +243,22 @@ def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
         for one in hypothesis.candidates
     }
     assert names == {"eccentricity", "kinematic_error"}
+
+
+def test_what_nothing_tells_apart_is_a_class_beside_two_other_effects():
+    """Of a line of the encoder or of the drive the likelier pair alone was extended by a third."""
+    line = "eccentricity:sensor@0.009901"
+    effects = {line: (2.0 * ARCSEC, 0.5 * ARCSEC), RIPPLE: (0.003, 0.001), INERTIA: (0.03,)}
+    seen = [1.0 / 101.0, 5.0]
+    data = planted(effects, seen=seen, empty=OF_ENCODER)
+    verdict = verdict_on(data, [*effects, "kinematic_error:mesh@0.009901"], seen)
+    assert verdict.status == "class"
+    both = [
+        labels_of(verdict),
+        *({one.label for one in each.candidates} for each in verdict.equivalent),
+    ]
+    assert len(both) == 2
+    assert {RIPPLE, INERTIA, line} in both
 
 
 @pytest.mark.nightly

@@ -11,7 +11,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.hypothesis import contains
 from pymoo_hdte.discrepancy.engine.rules import RULES
-from pymoo_hdte.effects.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 FREEDOM = 1000
 
@@ -102,7 +102,7 @@ def test_what_is_left_in_multiples_of_the_noise_is_a_doubt():
 
 def law(name, *, bounded=False, chi_square=1000.0):
     """A set of one law at the input with one unknown, which may have ended at its upper bound."""
-    level = SimpleNamespace(name="level", linear=False, lower=0.0)
+    level = unknown("level", 0.0, 1.0, 0.1)
     only = Candidate(name, "input", (level,), ((0.0,),), lambda values: (), "")
     fitted = SimpleNamespace(
         chi_square=chi_square,
