@@ -24,10 +24,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     down_to_noise,
     gains_enough,
 )
-from pymoo_hdte.discrepancy.engine.screening import Screened, reduced, varied
-
-_RANK = 1e-5
-"""Share of the largest singular value from which a direction counts."""
+from pymoo_hdte.discrepancy.engine.screening import Screened, basis_of, reduced, varied
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +169,7 @@ class AnyForm:
     @cached_property
     def _of_base(self) -> NDArray[np.float64]:
         """What the base's parameters can do, orthonormal, shape (n, k)."""
-        return _orthonormal(self.base.jacobian[:, self.base.bound_sides == 0.0])
+        return basis_of(self.base.jacobian[:, self.base.bound_sides == 0.0])
 
     def earns(self, one: Hypothesis, without: Hypothesis) -> bool:
         """Tell whether a member is earned: what is left without it is no error of form.
@@ -266,7 +263,7 @@ class AnyForm:
 
     def _beyond(self, columns: NDArray[np.float64], residuals: NDArray[np.float64]) -> Rest | None:
         """Return what residuals (n,) hold beyond columns (n, m); None if these follow any data."""
-        directions = _orthonormal(columns)
+        directions = basis_of(columns)
         residual = residuals - directions @ (directions.T @ residuals)
         freedom = len(residual) - directions.shape[1]
         if freedom < 1:
@@ -282,7 +279,7 @@ class AnyForm:
         """Return what an effect removes in any form, less what noise gives so many unknowns."""
         directions = np.concatenate([one.signatures, self._forms_of(one.candidate)])
         beyond = directions - (directions @ rest.directions) @ rest.directions.T
-        free = _orthonormal(beyond.T)
+        free = basis_of(beyond.T)
         return float(np.sum((free.T @ rest.residual) ** 2)) - free.shape[1]
 
     def _forms_of(self, candidate: Candidate) -> NDArray[np.float64]:
@@ -293,11 +290,3 @@ class AnyForm:
             found = [response((one,)) for one in self.data.corrections(candidate) or ()]
             self._by_place[place] = np.array(found).reshape(-1, len(self.base.residuals))
         return self._by_place[place]
-
-
-def _orthonormal(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return an orthonormal basis of columns (n, m) that need not be independent, (n, k)."""
-    sizes = np.linalg.norm(columns, axis=0)
-    kept = sizes > 0.0
-    left, values, _ = np.linalg.svd(columns[:, kept] / sizes[kept], full_matrices=False)
-    return np.asarray(left[:, values > _RANK * values.max(initial=0.0)])

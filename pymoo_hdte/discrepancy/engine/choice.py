@@ -8,19 +8,18 @@ another form does, where the base imitates what most forms of the law share.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.doubts import (
-    bounded_unknowns,
     explains_in_any_form,
     is_harmonic,
     strength_is_certain,
     uncertain,
 )
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, bounded_unknowns, contains
 from pymoo_hdte.discrepancy.engine.screening import Screened
 from pymoo_hdte.discrepancy.engine.search import Search
 
@@ -28,17 +27,27 @@ from pymoo_hdte.discrepancy.engine.search import Search
 def best_set(search: Search) -> Hypothesis:
     """Return the set of least BIC of those that explain the misfit, of all if none does.
 
-    A set of several effects counts only if each of them is earned. What is fitted without one of
-    them, or fitted further, counts too.
+    A set of several effects counts only if each of them is earned. What is fitted on the way, as
+    the set without one of them, counts too.
     """
     found: list[Hypothesis] = []
-    while found != (now := search.found):
-        found = now
-        explaining = (
-            one for one in found if explains_in_any_form(search, one) and search.earned(one)
-        )
-        best = next(explaining, None) or next(one for one in found if search.earned(one))
+    while found != search.found:
+        found = search.found
+        best = _first(
+            search, lambda one: explains_in_any_form(search, one) and search.earned(one)
+        ) or _first(search, search.earned)
+    assert best is not None, "a single effect is earned"
     return best
+
+
+def _first(search: Search, passes: Callable[[Hypothesis], bool]) -> Hypothesis | None:
+    """Return the set of least BIC that passes, of all that are known once it is judged."""
+    judged: dict[Hypothesis, bool] = {}
+    while left := [one for one in search.found if judged.get(one, True)]:
+        if left[0] in judged:
+            return left[0]
+        judged[left[0]] = passes(left[0])
+    return None
 
 
 def special_case(search: Search, best: Hypothesis) -> Hypothesis:

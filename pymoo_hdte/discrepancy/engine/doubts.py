@@ -10,7 +10,7 @@ from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, explains
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, bounded_unknowns, explains
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.search import Search
 
@@ -95,24 +95,6 @@ def is_harmonic(higher: float, order: float) -> bool:
 def left_by(per_degree: float) -> str:
     """Say what a chi-square per degree of freedom means."""
     return f"what is left is {np.sqrt(per_degree):.3g} times the noise"
-
-
-def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
-    """Return for each candidate of a fit which of its unknowns ended at a bound.
-
-    A level that ended at zero is a part that the effect does not have, and a corner that ended as
-    sharp as points can resolve is a sharp corner.
-    """
-    found = []
-    for candidate, place in fitted.places:
-        names = []
-        for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
-            none = parameter.linear and parameter.lower == 0.0 and side < 0.0
-            arrived = none or (parameter.open_above and side > 0.0)
-            if side != 0.0 and not arrived:
-                names.append(parameter.name)
-        found.append((candidate, names))
-    return found
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:

@@ -118,6 +118,24 @@ def unexplained(data: Evidence, base: Fit, fitted: Fit) -> NDArray[np.bool_]:
     return np.asarray(before.significant(rules) & plain & residual)
 
 
+def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
+    """Return for each candidate of a fit which of its unknowns ended at a bound.
+
+    A level that ended at zero is a part that the effect does not have, and a corner that ended as
+    sharp as points can resolve is a sharp corner.
+    """
+    found = []
+    for candidate, place in fitted.places:
+        names = []
+        for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
+            none = parameter.linear and parameter.lower == 0.0 and side < 0.0
+            arrived = none or (parameter.open_above and side > 0.0)
+            if side != 0.0 and not arrived:
+                names.append(parameter.name)
+        found.append((candidate, names))
+    return found
+
+
 def gains_enough(one: Hypothesis, base: Fit, rules: Rules) -> bool:
     """Tell whether a set of effects reduces the criterion of the base enough for a name."""
     unknowns = sum(candidate.unknowns for candidate in one.candidates)
@@ -146,11 +164,11 @@ def alike(
 ) -> bool:
     """Tell whether another hypothesis is indistinguishable from the chosen one with these data.
 
-    The true form of an effect may differ from the listed one. Two laws of no exact form are
-    therefore alike if what one leaves beyond the other is no more than such forms leave, unless one
-    is a special case of the other. Where even the chosen form leaves more than noise, differences
-    of chi-square are compared with this residual. Two laws at one port ``overlap`` where other
-    forms of both are known.
+    The true form of an effect may differ from the listed one. Two sets are therefore alike if what
+    one leaves beyond the other is no more than such forms leave, unless they differ by effects of
+    exact form only, or one is a special case of the other. Where even the chosen form leaves more
+    than noise, differences of chi-square are compared with this residual. Two laws at one port
+    ``overlap`` where other forms of both are known.
     """
     if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
         return False
@@ -158,10 +176,11 @@ def alike(
     near = one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
     residual = chosen.fit.chi_square - degrees_of_freedom
     if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
-        further = one.fit.chi_square - chosen.fit.chi_square
-        same = all(mine.beside(other) for mine, other in differing(one, chosen))
+        further, pairs = one.fit.chi_square - chosen.fit.chi_square, differing(one, chosen)
+        same = all(mine.beside(other) for mine, other in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
-        near = further < accuracy**2 * (chosen.removed + residual)
+        exact = all(mine.exact and other.exact for mine, other in pairs)
+        near = not exact and further < accuracy**2 * (chosen.removed + residual)
     if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
         return near
     return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual

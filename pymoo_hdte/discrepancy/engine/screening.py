@@ -20,6 +20,9 @@ from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
+_RANK = 1e-5
+"""Share of the largest singular value from which a direction counts."""
+
 
 @dataclass(frozen=True, eq=False)
 class Screened:
@@ -222,3 +225,11 @@ def _least_squares(
     solution, *_ = np.linalg.lstsq(signatures.T, -residual, rcond=1e-10)
     rest = residual + signatures.T @ solution
     return solution @ starts, float(residual @ residual - rest @ rest)
+
+
+def basis_of(columns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return an orthonormal basis of columns (n, m) that need not be independent, (n, k)."""
+    sizes = np.linalg.norm(columns, axis=0)
+    kept = sizes > 0.0
+    left, values, _ = np.linalg.svd(columns[:, kept] / sizes[kept], full_matrices=False)
+    return np.asarray(left[:, values > _RANK * values.max(initial=0.0)])

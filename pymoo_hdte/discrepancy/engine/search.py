@@ -9,28 +9,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
+from pymoo_hdte.discrepancy.engine.fitted_sets import Effects, FittedSets
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.freed_parameters import freed_together
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
-    hypothesis_of,
+    bounded_unknowns,
     label_of,
     leave_the_same,
 )
-from pymoo_hdte.discrepancy.engine.membership import ill_explained, is_earned
+from pymoo_hdte.discrepancy.engine.membership import ill_explained
 from pymoo_hdte.discrepancy.engine.screening import Screened, most_hopeful, varied
-from pymoo_hdte.discrepancy.engine.starts import best_fit, other_starts
-
-Vector = NDArray[np.float64]
-Effects = tuple[Candidate, ...]
 
 
-class Search:
-    """Sets of effects fitted jointly with the base, each once.
+class Search(FittedSets):
+    """The search among sets of effects.
 
     Parameters
     ----------
@@ -39,29 +34,13 @@ class Search:
         Without any of them.
     candidates : sequence of Candidate
         Effects that may be missing, and base parameters that may be out of tolerance.
-
-    Attributes
-    ----------
-    forms : AnyForm
-        What sets leave in any form of their laws.
     """
 
     def __init__(self, data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> None:
-        self.data, self.base, self.candidates = data, base, candidates
-        self.forms = AnyForm(data, base)
-        self.degrees_of_freedom = self.forms.degrees_of_freedom
-        self.excess = self.forms.excess
-        self._by_label: dict[frozenset[str], Hypothesis] = {}
-        self._finished: set[frozenset[str]] = set()
-        self._from_all_starts: set[frozenset[str]] = set()
+        super().__init__(data, base)
+        self.candidates = candidates
         self._extended: set[frozenset[str]] = set()
-        self._resumed = False
         self._beside_base: dict[str, Screened] = {}
-
-    @property
-    def found(self) -> list[Hypothesis]:
-        """All sets fitted so far, by rising BIC."""
-        return sorted(self._by_label.values(), key=lambda one: one.bic)
 
     def singles(self, screened: Sequence[Screened]) -> None:
         """Fit the most promising single effects, and the base parameters out of tolerance."""
@@ -72,13 +51,13 @@ class Search:
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
             self.alone(one)
         if self._by_label and self.found[0].explained < rules.explained_share:
-            self._from_other_starts(self._of_size(1))
+            self.from_other_starts(self.of_size(1))
         self._parameters()
-        self._finish_near(1)
+        self.finish_near(1)
         if not self.enough(self.found[0]):
-            self._from_other_starts(self.found[:1])
+            self.from_other_starts(self.found[:1])
         self._special_cases(self.found[0])
-        self._finish_near(1)
+        self.finish_near(1)
 
     def grow(self) -> None:
         """Fit sets of more effects as long as what is left could be that of a further one."""
@@ -87,7 +66,7 @@ class Search:
             self._extend_beyond_forms(first)
             return
         for size in range(1, rules.most_effects):
-            grown = self._of_size(size)[: rules.most_firsts]
+            grown = self.of_size(size)[: rules.most_firsts]
             for place, one in enumerate(grown):
                 if place > 0 and leave_the_same(one, grown[0], rules):
                     self._extend_like(one, grown[0])
@@ -95,89 +74,26 @@ class Search:
                     if not self._could_count(one):
                         return
                     self._extend(one)
-            self._finish_near(size + 1)
+            self.finish_near(size + 1)
             if size == 1:
                 self._past_resonances(first)
-            for one in self._of_size(size + 1)[:1]:
+            for one in self.of_size(size + 1)[:1]:
                 if size == 1:
                     self._exchange(one)
                 self._special_cases(one)
-            self._finish_near(size + 1)
+            self.finish_near(size + 1)
 
     def alone(self, one: Screened) -> Hypothesis:
         """Return a single effect, fitted so far as to rank it."""
-        return self._fit((one.candidate,), np.append(self.base.values, one.start))
+        return self.fitted((one.candidate,), np.append(self.base.values, one.start))
 
     def resume(self, known: Sequence[Hypothesis]) -> None:
         """Fit sets that another search has found on nearly the same data."""
         self._resumed = True
         for one in known:
-            self._fit(one.candidates, one.fit.values)
+            self.fitted(one.candidates, one.fit.values)
         for size in {len(one.members) for one in known}:
-            self._finish_near(size)
-
-    def enough(self, one: Hypothesis) -> bool:
-        """Tell whether a set explains the data down to the noise."""
-        return self.forms.leaves_noise(one)
-
-    def earned(self, one: Hypothesis) -> bool:
-        """Tell whether each member is earned: without it the rest explains clearly less."""
-        members = one.members
-        if len(members) == 1:
-            return True
-        return all(self._earns(one, member, self.without(one, member)) for member in members)
-
-    def _earns(self, one: Hypothesis, member: Effects, rest: Hypothesis) -> bool:
-        """Tell whether a member is earned, as the listed laws go or in any form of the others."""
-        earned = is_earned(self.data, self.base, one, rest, member)
-        return earned or self.forms.earns(one, rest)
-
-    def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
-        """Return a set without one of its members, fitted to the end."""
-        kept = tuple(other for other in one.candidates if other not in member)
-        return self.finished(self._fit(kept, one.values_of(kept)))
-
-    def _of_size(self, size: int) -> list[Hypothesis]:
-        return [one for one in self.found if len(one.members) == size]
-
-    def _fit(self, effects: Effects, start: Vector) -> Hypothesis:
-        """Return a set fitted from a start so far as to rank it, unless it is known already."""
-        label = label_of(effects)
-        if label not in self._by_label:
-            trial = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
-            self._by_label[label] = hypothesis_of(trial, self.excess)
-        return self._by_label[label]
-
-    def _from_other_starts(self, sets: Sequence[Hypothesis]) -> None:
-        """Fit single effects from all their starts, each once."""
-        for one in sets:
-            starts = other_starts(one, self.base.values)
-            if starts and (label := label_of(one.candidates)) not in self._from_all_starts:
-                self.finished(one, *starts)
-                self._from_all_starts.add(label)
-
-    def finished(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
-        """Return a set fitted to the end: from its values and, unless resumed, other starts."""
-        label = label_of(one.candidates)
-        if label not in self._finished or starts:
-            if self._resumed:
-                best = fit(self.data, one.candidates, one.fit.values)
-            else:
-                best = best_fit(self.data, one, starts, self._by_label.values())
-            self._by_label[label] = hypothesis_of(best, self.excess)
-            self._finished.add(label)
-        return self._by_label[label]
-
-    def _finish_near(self, size: int) -> None:
-        """Fit the best sets of a size to the end, and those that may come as near."""
-        rules = self.data.rules
-        for place in range(len(self._of_size(size))):
-            same = self._of_size(size)
-            best, one = same[0], same[place]
-            near = rules.refit_margin * rules.evidence_distance
-            misfit = max(best.fit.chi_square / self.degrees_of_freedom, 1.0)
-            if place < rules.most_firsts or one.bic - best.bic < near * misfit:
-                self.finished(one)
+            self.finish_near(size)
 
     def _parameters(self) -> None:
         """Fit all base parameters that want to leave their tolerances together.
@@ -192,11 +108,11 @@ class Search:
         if not needed or found.chi_square > best:
             return
         if len(needed) > 1:
-            needed = self._pruned(self._fit(needed, values))
+            needed = self._pruned(self.fitted(needed, values))
         alone = {one.frees for one in self.data.out_of_tolerance([str(one.frees) for one in freed])}
         for one in needed:
             if one.frees in alone:
-                self._fit((one,), values)
+                self.fitted((one,), values)
         # An effect covers these under another name, with what proved needless beside them.
         covered = {one.label for one in freed if one.frees not in alone}
         for label in [one for one in self._by_label if one & covered]:
@@ -216,17 +132,18 @@ class Search:
     def _could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified; one at a bound may stand for two."""
         if self.enough(one):
-            return any(one.fit.bound_sides[one.fit.n_base :])
+            return any(bounded for _, bounded in bounded_unknowns(one.fit))
         return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
 
     def _extend(self, one: Hypothesis, by_part: bool = True) -> None:
         """Fit a set with each of the effects that would remove most of what it leaves."""
-        label = label_of(one.candidates)
-        if label in self._extended:
+        label, others = label_of(one.candidates), self._further(one)
+        if label in self._extended or not others:
             return
         self._extended.add(label)
-        others = self._further(one)
-        if not others:
+        if len(one.members) > 1 and self.forms.explains(one):
+            # A third effect shows beside two only in what no form of theirs explains.
+            self._extend_beyond_forms(one)
             return
         rules, left = self.data.rules, one.fit.chi_square - self.degrees_of_freedom
         before, after = (self.data.excess(each) for each in (self.base, one.fit))
@@ -234,7 +151,7 @@ class Search:
         of_ill = [(part, float(after.of_parts[part])) for part in ill]
         chosen = most_hopeful(self.data, one.fit, others, self._known(others), left, of_ill)
         for more in chosen:
-            self._fit((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
+            self.fitted((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
         self._extend_beyond_forms(one)
 
     def _further(self, one: Hypothesis) -> list[Candidate]:
@@ -250,9 +167,9 @@ class Search:
         small = len(one.members) < self.data.rules.most_effects
         found = self.forms.beside(one, self._known(self._further(one))) if small else []
         for more in found:
-            self._fit((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
+            self.fitted((*one.candidates, more.candidate), np.append(one.fit.values, more.start))
         if found:
-            self._finish_near(len(one.members) + 1)
+            self.finish_near(len(one.members) + 1)
 
     def _known(self, others: Sequence[Candidate]) -> list[Screened]:
         """Return effects as screened beside the base; none where none was."""
@@ -264,12 +181,12 @@ class Search:
         Screening takes longest where an effect has lines that beat with those of the error.
         """
         shorter = label_of(other.candidates)
-        for longer in self._of_size(len(other.members) + 1):
+        for longer in self.of_size(len(other.members) + 1):
             more = [each for each in longer.candidates if each.label not in shorter]
             fits = shorter < label_of(longer.candidates)
             if fits and all(more[0].goes_with(each) for each in one.candidates):
                 start = longer.values_of(more)[len(self.base.values) :]
-                self._fit((*one.candidates, *more), np.append(one.fit.values, start))
+                self.fitted((*one.candidates, *more), np.append(one.fit.values, start))
 
     def _exchange(self, one: Hypothesis) -> None:
         """Fit sets in which something else is in the place of one member."""
@@ -284,17 +201,16 @@ class Search:
         plainly = self.data.rules.contradicting_chi_square * self.degrees_of_freedom
         inertias = [one for one in self._further(first) if one.exact and len(one.parameters) == 1]
         for more in inertias if self.found[0].fit.chi_square > plainly else ():
-            starts = [np.append(first.fit.values, start) for start in more.starts]
-            if len(starts) > 1:
-                self.finished(self._fit((*first.candidates, more), starts[0]), *starts[1:])
+            for start in more.starts if len(more.starts) > 1 else ():
+                values = np.append(first.fit.values, start)
+                self.fitted((*first.candidates, more), values, again=True)
 
     def _special_cases(self, one: Hypothesis) -> None:
         """Fit sets in which one member is replaced by a special case of it at the same port."""
         for member in one.candidates:
+            kept = tuple(each for each in one.candidates if each is not member)
             for other in self.candidates:
-                if other.port != member.port or not member.holds(other):
-                    continue
-                kept = tuple(each for each in one.candidates if each is not member)
-                if all(other.goes_with(each) for each in kept):
+                special = other.port == member.port and member.holds(other)
+                if special and all(other.goes_with(each) for each in kept):
                     start = np.append(one.values_of(kept), other.starts[0])
-                    self._fit((*kept, other), start)
+                    self.fitted((*kept, other), start)

@@ -25,7 +25,6 @@ from pymoo_hdte.discrepancy.engine.choice import (
 )
 from pymoo_hdte.discrepancy.engine.doubts import (
     NOT_PROVEN,
-    bounded_unknowns,
     doubts_of,
     explains_in_any_form,
     left_by,
@@ -35,6 +34,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     alike,
+    bounded_unknowns,
     contains,
     down_to_noise,
     gains_enough,

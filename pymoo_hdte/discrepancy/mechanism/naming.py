@@ -9,10 +9,11 @@ from itertools import combinations
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.doubts import bounded_unknowns, doubts_of
+from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
+    bounded_unknowns,
     contains,
     down_to_noise,
     hypothesis_of,

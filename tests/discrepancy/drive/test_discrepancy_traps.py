@@ -8,7 +8,7 @@ from quick_campaigns import quick_analysis, quick_campaign
 
 from pymoo_hdte.discrepancy.drive.analysis import examine_drive
 from pymoo_hdte.discrepancy.drive.evidence import Data
-from pymoo_hdte.discrepancy.engine import search
+from pymoo_hdte.discrepancy.engine import fitted_sets
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.drive import NewZero
@@ -32,7 +32,7 @@ def unsearched(monkeypatch):
     def as_screened(data, candidates, start, **settings):
         return fit(data, candidates, start, 1)
 
-    monkeypatch.setattr(search, "fit", as_screened)
+    monkeypatch.setattr(fitted_sets, "fit", as_screened)
     return replace(RULES, most_fitted=1, most_effects=1)
 
 

@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.engine import hypothesis, membership, search
 from pymoo_hdte.discrepancy.engine import verdict as naming
+from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import fit
@@ -182,7 +183,7 @@ def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
         return [one for one in screen(data, fitted, others) if one.candidate.label in ways[there]]
 
     monkeypatch.setattr(search, "most_hopeful", hopeful)
-    monkeypatch.setattr(search.AnyForm, "beside", lambda *_: [])
+    monkeypatch.setattr(AnyForm, "beside", lambda *_: [])
     monkeypatch.setattr(search.Search, "_exchange", lambda *_: None)
     data = planted({RIPPLE: (0.003, 0.001), SOFT: (0.3, 5e-4, 4.0)})
     verdict = verdict_on(data, [RIPPLE, DRAG, SOFT])

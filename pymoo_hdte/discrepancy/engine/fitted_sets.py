@@ -1,0 +1,123 @@
+"""Sets of effects fitted jointly with the base, each once: so far as to rank it, or to the end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pymoo_hdte.discrepancy.engine.any_form import AnyForm
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vector, fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, hypothesis_of, label_of
+from pymoo_hdte.discrepancy.engine.membership import is_earned
+from pymoo_hdte.discrepancy.engine.starts import best_fit, other_starts
+
+Effects = tuple[Candidate, ...]
+
+
+class FittedSets:
+    """Sets of effects, what each explains, and whether their members are earned.
+
+    Parameters
+    ----------
+    data : Evidence
+    base : Fit
+        Without any effect.
+
+    Attributes
+    ----------
+    forms : AnyForm
+        What sets leave in any form of their laws.
+    degrees_of_freedom : int
+        Of the base.
+    excess : float
+        Chi-square of the base beyond them.
+    """
+
+    def __init__(self, data: Evidence, base: Fit) -> None:
+        self.data, self.base = data, base
+        self.forms = AnyForm(data, base)
+        self.degrees_of_freedom = self.forms.degrees_of_freedom
+        self.excess = self.forms.excess
+        self._by_label: dict[frozenset[str], Hypothesis] = {}
+        self._finished: set[frozenset[str]] = set()
+        self._from_all_starts: set[frozenset[str]] = set()
+        self._resumed = False
+
+    @property
+    def found(self) -> list[Hypothesis]:
+        """All sets fitted so far, by rising BIC."""
+        return sorted(self._by_label.values(), key=lambda one: one.bic)
+
+    def of_size(self, size: int) -> list[Hypothesis]:
+        """Return the sets of so many members, by rising BIC."""
+        return [one for one in self.found if len(one.members) == size]
+
+    def enough(self, one: Hypothesis) -> bool:
+        """Tell whether a set explains the data down to the noise."""
+        return self.forms.leaves_noise(one)
+
+    def earned(self, one: Hypothesis) -> bool:
+        """Tell whether each member is earned: without it the rest explains clearly less."""
+        members = one.members
+        if len(members) == 1:
+            return True
+        return all(self._earns(one, member, self.without(one, member)) for member in members)
+
+    def _earns(self, one: Hypothesis, member: Effects, rest: Hypothesis) -> bool:
+        """Tell whether a member is earned, as the listed laws go or in any form of the others."""
+        earned = is_earned(self.data, self.base, one, rest, member)
+        return earned or self.forms.earns(one, rest)
+
+    def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
+        """Return a set without one of its members, fitted to the end."""
+        kept = tuple(other for other in one.candidates if other not in member)
+        return self.finished(self.fitted(kept, one.values_of(kept)))
+
+    def fitted(self, effects: Effects, start: Vector, again: bool = False) -> Hypothesis:
+        """Return a set fitted from a start so far as to rank it.
+
+        A set that is known already is fitted ``again`` only where that is asked for.
+        """
+        label = label_of(effects)
+        if label not in self._by_label or again:
+            found = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
+            trial, known = hypothesis_of(found, self.excess), self._by_label.get(label)
+            if known is None or trial.bic < known.bic:
+                self._by_label[label] = trial
+                self._finished.discard(label)
+        return self._by_label[label]
+
+    def from_other_starts(self, sets: Sequence[Hypothesis]) -> None:
+        """Fit single effects from all their starts, each once."""
+        for one in sets:
+            starts = other_starts(one, self.base.values)
+            if starts and (label := label_of(one.candidates)) not in self._from_all_starts:
+                self.finished(one, *starts)
+                self._from_all_starts.add(label)
+
+    def finished(self, one: Hypothesis, *starts: Vector) -> Hypothesis:
+        """Return a set fitted to the end: from its values and, unless resumed, other starts."""
+        label = label_of(one.candidates)
+        if label not in self._finished or starts:
+            if self._resumed:
+                best = fit(self.data, one.candidates, one.fit.values)
+            else:
+                best = best_fit(self.data, one, starts, self._by_label.values())
+            self._by_label[label] = hypothesis_of(best, self.excess)
+            self._finished.add(label)
+        return self._by_label[label]
+
+    def finish_near(self, size: int) -> None:
+        """Fit the best sets of a size to the end, and those that may come as near.
+
+        Beside several effects that leave no more than noise, only the latter.
+        """
+        rules = self.data.rules
+        for place in range(len(self.of_size(size))):
+            same = self.of_size(size)
+            best, one = same[0], same[place]
+            near = rules.refit_margin * rules.evidence_distance
+            misfit = max(best.fit.chi_square / self.degrees_of_freedom, 1.0)
+            first = place < (1 if size > 1 and self.enough(best) else rules.most_firsts)
+            if first or one.bic - best.bic < near * misfit:
+                self.finished(one)
