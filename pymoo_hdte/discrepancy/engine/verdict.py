@@ -203,7 +203,7 @@ def _rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
         if all(
             _is_rival(search, one, special)
             for special in found
-            if special is not one and contains(one, special)
+            if special.names != one.names and contains(one, special)
         )
     ]
 

@@ -284,6 +284,9 @@ def test_what_contains_a_member_of_a_class_has_to_be_a_rival_of_that(
         earned=lambda one: True,
     )
     assert verdict._rivals(search, chosen) == [rival, further][:members]
+    # One effect at two orders is no special case of itself.
+    search.found = [chosen, rival, a_set(dry, a_law("backlash", order=2.0), chi_square=1105.0)]
+    assert verdict._rivals(search, chosen) == search.found[1:]
 
 
 @pytest.mark.parametrize(
