@@ -14,12 +14,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
+_NONE = np.empty((0, 0))
 _RANK = 1e-5
 """Share of the largest singular value from which a direction counts."""
 
@@ -50,6 +52,10 @@ class Screened:
 def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
     """Return all candidates, the most promising first.
 
+    Beside effects, parameters that ended at a bound may leave it inward: with an effect missing the
+    gain of a sensor goes to its bound, and comes back with the effect. Without effects they stay
+    there, so that noise alone removes no more than `Rules.single_effect_gain` says.
+
     Parameters
     ----------
     data : Evidence
@@ -59,13 +65,14 @@ def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list
     """
     orthonormal, residual = _beyond_parameters(fitted)
     response, parts = data.response(fitted), data.rows_of_parts()
+    inward = _inward(fitted, orthonormal) if fitted.candidates else _NONE
     found = []
     for candidate in candidates:
         if candidate.frees is not None:
             found.append(_freed(candidate, fitted, orthonormal, residual))
             continue
         signatures = np.array([response(candidate.build(start)) for start in candidate.starts])
-        found.append(_screened(candidate, signatures, orthonormal, residual, parts))
+        found.append(_screened(candidate, signatures, orthonormal, residual, parts, inward))
     return sorted(found, key=lambda one: -one.reduction)
 
 
@@ -78,6 +85,8 @@ def most_hopeful(
     ill: Sequence[tuple[int, float]],
 ) -> list[Screened]:
     """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
+
+    If to first order none does in total, the best of all is tried.
 
     Parameters
     ----------
@@ -92,13 +101,16 @@ def most_hopeful(
     ill : sequence of (int, float)
         Parts of the data that it explains ill, and their excess.
     """
+    rules = data.rules
     if known:
         others = _not_far_behind(data, fitted, known, left, ill)
     screened = screen(data, fitted, others) if others else []
-    chosen = _hopeful(screened, [one.reduction for one in screened], left, data.rules)
+    chosen = _hopeful(screened, [one.reduction for one in screened], left, rules)
+    if not chosen:
+        chosen = [one for one in screened[:1] if one.reduction >= rules.promising_share * left]
     for part, of_part in ill:
         reductions = [one.by_part[part] for one in screened]
-        more = _hopeful(screened, reductions, of_part, data.rules)
+        more = _hopeful(screened, reductions, of_part, rules)
         chosen += [one for one in more if one not in chosen]
     return chosen
 
@@ -117,9 +129,10 @@ def _not_far_behind(
     """
     share = data.rules.promising_share * data.rules.second_hope_share
     orthonormal, residual = _beyond_parameters(fitted)
-    parts = data.rows_of_parts()
+    parts, inward = data.rows_of_parts(), _inward(fitted, orthonormal)
     found = (
-        _screened(one.candidate, one.signatures, orthonormal, residual, parts) for one in known
+        _screened(one.candidate, one.signatures, orthonormal, residual, parts, inward)
+        for one in known
     )
     return [
         one.candidate
@@ -151,7 +164,7 @@ def reduced(
 
     What is done by other directions, orthonormal (n, k), is projected out of its signatures.
     """
-    return _screened(one.candidate, one.signatures, orthonormal, residual, ())
+    return _screened(one.candidate, one.signatures, orthonormal, residual, (), _NONE)
 
 
 def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -161,19 +174,27 @@ def _beyond_parameters(fitted: Fit) -> tuple[NDArray[np.float64], NDArray[np.flo
     return orthonormal, fitted.residuals - orthonormal @ (orthonormal.T @ fitted.residuals)
 
 
+def _inward(fitted: Fit, orthonormal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what parameters at bounds do beyond the others if they leave these, shape (k, n)."""
+    bounded = fitted.bound_sides != 0.0
+    moves = -(fitted.jacobian[:, bounded] * fitted.bound_sides[bounded])
+    return np.asarray((moves - orthonormal @ (orthonormal.T @ moves)).T)
+
+
 def _screened(
     candidate: Candidate,
     signatures: NDArray[np.float64],
     orthonormal: NDArray[np.float64],
     residual: NDArray[np.float64],
     parts: Sequence[NDArray[np.int_]],
+    inward: NDArray[np.float64],
 ) -> Screened:
     """Return what a candidate could remove, as a whole and in each part."""
     beyond = signatures - (signatures @ orthonormal) @ orthonormal.T
     by_part = tuple(
-        _best_start(candidate, beyond[:, rows], residual[rows]).reduction for rows in parts
+        _best_start(candidate, beyond[:, rows], residual[rows], _NONE).reduction for rows in parts
     )
-    best = _best_start(candidate, beyond, residual)
+    best = _best_start(candidate, beyond, residual, inward)
     return replace(best, by_part=by_part, signatures=signatures)
 
 
@@ -192,39 +213,73 @@ def _freed(
 
 
 def _best_start(
-    candidate: Candidate, signatures: NDArray[np.float64], residual: NDArray[np.float64]
+    candidate: Candidate,
+    signatures: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    inward: NDArray[np.float64],
 ) -> Screened:
     """Return the reduction by the candidate, and the strengths that give it."""
     starts = np.array(candidate.starts)
     lower = np.array([parameter.lower for parameter in candidate.parameters])
     upper = np.array([parameter.upper for parameter in candidate.parameters])
     if candidate.linear:
-        best, reduction = _least_squares(signatures, starts, residual)
+        found, reduction = _least_squares(signatures, residual, inward)
+        best = found @ starts
         harmonic = [one.name.startswith(HARMONIC_NAMES[1:]) for one in candidate.parameters]
         lines = np.hypot(*best[harmonic].reshape(-1, 2).T)
         if lines.size and lines.max() > np.hypot(*best[:2]):
             # A line that is weaker than its harmonic is not the fundamental of that harmonic.
             kept = np.flatnonzero(~np.array(harmonic))
-            best, reduction = _least_squares(signatures[kept], starts[kept], residual)
+            found, reduction = _least_squares(signatures[kept], residual, inward)
+            best = found @ starts[kept]
     else:
-        sizes = np.einsum("ij,ij->i", signatures, signatures)
-        along = -signatures @ residual
-        strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
-        gains = np.where((strengths > 0.0) | (lower[0] < 0.0), along * strengths, 0.0)
+        # The first parameter is the strength; the others are shapes.
+        positive = bool(lower[0] >= 0.0)
+        strengths, gains = _one_by_one(signatures, residual, inward, positive)
         place = int(np.argmax(gains))
         reduction, best = float(gains[place]), starts[place].copy()
-        # The first parameter is the strength; the others are shapes.
-        best[0] *= np.clip(strengths[place], 0.2, 10.0) if lower[0] >= 0.0 else strengths[place]
+        best[0] *= np.clip(strengths[place], 0.2, 10.0) if positive else strengths[place]
     return Screened(candidate, reduction, tuple(np.clip(best, lower, upper).tolist()))
 
 
+def _one_by_one(
+    signatures: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    inward: NDArray[np.float64],
+    positive: bool,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the strength of each signature (k, n) alone, and the reduction by it, (k,)."""
+    if len(inward):
+        found = [_least_squares(one[None], residual, inward, positive) for one in signatures]
+        return np.array([one for (one,), _ in found]), np.array([gain for _, gain in found])
+    sizes = np.einsum("ij,ij->i", signatures, signatures)
+    along = -signatures @ residual
+    strengths = np.divide(along, sizes, out=np.zeros_like(along), where=sizes > 1e-12)
+    return strengths, np.where((strengths > 0.0) | (not positive), along * strengths, 0.0)
+
+
 def _least_squares(
-    signatures: NDArray[np.float64], starts: NDArray[np.float64], residual: NDArray[np.float64]
+    signatures: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    inward: NDArray[np.float64],
+    positive: bool = False,
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the values along the starts with the largest reduction, and that reduction."""
-    solution, *_ = np.linalg.lstsq(signatures.T, -residual, rcond=1e-10)
-    rest = residual + signatures.T @ solution
-    return solution @ starts, float(residual @ residual - rest @ rest)
+    """Return the strengths of signatures (k, n) with the largest reduction, and that reduction.
+
+    Those of moves ``inward`` (m, n) are positive, of signatures only where they are ``positive``.
+    """
+    moves = len(inward)
+    columns = np.concatenate([inward, signatures]).T if moves else signatures.T
+    if moves:
+        sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
+        left, right = np.linalg.qr(columns / sizes)
+        least = np.full(len(sizes), 0.0 if positive else -np.inf)
+        least[:moves] = 0.0
+        found = lsq_linear(right, -left.T @ residual, (least, np.inf), "bvls").x / sizes
+    else:
+        found, *_ = np.linalg.lstsq(columns, -residual, rcond=1e-10)
+    rest = residual + columns @ found
+    return found[moves:], float(residual @ residual - rest @ rest)
 
 
 def basis_of(columns: NDArray[np.float64]) -> NDArray[np.float64]:

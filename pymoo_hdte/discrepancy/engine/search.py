@@ -7,6 +7,7 @@ that is explained worst. Members of sets are tried by exchange, too, and each ha
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -62,17 +63,15 @@ class Search(FittedSets):
     def grow(self) -> None:
         """Fit sets of more effects as long as what is left could be that of a further one."""
         rules, first = self.data.rules, self.found[0]
-        if self.enough(first):
+        if self.enough(first) or not self._could_count(first):
             self._extend_beyond_forms(first)
             return
         for size in range(1, rules.most_effects):
-            grown = self.of_size(size)[: rules.most_firsts]
-            for place, one in enumerate(grown):
-                if place > 0 and leave_the_same(one, grown[0], rules):
-                    self._extend_like(one, grown[0])
-                elif place == 0 or size == 1:
-                    if not self._could_count(one):
-                        return
+            grown = self.of_size(size)[: rules.most_firsts if size == 1 else 1]
+            for one in grown:
+                if not self._could_count(one):
+                    return
+                if one is grown[0] or not leave_the_same(one, grown[0], rules):
                     self._extend(one)
             self.finish_near(size + 1)
             if size == 1:
@@ -175,18 +174,21 @@ class Search(FittedSets):
         """Return effects as screened beside the base; none where none was."""
         return [self._beside_base[one.label] for one in others] if self._beside_base else []
 
-    def _extend_like(self, one: Hypothesis, other: Hypothesis) -> None:
-        """Fit a set with each of the effects by which another one was extended.
+    def complete(self, chosen: Hypothesis) -> None:
+        """Fit the sets that differ from a chosen one by parts that leave the same alone.
 
-        Screening takes longest where an effect has lines that beat with those of the error.
+        Screening takes longest where an effect has lines that beat with those of the error, and
+        would find the same further effects beside each of these parts.
         """
-        shorter = label_of(other.candidates)
-        for longer in self.of_size(len(other.members) + 1):
-            more = [each for each in longer.candidates if each.label not in shorter]
-            fits = shorter < label_of(longer.candidates)
-            if fits and all(more[0].goes_with(each) for each in one.candidates):
-                start = longer.values_of(more)[len(self.base.values) :]
-                self.fitted((*one.candidates, *more), np.append(one.fit.values, start))
+        whole, rules = label_of(chosen.candidates), self.data.rules
+        for part in [one for one in self.found if label_of(one.candidates) < whole]:
+            kept = [each for each in chosen.candidates if each not in part.candidates]
+            for other in self.of_size(len(part.members)):
+                both = (*other.candidates, *kept)
+                if other is not part and leave_the_same(other, part, rules) and _together(both):
+                    start = chosen.values_of(kept)[len(self.base.values) :]
+                    self.fitted(both, np.append(other.fit.values, start))
+        self.finish_near(len(chosen.members))
 
     def _exchange(self, one: Hypothesis) -> None:
         """Fit sets in which something else is in the place of one member."""
@@ -214,3 +216,8 @@ class Search(FittedSets):
                 if special and all(other.goes_with(each) for each in kept):
                     start = np.append(one.values_of(kept), other.starts[0])
                     self.fitted((*kept, other), start)
+
+
+def _together(effects: Effects) -> bool:
+    """Tell whether a drive may have all these effects, none of them twice."""
+    return all(one.goes_with(other) for one, other in combinations(effects, 2))

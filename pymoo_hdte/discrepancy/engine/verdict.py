@@ -143,16 +143,19 @@ def judge(
     else:
         search.singles(screened)
         search.grow()
-    chosen = confirmed(search, special_case(search, best_set(search)))
+    chosen = _chosen(search)
+    if not known and len(chosen.members) > 1:
+        search.complete(chosen)
+        chosen = _chosen(search)
     certain = explains_in_any_form(search, chosen)
     if not certain:
         chosen = simpler_law(search, chosen)
     foreign: list[Hypothesis] = []
     if not (certain and chosen.listed):
         foreign = in_another_form(search, chosen, () if known else screened)
-        if not certain and explains_in_any_form(search, again := best_set(search)):
+        if not certain and explains_in_any_form(search, best_set(search)):
             # One of the effects that were fitted only now does so as it is listed.
-            chosen, certain, foreign = confirmed(search, special_case(search, again)), True, []
+            chosen, certain, foreign = _chosen(search), True, []
     if foreign:
         equivalent = [*foreign[1:], *([chosen] if certain else [])]
         chosen, certain = foreign[0], True
@@ -189,6 +192,11 @@ def judge(
         sure,
         search.forms.share_in_another(chosen) if foreign else None,
     )
+
+
+def _chosen(search: Search) -> Hypothesis:
+    """Return the best set, or its special case that does as well, without doubted members."""
+    return confirmed(search, special_case(search, best_set(search)))
 
 
 def _rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
