@@ -32,6 +32,7 @@ RIPPLE, LINE = "torque_ripple:input@5", "kinematic_error:mesh@3"
 SOFT, CUBIC = "soft_windup:mesh", "hardening_stiffness:mesh"
 DRAG, OUTPUT_FRICTION = "nonlinear_drag:input", "coulomb_friction:output"
 REACTION, INERTIA = "kinematic_reaction:input", "load_inertia:output"
+LOADS = (5.0, 12.0, 20.0, 30.0, 40.0)
 SEEN = [3.0, 5.0]
 FEW = [RIPPLE, LINE, SOFT, REACTION, INERTIA, "nonlinear_drag:input"]
 """Rivals enough where the rule is tested and not the choice among all."""
@@ -189,6 +190,18 @@ def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
     verdict = verdict_on(data, [RIPPLE, DRAG, SOFT])
     assert verdict.status == "named"
     assert labels_of(verdict) == {RIPPLE, SOFT}
+
+
+def test_a_second_effect_shows_where_no_single_part_contradicts_the_first():
+    """The whole does, by little, and friction of the load takes nearly all of it."""
+    friction = "load_dependent_friction:input"
+    records = known_data([(rpm, load) for rpm in (30.0, 300.0) for load in LOADS], ORDERS)
+    data = planted({SOFT: (0.3, 8e-4, 3.0), friction: (0.095,)}, empty=records)
+    soft = fit(data, of_labels([SOFT], empty=records))
+    assert not data.excess(soft).significant(data.rules).any()
+    verdict = verdict_on(data, [*FEW, friction])
+    assert verdict.status == "named"
+    assert labels_of(verdict) == {SOFT, friction}
 
 
 def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():

@@ -79,6 +79,22 @@ def test_reduction_by_a_line_is_that_of_linear_least_squares():
     assert found.start == pytest.approx(planted, abs=0.1 * np.hypot(*planted))
 
 
+def test_a_gain_comes_back_from_its_bound_with_the_friction_that_drove_it_there():
+    """With the gain held there, friction seemed to remove less than half of what it does."""
+    data = known_data(CONDITIONS[::2], [1.0, 2.0, 2.02, 6.0])
+    ripple, friction = (
+        listed(data, name, [6.0]) for name in ("torque_ripple", "load_dependent_friction")
+    )
+    hidden = (*ripple.build((3e-3, 1e-3)), *friction.build((0.1,)))
+    data, _ = measured(hidden, np.random.default_rng(1), data)
+    beside = fit(data, (ripple,))
+    assert "output_torque_gain" in beside.at_bounds
+    (found,) = screen(data, beside, (friction,))
+    both = fit(data, (ripple, friction), np.append(beside.values, found.start))
+    assert found.reduction == pytest.approx(beside.chi_square - both.chi_square, rel=0.02)
+    assert found.start == pytest.approx([0.1], rel=0.1)
+
+
 @pytest.mark.nightly
 def test_noise_gives_a_candidate_its_share_by_chance():
     """The reduction by two unknowns is a chi-square of two degrees of freedom."""
