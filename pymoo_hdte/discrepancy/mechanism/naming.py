@@ -72,7 +72,7 @@ def _compared(
 ) -> tuple[Verdict, bool]:
     """Return the verdict on the sets of a search, and on the best effects if it missed them.
 
-    And whether these were needed: what they leave is the noise of the data, down to which they
+    And whether it may be of these: what they leave is the noise of the data, down to which they
     explain a misfit in any case, so that their share has to be looked at besides.
 
     A search extends a set by what could remove most of what it leaves, to first order. That may be
@@ -81,7 +81,8 @@ def _compared(
     """
     verdict = judge(data, base, candidates)
     if verdict.status != "unlisted" or verdict.chosen is None or best is None:
-        return verdict, False
+        chosen = verdict.chosen.candidates if verdict.chosen is not None else ()
+        return verdict, best is not None and label_of(chosen) == label_of(best.candidates)
     found = [verdict.chosen, *verdict.alternatives]
     if label_of(best.candidates) in [label_of(one.candidates) for one in found]:
         return verdict, False
