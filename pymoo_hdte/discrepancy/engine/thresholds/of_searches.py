@@ -19,8 +19,9 @@ class SearchRules(RuleSet):
 
     promising_share: float = rule(
         0.2,
-        "share of the best candidate's reduction",
-        "Least reduction of chi-square, to first order, with which a candidate is fitted.",
+        "share of the best candidate's reduction, or of what a set leaves",
+        "Least reduction of chi-square, to first order, with which a candidate is fitted; of the "
+        "best one beside other effects where none reaches `second_hope_share`.",
         f"{BY_HAND}: the screening is linear and may underrate a candidate; this allows for a "
         "factor of five.",
         at_least=0.0,
