@@ -178,7 +178,7 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #        both open.
 #    * - ``named``
 #      - A set explains it, and no other comes near. A law that contains the named one and ended at
-#        a bound is no other.
+#        a bound is no other. A corner that ended as sharp as points can resolve is at no bound.
 #    * - ``partial``
 #      - As before, but one of its values ended at a bound, the interval of a strength contains
 #        nothing, a sensor's zero or gain ended far beyond what is stated of it, values out of
@@ -289,12 +289,13 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 
 # %%
 # Of another machine than a drive, no model meets the noise of its sensors. There all of this
-# is measured in units of the *rest*, which is what up to three effects leave, and three rules are
+# is measured in units of the *rest*, which is what up to three effects leave, and four rules are
 # added (``pymoo_hdte.discrepancy.mechanism.naming``): a named effect removes at least half of the
 # power of the misfit beyond the noise of the sensors; of models that leave about as much, the one
-# with the fewest unknowns is named; and a law that merely contains the named one is no other
-# explanation. The effects that define the rest are compared as well if the search finds nothing to
-# name, and the largest force is named first.
+# with the fewest unknowns is named; a law that merely contains the named one is no other
+# explanation; and the effects that define the rest, down to which they fit in any case, are named
+# in part where they remove less than nine tenths of that power. They are compared as well if the
+# search finds nothing to name, and the largest force is named first.
 
 # %%
 # Change a rule

@@ -51,7 +51,11 @@ class HardeningStiffness(Aperiodic):
 
 
 def _sharpness() -> Parameter:
-    """Guess the corner of a curve: from no corner to one that measured points cannot resolve."""
+    """Guess the corner of a curve: from no corner to one that measured points cannot resolve.
+
+    There the curve is off from two straight pieces by 3 % of the torsion at the corner itself
+    (1 - 2^(-1/20)), and by less than a thousandth a quarter away from it.
+    """
     return unknown("sharpness", 1.0, 20.0, 3.0, open_above=True)
 
 

@@ -37,7 +37,7 @@ class Parameter:
     linear : bool
         Whether a prediction is close to linear in it: part of a line, or a level.
     open_above : bool
-        Whether larger values predict the same: one that ends at ``upper`` has then arrived.
+        Whether larger values predict nearly the same: ``upper`` is then no limit of the law.
     """
 
     name: str

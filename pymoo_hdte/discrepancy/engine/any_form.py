@@ -226,9 +226,9 @@ class AnyForm:
     def _least(self, one: Hypothesis, member: Sequence[Candidate], rest: Rest) -> float:
         """Return what a further member has to remove beyond the forms of a set.
 
-        If the listed forms leave no more than noise, the model's own error is no larger than that
-        of exact forms, except for laws with memory; a gain that noise alone does not give is then
-        enough.
+        Of laws with memory the model's own error is a share of the whole misfit. Of others it is
+        that of exact forms where the listed forms leave no more than noise, and the square of the
+        share that they leave elsewhere. A gain that noise alone does not give is the least.
         """
         rules, to_noise = self.data.rules, self.leaves_noise(one)
         error = rules.exact_model_accuracy**2

@@ -33,20 +33,21 @@ def best_set(search: Search) -> Hypothesis:
     found: list[Hypothesis] = []
     while found != search.found:
         found = search.found
-        best = _first(
+        best = _least_that(
             search, lambda one: explains_in_any_form(search, one) and search.earned(one)
-        ) or _first(search, search.earned)
+        ) or _least_that(search, search.earned)
     assert best is not None, "a single effect is earned"
     return best
 
 
-def _first(search: Search, passes: Callable[[Hypothesis], bool]) -> Hypothesis | None:
-    """Return the set of least BIC that passes, of all that are known once it is judged."""
-    judged: dict[Hypothesis, bool] = {}
-    while left := [one for one in search.found if judged.get(one, True)]:
-        if left[0] in judged:
+def _least_that(search: Search, passes: Callable[[Hypothesis], bool]) -> Hypothesis | None:
+    """Return the set of least BIC that passes, of all that are known once it has been judged."""
+    passed: set[Hypothesis] = set()
+    refused: set[Hypothesis] = set()
+    while left := [one for one in search.found if one not in refused]:
+        if left[0] in passed:
             return left[0]
-        judged[left[0]] = passes(left[0])
+        (passed if passes(left[0]) else refused).add(left[0])
     return None
 
 

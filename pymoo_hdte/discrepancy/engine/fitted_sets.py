@@ -1,4 +1,4 @@
-"""Sets of effects fitted jointly with the base, each once: so far as to rank it, or to the end."""
+"""Sets of effects fitted jointly with the base: first so far as to rank them, then to the end."""
 
 from __future__ import annotations
 
@@ -76,7 +76,8 @@ class FittedSets:
     def fitted(self, effects: Effects, start: Vector, again: bool = False) -> Hypothesis:
         """Return a set fitted from a start so far as to rank it.
 
-        A set that is known already is fitted ``again`` only where that is asked for.
+        A set that is known already is fitted ``again`` only where that is asked for; the better
+        of both fits is kept.
         """
         label = label_of(effects)
         if label not in self._by_label or again:
@@ -107,10 +108,23 @@ class FittedSets:
             self._finished.add(label)
         return self._by_label[label]
 
+    def resume(self, known: Sequence[Hypothesis]) -> None:
+        """Fit sets from the values that another search has found on nearly the same data."""
+        self._resumed = True
+        for one in known:
+            self.fitted(one.candidates, one.fit.values)
+        for size in {len(one.members) for one in known}:
+            self.finish_near(size)
+
+    def forget(self, label: frozenset[str]) -> None:
+        """Leave a set out that is known under another name."""
+        self._by_label.pop(label)
+
     def finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near.
 
-        Beside several effects that leave no more than noise, only the latter.
+        If the best set has several effects and leaves no more than noise, only those that may come
+        as near.
         """
         rules = self.data.rules
         for place in range(len(self.of_size(size))):

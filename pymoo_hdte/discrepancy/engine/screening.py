@@ -37,7 +37,8 @@ class Screened:
         Of the whole chi-square.
     start : tuple of float
     by_part : tuple of float
-        The same for each part of the data alone; empty for a parameter out of tolerance.
+        The same for each part of the data alone, with parameters at bounds held there; empty for a
+        parameter out of tolerance.
     signatures : ndarray, shape (n_starts, n_residuals)
         Change of the residuals by each of its starts; empty for a parameter out of tolerance.
     """
@@ -86,7 +87,7 @@ def most_hopeful(
 ) -> list[Screened]:
     """Return the effects that may remove most of what a fit leaves, in total or in a part of it.
 
-    If to first order none does in total, the best of all is tried.
+    If to first order none does in total, the best one is tried where it is promising.
 
     Parameters
     ----------

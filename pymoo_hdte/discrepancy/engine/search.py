@@ -1,7 +1,9 @@
 """Search for the set of effects that explains a misfit; sets that decide are fitted to the end.
 
-Sets grow by the effects that could remove most of what is left, in total or in the part of the data
-that is explained worst. Members of sets are tried by exchange, too, and each has to be earned.
+Sets grow by the effects that could remove most of what is left, in total, in the part of the data
+that is explained worst, or beyond all forms of their laws. Members of sets are tried by exchange,
+too, and each has to be earned. The chosen set is compared with those in which a part is replaced by
+another that explains as much by itself.
 """
 
 from __future__ import annotations
@@ -51,7 +53,7 @@ class Search(FittedSets):
         promising = [one for one in screened if one.reduction >= least]
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
             self.alone(one)
-        if self._by_label and self.found[0].explained < rules.explained_share:
+        if self.found and self.found[0].explained < rules.explained_share:
             self.from_other_starts(self.of_size(1))
         self._parameters()
         self.finish_near(1)
@@ -86,14 +88,6 @@ class Search(FittedSets):
         """Return a single effect, fitted so far as to rank it."""
         return self.fitted((one.candidate,), np.append(self.base.values, one.start))
 
-    def resume(self, known: Sequence[Hypothesis]) -> None:
-        """Fit sets that another search has found on nearly the same data."""
-        self._resumed = True
-        for one in known:
-            self.fitted(one.candidates, one.fit.values)
-        for size in {len(one.members) for one in known}:
-            self.finish_near(size)
-
     def _parameters(self) -> None:
         """Fit all base parameters that want to leave their tolerances together.
 
@@ -103,7 +97,7 @@ class Search(FittedSets):
         freed, found = freed_together(self.data, self.base)
         values = found.values
         needed = tuple(one for one in freed if one.outside(self.data.base, values))
-        best = self.found[0].bic if self._by_label else np.inf
+        best = self.found[0].bic if self.found else np.inf
         if not needed or found.chi_square > best:
             return
         if len(needed) > 1:
@@ -114,9 +108,9 @@ class Search(FittedSets):
                 self.fitted((one,), values)
         # An effect covers these under another name, with what proved needless beside them.
         covered = {one.label for one in freed if one.frees not in alone}
-        for label in [one for one in self._by_label if one & covered]:
-            if len(label) == 1 or label_of(needed) < label:
-                self._by_label.pop(label)
+        for label in map(label_of, (one.candidates for one in self.found)):
+            if label & covered and (len(label) == 1 or label_of(needed) < label):
+                self.forget(label)
 
     def _pruned(self, one: Hypothesis) -> Effects:
         """Return the parameters of a set whose removal would cost more than they do."""
@@ -175,10 +169,10 @@ class Search(FittedSets):
         return [self._beside_base[one.label] for one in others] if self._beside_base else []
 
     def complete(self, chosen: Hypothesis) -> None:
-        """Fit the sets that differ from a chosen one by parts that leave the same alone.
+        """Fit the sets in which a part of a chosen one is another that leaves the same by itself.
 
-        Screening takes longest where an effect has lines that beat with those of the error, and
-        would find the same further effects beside each of these parts.
+        Only the better of the two was extended: a screening beside the other would find the same
+        further effects, and takes longest where a line beats with those of the error.
         """
         whole, rules = label_of(chosen.candidates), self.data.rules
         for part in [one for one in self.found if label_of(one.candidates) < whole]:
@@ -220,4 +214,5 @@ class Search(FittedSets):
 
 def _together(effects: Effects) -> bool:
     """Tell whether a drive may have all these effects, none of them twice."""
-    return all(one.goes_with(other) for one, other in combinations(effects, 2))
+    twice = len(label_of(effects)) < len(effects)
+    return not twice and all(one.goes_with(other) for one, other in combinations(effects, 2))

@@ -202,35 +202,38 @@ def _chosen(search: Search) -> Hypothesis:
 def _rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     """Return the sets that explain the data as well as the chosen one by something else.
 
-    What contains one of them is a further one only where it is a rival of that, too.
+    What contains one of them is a further one only where it comes near that, too.
     """
-    found = [one for one in search.found if one is not chosen and _is_rival(search, one, chosen)]
+    found = [
+        one
+        for one in search.found
+        if one is not chosen
+        and _comes_near(search, one, chosen)
+        and explains_in_any_form(search, one)
+        and search.earned(one)
+    ]
     return [
         one
         for one in found
         if all(
-            _is_rival(search, one, special)
+            _comes_near(search, one, special)
             for special in found
             if special.names != one.names and contains(one, special)
         )
     ]
 
 
-def _is_rival(search: Search, one: Hypothesis, chosen: Hypothesis) -> bool:
-    """Tell whether a set explains the data as well as the chosen one by something else.
+def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
+    """Tell whether a set says something else than another that the data do not tell from it.
 
-    A law that contains the chosen one and ends at its bound is the chosen one. Where its further
+    A law that contains the other one and ends at its bound is the other one. Where its further
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
-    rules, overlap = search.data.rules, search.forms.known((*one.candidates, *chosen.candidates))
-    near = alike(one, chosen, search.degrees_of_freedom, rules, overlap)
-    near = near or undecided(one, chosen, rules)
-    return (
-        near
-        and not (contains(one, chosen) and any(bounded for _, bounded in bounded_unknowns(one.fit)))
-        and explains_in_any_form(search, one)
-        and search.earned(one)
-    )
+    rules, overlap = search.data.rules, search.forms.known((*one.candidates, *other.candidates))
+    near = alike(one, other, search.degrees_of_freedom, rules, overlap)
+    if not (near or undecided(one, other, rules)):
+        return False
+    return not (contains(one, other) and any(bounded for _, bounded in bounded_unknowns(one.fit)))
 
 
 def _distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:

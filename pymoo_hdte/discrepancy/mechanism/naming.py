@@ -46,7 +46,7 @@ def judged(
     """
     base, rules = fit(data), data.rules
     searched = [one for one in candidates if not one.instead_of]
-    verdict, of_its_own_noise = _compared(data, base, searched, best)
+    verdict, added = _compared(data, base, searched, best)
     verdict = _mostly_explained(sensors, data, verdict)
     verdict = _simplest(data, verdict)
     verdict = _with_true_rivals(data, _within_bounds(sensors, data, verdict))
@@ -61,8 +61,12 @@ def judged(
     least = rules.explained_share if verdict.status == "parameter" else rules.main_share
     if removed < least or out:
         return _as_unlisted(verdict, verdict.chosen)
-    verdict = replace(verdict, chosen=_largest_first(data, verdict.chosen))
-    if of_its_own_noise and verdict.status == "named" and removed < rules.explained_share:
+    chosen = _largest_first(data, verdict.chosen)
+    verdict = replace(verdict, chosen=chosen)
+    # The best effects define the noise, so that they fit down to it in any case.
+    is_best = best is not None and label_of(chosen.candidates) == label_of(best.candidates)
+    own_noise = added or is_best
+    if own_noise and verdict.status == "named" and removed < rules.explained_share:
         return replace(verdict, status="partial", doubts=(*verdict.doubts, _too_little(removed)))
     return verdict
 
@@ -70,10 +74,9 @@ def judged(
 def _compared(
     data: MeasuredData, base: Fit, candidates: Sequence[Candidate], best: Hypothesis | None
 ) -> tuple[Verdict, bool]:
-    """Return the verdict on the sets of a search, and on the best effects if it missed them.
+    """Return the verdict on the sets of a search, and whether the best effects were added to them.
 
-    And whether it may be of these: what they leave is the noise of the data, down to which they
-    explain a misfit in any case, so that their share has to be looked at besides.
+    They are if the search finds nothing to name and missed them.
 
     A search extends a set by what could remove most of what it leaves, to first order. That may be
     nothing for one of two effects between which the base lies: springs that slip and a spring that
@@ -81,8 +84,7 @@ def _compared(
     """
     verdict = judge(data, base, candidates)
     if verdict.status != "unlisted" or verdict.chosen is None or best is None:
-        chosen = verdict.chosen.candidates if verdict.chosen is not None else ()
-        return verdict, best is not None and label_of(chosen) == label_of(best.candidates)
+        return verdict, False
     found = [verdict.chosen, *verdict.alternatives]
     if label_of(best.candidates) in [label_of(one.candidates) for one in found]:
         return verdict, False

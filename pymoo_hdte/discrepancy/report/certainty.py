@@ -131,9 +131,14 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
     elif others:
         best = min(others, key=lambda hypothesis: hypothesis.bic)
         words.append(_next_best(best, chosen))
-    if chosen.fit.at_bounds:
+    bounded = [
+        one.name
+        for one, side in zip(chosen.fit.parameters, chosen.fit.bound_sides, strict=True)
+        if side < 0.0 or (side > 0.0 and not one.open_above)
+    ]
+    if bounded:
         orders = finding.campaign.believed.error_orders
-        names = ", ".join(words_of(name, orders) for name in chosen.fit.at_bounds)
+        names = ", ".join(words_of(name, orders) for name in bounded)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
     return [_probably(verdict), *words]
 

@@ -19,9 +19,11 @@ class SearchRules(RuleSet):
 
     promising_share: float = rule(
         0.2,
-        "share of the best candidate's reduction, or of what a set leaves",
-        "Least reduction of chi-square, to first order, with which a candidate is fitted; of the "
-        "best one beside other effects where none reaches `second_hope_share`.",
+        "share of the best candidate's reduction",
+        "Least reduction of chi-square, to first order, with which a candidate is fitted. Beside "
+        "other effects it is a share of what these leave: where no candidate reaches "
+        "`second_hope_share`, the best one is fitted from here on; and what stays below the "
+        "product of both by its signature beside the base is not screened again.",
         f"{BY_HAND}: the screening is linear and may underrate a candidate; this allows for a "
         "factor of five.",
         at_least=0.0,
@@ -58,15 +60,16 @@ class SearchRules(RuleSet):
     refit_margin: float = rule(
         5.0,
         "1",
-        "Multiple of the distances `evidence_distance` and `form_ratio` within which another "
-        "explanation is fitted to the end before it is judged.",
+        "Multiple of `evidence_distance` within which another explanation is fitted to the end "
+        "before it is judged.",
         f"{BY_HAND}: a fit that is continued may come nearer by this factor.",
         at_least=1.0,
     )
     second_hope_share: float = rule(
         0.5,
         "share of what the first effect leaves",
-        "Least share that a second effect removes to first order to be fitted.",
+        "Least share that a second effect removes to first order to be fitted, if not only the "
+        "best is; and a first one, of the whole misfit, in any form of its law.",
         f"{BY_HAND}: well below `second_share`, since the screening is linear.",
         at_least=0.0,
     )
@@ -79,8 +82,9 @@ class SearchRules(RuleSet):
     most_firsts: int = rule(
         2,
         "1",
-        "Sets of one size that are extended by a further effect, and that are fitted from other "
-        "starts.",
+        "Single effects that are extended by a further one, and sets of one size that are fitted "
+        "to the end however far apart; one alone where several effects leave no more than noise. A "
+        "second single that leaves the same as the first is not extended anew.",
         f"{BY_HAND}: the better of two effects alone need not be one of both.",
     )
     most_freed_rounds: int = rule(
