@@ -16,6 +16,8 @@ from pymoo_hdte.discrepancy.engine import doubts, verdict
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.fitting import Vote, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import down_to_noise, hypothesis_of
+from pymoo_hdte.discrepancy.engine.screening import screen
+from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.effects.friction import PeriodicTorque, smoothed_sign
 from pymoo_hdte.effects.law import Response
@@ -160,6 +162,27 @@ def test_a_form_is_known_to_the_square_of_what_its_listed_one_leaves(further, na
     data = replace(measured(hidden, np.random.default_rng(1), empty)[0], rules=COARSE)
     found = judge(data, fit(data), [law, drift])
     assert {one.label for one in found.chosen.candidates} == {waving, DRIFT} if named else {waving}
+
+
+def test_beside_two_effects_a_third_is_not_fitted_to_errors_of_their_forms(monkeypatch):
+    """A pair took 70 s, most of it for third effects that its spring's form explained as well."""
+    line = "kinematic_error:mesh@3"
+    laws = [one for one in library(DATA, (3.0,)) if one.label in (SPRING, line, FRICTION)]
+    (error,) = (one for one in laws if one.label == line)
+    data = planted(FOREIGN[SPRING], *error.build((3e-6, 0.0)))
+    base = fit(data)
+
+    def sizes():
+        search = Search(data, base, laws)
+        search.singles(screen(data, base, laws))
+        search.grow()
+        assert {one.label for one in search.found[0].candidates} == {SPRING, line}
+        assert not search.enough(search.found[0])
+        return {len(one.members) for one in search.found}
+
+    assert sizes() == {1, 2}
+    monkeypatch.setattr(AnyForm, "explains", lambda *_: False)
+    assert sizes() == {1, 2, 3}
 
 
 @pytest.mark.nightly

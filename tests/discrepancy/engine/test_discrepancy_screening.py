@@ -1,6 +1,7 @@
 """First-order signatures: what a candidate could remove, in closed form and by a fit."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.prediction import Conditions
 from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
+from pymoo_hdte.discrepancy.engine import screening
 from pymoo_hdte.discrepancy.engine.fitting import fit
-from pymoo_hdte.discrepancy.engine.screening import screen
+from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.screening import Screened, most_hopeful, screen
 from pymoo_hdte.units import ARCSEC
 
 SEEN = [3.0, 6.0]
@@ -81,7 +84,7 @@ def test_reduction_by_a_line_is_that_of_linear_least_squares():
 
 def test_a_gain_comes_back_from_its_bound_with_the_friction_that_drove_it_there():
     """With the gain held there, friction seemed to remove less than half of what it does."""
-    data = known_data(CONDITIONS[::2], [1.0, 2.0, 2.02, 6.0])
+    data = known_data(FEW, [1.0, 2.0, 2.02, 6.0])
     ripple, friction = (
         listed(data, name, [6.0]) for name in ("torque_ripple", "load_dependent_friction")
     )
@@ -93,6 +96,22 @@ def test_a_gain_comes_back_from_its_bound_with_the_friction_that_drove_it_there(
     both = fit(data, (ripple, friction), np.append(beside.values, found.start))
     assert found.reduction == pytest.approx(beside.chi_square - both.chi_square, rel=0.02)
     assert found.start == pytest.approx([0.1], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("shares", "tried"),
+    [((0.3, 0.25), "a"), ((0.15, 0.1), ""), ((0.6, 0.3), "a"), ((0.7, 0.6), "ab")],
+)
+def test_where_no_second_effect_is_hopeful_the_best_one_is_tried(shares, tried, monkeypatch):
+    """Friction of the load beside a large ripple removed 85 %, and to first order 34 %."""
+    found = [
+        Screened(SimpleNamespace(name=name), 100.0 * share, ())
+        for name, share in zip("ab", shares, strict=True)
+    ]
+    monkeypatch.setattr(screening, "screen", lambda data, fitted, others: found)
+    data = SimpleNamespace(rules=RULES)
+    chosen = most_hopeful(data, None, ["a", "b"], [], 100.0, [])
+    assert "".join(one.candidate.name for one in chosen) == tried
 
 
 @pytest.mark.nightly

@@ -9,6 +9,7 @@ import pytest
 from pymoo_hdte.discrepancy.engine import choice, verdict
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
+from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
 from pymoo_hdte.discrepancy.engine.hypothesis import contains
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.effects.unknowns import Parameter, unknown
@@ -220,6 +221,34 @@ def search_among(*found):
         found=found,
         earned=lambda one: True,
     )
+
+
+@pytest.mark.parametrize(
+    ("size", "behind", "enough", "finished"),
+    [
+        (2, 1e4, True, [0]),
+        (2, 10.0, True, [0, 1]),
+        (2, 1e4, False, [0, 1]),
+        (1, 1e4, True, [0, 1]),
+    ],
+)
+def test_a_set_far_behind_several_effects_that_leave_noise_is_not_finished(
+    size, behind, enough, finished
+):
+    """Springs that slip took two minutes to end far behind a damping that explained all."""
+    sets = [SimpleNamespace(place=0, bic=0.0), SimpleNamespace(place=1, bic=behind)]
+    for one in sets:
+        one.fit = SimpleNamespace(chi_square=float(FREEDOM))
+    done = []
+    fake = SimpleNamespace(
+        data=SimpleNamespace(rules=RULES),
+        degrees_of_freedom=FREEDOM,
+        of_size=lambda wanted: sets,
+        enough=lambda one: enough,
+        finished=lambda one: done.append(one.place),
+    )
+    FittedSets.finish_near(fake, size)
+    assert done == finished
 
 
 def freed(*names):
