@@ -26,13 +26,15 @@ SCALE = 46.0 / 101.0
 """Order of a line that an encoder shows 46 times in its turn."""
 ORDERS = [1.0, 2.0, 2.02, 3.0, 4.0, 5.0, 6.0]
 EMPTY = known_data(CONDITIONS[::2], ORDERS)
+LOADS = (5.0, 12.0, 20.0, 30.0, 40.0)
+WITH_LOADS = known_data([(rpm, load) for rpm in (30.0, 300.0) for load in LOADS], ORDERS)
+"""Flanks are held in all records."""
 OF_ENCODER = known_data(CONDITIONS[::2], [1.0 / 101.0, SCALE, *ORDERS])
 """With orders of the output's encoder, which make every solution much longer."""
 RIPPLE, LINE = "torque_ripple:input@5", "kinematic_error:mesh@3"
 SOFT, CUBIC = "soft_windup:mesh", "hardening_stiffness:mesh"
 DRAG, OUTPUT_FRICTION = "nonlinear_drag:input", "coulomb_friction:output"
 REACTION, INERTIA = "kinematic_reaction:input", "load_inertia:output"
-LOADS = (5.0, 12.0, 20.0, 30.0, 40.0)
 SEEN = [3.0, 5.0]
 FEW = [RIPPLE, LINE, SOFT, REACTION, INERTIA, "nonlinear_drag:input"]
 """Rivals enough where the rule is tested and not the choice among all."""
@@ -195,13 +197,21 @@ def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
 def test_a_second_effect_shows_where_no_single_part_contradicts_the_first():
     """The whole does, by little, and friction of the load takes nearly all of it."""
     friction = "load_dependent_friction:input"
-    records = known_data([(rpm, load) for rpm in (30.0, 300.0) for load in LOADS], ORDERS)
-    data = planted({SOFT: (0.3, 8e-4, 3.0), friction: (0.095,)}, empty=records)
-    soft = fit(data, of_labels([SOFT], empty=records))
+    data = planted({SOFT: (0.3, 8e-4, 3.0), friction: (0.095,)}, empty=WITH_LOADS)
+    soft = fit(data, of_labels([SOFT], empty=WITH_LOADS))
     assert not data.excess(soft).significant(data.rules).any()
     verdict = verdict_on(data, [*FEW, friction])
     assert verdict.status == "named"
     assert labels_of(verdict) == {SOFT, friction}
+
+
+@pytest.mark.parametrize(("listed", "status"), [((), "partial"), (("backlash:mesh",), "class")])
+def test_a_play_is_no_wind_up_of_straight_pieces(listed, status):
+    """Such a wind-up that loses all its stiffness is a play: its softening ends at a bound."""
+    (play,) = of_labels(["backlash:mesh"], empty=WITH_LOADS)
+    data = planted({"backlash:mesh": (3e-5,)}, empty=WITH_LOADS)
+    data = with_sweep(data, play.build((3e-5,)), np.random.default_rng(5))
+    assert verdict_on(data, [SOFT, CUBIC, INERTIA, *listed]).status == status
 
 
 def test_a_stiffness_out_of_tolerance_is_a_parameter_and_no_effect():
