@@ -293,9 +293,9 @@ for one in sorted([verdict.chosen, *verdict.alternatives], key=lambda one: one.b
 # added (``pymoo_hdte.discrepancy.mechanism.naming``): a named effect removes at least half of the
 # power of the misfit beyond the noise of the sensors; of models that leave about as much, the one
 # with the fewest unknowns is named; a law that merely contains the named one is no other
-# explanation; and the effects that define the rest, down to which they fit in any case, are named
-# in part where they remove less than nine tenths of that power. They are compared as well if the
-# search finds nothing to name, and the largest force is named first.
+# explanation; and what is among the effects that define the rest, down to which these fit in any
+# case, is named in part where it removes less than nine tenths of that power. They are compared as
+# well if the search finds nothing to name, and the largest force is named first.
 
 # %%
 # Change a rule

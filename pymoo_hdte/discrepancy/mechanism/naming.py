@@ -64,8 +64,8 @@ def judged(
     chosen = _largest_first(data, verdict.chosen)
     verdict = replace(verdict, chosen=chosen)
     # The best effects define the noise, so that they fit down to it in any case.
-    is_best = best is not None and label_of(chosen.candidates) == label_of(best.candidates)
-    own_noise = added or is_best
+    among = best is not None and label_of(chosen.candidates) <= label_of(best.candidates)
+    own_noise = added or among
     if own_noise and verdict.status == "named" and removed < rules.explained_share:
         return replace(verdict, status="partial", doubts=(*verdict.doubts, _too_little(removed)))
     return verdict
