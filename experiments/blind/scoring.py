@@ -31,7 +31,7 @@ from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.drive.proof import Proof, prove
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, expected_values
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.effects.unknowns import line_with_variance
 
@@ -179,13 +179,14 @@ def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:
     Quantities that the hidden form does not have are left out, and effects that are not hidden.
     """
     fitted, total, covered = verdict.accepted, 0, 0
+    values = expected_values(fitted)
     for candidate, place in fitted.places:
         for row in range(place.start, place.stop):
-            name, value = fitted.parameters[row].name, float(fitted.values[row])
+            name, value = fitted.parameters[row].name, float(values[row])
             variance = float(fitted.covariance[row, row])
             if name.endswith("_cosine"):
                 pair = np.array([row, row + 1])
-                cosine, sine = fitted.values[pair]
+                cosine, sine = values[pair]
                 block = fitted.covariance[np.ix_(pair, pair)]
                 (value, variance), _ = line_with_variance(cosine, sine, block)
                 name = name.removesuffix("_cosine")

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened
@@ -134,6 +134,23 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
                 names.append(parameter.name)
         found.append((candidate, names))
     return found
+
+
+def expected_values(fitted: Fit) -> NDArray[np.float64]:
+    """Return the values to be expected by a fit and its bounds, those around which intervals lie.
+
+    A base parameter of which the records do not even halve the variance between its bounds ends
+    anywhere there, often at one of them: to be expected is the middle. What an effect has beyond
+    it, as an inertia beyond the believed one, moves along. Shape (n_parameters,).
+    """
+    n, variance = fitted.n_base, np.diag(fitted.covariance)
+    layout = Layout(fitted.parameters)
+    lower, upper = layout.array("lower"), layout.array("upper")
+    uniform = (upper - lower) ** 2 / 12.0
+    undetermined = (np.arange(len(variance)) < n) & (variance > 0.5 * uniform)
+    pull = np.where(undetermined, ((lower + upper) / 2.0 - fitted.values) / uniform, 0.0)
+    moved = fitted.values + fitted.covariance @ pull
+    return np.asarray(np.clip(moved, lower, upper))
 
 
 def gains_enough(one: Hypothesis, base: Fit, rules: Rules) -> bool:

@@ -17,7 +17,7 @@ from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.parameters import base_unit
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, expected_values
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.effects.sentence_blanks import in_words, joined_sentences
@@ -177,7 +177,8 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: Sequence[int]) -> dict[
         if name.endswith("_cosine"):
             found |= _line(name.removesuffix("_cosine"), candidate, fitted, row)
         elif not name.endswith("_sine"):
-            found[name] = quantity(fitted.values[row], variance, _unit(candidate, name))
+            value = expected_values(fitted)[row]
+            found[name] = quantity(value, variance, _unit(candidate, name))
     return found
 
 
@@ -189,7 +190,7 @@ def _line(name: str, candidate: Candidate, fitted: Fit, row: int) -> dict[str, A
     """Return amplitude and phase, with intervals, of a line whose cosine part is at a row."""
     rows = np.array([row, row + 1])
     covariance = fitted.covariance[np.ix_(rows, rows)]
-    cosine, sine = fitted.values[rows]
+    cosine, sine = expected_values(fitted)[rows]
     amplitude, phase = line_with_variance(cosine, sine, covariance)
     prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
     return {

@@ -12,6 +12,7 @@ from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.hypothesis import expected_values
 from pymoo_hdte.units import ARCSEC
 
 FEW = CONDITIONS[::2]
@@ -168,6 +169,24 @@ def test_a_parameter_out_of_tolerance_stops_at_its_bound(factor, side):
     deviation = np.sqrt(freed.covariance[place, place])
     assert freed.values[place] == pytest.approx(truth[place], abs=4.0 * deviation)
     assert freed.chi_square < 0.5 * base.chi_square
+
+
+@pytest.mark.parametrize("share", [0.92, 1.0, 1.08])
+def test_the_interval_of_an_inertia_holds_it_wherever_the_believed_one_lies(share):
+    """Records show their sum only, and fits end at one end of the tolerance of the believed one."""
+    speeds, loads = (150.0, 500.0, 1000.0, 1500.0, 2000.0), (5.0, 20.0, 30.0, 40.0, 10.0)
+    empty = known_data(list(zip(speeds, loads, strict=True)), [1.0, 2.0, 2.02, 3.0])
+    load = listed(empty, "load_inertia")
+    data, _ = measured(load.build((0.05,)), np.random.default_rng(1), empty, load_inertia=share)
+    found = min(
+        (fit(data, (load,), np.append(fit(data).values, start)) for start in load.starts),
+        key=lambda one: one.chi_square,
+    )
+    deviation = np.sqrt(found.covariance[-1, -1])
+    assert expected_values(found)[-1] == pytest.approx(0.05, abs=1.96 * deviation)
+    # What records determine stays where it is.
+    stiffness = Layout(data.base).index("stiffness")
+    assert expected_values(found)[stiffness] == pytest.approx(found.values[stiffness], rel=1e-4)
 
 
 def test_an_effect_comes_back_from_a_start_far_away():
