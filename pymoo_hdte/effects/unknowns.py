@@ -49,6 +49,10 @@ class Parameter:
     linear: bool = False
     open_above: bool = False
 
+    def limited_at(self, side: float) -> bool:
+        """Tell whether a value is limited that ended at a side: -1 lower, 1 upper, 0 neither."""
+        return side < 0.0 or (side > 0.0 and not self.open_above)
+
 
 def unknown(
     name: str,

@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     strength_is_certain,
     uncertain,
 )
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, bounded_unknowns, contains
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains, is_bounded
 from pymoo_hdte.discrepancy.engine.screening import Screened
 from pymoo_hdte.discrepancy.engine.search import Search
 
@@ -59,7 +59,7 @@ def special_case(search: Search, best: Hypothesis) -> Hypothesis:
     the slowest speed is dry friction; one that falls by a hundredth may be, and is in its class.
     """
     error = search.data.rules.model_accuracy**2 * search.excess
-    if any(bounded for _, bounded in bounded_unknowns(best.fit)):
+    if is_bounded(best.fit):
         error = np.inf
     simpler = (
         search.finished(one)

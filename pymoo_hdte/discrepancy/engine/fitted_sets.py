@@ -28,9 +28,8 @@ class FittedSets:
     forms : AnyForm
         What sets leave in any form of their laws.
     degrees_of_freedom : int
-        Of the base.
     excess : float
-        Chi-square of the base beyond them.
+        Of the base, as of ``forms``.
     """
 
     def __init__(self, data: Evidence, base: Fit) -> None:

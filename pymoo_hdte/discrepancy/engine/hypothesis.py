@@ -129,11 +129,15 @@ def bounded_unknowns(fitted: Fit) -> list[tuple[Candidate, list[str]]]:
         names = []
         for side, parameter in zip(fitted.bound_sides[place], candidate.parameters, strict=True):
             none = parameter.linear and parameter.lower == 0.0 and side < 0.0
-            arrived = none or (parameter.open_above and side > 0.0)
-            if side != 0.0 and not arrived:
+            if parameter.limited_at(side) and not none:
                 names.append(parameter.name)
         found.append((candidate, names))
     return found
+
+
+def is_bounded(fitted: Fit) -> bool:
+    """Tell whether any unknown of the candidates of a fit ended at a bound."""
+    return any(bounded for _, bounded in bounded_unknowns(fitted))
 
 
 def expected_values(fitted: Fit) -> NDArray[np.float64]:

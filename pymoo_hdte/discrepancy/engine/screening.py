@@ -22,6 +22,7 @@ from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.effects.unknowns import HARMONIC_NAMES
 
 _NONE = np.empty((0, 0))
+"""No signatures, and no moves."""
 _RANK = 1e-5
 """Share of the largest singular value from which a direction counts."""
 
@@ -47,7 +48,7 @@ class Screened:
     reduction: float
     start: tuple[float, ...]
     by_part: tuple[float, ...] = ()
-    signatures: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 0)))
+    signatures: NDArray[np.float64] = field(default_factory=lambda: _NONE)
 
 
 def screen(data: Evidence, fitted: Fit, candidates: Sequence[Candidate]) -> list[Screened]:
@@ -269,9 +270,9 @@ def _least_squares(
 
     Those of moves ``inward`` (m, n) are positive, of signatures only where they are ``positive``.
     """
-    moves = len(inward)
-    columns = np.concatenate([inward, signatures]).T if moves else signatures.T
+    moves, columns = len(inward), signatures.T
     if moves:
+        columns = np.concatenate([inward, signatures]).T
         sizes = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
         left, right = np.linalg.qr(columns / sizes)
         least = np.full(len(sizes), 0.0 if positive else -np.inf)

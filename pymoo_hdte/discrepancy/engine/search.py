@@ -19,7 +19,7 @@ from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.freed_parameters import freed_together
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
-    bounded_unknowns,
+    is_bounded,
     label_of,
     leave_the_same,
 )
@@ -125,7 +125,7 @@ class Search(FittedSets):
     def _could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified; one at a bound may stand for two."""
         if self.enough(one):
-            return any(bounded for _, bounded in bounded_unknowns(one.fit))
+            return is_bounded(one.fit)
         return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
 
     def _extend(self, one: Hypothesis, by_part: bool = True) -> None:
@@ -195,11 +195,13 @@ class Search(FittedSets):
         An inertia moves resonances past lines: to first order it does next to nothing for them.
         """
         plainly = self.data.rules.contradicting_chi_square * self.degrees_of_freedom
-        inertias = [one for one in self._further(first) if one.exact and len(one.parameters) == 1]
-        for more in inertias if self.found[0].fit.chi_square > plainly else ():
-            for start in more.starts if len(more.starts) > 1 else ():
-                values = np.append(first.fit.values, start)
-                self.fitted((*first.candidates, more), values, again=True)
+        if self.found[0].fit.chi_square <= plainly:
+            return
+        for more in self._further(first):
+            if more.exact and len(more.parameters) == 1 and len(more.starts) > 1:
+                for start in more.starts:
+                    values = np.append(first.fit.values, start)
+                    self.fitted((*first.candidates, more), values, again=True)
 
     def _special_cases(self, one: Hypothesis) -> None:
         """Fit sets in which one member is replaced by a special case of it at the same port."""

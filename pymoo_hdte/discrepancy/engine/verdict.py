@@ -34,10 +34,10 @@ from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     alike,
-    bounded_unknowns,
     contains,
     down_to_noise,
     gains_enough,
+    is_bounded,
     label_of,
 )
 from pymoo_hdte.discrepancy.engine.nesting import undecided
@@ -231,9 +231,8 @@ def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
     """
     rules, overlap = search.data.rules, search.forms.known((*one.candidates, *other.candidates))
     near = alike(one, other, search.degrees_of_freedom, rules, overlap)
-    if not (near or undecided(one, other, rules)):
-        return False
-    return not (contains(one, other) and any(bounded for _, bounded in bounded_unknowns(one.fit)))
+    near = near or undecided(one, other, rules)
+    return near and not (contains(one, other) and is_bounded(one.fit))
 
 
 def _distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:

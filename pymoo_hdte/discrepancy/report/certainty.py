@@ -134,7 +134,7 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
     bounded = [
         one.name
         for one, side in zip(chosen.fit.parameters, chosen.fit.bound_sides, strict=True)
-        if side < 0.0 or (side > 0.0 and not one.open_above)
+        if one.limited_at(side)
     ]
     if bounded:
         orders = finding.campaign.believed.error_orders

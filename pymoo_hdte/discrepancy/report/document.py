@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
@@ -172,13 +173,15 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: Sequence[int]) -> dict[
     found: dict[str, Any] = {}
     if candidate.frees is not None:
         rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
+    values = expected_values(fitted)
     for row in rows:
-        name, variance = fitted.parameters[row].name, fitted.covariance[row, row]
+        name = fitted.parameters[row].name
         if name.endswith("_cosine"):
-            found |= _line(name.removesuffix("_cosine"), candidate, fitted, row)
+            pair = np.array([row, row + 1])
+            covariance = fitted.covariance[np.ix_(pair, pair)]
+            found |= _line(name.removesuffix("_cosine"), candidate, values[pair], covariance)
         elif not name.endswith("_sine"):
-            value = expected_values(fitted)[row]
-            found[name] = quantity(value, variance, _unit(candidate, name))
+            found[name] = quantity(values[row], fitted.covariance[row, row], _unit(candidate, name))
     return found
 
 
@@ -186,11 +189,11 @@ def _unit(candidate: Candidate, name: str) -> str:
     return base_unit(name) if candidate.unit is None else candidate.unit(name)
 
 
-def _line(name: str, candidate: Candidate, fitted: Fit, row: int) -> dict[str, Any]:
-    """Return amplitude and phase, with intervals, of a line whose cosine part is at a row."""
-    rows = np.array([row, row + 1])
-    covariance = fitted.covariance[np.ix_(rows, rows)]
-    cosine, sine = expected_values(fitted)[rows]
+def _line(
+    name: str, candidate: Candidate, parts: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> dict[str, Any]:
+    """Return amplitude and phase of a line, with intervals, from its cosine and sine parts."""
+    cosine, sine = parts
     amplitude, phase = line_with_variance(cosine, sine, covariance)
     prefix = next(one for one in reversed(HARMONIC_NAMES) if name.startswith(one))
     return {
