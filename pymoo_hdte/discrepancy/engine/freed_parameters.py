@@ -6,13 +6,13 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 
 
-def freed_together(data: Evidence, base: Fit) -> tuple[tuple[Candidate, ...], Fit]:
-    """Return the parameters that reach a bound, free, and the base fitted with them.
+def freed_together(data: Evidence, bound: Fit) -> tuple[tuple[Candidate, ...], Fit]:
+    """Return the parameters that a fit leaves at a bound, free, and its set fitted with them.
 
     Freeing some may carry others to their bounds, which are freed in a further round.
     """
     freed: tuple[Candidate, ...] = ()
-    found = base
+    found = bound
     for _ in range(data.rules.most_freed_rounds):
         names = {one.frees for one in freed}
         free = data.out_of_tolerance(found.at_bounds, together=True)
@@ -20,5 +20,5 @@ def freed_together(data: Evidence, base: Fit) -> tuple[tuple[Candidate, ...], Fi
         if not more:
             break
         freed = (*freed, *more)
-        found = fit(data, freed, found.values)
+        found = fit(data, (*bound.candidates, *freed), found.values)
     return freed, found

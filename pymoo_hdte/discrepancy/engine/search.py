@@ -100,8 +100,7 @@ class Search(FittedSets):
         best = self.found[0].bic if self.found else np.inf
         if not needed or found.chi_square > best:
             return
-        if len(needed) > 1:
-            needed = self._pruned(self.fitted(needed, values))
+        needed = self._pruned(self.fitted(needed, values)).candidates
         alone = {one.frees for one in self.data.out_of_tolerance([str(one.frees) for one in freed])}
         for one in needed:
             if one.frees in alone:
@@ -112,15 +111,30 @@ class Search(FittedSets):
             if label & covered and (len(label) == 1 or label_of(needed) < label):
                 self.forget(label)
 
-    def _pruned(self, one: Hypothesis) -> Effects:
-        """Return the parameters of a set whose removal would cost more than they do."""
-        while len(one.candidates) > 1:
-            fewer = [self.without(one, (each,)) for each in one.candidates]
+    def _pruned(self, one: Hypothesis) -> Hypothesis:
+        """Return a set without the base parameters that cost more than their removal does."""
+        freed = [each for each in one.candidates if each.frees is not None]
+        while len(freed) > 1:
+            fewer = [self.without(one, (each,)) for each in freed]
             best = min(fewer, key=lambda each: each.bic)
             if best.bic > one.bic:
                 break
-            one = best
-        return one.candidates
+            one, freed = best, [each for each in freed if each in best.candidates]
+        return one
+
+    def _free_beside(self, one: Hypothesis) -> None:
+        """Fit a set of effects with the base parameters that it leaves at their bounds, free.
+
+        Beside an effect others may be out of tolerance than those that carry its misfit alone.
+        """
+        if any(each.frees is not None for each in one.candidates):
+            return
+        freed, found = freed_together(self.data, one.fit)
+        needed = tuple(each for each in freed if each.outside(self.data.base, found.values))
+        left = one.fit.chi_square - self.degrees_of_freedom
+        removed = one.fit.chi_square - found.chi_square
+        if needed and removed >= self.data.rules.explained_part_share * left:
+            self._pruned(self.fitted((*one.candidates, *needed), found.values))
 
     def _could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified; one at a bound may stand for two."""
@@ -134,6 +148,7 @@ class Search(FittedSets):
         if label in self._extended or not others:
             return
         self._extended.add(label)
+        self._free_beside(one)
         if len(one.members) > 1 and self.forms.explains(one):
             # A third effect shows beside two only in what no form of theirs explains.
             self._extend_beyond_forms(one)

@@ -234,6 +234,18 @@ def test_a_parameter_out_of_tolerance_does_not_hide_an_effect_beside_it():
     assert status("parameter", "torque_ripple") == "named"
 
 
+@pytest.mark.parametrize(("label", "values"), [(LINE, (2e-6, 1e-6)), (SOFT, (0.3, 3e-4, 3.0))])
+def test_a_value_out_of_tolerance_is_found_beside_an_effect(label, values):
+    """An effect that left 1.84 per degree of freedom beside a wrong amplitude was named alone."""
+    verdict = verdict_on(planted({label: values}, error_amplitude_0=1.6), FEW)
+    assert verdict.status == "named"
+    assert labels_of(verdict) == {label, "parameter:error_amplitude_0"}
+    place = Layout(verdict.base.parameters).index("error_amplitude_0")
+    fitted = verdict.chosen.fit
+    deviation = np.sqrt(fitted.covariance[place, place])
+    assert fitted.values[place] == pytest.approx(1.6 * EMPTY.base[place].start, abs=4.0 * deviation)
+
+
 @pytest.mark.parametrize(("label", "value"), [(INERTIA, 0.02), ("damping_reference:mesh", 3.0)])
 def test_an_effect_has_no_rival_in_the_base_parameter_that_it_changes(label, value):
     """Not even where another parameter ended at its bound as well, before the effect was found."""
