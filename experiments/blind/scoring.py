@@ -179,7 +179,7 @@ def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:
     Quantities that the hidden form does not have are left out, and effects that are not hidden.
     """
     fitted, total, covered = verdict.accepted, 0, 0
-    values = expected_values(fitted)
+    values = expected_values(fitted, verdict.rules)
     for candidate, place in fitted.places:
         for row in range(place.start, place.stop):
             name, value = fitted.parameters[row].name, float(values[row])

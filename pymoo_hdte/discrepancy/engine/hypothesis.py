@@ -140,18 +140,20 @@ def is_bounded(fitted: Fit) -> bool:
     return any(bounded for _, bounded in bounded_unknowns(fitted))
 
 
-def expected_values(fitted: Fit) -> NDArray[np.float64]:
+def expected_values(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
     """Return the values to be expected by a fit and its bounds, those around which intervals lie.
 
-    A base parameter of which the records do not even halve the variance between its bounds ends
-    anywhere there, often at one of them: to be expected is the middle. What an effect has beyond
-    it, as an inertia beyond the believed one, moves along. Shape (n_parameters,).
+    A base parameter that no record determines ends anywhere between its bounds, often at one of
+    them: to be expected is the middle. What an effect has beyond it, as an inertia beyond the
+    believed one, moves along. Shape (n_parameters,).
     """
     n, variance = fitted.n_base, np.diag(fitted.covariance)
     layout = Layout(fitted.parameters)
     lower, upper = layout.array("lower"), layout.array("upper")
     uniform = (upper - lower) ** 2 / 12.0
-    undetermined = (np.arange(len(variance)) < n) & (variance > 0.5 * uniform)
+    width = 2.0 * rules.certain_deviations * np.sqrt(variance)
+    undetermined = width > rules.undetermined_share * (upper - lower)
+    undetermined[n:] = False
     pull = np.where(undetermined, ((lower + upper) / 2.0 - fitted.values) / uniform, 0.0)
     moved = fitted.values + fitted.covariance @ pull
     return np.asarray(np.clip(moved, lower, upper))

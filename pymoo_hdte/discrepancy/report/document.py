@@ -155,7 +155,7 @@ def _effects(verdict: Verdict) -> list[dict[str, Any]]:
                 "port": candidate.port,
                 "order": candidate.order,
                 "sentence": candidate.sentence,
-                "parameters": _parameters(candidate, fitted, rows),
+                "parameters": _parameters(candidate, fitted, rows, verdict.rules),
                 "at_bound": bounded,
                 "explained": verdict.chosen.explained if verdict.chosen else None,
             }
@@ -163,7 +163,9 @@ def _effects(verdict: Verdict) -> list[dict[str, Any]]:
     return found
 
 
-def _parameters(candidate: Candidate, fitted: Fit, rows: Sequence[int]) -> dict[str, Any]:
+def _parameters(
+    candidate: Candidate, fitted: Fit, rows: Sequence[int], rules: Rules
+) -> dict[str, Any]:
     """Return values with intervals; cosine and sine part as amplitude and phase.
 
     For a base parameter out of tolerance, its fitted value.
@@ -173,7 +175,7 @@ def _parameters(candidate: Candidate, fitted: Fit, rows: Sequence[int]) -> dict[
     found: dict[str, Any] = {}
     if candidate.frees is not None:
         rows = [[one.name for one in fitted.parameters].index(candidate.frees)]
-    values = expected_values(fitted)
+    values = expected_values(fitted, rules)
     for row in rows:
         name = fitted.parameters[row].name
         if name.endswith("_cosine"):

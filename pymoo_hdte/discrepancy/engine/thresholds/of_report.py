@@ -122,7 +122,7 @@ class ReportRules(RuleSet):
         0.8,
         "share of the width between the bounds",
         "An interval that is wider is shown as all between the bounds: they gave it, and not the "
-        "records.",
+        "records. Intervals of effects lie around what is to be expected in the middle of it.",
         "A uniform distribution between the bounds has a standard deviation of 0.289 times their "
         "width, and so a normal interval of 1.13 times it. Records that leave more than 0.8 have "
         "not halved its variance.",
