@@ -31,9 +31,8 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
     for name in _contradicted(fitted, search.data.rules):
         found.append(f"{name.replace('_', ' ')} ended far beyond what is stated of it")
     curves = [one.label for one in chosen.candidates if not one.exact]
-    freed = any(one.frees is not None for one in chosen.candidates)
     if not search.enough(chosen):
-        if curves and freed:
+        if curves and chosen.frees:
             found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
         found += _harmonics_of_another(chosen.candidates)
     if vote is not None and vote.after >= vote.before:

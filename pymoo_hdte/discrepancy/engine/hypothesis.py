@@ -56,6 +56,11 @@ class Hypothesis:
         return all(candidate.exact for candidate in self.candidates)
 
     @property
+    def frees(self) -> bool:
+        """Whether base parameters are out of tolerance among them."""
+        return any(candidate.frees is not None for candidate in self.candidates)
+
+    @property
     def label(self) -> str:
         """Their labels in one word."""
         return "+".join(candidate.label for candidate in self.candidates)

@@ -16,7 +16,7 @@ import numpy as np
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitted_sets import Effects, FittedSets
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
-from pymoo_hdte.discrepancy.engine.freed_parameters import freed_together
+from pymoo_hdte.discrepancy.engine.freed_parameters import freed_together, gain_of_freed
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     is_bounded,
@@ -79,6 +79,7 @@ class Search(FittedSets):
             if size == 1:
                 self._past_resonances(first)
             for one in self.of_size(size + 1)[:1]:
+                self._pruned_beside(one)
                 if size == 1:
                     self._exchange(one)
                 self._special_cases(one)
@@ -101,14 +102,24 @@ class Search(FittedSets):
         if not needed or found.chi_square > best:
             return
         needed = self._pruned(self.fitted(needed, values)).candidates
-        alone = {one.frees for one in self.data.out_of_tolerance([str(one.frees) for one in freed])}
+        covered = self._covered(freed)
         for one in needed:
-            if one.frees in alone:
+            if one.label not in covered:
                 self.fitted((one,), values)
-        # An effect covers these under another name, with what proved needless beside them.
-        covered = {one.label for one in freed if one.frees not in alone}
-        for label in map(label_of, (one.candidates for one in self.found)):
-            if label & covered and (len(label) == 1 or label_of(needed) < label):
+        self._forget_covered(frozenset(), needed, covered)
+
+    def _covered(self, freed: Effects) -> frozenset[str]:
+        """Return the parameters that an effect covers under another name, by their labels."""
+        alone = {one.frees for one in self.data.out_of_tolerance([str(one.frees) for one in freed])}
+        return frozenset(one.label for one in freed if one.frees not in alone)
+
+    def _forget_covered(
+        self, effects: frozenset[str], needed: Effects, covered: frozenset[str]
+    ) -> None:
+        """Leave out covered parameters that are free alone, or needlessly beside the others."""
+        for label in [label_of(one.candidates) for one in self.found]:
+            freed = label - effects if label > effects else frozenset()
+            if freed & covered and (len(freed) == 1 or label_of(needed) < freed):
                 self.forget(label)
 
     def _pruned(self, one: Hypothesis) -> Hypothesis:
@@ -127,14 +138,24 @@ class Search(FittedSets):
 
         Beside an effect others may be out of tolerance than those that carry its misfit alone.
         """
-        if any(each.frees is not None for each in one.candidates):
+        least = self.data.rules.explained_part_share
+        least *= one.fit.chi_square - self.degrees_of_freedom
+        bounded = self.data.out_of_tolerance(one.fit.at_bounds, together=True)
+        if one.frees or not bounded or gain_of_freed(one.fit, bounded) < least:
             return
         freed, found = freed_together(self.data, one.fit)
         needed = tuple(each for each in freed if each.outside(self.data.base, found.values))
-        left = one.fit.chi_square - self.degrees_of_freedom
-        removed = one.fit.chi_square - found.chi_square
-        if needed and removed >= self.data.rules.explained_part_share * left:
-            self._pruned(self.fitted((*one.candidates, *needed), found.values))
+        if len(needed) > 1 or not label_of(needed) <= self._covered(needed):
+            self.fitted((*one.candidates, *needed), found.values)
+
+    def _pruned_beside(self, one: Hypothesis) -> None:
+        """Fit a set of effects and freed parameters without those parameters that are needless."""
+        effects = [each for each in one.candidates if each.frees is None]
+        if effects and one.frees:
+            freed = tuple(each for each in one.candidates if each not in effects)
+            best = self._pruned(one)
+            needed = tuple(each for each in best.candidates if each not in effects)
+            self._forget_covered(label_of(effects), needed, self._covered(freed))
 
     def _could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified; one at a bound may stand for two."""

@@ -39,6 +39,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     gains_enough,
     is_bounded,
     label_of,
+    leave_the_same,
 )
 from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
@@ -167,9 +168,11 @@ def judge(
     vote = data.held_out_vote(base, chosen.fit)
     shown = vote is None or vote.counts(rules)
     doubts = doubts_of(search, chosen, vote if shown else None) + other_forms(search, chosen)
-    if not certain and _stands_out(search, chosen):
+    twins = _twins(search, chosen)
+    if not certain and _stands_out(search, chosen, twins):
         certain, left = True, left_by(chosen.fit.chi_square / degrees_of_freedom)
         doubts += [left] if left not in doubts else []
+        equivalent += twins
     if certain and not foreign:
         # The rules of earning may pass over a set for which the evidence speaks: both are told.
         equivalent += in_one_law(search, chosen)
@@ -241,8 +244,17 @@ def _distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypo
     return list(reversed(of_names.values()))
 
 
-def _stands_out(search: Search, chosen: Hypothesis) -> bool:
-    """Tell whether a set that leaves more than the noise is certain as far as it goes.
+def _twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return the sets of the size of the chosen one that leave the same."""
+    return [
+        one
+        for one in search.of_size(len(chosen.members))
+        if one.names != chosen.names and leave_the_same(one, chosen, search.data.rules)
+    ]
+
+
+def _stands_out(search: Search, chosen: Hypothesis, twins: Sequence[Hypothesis] = ()) -> bool:
+    """Tell whether a set that leaves more than the noise, or a twin, is certain as far as it goes.
 
     It removes most of the misfit, and all other sets of its size leave plainly more: what is left
     may be the form of a law, or a further effect. Sets that say the same and more do not count as
@@ -254,6 +266,7 @@ def _stands_out(search: Search, chosen: Hypothesis) -> bool:
         for one in search.found
         if len(one.members) == len(chosen.members)
         and one.names != chosen.names
+        and one not in twins
         and not contains(one, chosen)
         and not label_of(one.candidates) > label_of(chosen.candidates)
     )

@@ -12,6 +12,7 @@ from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
 from pymoo_hdte.discrepancy.drive.objective import LOST, Objective
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.freed_parameters import gain_of_freed
 from pymoo_hdte.discrepancy.engine.hypothesis import expected_values
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.units import ARCSEC
@@ -170,6 +171,8 @@ def test_a_parameter_out_of_tolerance_stops_at_its_bound(factor, side):
     deviation = np.sqrt(freed.covariance[place, place])
     assert freed.values[place] == pytest.approx(truth[place], abs=4.0 * deviation)
     assert freed.chi_square < 0.5 * base.chi_square
+    gain = gain_of_freed(base, freed.candidates)
+    assert gain == pytest.approx(base.chi_square - freed.chi_square, rel=0.1)
 
 
 @pytest.mark.parametrize("share", [0.92, 1.0, 1.08])

@@ -281,6 +281,18 @@ def test_an_eccentric_encoder_comes_with_the_line_that_nothing_tells_it_from():
     assert names == {"eccentricity", "kinematic_error"}
 
 
+def test_what_nothing_tells_apart_is_a_class_also_where_more_is_missing():
+    """An eccentricity that removed .9999 of a misfit was in no list: its twin left as little."""
+    label, seen = "eccentricity:sensor@0.009901", [1.0 / 101.0]
+    data = planted({label: (2.0 * ARCSEC, 0.5 * ARCSEC)}, seen=seen, empty=OF_ENCODER)
+    labels = [label, "kinematic_error:mesh@0.009901"]
+    verdict = verdict_on(disturbed(data, 600.0), labels, seen)
+    assert verdict.status == "class"
+    assert {verdict.chosen.label, *(one.label for one in verdict.equivalent)} == set(labels)
+    assert verdict.leaves_more_than_noise
+    assert verdict.doubts
+
+
 def test_what_nothing_tells_apart_is_a_class_beside_two_other_effects():
     """Of a line of the encoder or of the drive the likelier pair alone was extended by a third."""
     line = "eccentricity:sensor@0.009901"

@@ -10,7 +10,7 @@ from pymoo_hdte.discrepancy.engine import choice, verdict
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
-from pymoo_hdte.discrepancy.engine.hypothesis import contains
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
@@ -29,6 +29,7 @@ def doubts(chi_square_per_degree, *candidates, base=(), values=()):
     """Doubts about a set that leaves so much, with no held-out record."""
     layout = Layout(base)
     fitted = SimpleNamespace(
+        candidates=candidates,
         chi_square=chi_square_per_degree * FREEDOM,
         at_bounds=(),
         parameters=base,
@@ -40,7 +41,7 @@ def doubts(chi_square_per_degree, *candidates, base=(), values=()):
     search = SimpleNamespace(
         data=SimpleNamespace(rules=RULES), degrees_of_freedom=FREEDOM, enough=lambda chosen: quiet
     )
-    return doubts_of(search, SimpleNamespace(fit=fitted, candidates=candidates), None)
+    return doubts_of(search, Hypothesis(fitted, bic=0.0, explained=1.0), None)
 
 
 FRICTION, LINE = one("stribeck:input", exact=False), one("kinematic_error:mesh@3", exact=True)
@@ -268,6 +269,15 @@ def freed(*names):
 def test_a_set_stands_out_from_others_that_say_something_else(others, certain):
     chosen = set_of(*freed("damping"), left=5.0)
     assert verdict._stands_out(search_among(chosen, *others), chosen) == certain
+
+
+def test_sets_that_leave_the_same_stand_out_together():
+    chosen, twin = set_of(a_law("eccentricity"), left=5.0), set_of(a_law("error"), left=5.0)
+    search = search_among(chosen, twin)
+    assert not verdict._stands_out(search, chosen)
+    assert verdict._stands_out(search, chosen, [twin])
+    third = set_of(a_law("ripple"), left=9.0)
+    assert not verdict._stands_out(search_among(chosen, twin, third), chosen, [twin])
 
 
 @pytest.mark.parametrize(("special_left", "name"), [(9.0, "hysteresis"), (11.0, "richer")])
