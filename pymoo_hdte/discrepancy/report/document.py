@@ -117,9 +117,10 @@ def sentence(verdict: Verdict) -> str:
         )
     if verdict.status == "class":
         others = "; or ".join(in_words(hypothesis.label) for hypothesis in verdict.equivalent)
-        return f"{what} Or, which these data cannot tell from it: {others}."
-    if verdict.status == "partial":
-        return f"{what} That is not all, or not quite right: {in_words('; '.join(verdict.doubts))}."
+        what = f"{what} Or, which these data cannot tell from it: {others}."
+    if verdict.doubts:
+        doubts = in_words("; ".join(verdict.doubts))
+        return f"{what} That is not all, or not quite right: {doubts}."
     return what
 
 

@@ -290,7 +290,8 @@ def test_what_nothing_tells_apart_is_a_class_also_where_more_is_missing():
     assert verdict.status == "class"
     assert {verdict.chosen.label, *(one.label for one in verdict.equivalent)} == set(labels)
     assert verdict.leaves_more_than_noise
-    assert verdict.doubts
+    assert all(one in sentence(verdict) for one in verdict.doubts)
+    assert sentence(replace(verdict, doubts=())) != sentence(verdict)
 
 
 def test_what_nothing_tells_apart_is_a_class_beside_two_other_effects():
