@@ -125,12 +125,16 @@ class FittedSets:
         If the best set has several effects and leaves no more than noise, only those that may come
         as near.
         """
-        rules = self.data.rules
         for place in range(len(self.of_size(size))):
             same = self.of_size(size)
             best, one = same[0], same[place]
-            near = rules.refit_margin * rules.evidence_distance
-            misfit = max(best.fit.chi_square / self.degrees_of_freedom, 1.0)
-            first = place < (1 if size > 1 and self.enough(best) else rules.most_firsts)
-            if first or one.bic - best.bic < near * misfit:
+            alone = size > 1 and self.enough(best)
+            first = place < (1 if alone else self.data.rules.most_firsts)
+            if first or self.comes_near(one, best):
                 self.finished(one)
+
+    def comes_near(self, one: Hypothesis, best: Hypothesis) -> bool:
+        """Tell whether a set may come as near as the best once both are fitted to the end."""
+        near = self.data.rules.refit_margin * self.data.rules.evidence_distance
+        misfit = max(best.fit.chi_square / self.degrees_of_freedom, 1.0)
+        return one.bic - best.bic < near * misfit

@@ -78,8 +78,8 @@ class Search(FittedSets):
             self.finish_near(size + 1)
             if size == 1:
                 self._past_resonances(first)
+            self._prune_near(size + 1)
             for one in self.of_size(size + 1)[:1]:
-                self._pruned_beside(one)
                 if size == 1:
                     self._exchange(one)
                 self._special_cases(one)
@@ -148,14 +148,16 @@ class Search(FittedSets):
         if len(needed) > 1 or not label_of(needed) <= self._covered(needed):
             self.fitted((*one.candidates, *needed), found.values)
 
-    def _pruned_beside(self, one: Hypothesis) -> None:
-        """Fit a set of effects and freed parameters without those parameters that are needless."""
-        effects = [each for each in one.candidates if each.frees is None]
-        if effects and one.frees:
-            freed = tuple(each for each in one.candidates if each not in effects)
-            best = self._pruned(one)
-            needed = tuple(each for each in best.candidates if each not in effects)
-            self._forget_covered(label_of(effects), needed, self._covered(freed))
+    def _prune_near(self, size: int) -> None:
+        """Fit the best sets of effects and freed parameters without the needless parameters."""
+        same = self.of_size(size)
+        for one in same:
+            effects = [each for each in one.candidates if each.frees is None]
+            if one.frees and effects and self.comes_near(one, same[0]):
+                freed = tuple(each for each in one.candidates if each not in effects)
+                best = self._pruned(one)
+                needed = tuple(each for each in best.candidates if each not in effects)
+                self._forget_covered(label_of(effects), needed, self._covered(freed))
 
     def _could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified; one at a bound may stand for two."""

@@ -245,11 +245,14 @@ def _distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypo
 
 
 def _twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the sets of the size of the chosen one that leave the same."""
+    """Return the sets of as many effects and values as the chosen one that leave the same."""
     return [
         one
         for one in search.of_size(len(chosen.members))
-        if one.names != chosen.names and leave_the_same(one, chosen, search.data.rules)
+        if one.names != chosen.names
+        and len(one.candidates) == len(chosen.candidates)
+        and one.frees == chosen.frees
+        and leave_the_same(one, chosen, search.data.rules)
     ]
 
 

@@ -246,11 +246,19 @@ def test_a_value_out_of_tolerance_is_found_beside_an_effect(label, values):
     assert fitted.values[place] == pytest.approx(1.6 * EMPTY.base[place].start, abs=4.0 * deviation)
 
 
-@pytest.mark.parametrize(("label", "value"), [(INERTIA, 0.02), ("damping_reference:mesh", 3.0)])
-def test_an_effect_has_no_rival_in_the_base_parameter_that_it_changes(label, value):
+@pytest.mark.parametrize(
+    ("label", "value", "beside"),
+    [
+        (INERTIA, 0.02, {}),
+        (INERTIA, 0.02, {RIPPLE: (0.003, 0.001)}),
+        ("damping_reference:mesh", 3.0, {}),
+        ("damping_reference:mesh", 3.0, {LINE: (2e-6, 1e-6)}),
+    ],
+)
+def test_an_effect_has_no_rival_in_the_base_parameter_that_it_changes(label, value, beside):
     """Not even where another parameter ended at its bound as well, before the effect was found."""
-    verdict = verdict_on(planted({label: (value,)}), [label, RIPPLE])
-    assert (verdict.status, labels_of(verdict)) == ("named", {label})
+    verdict = verdict_on(planted({label: (value,), **beside}), [label, RIPPLE, LINE])
+    assert (verdict.status, labels_of(verdict)) == ("named", {label, *beside})
     assert verdict.probability == pytest.approx(RULES.named_right, abs=0.01)
 
 

@@ -241,14 +241,11 @@ def test_a_set_far_behind_several_effects_that_leave_noise_is_not_finished(
     for one in sets:
         one.fit = SimpleNamespace(chi_square=float(FREEDOM))
     done = []
-    fake = SimpleNamespace(
-        data=SimpleNamespace(rules=RULES),
-        degrees_of_freedom=FREEDOM,
-        of_size=lambda wanted: sets,
-        enough=lambda one: enough,
-        finished=lambda one: done.append(one.place),
-    )
-    FittedSets.finish_near(fake, size)
+    known = FittedSets.__new__(FittedSets)
+    known.data, known.degrees_of_freedom = SimpleNamespace(rules=RULES), FREEDOM
+    known.of_size, known.enough = lambda wanted: sets, lambda one: enough
+    known.finished = lambda one: done.append(one.place)
+    known.finish_near(size)
     assert done == finished
 
 
