@@ -136,12 +136,15 @@ class Search(FittedSets):
     def _free_beside(self, one: Hypothesis) -> None:
         """Fit a set of effects with the base parameters that it leaves at their bounds, free.
 
-        Beside an effect others may be out of tolerance than those that carry its misfit alone.
+        Beside an effect others may be out of tolerance than those that carry its misfit alone. None
+        is where the best set explains the misfit in another form: an amplitude may stand for that.
         """
         least = self.data.rules.explained_part_share
         least *= one.fit.chi_square - self.degrees_of_freedom
         bounded = self.data.out_of_tolerance(one.fit.at_bounds, together=True)
         if one.frees or not bounded or gain_of_freed(one.fit, bounded) < least:
+            return
+        if self.forms.explains(self.of_size(len(one.members))[0]):
             return
         freed, found = freed_together(self.data, one.fit)
         needed = tuple(each for each in freed if each.outside(self.data.base, found.values))

@@ -246,6 +246,14 @@ def test_a_value_out_of_tolerance_is_found_beside_an_effect(label, values):
     assert fitted.values[place] == pytest.approx(1.6 * EMPTY.base[place].start, abs=4.0 * deviation)
 
 
+def test_no_value_is_freed_for_what_another_form_of_the_law_explains(monkeypatch):
+    """A second harmonic of a play that varies was an amplitude out of tolerance as well."""
+    monkeypatch.setattr(AnyForm, "explains", lambda self, one: True)
+    verdict = verdict_on(planted({LINE: (2e-6, 1e-6)}, error_amplitude_0=1.6), FEW)
+    assert labels_of(verdict) == {LINE}
+    assert not any(one.frees for one in verdict.alternatives if len(one.members) > 1)
+
+
 @pytest.mark.parametrize(
     ("label", "value", "beside"),
     [
