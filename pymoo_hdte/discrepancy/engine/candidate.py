@@ -172,12 +172,17 @@ def out_of_tolerance(name: str, words: str, acts_at: str = "") -> Candidate:
         name,
         (),
         ((),),
-        lambda v: (),
+        _no_effect,
         out_of_tolerance_sentence(words),
         exact=True,
         frees=name,
         acts_at=acts_at,
     )
+
+
+def _no_effect(values: Sequence[float]) -> tuple[Any, ...]:
+    """Return nothing: a base parameter out of tolerance is no effect."""
+    return ()
 
 
 @dataclass(frozen=True)

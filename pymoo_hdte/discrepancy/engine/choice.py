@@ -19,7 +19,13 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     strength_is_certain,
     uncertain,
 )
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains, is_bounded
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    contains,
+    gains_enough,
+    is_bounded,
+    label_of,
+)
 from pymoo_hdte.discrepancy.engine.screening import Screened
 from pymoo_hdte.discrepancy.engine.search import Search
 
@@ -117,6 +123,46 @@ def simpler_law(search: Search, chosen: Hypothesis) -> Hypothesis:
 def left_beyond_noise(search: Search, one: Hypothesis) -> float:
     """Return the excess chi-square that a set leaves."""
     return one.fit.chi_square - search.degrees_of_freedom
+
+
+def twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return the sets of as many effects and values as the chosen one that no evidence tells apart.
+
+    A law that contains the chosen one follows more of any form, and is none.
+    """
+    misfit = max(chosen.fit.chi_square / search.degrees_of_freedom, 1.0)
+    most = chosen.fit.evidence + search.data.rules.evidence_distance * misfit
+    return [
+        one
+        for one in search.of_size(len(chosen.members))
+        if one.names != chosen.names
+        and len(one.candidates) == len(chosen.candidates)
+        and one.has_freed == chosen.has_freed
+        and one.fit.evidence < most
+        and not (contains(one, chosen) or contains(chosen, one))
+        and search.earned(one)
+    ]
+
+
+def stands_out(search: Search, chosen: Hypothesis, together: Sequence[Hypothesis] = ()) -> bool:
+    """Tell whether a set is certain as far as it goes, alone or ``together`` with its twins.
+
+    It removes most of the misfit, and all other sets of its size leave plainly more: what is left
+    may be the form of a law, or a further effect. Sets that say the same and more do not count as
+    others; those that the screening left out are far behind.
+    """
+    rules = search.data.rules
+    others = (
+        one
+        for one in search.of_size(len(chosen.members))
+        if one.names != chosen.names
+        and one not in together
+        and not contains(one, chosen)
+        and not label_of(one.candidates) > label_of(chosen.candidates)
+    )
+    enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
+    least = rules.form_ratio * left_beyond_noise(search, chosen)
+    return enough and all(left_beyond_noise(search, one) >= least for one in others)
 
 
 def in_another_form(

@@ -38,14 +38,16 @@ class FittedSets:
         self.degrees_of_freedom = self.forms.degrees_of_freedom
         self.excess = self.forms.excess
         self._by_label: dict[frozenset[str], Hypothesis] = {}
+        self._left_out: set[frozenset[str]] = set()
         self._finished: set[frozenset[str]] = set()
         self._from_all_starts: set[frozenset[str]] = set()
         self._resumed = False
 
     @property
     def found(self) -> list[Hypothesis]:
-        """All sets fitted so far, by rising BIC."""
-        return sorted(self._by_label.values(), key=lambda one: one.bic)
+        """All sets fitted so far that are no others under another name, by rising BIC."""
+        known = (one for label, one in self._by_label.items() if label not in self._left_out)
+        return sorted(known, key=lambda one: one.bic)
 
     def of_size(self, size: int) -> list[Hypothesis]:
         """Return the sets of so many members, by rising BIC."""
@@ -115,9 +117,9 @@ class FittedSets:
         for size in {len(one.members) for one in known}:
             self.finish_near(size)
 
-    def forget(self, label: frozenset[str]) -> None:
-        """Leave a set out that is known under another name."""
-        self._by_label.pop(label)
+    def leave_out(self, one: Hypothesis) -> None:
+        """Leave a set out of all that are compared: it is known under another name."""
+        self._left_out.add(label_of(one.candidates))
 
     def finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near.
@@ -130,10 +132,10 @@ class FittedSets:
             best, one = same[0], same[place]
             alone = size > 1 and self.enough(best)
             first = place < (1 if alone else self.data.rules.most_firsts)
-            if first or self.comes_near(one, best):
+            if first or self.may_come_as_near(one, best):
                 self.finished(one)
 
-    def comes_near(self, one: Hypothesis, best: Hypothesis) -> bool:
+    def may_come_as_near(self, one: Hypothesis, best: Hypothesis) -> bool:
         """Tell whether a set may come as near as the best once both are fitted to the end."""
         near = self.data.rules.refit_margin * self.data.rules.evidence_distance
         misfit = max(best.fit.chi_square / self.degrees_of_freedom, 1.0)

@@ -56,8 +56,8 @@ class Hypothesis:
         return all(candidate.exact for candidate in self.candidates)
 
     @property
-    def frees(self) -> bool:
-        """Whether base parameters are out of tolerance among them."""
+    def has_freed(self) -> bool:
+        """Whether base parameters out of tolerance are among them."""
         return any(candidate.frees is not None for candidate in self.candidates)
 
     @property

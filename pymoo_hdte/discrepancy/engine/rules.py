@@ -84,7 +84,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         0.75,
         "share of the excess chi-square",
         "Least share of the excess, of a mechanism of the power beyond the sensors' noise, that "
-        "effects remove to be named in part, where they leave more and stand out.",
+        "effects remove to be named in part, or as one of several, where they leave more and stand "
+        "out.",
         "Simulation: in 11 development campaigns of ten effects that are in no list the nearest "
         "listed one removed 0.55 at most; foreign forms of listed effects are removed to 0.83 or "
         "more.",
@@ -94,7 +95,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         0.5,
         "share of the excess chi-square",
         "Least share of the excess of each single part of the data that effects remove, and of "
-        "what is left that a second effect removes before its fit is finished.",
+        "what is left that a second effect removes before its fit is finished, or that base "
+        "parameters at bounds would remove, to first order, to be freed beside effects.",
         f"{BY_HAND}: half is the least that may be called most of it. A curve that removes 96 % of "
         "the whole and nothing of the input torque is not the cause of both.",
         at_least=0.0,

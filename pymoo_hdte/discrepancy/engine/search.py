@@ -1,9 +1,10 @@
 """Search for the set of effects that explains a misfit; sets that decide are fitted to the end.
 
 Sets grow by the effects that could remove most of what is left, in total, in the part of the data
-that is explained worst, or beyond all forms of their laws. Members of sets are tried by exchange,
-too, and each has to be earned. The chosen set is compared with those in which a part is replaced by
-another that explains as much by itself.
+that is explained worst, or beyond all forms of their laws, and by the base parameters that they
+leave at the bounds of their tolerances. Members of sets are tried by exchange, too, and each has to
+be earned. The chosen set is compared with those in which a part is replaced by another that
+explains as much by itself.
 """
 
 from __future__ import annotations
@@ -72,17 +73,17 @@ class Search(FittedSets):
             grown = self.of_size(size)[: rules.most_firsts if size == 1 else 1]
             for one in grown:
                 if not self._could_count(one):
-                    return
+                    continue
                 if one is grown[0] or not leave_the_same(one, grown[0], rules):
                     self._extend(one)
             self.finish_near(size + 1)
             if size == 1:
                 self._past_resonances(first)
-            self._prune_near(size + 1)
             for one in self.of_size(size + 1)[:1]:
                 if size == 1:
                     self._exchange(one)
                 self._special_cases(one)
+            self._prune_near(size + 1)
             self.finish_near(size + 1)
 
     def alone(self, one: Screened) -> Hypothesis:
@@ -106,24 +107,29 @@ class Search(FittedSets):
         for one in needed:
             if one.label not in covered:
                 self.fitted((one,), values)
-        self._forget_covered(frozenset(), needed, covered)
+        self._leave_covered_out((), needed, covered)
 
     def _covered(self, freed: Effects) -> frozenset[str]:
         """Return the parameters that an effect covers under another name, by their labels."""
         alone = {one.frees for one in self.data.out_of_tolerance([str(one.frees) for one in freed])}
         return frozenset(one.label for one in freed if one.frees not in alone)
 
-    def _forget_covered(
-        self, effects: frozenset[str], needed: Effects, covered: frozenset[str]
+    def _leave_covered_out(
+        self, effects: Sequence[Candidate], needed: Effects, covered: frozenset[str]
     ) -> None:
-        """Leave out covered parameters that are free alone, or needlessly beside the others."""
-        for label in [label_of(one.candidates) for one in self.found]:
-            freed = label - effects if label > effects else frozenset()
-            if freed & covered and (len(freed) == 1 or label_of(needed) < freed):
-                self.forget(label)
+        """Leave sets out with covered parameters alone, or needlessly, free beside effects."""
+        for one in self.found:
+            freed = label_of([each for each in one.candidates if each.frees is not None])
+            beside = label_of(one.candidates) - freed
+            needless = len(freed) == 1 or label_of(needed) < freed
+            if beside == label_of(effects) and freed & covered and needless:
+                self.leave_out(one)
 
     def _pruned(self, one: Hypothesis) -> Hypothesis:
-        """Return a set without the base parameters that cost more than their removal does."""
+        """Return a set without the base parameters that cost more than their removal does.
+
+        One of them stays.
+        """
         freed = [each for each in one.candidates if each.frees is not None]
         while len(freed) > 1:
             fewer = [self.without(one, (each,)) for each in freed]
@@ -136,15 +142,18 @@ class Search(FittedSets):
     def _free_beside(self, one: Hypothesis) -> None:
         """Fit a set of effects with the base parameters that it leaves at their bounds, free.
 
-        Beside an effect others may be out of tolerance than those that carry its misfit alone. None
-        is where the best set explains the misfit in another form: an amplitude may stand for that.
+        Beside an effect others may be out of tolerance than those that carry its misfit alone.
+        Where the best set of its size explains the misfit in another form of its laws, or where no
+        forms are known, an amplitude out of tolerance may stand for the form: none is freed.
         """
-        least = self.data.rules.explained_part_share
-        least *= one.fit.chi_square - self.degrees_of_freedom
+        rules = self.data.rules
+        least = rules.explained_part_share * (one.fit.chi_square - self.degrees_of_freedom)
+        least = max(least, rules.single_effect_gain)
         bounded = self.data.out_of_tolerance(one.fit.at_bounds, together=True)
-        if one.frees or not bounded or gain_of_freed(one.fit, bounded) < least:
+        if one.has_freed or not bounded or gain_of_freed(one.fit, bounded) < least:
             return
-        if self.forms.explains(self.of_size(len(one.members))[0]):
+        best = self.of_size(len(one.members))[0]
+        if self.forms.rest(best.fit) is None or self.forms.explains(best):
             return
         freed, found = freed_together(self.data, one.fit)
         needed = tuple(each for each in freed if each.outside(self.data.base, found.values))
@@ -153,14 +162,15 @@ class Search(FittedSets):
 
     def _prune_near(self, size: int) -> None:
         """Fit the best sets of effects and freed parameters without the needless parameters."""
-        same = self.of_size(size)
-        for one in same:
+        for one in self.of_size(size):
             effects = [each for each in one.candidates if each.frees is None]
-            if one.frees and effects and self.comes_near(one, same[0]):
-                freed = tuple(each for each in one.candidates if each not in effects)
-                best = self._pruned(one)
-                needed = tuple(each for each in best.candidates if each not in effects)
-                self._forget_covered(label_of(effects), needed, self._covered(freed))
+            best = self.of_size(size)[0]
+            if not (one.has_freed and effects and self.may_come_as_near(one, best)):
+                continue
+            freed = tuple(each for each in one.candidates if each not in effects)
+            pruned = self._pruned(self.finished(one))
+            needed = tuple(each for each in pruned.candidates if each not in effects)
+            self._leave_covered_out(effects, needed, self._covered(freed))
 
     def _could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified; one at a bound may stand for two."""
@@ -169,12 +179,17 @@ class Search(FittedSets):
         return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
 
     def _extend(self, one: Hypothesis, by_part: bool = True) -> None:
-        """Fit a set with each of the effects that would remove most of what it leaves."""
+        """Fit a set with each of the effects that would remove most of what it leaves.
+
+        And with the base parameters that it leaves at their bounds, free.
+        """
         label, others = label_of(one.candidates), self._further(one)
-        if label in self._extended or not others:
+        if label in self._extended | self._left_out:
             return
         self._extended.add(label)
         self._free_beside(one)
+        if not others:
+            return
         if len(one.members) > 1 and self.forms.explains(one):
             # A third effect shows beside two only in what no form of theirs explains.
             self._extend_beyond_forms(one)

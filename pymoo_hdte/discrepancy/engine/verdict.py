@@ -4,7 +4,8 @@ The base is fitted within its tolerances first. If it is not adequate, candidate
 best few are fitted jointly with the base, and the one with the least BIC is named, provided that it
 removes most of the excess, and at least half of it in each part of the data. Hypotheses that the
 data cannot separate from it are named with it. A second effect must remove most of the first one's
-residual, in total or in the part that the first explains worst.
+residual, in total or in the part that the first explains worst. What stands out from all else but
+leaves more than noise is named in part.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from pymoo_hdte.discrepancy.engine.choice import (
     confirmed,
     in_another_form,
     in_one_law,
-    left_beyond_noise,
     simpler_law,
     special_case,
+    stands_out,
+    twins,
 )
 from pymoo_hdte.discrepancy.engine.doubts import (
     NOT_PROVEN,
@@ -36,10 +38,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     alike,
     contains,
     down_to_noise,
-    gains_enough,
     is_bounded,
-    label_of,
-    leave_the_same,
 )
 from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
@@ -65,13 +64,13 @@ class Verdict:
     alternatives : tuple of Hypothesis
         Other sets that were fitted.
     equivalent : tuple of Hypothesis
-        Those of them that also explain the data and cannot be separated from the chosen one.
+        Those of them that explain the data, or leave the same of them, as well as the chosen one.
     degrees_of_freedom : int
     rules : Rules
         Thresholds of the verdict.
     doubts : tuple of str
-        What forbids to name the chosen effects plainly; with ``"partial"`` they are certain as far
-        as they go.
+        What forbids to name the chosen effects plainly; with ``"partial"`` and ``"class"`` they are
+        certain as far as they go.
     shown_in_held_out : bool
         Whether the records kept out of the fit, if there are any, show what is chosen.
     probability : float or None
@@ -162,17 +161,18 @@ def judge(
         chosen, certain = foreign[0], True
     else:
         equivalent = _rivals(search, chosen)
+    together = [] if certain else twins(search, chosen)
+    in_part = not certain and stands_out(search, chosen, together)
+    equivalent += together if in_part else []
     if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
         equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
         chosen = listed[0]
     vote = data.held_out_vote(base, chosen.fit)
     shown = vote is None or vote.counts(rules)
     doubts = doubts_of(search, chosen, vote if shown else None) + other_forms(search, chosen)
-    twins = _twins(search, chosen)
-    if not certain and _stands_out(search, chosen, twins):
+    if in_part:
         certain, left = True, left_by(chosen.fit.chi_square / degrees_of_freedom)
         doubts += [left] if left not in doubts else []
-        equivalent += twins
     if certain and not foreign:
         # The rules of earning may pass over a set for which the evidence speaks: both are told.
         equivalent += in_one_law(search, chosen)
@@ -181,7 +181,9 @@ def judge(
     status = _status(chosen, certain, equivalent, doubts)
     rivals = tuple(equivalent) if status == "class" else ()
     compared = (chosen, *rivals) if foreign else search.found
-    sure = probability.of_names(status, chosen, rivals, compared, degrees_of_freedom, rules)
+    # A class that is not all is no more certain than a name in part.
+    like = "partial" if in_part and status == "class" else status
+    sure = probability.of_names(like, chosen, rivals, compared, degrees_of_freedom, rules)
     return Verdict(
         status,
         base,
@@ -242,40 +244,6 @@ def _distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypo
     """Return the sets that name other effects, each once: one order or another is one effect."""
     of_names = {one.names: one for one in reversed(equivalent) if one.names != chosen.names}
     return list(reversed(of_names.values()))
-
-
-def _twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the sets of as many effects and values as the chosen one that leave the same."""
-    return [
-        one
-        for one in search.of_size(len(chosen.members))
-        if one.names != chosen.names
-        and len(one.candidates) == len(chosen.candidates)
-        and one.frees == chosen.frees
-        and leave_the_same(one, chosen, search.data.rules)
-    ]
-
-
-def _stands_out(search: Search, chosen: Hypothesis, twins: Sequence[Hypothesis] = ()) -> bool:
-    """Tell whether a set that leaves more than the noise, or a twin, is certain as far as it goes.
-
-    It removes most of the misfit, and all other sets of its size leave plainly more: what is left
-    may be the form of a law, or a further effect. Sets that say the same and more do not count as
-    others; those that the screening left out are far behind.
-    """
-    rules = search.data.rules
-    others = (
-        one
-        for one in search.found
-        if len(one.members) == len(chosen.members)
-        and one.names != chosen.names
-        and one not in twins
-        and not contains(one, chosen)
-        and not label_of(one.candidates) > label_of(chosen.candidates)
-    )
-    enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
-    least = rules.form_ratio * left_beyond_noise(search, chosen)
-    return enough and all(left_beyond_noise(search, one) >= least for one in others)
 
 
 def _status(

@@ -150,7 +150,7 @@ def _probably(verdict: Verdict) -> str:
         "class": "one of these is the cause",
         "partial": "what is named is missing, if not all",
     }.get(verdict.status, "this is the cause")
-    if verdict.status == "class" and verdict.doubts:
+    if verdict.status == "class" and verdict.leaves_more_than_noise:
         what = "one of these is missing, if not all"
     whole = int(100.0 * (verdict.probability or 0.0))
     return (

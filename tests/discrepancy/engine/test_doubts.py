@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pymoo_hdte.discrepancy.engine import choice, verdict
+from pymoo_hdte.discrepancy.engine import choice
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
@@ -197,16 +197,11 @@ def test_two_lines_of_one_name_are_no_special_case_of_one_of_them_and_another():
 
 def set_of(*members, left, explained=0.9):
     """A set of laws, and values set free, that leaves so many times the noise beyond it."""
-    fitted = SimpleNamespace(chi_square=(1.0 + left) * FREEDOM, n_base=0)
-    freed = tuple(each for each in members if each.frees is not None)
-    alone = [(each,) for each in members if each.frees is None]
-    return SimpleNamespace(
-        fit=fitted,
-        candidates=members,
-        members=alone + ([freed] if freed else []),
-        names=frozenset((each.name, each.port) for each in members),
-        explained=explained,
+    chi_square = (1.0 + left) * FREEDOM
+    fitted = SimpleNamespace(
+        candidates=members, chi_square=chi_square, evidence=chi_square, n_base=0
     )
+    return Hypothesis(fitted, bic=chi_square, explained=explained)
 
 
 def a_law(name, frees=None):
@@ -220,6 +215,7 @@ def search_among(*found):
         base=base,
         degrees_of_freedom=FREEDOM,
         found=found,
+        of_size=lambda size: [one for one in found if len(one.members) == size],
         earned=lambda one: True,
     )
 
@@ -265,16 +261,28 @@ def freed(*names):
 )
 def test_a_set_stands_out_from_others_that_say_something_else(others, certain):
     chosen = set_of(*freed("damping"), left=5.0)
-    assert verdict._stands_out(search_among(chosen, *others), chosen) == certain
+    assert choice.stands_out(search_among(chosen, *others), chosen) == certain
 
 
 def test_sets_that_leave_the_same_stand_out_together():
     chosen, twin = set_of(a_law("eccentricity"), left=5.0), set_of(a_law("error"), left=5.0)
     search = search_among(chosen, twin)
-    assert not verdict._stands_out(search, chosen)
-    assert verdict._stands_out(search, chosen, [twin])
+    assert not choice.stands_out(search, chosen)
+    assert choice.stands_out(search, chosen, [twin])
     third = set_of(a_law("ripple"), left=9.0)
-    assert not verdict._stands_out(search_among(chosen, twin, third), chosen, [twin])
+    assert not choice.stands_out(search_among(chosen, twin, third), chosen, [twin])
+
+
+def test_twins_are_told_apart_by_no_evidence_and_say_something_else(monkeypatch):
+    monkeypatch.setattr(Candidate, "holds", lambda one, other: one.name == "richer")
+    chosen = set_of(a_law("eccentricity"), left=5.0)
+    twin, far, richer = (
+        set_of(a_law(name), left=left)
+        for name, left in (("error", 5.01), ("ripple", 5.2), ("richer", 5.0))
+    )
+    freed_alone = set_of(*freed("damping"), left=5.0)
+    search = search_among(chosen, twin, far, richer, freed_alone)
+    assert choice.twins(search, chosen) == [twin]
 
 
 @pytest.mark.parametrize(("special_left", "name"), [(9.0, "hysteresis"), (11.0, "richer")])
