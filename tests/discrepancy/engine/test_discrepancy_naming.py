@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from night import others_at_night
 from planted_features import CONDITIONS, known_data, library, measured, with_sweep
 from scipy.stats import chi2
 
@@ -234,7 +235,10 @@ def test_a_parameter_out_of_tolerance_does_not_hide_an_effect_beside_it():
     assert status("parameter", "torque_ripple") == "named"
 
 
-@pytest.mark.parametrize(("label", "values"), [(LINE, (2e-6, 1e-6)), (SOFT, (0.3, 3e-4, 3.0))])
+@pytest.mark.parametrize(
+    ("label", "values"),
+    others_at_night([(LINE, (2e-6, 1e-6)), (SOFT, (0.3, 3e-4, 3.0))], (LINE, (2e-6, 1e-6))),
+)
 def test_a_value_out_of_tolerance_is_found_beside_an_effect(label, values):
     """An effect that left 1.84 per degree of freedom beside a wrong amplitude was named alone."""
     verdict = verdict_on(planted({label: values}, error_amplitude_0=1.6), FEW)
