@@ -16,7 +16,7 @@ from experiments.comparison.figures import BLUE, GREY, grid
 from pymoo_hdte.drive.effects import ENCODER_LINE
 
 _TRUTHS = (*LISTED, "none", *UNLISTED)
-_ANSWERS = (*LISTED, PARAMETER, ENCODER_LINE, "adequate", "unlisted", ERROR)
+_OF_NO_EFFECT = ("adequate", "unlisted", ERROR)
 _APART = 0.06
 """Probabilities between which there is room for a number."""
 _OF_ONE = ("none", "single", "unlisted")
@@ -25,11 +25,14 @@ _OF_ONE = ("none", "single", "unlisted")
 
 def confusion_matrix(outcomes: Sequence[Outcome]) -> Figure:
     """Draw what is hidden against what is answered, for all cases that hide at most one effect."""
-    counts = np.zeros((len(_TRUTHS), len(_ANSWERS)), dtype=int)
-    for one in outcomes:
-        if one.case.kind not in _OF_ONE:
-            continue
-        counts[_TRUTHS.index(one.case.truth), _ANSWERS.index(one.answer)] += 1
+    drawn = [one for one in outcomes if one.case.kind in _OF_ONE]
+    known = (*LISTED, PARAMETER, ENCODER_LINE)
+    # The library holds effects that the bench never hides, as the new zero of a sensor.
+    others = sorted({one.answer for one in drawn} - {*known, *_OF_NO_EFFECT})
+    answers = (*known, *others, *_OF_NO_EFFECT)
+    counts = np.zeros((len(_TRUTHS), len(answers)), dtype=int)
+    for one in drawn:
+        counts[_TRUTHS.index(one.case.truth), answers.index(one.answer)] += 1
     figure, axes = grid(1, 1, width=9.5, height=9.0)
     axis = axes.flat[0]
     axis.grid(False)
@@ -39,8 +42,8 @@ def confusion_matrix(outcomes: Sequence[Outcome]) -> Figure:
         colour = "white" if shares[row, column] > 0.5 else "black"
         axis.text(column, row, str(counts[row, column]), color=colour,
                   ha="center", va="center", fontsize=8)  # fmt: skip
-    words = [[name.replace("_", " ") for name in names] for names in (_ANSWERS, _TRUTHS)]
-    axis.set_xticks(range(len(_ANSWERS)), words[0], rotation=60, ha="right", fontsize=8)
+    words = [[name.replace("_", " ") for name in names] for names in (answers, _TRUTHS)]
+    axis.set_xticks(range(len(answers)), words[0], rotation=60, ha="right", fontsize=8)
     axis.set_yticks(range(len(_TRUTHS)), words[1], fontsize=8)
     axis.set_xlabel("answer")
     axis.set_ylabel("hidden")

@@ -20,6 +20,7 @@ from experiments.blind.campaigns import campaign_of, hiding, rows_of
 from experiments.blind.cases import STRESSES, Case, all_cases
 from experiments.blind.codes import NAMES, PORTS, STATUSES, code_of_set, words_of_set
 from experiments.blind.data import format_outcomes, format_seconds, outcome, read_outcomes
+from experiments.blind.figures import confusion_matrix
 from experiments.blind.outcome import Outcome
 from experiments.blind.reliability import reliability
 from experiments.blind.rig.forms import FORMS, LISTED, UNLISTED
@@ -380,6 +381,18 @@ def test_an_interval_covers_a_value_that_the_hidden_form_has():
 class _Hidden:
     def __init__(self, quantities):
         self.quantities = quantities
+
+
+def test_an_answer_that_the_bench_never_hides_has_its_place_in_the_confusion_matrix():
+    """The picture of a block of cases failed at a new zero of a sensor."""
+    outcomes = [
+        Outcome(CLEAN, "named", ("new_zero:sensor",)),
+        Outcome(ECCENTRIC, "named", ("eccentricity:sensor",)),
+    ]
+    (axis,) = confusion_matrix(outcomes).axes
+    answers = [one.get_text() for one in axis.get_xticklabels()]
+    places = {answers[round(one.get_position()[0])] for one in axis.texts}
+    assert places == {"new zero", "eccentricity"}
 
 
 def test_numbers_of_a_case_give_its_scores():
