@@ -31,9 +31,9 @@ from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.drive.proof import Proof, prove
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, expected_values
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
-from pymoo_hdte.effects.unknowns import line_with_variance
+from pymoo_hdte.discrepancy.report.document import effects_of
 
 PARTS = ("analyse", "locate", "prove", "next_experiment")
 RIVALS = ("largest_residual_rule", "sparse_regression")
@@ -54,8 +54,6 @@ MOST_IN_CLASS = 3
 """Members of a class that still says something."""
 PLACES = tuple(f"chosen_{number}" for number in range(1, 13))
 """Of what is named: three effects at most, and as many as nine base parameters."""
-DEVIATIONS = 1.959963984540054
-"""Half-width of a 95 % interval, in standard deviations."""
 VERDICT_COLUMNS = (
     "status",
     "probability",
@@ -178,22 +176,14 @@ def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:
 
     Quantities that the hidden form does not have are left out, and effects that are not hidden.
     """
-    fitted, total, covered = verdict.accepted, 0, 0
-    values = expected_values(fitted, verdict.rules)
-    for candidate, place in fitted.places:
-        for row in range(place.start, place.stop):
-            name, value = fitted.parameters[row].name, float(values[row])
-            variance = float(fitted.covariance[row, row])
-            if name.endswith("_cosine"):
-                pair = np.array([row, row + 1])
-                cosine, sine = values[pair]
-                block = fitted.covariance[np.ix_(pair, pair)]
-                (value, variance), _ = line_with_variance(cosine, sine, block)
-                name = name.removesuffix("_cosine")
-            true = hidden.quantities.get((candidate.name, name))
+    total, covered = 0, 0
+    for effect in effects_of(verdict):
+        for name, stated in effect["parameters"].items():
+            true = hidden.quantities.get((effect["name"], name))
             if true is not None:
+                lower, upper = stated["interval95"]
                 total += 1
-                covered += abs(value - true) <= DEVIATIONS * variance**0.5
+                covered += lower <= true <= upper
     return {"quantities": float(total), "quantities_covered": float(covered)}
 
 

@@ -58,7 +58,7 @@ def verdict_document(
         "sentence": sentence(verdict),
         "probability": verdict.probability,
         "doubts": [in_words(one) for one in verdict.doubts],
-        "effects": _effects(verdict),
+        "effects": effects_of(verdict),
         "relevance": None if matters is None else matters.as_dict(),
         "alternatives": _alternatives(verdict),
         "base": {
@@ -144,7 +144,7 @@ def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
     return found
 
 
-def _effects(verdict: Verdict) -> list[dict[str, Any]]:
+def effects_of(verdict: Verdict) -> list[dict[str, Any]]:
     """Return the accepted effects; none unless the verdict names or classes them."""
     fitted, found = verdict.accepted, []
     for candidate, place in fitted.places:
