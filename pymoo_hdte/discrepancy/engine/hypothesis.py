@@ -196,12 +196,15 @@ def alike(
     one leaves beyond the other is no more than such forms leave, unless they differ by effects of
     exact form only, or one is a special case of the other. Where even the chosen form leaves more
     than noise, differences of chi-square are compared with this residual. Two laws at one port
-    ``overlap`` where other forms of both are known.
+    ``overlap`` where other forms of both are known. Where an effect of one stands for several base
+    parameters of the other, the evidence alone tells.
     """
-    if len(one.candidates) != len(chosen.candidates) or one.names == chosen.names:
+    if one.names == chosen.names:
         return False
     misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
     near = one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
+    if len(one.candidates) != len(chosen.candidates):
+        return near and _stands_for_parameters(one, chosen)
     residual = chosen.fit.chi_square - degrees_of_freedom
     if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
         further, pairs = one.fit.chi_square - chosen.fit.chi_square, differing(one, chosen)
@@ -212,6 +215,18 @@ def alike(
     if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
         return near
     return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
+
+
+def _stands_for_parameters(one: Hypothesis, other: Hypothesis) -> bool:
+    """Tell whether two sets with effects have as many members, and different effects.
+
+    More or fewer parameters beside the same effects are no other answer.
+    """
+    mine, theirs = (
+        frozenset(each.label for each in each_set.candidates if each.frees is None)
+        for each_set in (one, other)
+    )
+    return bool(mine and theirs) and mine != theirs and len(one.members) == len(other.members)
 
 
 def leave_the_same(one: Hypothesis, other: Hypothesis, rules: Rules) -> bool:

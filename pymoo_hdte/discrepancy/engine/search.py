@@ -164,8 +164,9 @@ class Search(FittedSets):
         """Fit the best sets of effects and freed parameters without the needless parameters."""
         for one in self.of_size(size):
             effects = [each for each in one.candidates if each.frees is None]
-            best = self.of_size(size)[0]
-            if not (one.has_freed and effects and self.may_come_as_near(one, best)):
+            if not (one.has_freed and effects) or label_of(one.candidates) in self._left_out:
+                continue
+            if not self.may_come_as_near(one, self.of_size(size)[0]):
                 continue
             freed = tuple(each for each in one.candidates if each not in effects)
             pruned = self._pruned(self.finished(one))

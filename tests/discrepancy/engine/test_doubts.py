@@ -10,8 +10,9 @@ from pymoo_hdte.discrepancy.engine import choice
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, alike, contains, label_of
 from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 FREEDOM = 1000
@@ -247,6 +248,39 @@ def test_a_set_far_behind_several_effects_that_leave_noise_is_not_finished(
 
 def freed(*names):
     return tuple(replace(a_law("parameter", name), port=name) for name in names)
+
+
+def test_all_sets_of_a_size_may_be_known_under_another_name():
+    """An inertia in a viscous clutch ended in an error, as none was left of two sets."""
+    known = Search.__new__(Search)
+    known.degrees_of_freedom = FREEDOM
+    known.data = SimpleNamespace(rules=RULES, out_of_tolerance=lambda names: [])
+    ripple, covered = a_law("ripple"), freed("load_inertia")
+    sets = [set_of(ripple, *covered, *more, left=1.0) for more in ((), freed("damping"))]
+    known._by_label = {label_of(one.candidates): one for one in sets}
+    known._left_out = set()
+    known.finished = lambda one: one
+    known._prune_near(2)
+    assert known.of_size(2) == []
+
+
+@pytest.mark.parametrize(
+    ("members", "left", "near"),
+    [
+        (("soft_windup", "damping_reference"), 5.01, True),
+        (("soft_windup", "damping_reference"), 5.2, False),
+        # More values beside the same effect are no other answer.
+        (("hardening_stiffness",), 5.01, False),
+    ],
+)
+def test_an_effect_may_stand_for_several_values_beside_another(members, left, near):
+    """A wind-up with more damping was a hardening with two values out of tolerance, plainly."""
+    values = freed("stiffness", "damping")
+    chosen = set_of(a_law("hardening_stiffness"), *values, left=5.0)
+    other = set_of(*(a_law(name) for name in members), left=left)
+    if len(members) == 1:
+        other = set_of(*other.candidates, *values, *freed("inertia"), left=left)
+    assert alike(other, chosen, FREEDOM, RULES) == near
 
 
 @pytest.mark.parametrize(
