@@ -122,7 +122,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         1e-3,
         "relative amplitude",
         "Effects of exact form that do not fit down to the noise leave no more of the amplitude of "
-        "a misfit than this, their model's own error.",
+        "a misfit than this, their model's own error. Values of effects are not stated more "
+        "closely either.",
         "Simulation: with three times as many harmonics no effect of exact form changes what the "
         "drive model predicts for it by more than 6e-4 (the reaction of the kinematic error; "
         "others 2e-4 or less).",

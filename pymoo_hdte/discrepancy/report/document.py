@@ -181,11 +181,18 @@ def _parameters(
         name = fitted.parameters[row].name
         if name.endswith("_cosine"):
             pair = np.array([row, row + 1])
-            covariance = fitted.covariance[np.ix_(pair, pair)]
+            own = _own_variance(np.hypot(*values[pair]), rules) * np.eye(2)
+            covariance = fitted.covariance[np.ix_(pair, pair)] + own
             found |= _line(name.removesuffix("_cosine"), candidate, values[pair], covariance)
         elif not name.endswith("_sine"):
-            found[name] = quantity(values[row], fitted.covariance[row, row], _unit(candidate, name))
+            variance = fitted.covariance[row, row] + _own_variance(values[row], rules)
+            found[name] = quantity(values[row], variance, _unit(candidate, name))
     return found
+
+
+def _own_variance(value: float, rules: Rules) -> float:
+    """Return the variance of a value by the error of the model itself, however little noise is."""
+    return float((rules.exact_model_accuracy * value / _DEVIATIONS) ** 2)
 
 
 def _unit(candidate: Candidate, name: str) -> str:
