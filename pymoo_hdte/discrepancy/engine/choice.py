@@ -25,6 +25,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     gains_enough,
     is_bounded,
     label_of,
+    near_by_evidence,
 )
 from pymoo_hdte.discrepancy.engine.screening import Screened
 from pymoo_hdte.discrepancy.engine.search import Search
@@ -130,15 +131,13 @@ def twins(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
 
     A law that contains the chosen one follows more of any form, and is none.
     """
-    misfit = max(chosen.fit.chi_square / search.degrees_of_freedom, 1.0)
-    most = chosen.fit.evidence + search.data.rules.evidence_distance * misfit
     return [
         one
         for one in search.of_size(len(chosen.members))
         if one.names != chosen.names
         and len(one.candidates) == len(chosen.candidates)
-        and one.has_freed == chosen.has_freed
-        and one.fit.evidence < most
+        and bool(one.freed) == bool(chosen.freed)
+        and near_by_evidence(one, chosen, search.degrees_of_freedom, search.data.rules)
         and not (contains(one, chosen) or contains(chosen, one))
         and search.earned(one)
     ]

@@ -32,7 +32,7 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
         found.append(f"{name.replace('_', ' ')} ended far beyond what is stated of it")
     curves = [one.label for one in chosen.candidates if not one.exact]
     if not search.enough(chosen):
-        if curves and chosen.has_freed:
+        if curves and chosen.freed:
             found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
         found += _harmonics_of_another(chosen.candidates)
     if vote is not None and vote.after >= vote.before:

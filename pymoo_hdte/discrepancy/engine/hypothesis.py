@@ -56,9 +56,14 @@ class Hypothesis:
         return all(candidate.exact for candidate in self.candidates)
 
     @property
-    def has_freed(self) -> bool:
-        """Whether base parameters out of tolerance are among them."""
-        return any(candidate.frees is not None for candidate in self.candidates)
+    def freed(self) -> tuple[Candidate, ...]:
+        """The base parameters out of tolerance among them."""
+        return tuple(each for each in self.candidates if each.frees is not None)
+
+    @property
+    def effects(self) -> tuple[Candidate, ...]:
+        """The others."""
+        return tuple(each for each in self.candidates if each.frees is None)
 
     @property
     def label(self) -> str:
@@ -68,9 +73,8 @@ class Hypothesis:
     @property
     def members(self) -> list[tuple[Candidate, ...]]:
         """The effects one by one; base parameters out of tolerance are one member together."""
-        freed = tuple(each for each in self.candidates if each.frees is not None)
-        effects = [(each,) for each in self.candidates if each.frees is None]
-        return effects + ([freed] if freed else [])
+        alone = [(each,) for each in self.effects]
+        return alone + ([self.freed] if self.freed else [])
 
     def values_of(self, kept: Sequence[Candidate]) -> NDArray[np.float64]:
         """Return the fitted values of the base and of some of the effects, in their order here."""
@@ -202,7 +206,7 @@ def alike(
     if one.names == chosen.names:
         return False
     misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
-    near = one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
+    near = near_by_evidence(one, chosen, degrees_of_freedom, rules)
     if len(one.candidates) != len(chosen.candidates):
         return near and _stands_for_parameters(one, chosen)
     residual = chosen.fit.chi_square - degrees_of_freedom
@@ -217,15 +221,20 @@ def alike(
     return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
 
 
+def near_by_evidence(
+    one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
+) -> bool:
+    """Tell whether the evidence does not tell a set from the chosen one."""
+    misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
+    return one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
+
+
 def _stands_for_parameters(one: Hypothesis, other: Hypothesis) -> bool:
     """Tell whether two sets with effects have as many members, and different effects.
 
     More or fewer parameters beside the same effects are no other answer.
     """
-    mine, theirs = (
-        frozenset(each.label for each in each_set.candidates if each.frees is None)
-        for each_set in (one, other)
-    )
+    mine, theirs = label_of(one.effects), label_of(other.effects)
     return bool(mine and theirs) and mine != theirs and len(one.members) == len(other.members)
 
 

@@ -102,42 +102,36 @@ class Search(FittedSets):
         best = self.found[0].bic if self.found else np.inf
         if not needed or found.chi_square > best:
             return
-        needed = self._pruned(self.fitted(needed, values)).candidates
-        covered = self._covered(freed)
-        for one in needed:
-            if one.label not in covered:
+        for one in self._prune(self.fitted(needed, values)).freed:
+            if not self._covered((one,)):
                 self.fitted((one,), values)
-        self._leave_covered_out((), needed, covered)
 
     def _covered(self, freed: Effects) -> frozenset[str]:
         """Return the parameters that an effect covers under another name, by their labels."""
         alone = {one.frees for one in self.data.out_of_tolerance([str(one.frees) for one in freed])}
         return frozenset(one.label for one in freed if one.frees not in alone)
 
-    def _leave_covered_out(
-        self, effects: Sequence[Candidate], needed: Effects, covered: frozenset[str]
-    ) -> None:
-        """Leave sets out with covered parameters alone, or needlessly, free beside effects."""
-        for one in self.found:
-            freed = label_of([each for each in one.candidates if each.frees is not None])
-            beside = label_of(one.candidates) - freed
-            needless = len(freed) == 1 or label_of(needed) < freed
-            if beside == label_of(effects) and freed & covered and needless:
-                self.leave_out(one)
-
-    def _pruned(self, one: Hypothesis) -> Hypothesis:
+    def _prune(self, one: Hypothesis) -> Hypothesis:
         """Return a set without the base parameters that cost more than their removal does.
 
-        One of them stays.
+        One of them stays. Sets of the same effects with covered parameters alone, or with needless
+        ones beside them, are left out.
         """
-        freed = [each for each in one.candidates if each.frees is not None]
-        while len(freed) > 1:
-            fewer = [self.without(one, (each,)) for each in freed]
-            best = min(fewer, key=lambda each: each.bic)
-            if best.bic > one.bic:
+        best, covered = one, self._covered(one.freed)
+        while len(best.freed) > 1:
+            fewer = min(
+                (self.without(best, (each,)) for each in best.freed), key=lambda each: each.bic
+            )
+            if fewer.bic > best.bic:
                 break
-            one, freed = best, [each for each in freed if each in best.candidates]
-        return one
+            best = fewer
+        needed = label_of(best.freed)
+        for other in self.found:
+            freed = label_of(other.freed)
+            needless = len(freed) == 1 or needed < freed
+            if label_of(other.effects) == label_of(one.effects) and freed & covered and needless:
+                self.leave_out(other)
+        return best
 
     def _free_beside(self, one: Hypothesis) -> None:
         """Fit a set of effects with the base parameters that it leaves at their bounds, free.
@@ -150,7 +144,7 @@ class Search(FittedSets):
         least = rules.explained_part_share * (one.fit.chi_square - self.degrees_of_freedom)
         least = max(least, rules.single_effect_gain)
         bounded = self.data.out_of_tolerance(one.fit.at_bounds, together=True)
-        if one.has_freed or not bounded or gain_of_freed(one.fit, bounded) < least:
+        if one.freed or not bounded or gain_of_freed(one.fit, bounded) < least:
             return
         best = self.of_size(len(one.members))[0]
         if self.forms.rest(best.fit) is None or self.forms.explains(best):
@@ -163,15 +157,11 @@ class Search(FittedSets):
     def _prune_near(self, size: int) -> None:
         """Fit the best sets of effects and freed parameters without the needless parameters."""
         for one in self.of_size(size):
-            effects = [each for each in one.candidates if each.frees is None]
-            if not (one.has_freed and effects) or label_of(one.candidates) in self._left_out:
+            beside = one.freed and one.effects
+            if not beside or label_of(one.candidates) in self._left_out:
                 continue
-            if not self.may_come_as_near(one, self.of_size(size)[0]):
-                continue
-            freed = tuple(each for each in one.candidates if each not in effects)
-            pruned = self._pruned(self.finished(one))
-            needed = tuple(each for each in pruned.candidates if each not in effects)
-            self._leave_covered_out(effects, needed, self._covered(freed))
+            if self.may_come_as_near(one, self.of_size(size)[0]):
+                self._prune(self.finished(one))
 
     def _could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified; one at a bound may stand for two."""
@@ -184,11 +174,12 @@ class Search(FittedSets):
 
         And with the base parameters that it leaves at their bounds, free.
         """
-        label, others = label_of(one.candidates), self._further(one)
-        if label in self._extended | self._left_out:
+        label = label_of(one.candidates)
+        if label in self._extended or label in self._left_out:
             return
         self._extended.add(label)
         self._free_beside(one)
+        others = self._further(one)
         if not others:
             return
         if len(one.members) > 1 and self.forms.explains(one):

@@ -125,7 +125,7 @@ def _mostly_explained(sensors: MeasuredData, data: MeasuredData, verdict: Verdic
     chosen, rules = verdict.chosen, data.rules
     if chosen is None or verdict.status != "unlisted" or not chosen.listed:
         return verdict
-    if any(one.frees is not None for one in chosen.candidates):
+    if chosen.freed:
         return verdict
     removed = share_removed(sensors, data, verdict.base, chosen.fit)
     if removed < rules.partial_share or unexplained(data, verdict.base, chosen.fit).any():

@@ -272,7 +272,7 @@ def test_no_value_is_freed_for_what_another_form_of_the_law_explains(monkeypatch
     monkeypatch.setattr(AnyForm, "explains", lambda self, one: True)
     verdict = verdict_on(planted({LINE: (2e-6, 1e-6)}, error_amplitude_0=1.6), FEW)
     assert labels_of(verdict) == {LINE}
-    assert not any(one.frees for one in verdict.alternatives if len(one.members) > 1)
+    assert not any(one.freed and one.effects for one in verdict.alternatives)
 
 
 @pytest.mark.parametrize(
