@@ -179,7 +179,7 @@ def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:
     total, covered = 0, 0
     for effect in effects_of(verdict):
         for name, stated in effect["parameters"].items():
-            true = hidden.quantities.get((effect["name"], name))
+            true = hidden.quantities.get((one_name(effect["name"], effect["port"]), name))
             if true is not None:
                 lower, upper = stated["interval95"]
                 total += 1

@@ -1,7 +1,8 @@
 """What counts as right: which names say what a case hides.
 
 Two names of one physical effect are one: a damping, or an inertia of the load, out of tolerance is
-what the effects ``damping_reference`` and ``load_inertia`` say. Some effects contain another one:
+what the effects ``damping_reference`` and ``load_inertia`` say, and dry friction whose contacts
+bend before they slip is a form of dry friction. Some effects contain another one:
 friction that falls with speed, or varies with position, or fades as grease warms up, is a dry
 friction too; naming that beside the effect is no wrong name, naming it alone is not the effect.
 """
@@ -12,12 +13,14 @@ from experiments.blind.cases import OUT_OF_TOLERANCE, Case
 
 SAME = {"damping": "damping_reference", "load_inertia": "load_inertia"}
 """Base parameters that an effect covers under its own name."""
+FORM_OF = {"presliding_friction": "coulomb_friction"}
+"""Effects of the library that are a form of one that is hidden."""
 PARAMETER = "parameter"
 
 
 def one_name(name: str, port: str) -> str:
     """Return the name that stands for a candidate of a name at a port."""
-    return SAME.get(port, name) if name == PARAMETER else name
+    return SAME.get(port, name) if name == PARAMETER else FORM_OF.get(name, name)
 
 
 def to_be_named(case: Case) -> frozenset[str]:

@@ -143,6 +143,9 @@ class Guess:
     name : str
         Replaces that of the effect, and no verdict names it: for what a campaign cannot separate
         from the machine.
+    among : int
+        Number of guesses from which it differs by a number only that no fit follows, as the time of
+        a change; itself counted.
     """
 
     unknowns: tuple[Parameter, ...]
@@ -153,6 +156,7 @@ class Guess:
     sentence: str = ""
     instead_of: str = ""
     name: str = ""
+    among: int = 1
 
     @property
     def begins(self) -> tuple[tuple[float, ...], ...]:

@@ -128,6 +128,11 @@ class Law(Protocol):
         """See `Behaviour`."""
         ...
 
+    @property
+    def before_slip(self) -> Law | None:
+        """See `Behaviour`."""
+        ...
+
     def with_input_locked(self) -> Law | None:
         """See `Behaviour`."""
         ...
@@ -203,6 +208,11 @@ class Behaviour:
     def driving(self) -> complex:
         """Phasor of a driving force, which a sensor of that force reads; 0 otherwise."""
         return 0.0
+
+    @property
+    def before_slip(self) -> Law | None:
+        """What holds a port before its contacts slip; None: it rests up to ``breakaway``."""
+        return None
 
 
 @dataclass(frozen=True)

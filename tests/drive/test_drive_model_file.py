@@ -135,7 +135,12 @@ def test_a_round_trip_changes_no_bit(model, tmp_path):
 def test_a_file_of_version_1_still_holds_its_model():
     loaded = DriveModel.load(STORED / "drive_model_version_1.npz")
     assert bits(loaded) == bits(MODEL)
-    later = {"load_dependent_friction", "temperature_dependent_friction", "new_zero"}
+    later = {
+        "load_dependent_friction",
+        "temperature_dependent_friction",
+        "new_zero",
+        "presliding_friction",
+    }
     known = {one.name for one in drive_effects()}
     assert {effect.name for effect in loaded.effects} == known - later
     linear = replace(loaded, effects=loaded.effects[:3])

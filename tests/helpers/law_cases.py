@@ -4,6 +4,7 @@ from pymoo_hdte.drive.effects import (
     KinematicErrorLine,
     KinematicReaction,
     LawAtPort,
+    PreslidingFriction,
     drive_effects,
 )
 from pymoo_hdte.effects.friction import (
@@ -29,6 +30,7 @@ EFFECTS = [
     LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 3 * ARCSEC, 2 * ARCSEC)),
     LawAtPort("hysteresis", "mesh", MaxwellSlip(1.0, 2e-4)),
     LawAtPort("coulomb_friction", "output", CoulombFriction(2.0)),
+    LawAtPort("presliding_friction", "output", PreslidingFriction(2.0, 4e-5, 1.4)),
     LawAtPort("stribeck_friction", "input", StribeckFriction(0.05, 0.05, 50.0)),
     LawAtPort("position_dependent_friction", "input", PeriodicFriction(1.0, 0.3, 0.02)),
     LawAtPort("nonlinear_drag", "input", NonlinearDrag(1e-6)),

@@ -52,6 +52,8 @@ class Candidate:
         Whether its force depends on the previous motion, which a model follows less exactly.
     instead_of : str
         Name of the effect in whose place alone it is tried; a search leaves it out.
+    among : int
+        Number of candidates from which it differs only by a number that no fit follows.
     unit : callable or None
         From an unknown, or the line whose cosine and sine parts two of them are, to its SI unit.
     """
@@ -70,6 +72,7 @@ class Candidate:
     form: str = ""
     remembers: bool = False
     instead_of: str = ""
+    among: int = 1
     unit: Callable[[str], str] | None = None
 
     @property
@@ -161,6 +164,7 @@ def candidate_of(
         form=guess.form,
         remembers=effect.remembers,
         instead_of=guess.instead_of,
+        among=guess.among,
         unit=effect.unit,
     )
 

@@ -111,11 +111,13 @@ class Fit:
         """Minus twice the logarithm of the model's probability, by Laplace's approximation.
 
         Chi-square and, for each parameter, a term for how much the data narrowed its range (MacKay,
-        Neural Computation 4, 1992): a value that no record determines costs nothing.
+        Neural Computation 4, 1992): a value that no record determines costs nothing. A number that
+        no fit follows, as the time of a change, is one of as many as were tried.
         """
         information = self.jacobian.T @ self.jacobian * np.outer(self._widths, self._widths) / 12.0
         _, narrowed = np.linalg.slogdet(information + np.eye(len(information)))
-        return self.chi_square + float(narrowed)
+        tried = sum(np.log(one.among) for one in self.candidates)
+        return self.chi_square + float(narrowed + 2.0 * tried)
 
     @property
     def _widths(self) -> Vector:

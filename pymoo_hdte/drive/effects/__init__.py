@@ -12,6 +12,7 @@ from pymoo_hdte.drive.effects.base import (
 from pymoo_hdte.drive.effects.encoder import ENCODER_LINE, Eccentricity
 from pymoo_hdte.drive.effects.encoder_zero import NewZero, ThermalDrift
 from pymoo_hdte.drive.effects.mesh_stiffness import MeshStiffnessVariation
+from pymoo_hdte.drive.effects.presliding import PreslidingFriction
 from pymoo_hdte.drive.effects.shafts import DampingReference, LoadInertia
 from pymoo_hdte.drive.effects.static_error import KinematicErrorLine, KinematicReaction
 
@@ -27,6 +28,7 @@ __all__ = [
     "LoadInertia",
     "MeshStiffnessVariation",
     "NewZero",
+    "PreslidingFriction",
     "Session",
     "ThermalDrift",
     "drive_effects",

@@ -213,6 +213,7 @@ def _changed(sizes: DriveSizes, after: float) -> Guess:
     return Guess(
         (unknown("size", -largest, largest, sizes.error, linear=True),),
         build=build,
+        among=len(sizes.changes),
         form=f"{after:.0f} s",
         sentence=f"The zero of the output encoder changed {after:.0f} s into the session.",
     )

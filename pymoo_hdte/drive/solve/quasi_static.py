@@ -183,9 +183,12 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     """Yield the legs of the path from rest."""
     torque = finite_array("torque", torque, (None,))
     locked = [law.with_input_locked() for port, law in coefficients.laws if port == "mesh"]
+    at_output = [law for port, law in coefficients.laws if port == "output"]
+    # The output turns as far as the mesh is twisted, and its contacts bend as far.
+    locked += [law.before_slip for law in at_output]
     mesh_laws = tuple(law for law in locked if law is not None)
     mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
-    held = _play(torque, sum(law.breakaway for port, law in coefficients.laws if port == "output"))
+    held = _play(torque, sum(law.breakaway for law in at_output if law.before_slip is None))
     steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
     moving = np.flatnonzero(moves)
     turning = moving[1:][moves[moving[1:]] * moves[moving[:-1]] < 0.0]

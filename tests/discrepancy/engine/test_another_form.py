@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from planted_features import known_data, library, measured
+from planted_features import known_data, library, measured, with_sweep
 
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.forms.corrections import (
@@ -25,8 +25,8 @@ from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.drive import LoadInertia
-from pymoo_hdte.effects.friction import smoothed_sign
-from pymoo_hdte.effects.law import Response
+from pymoo_hdte.effects.friction import CoulombFriction, smoothed_sign
+from pymoo_hdte.effects.law import Aperiodic, Response
 from pymoo_hdte.effects.unknowns import unknown, wave
 
 SPEEDS = (10.0, 40.0, 150.0, 500.0, 1200.0, 2000.0)
@@ -335,3 +335,37 @@ def test_a_damping_out_of_tolerance_may_be_the_form_of_a_drag_at_its_port(
     rest = SimpleNamespace(fit=fitted("rest"), exact=False, candidates=(drag,))
     both = SimpleNamespace(fit=fitted("both"), candidates=(drag, freed))
     assert is_earned(data, base, both, rest, (freed,)) == earned
+
+
+class Bristles(Aperiodic):
+    """Dahl's friction of 1.2 N.m, whose bristles bend by 25 urad."""
+
+    def respond(self, state):
+        path = state.path(state.position)
+        torque = np.zeros_like(path)
+        for step in range(path.shape[1]):
+            way = path[:, step] - (path[:, step - 1] if step else 0.0)
+            before = torque[:, step - 1] if step else 0.0
+            slipped = 1.2 * np.sign(way)
+            torque[:, step] = slipped + (before - slipped) * np.exp(-np.abs(way) / 25e-6)
+        return Response(state.back(torque), (1.2 + 0.0 * state.position) / 25e-6)
+
+
+class DryWithBristles(CoulombFriction):
+    """Dry friction in a record that turns on, and bristles in a sweep with the input locked."""
+
+    before_slip = Bristles()
+
+
+def test_dry_friction_whose_bristles_bend_is_no_hysteresis_of_the_mesh():
+    """The sweep shows a loop as that of a hysteresis, of which no record has the lines."""
+    effect = Correction("output", DryWithBristles(1.2))
+    rng = np.random.default_rng(2)
+    data = with_sweep(measured((effect,), rng, DATA)[0], (effect,), rng)
+    wanted = {"hysteresis", "coulomb_friction", "presliding_friction"}
+    laws = [one for one in library(data) if one.name in wanted]
+    found = judge(data, fit(data), laws)
+    assert (found.status, found.chosen.label) == ("named", "presliding_friction:output")
+    (_, place), covariance = found.chosen.fit.places[0], found.chosen.fit.covariance
+    deviation = np.sqrt(np.diag(covariance)[place][0])
+    assert found.chosen.fit.values[place][0] == pytest.approx(1.2, abs=3.0 * deviation + 1e-3)

@@ -163,6 +163,14 @@ def test_evidence_in_closed_form(ripple):
         assert other.bic > chosen.bic
 
 
+def test_a_number_that_no_fit_follows_costs_what_it_was_chosen_from(ripple):
+    """The time of a change is one of as many as were tried; an unknown order would be, too."""
+    fitted = ripple[1].chosen.fit
+    (chosen,) = fitted.candidates
+    one_of_12 = replace(fitted, candidates=(replace(chosen, among=12),))
+    assert one_of_12.evidence == pytest.approx(fitted.evidence + 2.0 * np.log(12.0))
+
+
 def test_the_same_data_give_the_same_verdict_to_the_last_bit(ripple):
     data, verdict = ripple
     again = verdict_on(data)

@@ -25,7 +25,12 @@ from pymoo_hdte.discrepancy.drive.forms.corrections import (
 )
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.drive import DriveEffect
-from pymoo_hdte.drive.effects import Eccentricity, KinematicErrorLine, ThermalDrift
+from pymoo_hdte.drive.effects import (
+    Eccentricity,
+    KinematicErrorLine,
+    PreslidingFriction,
+    ThermalDrift,
+)
 from pymoo_hdte.effects.friction import PeriodicTorque, smoothed_sign
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState, Response, Values
@@ -107,7 +112,14 @@ def _friction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
         Correction(candidate.port, AnyForce(_of_speed(power, candidate.port, ranges)))
         for power in range(ranges.terms)
     ]
-    return found + (_springs(candidate, ranges)[:4] if candidate.port == "output" else [])
+    return found + (_contacts(ranges) if candidate.port == "output" else [])
+
+
+def _contacts(ranges: Ranges) -> list[DriveEffect]:
+    """Contacts of the output that bend before they slip, by any way up to those of a bearing."""
+    size, shares = _SHARE * ranges.torque, _BENDS[:4]
+    laws = [PreslidingFriction(size, share * ranges.travel, 1e-3) for share in shares]
+    return [Correction("output", law) for law in laws]
 
 
 def _of_speed(
@@ -265,6 +277,7 @@ def _load(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
 
 _FORMS: dict[str, Callable[[Candidate, Ranges], list[DriveEffect]]] = {
     "coulomb_friction": _friction,
+    "presliding_friction": _friction,
     "stribeck_friction": _friction,
     "nonlinear_drag": _friction,
     "position_dependent_friction": _varying_friction,

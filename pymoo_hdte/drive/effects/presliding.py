@@ -1,0 +1,95 @@
+"""Dry friction of the output whose contacts bend before they slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.drive.effects.base import DriveSizes
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.law import Aperiodic, PortState, Response
+from pymoo_hdte.effects.unknowns import unknown
+
+
+@dataclass(frozen=True)
+class PreslidingFriction(Aperiodic):
+    """T = level sign(speed) where the port turns on and on, as `CoulombFriction`.
+
+    Where it moves to and fro by little, as the output does while the load is swept with the input
+    locked, its contacts bend before they slip: `MaxwellSlip` with the same sum of slip forces.
+    Bristles of Dahl's and LuGre's friction do so too.
+
+    Attributes
+    ----------
+    level : float
+        N.m.
+    torsion : float
+        Way after which all contacts slip, rad.
+    spread : float
+        Of their slip torsions, see `MaxwellSlip`; dimensionless.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite, or a torsion or spread that is not above 0.
+    """
+
+    level: float
+    torsion: float
+    spread: float = 1.0
+
+    def __post_init__(self) -> None:
+        real_number("presliding_friction.level", self.level)
+        real_number("presliding_friction.torsion", self.torsion, above=0.0)
+        real_number("presliding_friction.spread", self.spread, above=0.0)
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents of contacts that all slip."""
+        sign, slope = smoothed_sign(state.speed)
+        return Response(self.level * sign, damping=self.level * slope)
+
+    @property
+    def breakaway(self) -> float:
+        """The level, N.m."""
+        return max(self.level, 0.0)
+
+    @property
+    def constant(self) -> float:
+        """The level, N.m."""
+        return abs(self.level)
+
+    @property
+    def before_slip(self) -> MaxwellSlip:
+        """The contacts as springs that slip."""
+        return MaxwellSlip(self.level, self.torsion, self.spread)
+
+
+def _bending(sizes: Sizes) -> Sequence[Guess]:
+    """Guess contacts of the output of a drive; at other ports hysteresis says the same."""
+    if not isinstance(sizes, DriveSizes):
+        return []
+    travel, force = sizes.travel, sizes.force
+    unknowns = (
+        unknown("level", 0.0, sizes.largest, force),
+        unknown("torsion", 0.003 * travel, 2.0 * travel, 0.1 * travel),
+        unknown("spread", 0.3, 4.0, 1.5),
+    )
+    return [Guess(unknowns, [(force, share * travel, 1.5) for share in (0.03, 0.1, 0.4)])]
+
+
+register(
+    Effect(
+        "presliding_friction",
+        PreslidingFriction,
+        ("output",),
+        {"level": "torque", "torsion": "angle", "spread": ""},
+        "Dry friction at the {port} whose contacts bend before they slip, so that a load turns the "
+        "{port} by some arcseconds that return.",
+        _bending,
+        contains=("coulomb_friction",),
+    )
+)

@@ -1,0 +1,65 @@
+"""Dry friction of the output whose contacts bend before they slip."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive import (
+    LawAtPort,
+    harmonic_balance,
+    mean_torsion,
+    preset,
+    quasi_static_torsion,
+)
+from pymoo_hdte.drive.effects import PreslidingFriction
+from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.friction import CoulombFriction
+from pymoo_hdte.effects.guess import Sizes
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
+
+LEVEL, WAY, SPREAD = 1.5, 4e-5, 1.4
+SWEEP = np.concatenate([np.linspace(a, b, 200) for a, b in [(0, 40), (40, -40), (-40, 40)]])
+BENDING = PreslidingFriction(LEVEL, WAY, SPREAD)
+
+
+def with_law(name, port, law):
+    model = preset("calibrated").at(200.0, 20.0)
+    model = replace(model, effects=(*model.effects, LawAtPort(name, port, law)))
+    return model.coefficients(model.nominal[None])
+
+
+def test_with_the_input_locked_contacts_of_the_output_are_springs_across_the_mesh():
+    bending = with_law("presliding_friction", "output", BENDING)
+    springs = with_law("hysteresis", "mesh", MaxwellSlip(LEVEL, WAY, SPREAD))
+    assert quasi_static_torsion(bending, SWEEP) == pytest.approx(
+        quasi_static_torsion(springs, SWEEP), rel=1e-12
+    )
+
+
+def test_contacts_that_hardly_bend_hold_the_torsion_until_they_slip():
+    """The torsion differs from that beside dry friction by no more than the way of the contacts."""
+    dry = mean_torsion(with_law("coulomb_friction", "output", CoulombFriction(LEVEL)), SWEEP)
+    for way in (1e-6, 1e-7, 1e-8):
+        law = PreslidingFriction(LEVEL, way)
+        bending = mean_torsion(with_law("presliding_friction", "output", law), SWEEP)
+        assert 0.0 < np.abs(bending - dry).max() <= 2.0 * way
+
+
+def test_in_a_record_that_turns_on_they_are_dry_friction():
+    bending = harmonic_balance(with_law("presliding_friction", "output", BENDING))
+    dry = harmonic_balance(with_law("coulomb_friction", "output", CoulombFriction(LEVEL)))
+    assert np.array_equal(bending.transmission_error, dry.transmission_error)
+
+
+@pytest.mark.parametrize("field", ["torsion", "spread"])
+def test_a_way_has_to_be_positive(field):
+    with pytest.raises(InvalidInput, match=f"presliding_friction.{field}"):
+        replace(BENDING, **{field: 0.0})
+
+
+def test_it_is_sought_in_drives_only():
+    """At a port of another mechanism, hysteresis says the same."""
+    sizes = Sizes(force=1.0, residual=0.1, largest=5.0, speed=1.0, travel=0.1)
+    assert effect_named("presliding_friction").guesses(sizes) == []
