@@ -10,7 +10,12 @@ from scipy.stats import chi2, norm
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, Vote
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, bounded_unknowns, explains
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    bounded_unknowns,
+    expected_values,
+    explains,
+)
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.search import Search
 
@@ -118,22 +123,23 @@ def uncertain(fitted: Fit, rules: Rules) -> list[Candidate]:
 
 
 def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: Rules) -> bool:
-    """Tell whether the strength of an effect differs from nothing, by its own interval.
+    """Tell whether the strength of an effect differs from nothing, by the interval it is told with.
 
     Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
     friction that falls with speed may have no level. Shapes, which are not zero, do not count.
     """
     if not candidate.parameters:
         return True
+    values = expected_values(fitted, rules)
     limit = chi2.isf(2.0 * norm.sf(rules.certain_deviations), 2)
     for row, parameter in enumerate(candidate.parameters, place.start):
         if parameter.name.endswith("_cosine"):
             pair = np.array([row, row + 1])
             block = fitted.covariance[np.ix_(pair, pair)]
-            if fitted.values[pair] @ np.linalg.solve(block, fitted.values[pair]) > limit:
+            if values[pair] @ np.linalg.solve(block, values[pair]) > limit:
                 return True
         elif parameter.lower <= 0.0 and not parameter.name.endswith("_sine"):
             deviation = np.sqrt(fitted.covariance[row, row])
-            if abs(fitted.values[row]) > rules.certain_deviations * deviation:
+            if abs(values[row]) > rules.certain_deviations * deviation:
                 return True
     return all(parameter.lower > 0.0 for parameter in candidate.parameters)

@@ -217,6 +217,15 @@ def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
     assert labels_of(verdict) == {RIPPLE, SOFT}
 
 
+def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
+    """The believed one may be at the end of its tolerance, which no record tells from the rest."""
+    verdict = verdict_on(planted({INERTIA: (0.015,)}), [INERTIA, LINE])
+    assert "load_inertia" in verdict.chosen.fit.at_bounds
+    lower, upper = effects_of(verdict)[0]["parameters"]["inertia"]["interval95"]
+    assert 0.0 < lower < 0.015 < upper
+    assert (verdict.status, verdict.doubts) == ("named", ())
+
+
 def test_a_second_effect_shows_where_no_single_part_contradicts_the_first():
     """The whole does, by little, and friction of the load takes nearly all of it."""
     friction = "load_dependent_friction:input"
