@@ -60,6 +60,8 @@ class Sizes:
         Orders of the port's own angle at which its parts vary by design or manufacture.
     seen : tuple of float
         Orders with significant lines in the records; per turn of the reference shaft.
+    clear : tuple of float
+        Further ones, which are sought as harmonics only.
     shown : tuple of float
         All orders at which records could show lines; further harmonics could not be determined.
     together : bool
@@ -86,6 +88,7 @@ class Sizes:
     slower: float = 1.0
     expected: tuple[float, ...] = ()
     seen: tuple[float, ...] = ()
+    clear: tuple[float, ...] = ()
     shown: tuple[float, ...] = ()
     together: bool = False
     between: bool = False
@@ -99,7 +102,7 @@ class Sizes:
         first = order / self.slower
         count = harmonics_among(self.shown, first, most)
         further = range(count + 1, len(HARMONIC_NAMES) + 1)
-        clear = set(self.shown) & set(self.seen)
+        clear = set(self.shown) & {*self.seen, *self.clear}
         multiples = [*range(1, count + 1), *(k for k in further if is_among(clear, k * first))]
         return Family(tuple(multiple * order for multiple in multiples))
 

@@ -171,11 +171,11 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
 
 def _candidates(data: Data, base: Fit) -> list[Candidate]:
     features = data.features
-    seen = _strong_lines(features, base, data.rules)
+    clear = _strong_lines(features, base, data.rules)
+    seen = clear[: data.rules.most_order_lines]
     believed, orders = data.campaign.believed, features.orders.tolist()
-    return drive_candidates(
-        port_sizes(believed, orders, seen, scales_of(data, base)), believed.effects
-    )
+    sizes = port_sizes(believed, orders, seen, scales_of(data, base), clear)
+    return drive_candidates(sizes, believed.effects)
 
 
 def highest_order(campaign: Campaign, rules: Rules) -> float:
@@ -245,6 +245,7 @@ def _apart(wanted: list[float], campaign: Campaign, kept: list[float], rules: Ru
 def _strong_lines(features: Features, base: Fit, rules: Rules) -> list[float]:
     """Return the orders at which the residual of the base exceeds the noise in any channel.
 
+    The strongest first.
     If there are several speeds, a line seen at one speed only is a frequency and no order.
     """
     misfit: NDArray[np.float64] = (base.residuals[: features.values.size] ** 2).reshape(
@@ -261,7 +262,7 @@ def _strong_lines(features: Features, base: Fit, rules: Rules) -> list[float]:
         degrees_of_freedom = 8 * (len(speed) - fewest)
         strong &= total - strongest > _threshold(degrees_of_freedom, rules.second_speed_chance)
     ranked = [k for k in np.argsort(-total) if strong[k]]
-    return [float(features.orders[k]) for k in ranked[: rules.most_order_lines]]
+    return [float(features.orders[k]) for k in ranked]
 
 
 def _threshold(degrees_of_freedom: int, chance: float) -> float:

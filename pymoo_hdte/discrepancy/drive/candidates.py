@@ -17,8 +17,8 @@ from pymoo_hdte.effects.unknowns import Parameter
 
 _ACTING_AT = {"input_damping": "input", "output_damping": "output"}
 """Ports at which base parameters are friction, as a law there is."""
-_OF_THEIR_OWN = ("load_inertia", "damping")
-"""Base parameters that an effect in the library covers under another name."""
+_COVERED = {"load_inertia": "load_inertia", "damping": "damping_reference"}
+"""Base parameters that an effect in the library covers, and the effect."""
 
 
 def drive_candidates(
@@ -58,11 +58,16 @@ def out_of_tolerance(
     """
     believed, known = {one.name: one.start for one in base}, known_values(effects)
     found = [
-        candidate.out_of_tolerance(name, words_of(name, error_orders), _ACTING_AT.get(name, ""))
+        candidate.out_of_tolerance(
+            name,
+            words_of(name, error_orders),
+            _ACTING_AT.get(name, ""),
+            _COVERED.get(name, ""),
+        )
         for name in at_bounds
         if (name in MECHANICAL or name.startswith("error_amplitude_") or name in known)
         and believed[name] > 0.0
-        and (together or name not in _OF_THEIR_OWN)
+        and (together or name not in _COVERED)
     ]
     return [one for one in found if one.port not in known or _taken(base, one, effects)]
 

@@ -129,7 +129,11 @@ def _largest(features: Features, channel: int) -> float:
 
 
 def port_sizes(
-    believed: BelievedDrive, orders: Sequence[float], seen: Sequence[float], scales: Scales
+    believed: BelievedDrive,
+    orders: Sequence[float],
+    seen: Sequence[float],
+    scales: Scales,
+    clear: Sequence[float] = (),
 ) -> dict[str, DriveSizes]:
     """Return the sizes of each port.
 
@@ -139,8 +143,10 @@ def port_sizes(
     orders : sequence of float
         All orders of the features: harmonics beyond them could not be determined.
     seen : sequence of float
-        Orders with significant lines.
+        Orders of the strongest lines, for each of which an effect may be missing.
     scales : Scales
+    clear : sequence of float
+        Orders of all significant lines, which may be harmonics of an effect.
     """
     at_output = max(scales.output_torque, believed.ratio * scales.input_torque)
     residual = {
@@ -169,6 +175,7 @@ def port_sizes(
         loaded=True,
         driven=scales.driven,
         seen=tuple(sorted(seen)),
+        clear=tuple(clear),
         shown=tuple(orders),
         error=scales.error,
         largest_error=LARGEST * scales.error,

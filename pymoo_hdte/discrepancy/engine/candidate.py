@@ -46,6 +46,8 @@ class Candidate:
         Base parameter that it frees of its tolerance.
     acts_at : str
         Port at which that parameter makes a torque, if it is at a port.
+    covered_by : str
+        Name of the effect that says the same as that parameter alone out of tolerance, if any.
     form : str
         In a word, where the library holds several forms of one effect.
     remembers : bool
@@ -69,6 +71,7 @@ class Candidate:
     listed: bool = True
     frees: str | None = None
     acts_at: str = ""
+    covered_by: str = ""
     form: str = ""
     remembers: bool = False
     instead_of: str = ""
@@ -169,7 +172,7 @@ def candidate_of(
     )
 
 
-def out_of_tolerance(name: str, words: str, acts_at: str = "") -> Candidate:
+def out_of_tolerance(name: str, words: str, acts_at: str = "", covered_by: str = "") -> Candidate:
     """Return the candidate that frees a base parameter, called ``words``, of its tolerance."""
     return Candidate(
         "parameter",
@@ -181,6 +184,7 @@ def out_of_tolerance(name: str, words: str, acts_at: str = "") -> Candidate:
         exact=True,
         frees=name,
         acts_at=acts_at,
+        covered_by=covered_by,
     )
 
 

@@ -103,28 +103,23 @@ class Search(FittedSets):
         if not needed or found.chi_square > best:
             return
         for one in self._prune(self.fitted(needed, values)).freed:
-            if not self._covered((one,)):
+            if not _covered((one,)):
                 self.fitted((one,), values)
 
-    def _covered(self, freed: Effects) -> frozenset[str]:
-        """Return the parameters that an effect covers under another name, by their labels."""
-        alone = {one.frees for one in self.data.out_of_tolerance([str(one.frees) for one in freed])}
-        return frozenset(one.label for one in freed if one.frees not in alone)
-
     def _prune(self, one: Hypothesis) -> Hypothesis:
-        """Return a set without the base parameters that cost more than their removal does.
+        """Return a set without its needless base parameters, of which one stays.
 
-        One of them stays. Sets of the same effects with covered parameters alone, or with needless
-        ones beside them, are left out.
+        Sets of the same effects with covered parameters alone, or with needless ones beside them,
+        are left out.
         """
-        best, covered = one, self._covered(one.freed)
+        best, covered = one, _covered(one.freed)
         while len(best.freed) > 1:
-            fewer = min(
-                (self.without(best, (each,)) for each in best.freed), key=lambda each: each.bic
-            )
-            if fewer.bic > best.bic:
+            fewer = min((self._kept(best, each) for each in best.freed), key=lambda each: each.bic)
+            if not self._needless(best, fewer):
                 break
             best = fewer
+        if label_of(best.freed) <= covered:
+            self._by_its_effect(best)
         needed = label_of(best.freed)
         for other in self.found:
             freed = label_of(other.freed)
@@ -132,6 +127,34 @@ class Search(FittedSets):
             if label_of(other.effects) == label_of(one.effects) and freed & covered and needless:
                 self.leave_out(other)
         return best
+
+    def _needless(self, one: Hypothesis, fewer: Hypothesis) -> bool:
+        """Tell whether what a set has beyond ``fewer`` parameters costs more than it removes.
+
+        In units of what is left, where that is more than noise. Beside an effect it is needless,
+        too, where no more than noise is left without it: it may stand for the form of a law.
+        """
+        misfit = max(one.fit.chi_square / self.degrees_of_freedom, 1.0)
+        cost = misfit * np.log(len(one.fit.residuals))
+        less = fewer.fit.chi_square - one.fit.chi_square <= cost
+        return less or (bool(one.effects) and self.enough(fewer))
+
+    def _kept(self, one: Hypothesis, needless: Candidate) -> Hypothesis:
+        """Return a set with one parameter back in its tolerance, fitted from where the set ended.
+
+        Another way may have led the same fewer to a worse minimum before.
+        """
+        kept = tuple(each for each in one.candidates if each is not needless)
+        return self.finished(self.fitted(kept, one.values_of(kept), again=True))
+
+    def _by_its_effect(self, one: Hypothesis) -> None:
+        """Fit a set with the effect that covers its one freed parameter, from where that led."""
+        (freed,) = one.freed
+        for more in self.candidates:
+            if more.name == freed.covered_by and _together((*one.effects, more)):
+                values = one.values_of(one.effects)
+                for start in more.starts:
+                    self.fitted((*one.effects, more), np.append(values, start), again=True)
 
     def _free_beside(self, one: Hypothesis) -> None:
         """Fit a set of effects with the base parameters that it leaves at their bounds, free.
@@ -151,7 +174,7 @@ class Search(FittedSets):
             return
         freed, found = freed_together(self.data, one.fit)
         needed = tuple(each for each in freed if each.outside(self.data.base, found.values))
-        if len(needed) > 1 or not label_of(needed) <= self._covered(needed):
+        if len(needed) > 1 or not label_of(needed) <= _covered(needed):
             self.fitted((*one.candidates, *needed), found.values)
 
     def _prune_near(self, size: int) -> None:
@@ -260,6 +283,11 @@ class Search(FittedSets):
                 if special and all(other.goes_with(each) for each in kept):
                     start = np.append(one.values_of(kept), other.starts[0])
                     self.fitted((*kept, other), start)
+
+
+def _covered(freed: Effects) -> frozenset[str]:
+    """Return the labels of the parameters that an effect covers under another name."""
+    return frozenset(one.label for one in freed if one.covered_by)
 
 
 def _together(effects: Effects) -> bool:

@@ -191,6 +191,21 @@ def test_a_line_has_further_harmonics_up_to_the_fifth_where_they_are_seen(seen, 
     assert at_output.family(2.0).orders == expected
 
 
+def test_lines_that_bring_no_candidates_are_harmonics_all_the_same():
+    """Where many lines are strong, as of a reaction, the weaker harmonics of others are seen."""
+    turn = 1.0 / BELIEVED.ratio
+    orders = [turn, 2.0 * turn, 3.0 * turn, *ORDERS[1:]]
+
+    def held(clear):
+        sizes = port_sizes(BELIEVED, orders, [turn], SCALES, clear)
+        found = drive_candidates(sizes)
+        (one,) = [each for each in found if each.name == "eccentricity"]
+        return len(one.parameters) // 2
+
+    assert held([turn, 3.0 * turn]) == 3
+    assert held([turn]) == 2
+
+
 def test_a_believed_order_of_the_error_is_no_further_line_of_it():
     names = [
         (one.name, one.order)

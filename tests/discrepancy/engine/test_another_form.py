@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
-from pymoo_hdte.drive import LoadInertia
+from pymoo_hdte.drive import KinematicReaction, LoadInertia
 from pymoo_hdte.effects.friction import CoulombFriction, smoothed_sign
 from pymoo_hdte.effects.law import Aperiodic, Response
 from pymoo_hdte.effects.unknowns import unknown, wave
@@ -35,6 +35,7 @@ DATA = known_data(
     [(speed, LOADS[(2 * k + j) % 5]) for k, speed in enumerate(SPEEDS) for j in (0, 1)],
     [1.0, 2.0, 2.02, 3.0],
 )
+REACTION = "kinematic_reaction:input"
 OF_LOAD, LOAD = "load_dependent_friction:input", "load_inertia:output"
 
 
@@ -369,3 +370,57 @@ def test_dry_friction_whose_bristles_bend_is_no_hysteresis_of_the_mesh():
     (_, place), covariance = found.chosen.fit.places[0], found.chosen.fit.covariance
     deviation = np.sqrt(np.diag(covariance)[place][0])
     assert found.chosen.fit.values[place][0] == pytest.approx(1.2, abs=3.0 * deviation + 1e-3)
+
+
+def test_a_reaction_that_lags_behind_is_a_reaction():
+    """The generator's answer need not be in phase with the slope of the error."""
+
+    def lag(state):
+        return Response(1e-3 * np.asarray(state.load) * np.cos(state.phase(2.0) + 0.3))
+
+    effects = (KinematicReaction(1.0), Correction("input", AnyForceOfLoad(lag, (2.0,))))
+    data = measured(effects, np.random.default_rng(1), DATA)[0]
+    found = judge(data, fit(data), [one for one in library(DATA) if one.label == REACTION])
+    assert found.leaves_more_than_noise
+    assert (found.status, found.chosen.label) == ("named", REACTION)
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """A search in data of a reaction and more inertia, which its covered parameter explains."""
+    data = measured((KinematicReaction(1.0), LoadInertia(0.05)), np.random.default_rng(3), DATA)[0]
+    laws = [one for one in library(DATA) if one.label in (REACTION, LOAD)]
+    search = Search(data, fit(data), laws)
+    freed = data.out_of_tolerance(["load_inertia", "output_damping"], together=True)
+    (reaction,) = [one for one in laws if one.label == REACTION]
+    values = np.append(search.base.values, 1.0)
+    return search, search.finished(search.fitted((reaction, *freed), values))
+
+
+def test_a_parameter_that_an_effect_covers_is_told_as_that_effect(moved):
+    search, one = moved
+    search._prune(one)
+    assert {each.label for each in search.found[0].candidates} == {REACTION, LOAD}
+    assert "parameter:load_inertia" not in {c.label for one in search.found for c in one.candidates}
+
+
+def test_a_parameter_out_of_tolerance_removes_more_than_the_misfit_lets_it(moved, monkeypatch):
+    """Where eight times the noise is left, what removes thrice the cost of a parameter is noise."""
+    search, one = moved
+    cost, freedom = np.log(len(one.fit.residuals)), search.degrees_of_freedom
+    monkeypatch.setattr(Search, "enough", lambda self, one: False)
+
+    def needless(left, removed):
+        sets = [
+            replace(one, fit=SimpleNamespace(chi_square=value, residuals=one.fit.residuals,
+                                             candidates=one.candidates))
+            for value in (left, left + removed)
+        ]  # fmt: skip
+        return search._needless(*sets)
+
+    assert needless(freedom, 0.9 * cost)
+    assert not needless(freedom, 3.0 * cost)
+    assert needless(8.0 * freedom, 3.0 * cost)
+    assert not needless(8.0 * freedom, 9.0 * cost)
+    monkeypatch.setattr(Search, "enough", lambda self, one: True)
+    assert needless(freedom, 3.0 * cost)
