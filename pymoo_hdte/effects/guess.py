@@ -140,9 +140,9 @@ class Guess:
         Word for the form, where there are several.
     sentence : str
         Replaces that of the effect.
-    instead_of : str
-        Name of the effect in whose place alone it is tried: what a small motion may not tell from
-        it, and what several effects together would be.
+    instead_of : tuple of str
+        Names of the effects in whose place alone it is tried: what a small motion may not tell from
+        them, and what several effects together would be.
     name : str
         Replaces that of the effect, and no verdict names it: for what a campaign cannot separate
         from the machine.
@@ -157,7 +157,7 @@ class Guess:
     family: Family | None = None
     form: str = ""
     sentence: str = ""
-    instead_of: str = ""
+    instead_of: tuple[str, ...] = ()
     name: str = ""
     among: int = 1
 

@@ -136,7 +136,7 @@ def _spring(sizes: Sizes) -> list[Guess]:
                 _preloaded,
                 form="preloaded",
                 sentence="There is a spring at the {port}, its rest not at zero.",
-                instead_of="gravity",
+                instead_of=("gravity",),
             )
         )
     return found

@@ -52,8 +52,8 @@ class Candidate:
         In a word, where the library holds several forms of one effect.
     remembers : bool
         Whether its force depends on the previous motion, which a model follows less exactly.
-    instead_of : str
-        Name of the effect in whose place alone it is tried; a search leaves it out.
+    instead_of : tuple of str
+        Names of the effects in whose place alone it is tried; a search leaves it out.
     among : int
         Number of candidates from which it differs only by a number that no fit follows.
     unit : callable or None
@@ -74,7 +74,7 @@ class Candidate:
     covered_by: str = ""
     form: str = ""
     remembers: bool = False
-    instead_of: str = ""
+    instead_of: tuple[str, ...] = ()
     among: int = 1
     unit: Callable[[str], str] | None = None
 
@@ -97,6 +97,10 @@ class Candidate:
     def beside(self, other: Candidate) -> bool:
         """Tell whether both act at one port, where one may stand for the form of the other."""
         return (self.acts_at or self.port) == (other.acts_at or other.port)
+
+    def replaces(self, member: Candidate) -> bool:
+        """Tell whether it is tried in the place of an effect: at its port, or with a memory."""
+        return member.name in self.instead_of and (member.port == self.port or member.remembers)
 
     def holds(self, other: Candidate) -> bool:
         """Tell whether another effect is a special case of this one, or of this form of it."""

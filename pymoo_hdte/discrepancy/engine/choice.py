@@ -14,6 +14,7 @@ import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.doubts import (
+    explains_as_listed,
     explains_in_any_form,
     is_harmonic,
     strength_is_certain,
@@ -162,6 +163,45 @@ def stands_out(search: Search, chosen: Hypothesis, together: Sequence[Hypothesis
     enough = chosen.explained >= rules.partial_share and gains_enough(chosen, search.base, rules)
     least = rules.form_ratio * left_beyond_noise(search, chosen)
     return enough and all(left_beyond_noise(search, one) >= least for one in others)
+
+
+def replaced(search: Search, chosen: Hypothesis, others: Sequence[Candidate]) -> list[Hypothesis]:
+    """Return sets that explain the misfit with another effect in the place of some members.
+
+    What could follow the form of any law in a part of the data is no explanation unless it leaves
+    plainly less than what it replaces, or noise: elsewhere the sets are left out.
+
+    Parameters
+    ----------
+    search : Search
+    chosen : Hypothesis
+        The set that it found: if that leaves no more than noise, only its members are replaced.
+    others : sequence of Candidate
+        Which effects they may replace, they say.
+    """
+    rules = search.data.rules
+    near = [one for size in (1, 2, 3) for one in search.of_size(size)[: rules.most_firsts]]
+    found, tried = list[Hypothesis](), set[frozenset[str]]()
+    for one in [chosen] if search.enough(chosen) else near:
+        for other in others:
+            kept = tuple(each for each in one.candidates if not other.replaces(each))
+            effects, label = (*kept, other), label_of((*kept, other))
+            if len(kept) == len(one.candidates) or label in tried:
+                continue
+            tried.add(label)
+            values = one.values_of(kept)
+            fits = [
+                search.fitted(effects, np.append(values, start), again=True)
+                for start in other.starts
+            ]
+            whole = search.finished(fits[-1])
+            less = rules.form_ratio * left_beyond_noise(search, whole)
+            plainly = less <= left_beyond_noise(search, one) or search.enough(whole)
+            if plainly and explains_as_listed(search, whole):
+                found.append(whole)
+            else:
+                search.leave_out(whole)
+    return found
 
 
 def in_another_form(

@@ -20,6 +20,7 @@ from pymoo_hdte.discrepancy.engine.choice import (
     confirmed,
     in_another_form,
     in_one_law,
+    replaced,
     simpler_law,
     special_case,
     stands_out,
@@ -130,14 +131,15 @@ def judge(
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
     quiet = down_to_noise(base, degrees_of_freedom, rules)
     # Screening is slow, and known sets need none unless the base itself may be adequate.
-    screened = screen(data, base, candidates) if quiet or not known else []
+    searched = [one for one in candidates if not one.instead_of]
+    screened = screen(data, base, searched) if quiet or not known else []
     gain = max((one.reduction for one in screened), default=0.0)
     if quiet and gain < rules.single_effect_gain:
         clean = probability.of_nothing(screened, len(base.residuals), rules)
         return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
-    search = Search(data, base, candidates)
+    search = Search(data, base, searched)
     if known:
         search.resume(known)
     else:
@@ -146,6 +148,9 @@ def judge(
     chosen = _chosen(search)
     if not known and len(chosen.members) > 1:
         search.complete(chosen)
+        chosen = _chosen(search)
+    others = [one for one in candidates if one.instead_of]
+    if not known and replaced(search, chosen, others):
         chosen = _chosen(search)
     certain = explains_in_any_form(search, chosen)
     if not certain:

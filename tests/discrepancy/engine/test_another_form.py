@@ -26,6 +26,7 @@ from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.drive import KinematicReaction, LoadInertia
 from pymoo_hdte.effects.friction import CoulombFriction, smoothed_sign
+from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import Aperiodic, Response
 from pymoo_hdte.effects.unknowns import unknown, wave
 
@@ -424,3 +425,18 @@ def test_a_parameter_out_of_tolerance_removes_more_than_the_misfit_lets_it(moved
     assert not needless(8.0 * freedom, 9.0 * cost)
     monkeypatch.setattr(Search, "enough", lambda self, one: True)
     assert needless(freedom, 3.0 * cost)
+
+
+def test_uneven_springs_of_the_mesh_need_no_friction_whose_contacts_bend():
+    """Friction that shows in the sweep alone could follow whatever another form leaves there."""
+    effects = tuple(
+        Correction("mesh", MaxwellSlip(force, torsion, spread))
+        for force, torsion, spread in ((1.2, 3e-5, 1.0), (1.2, 3e-4, 2.5))
+    )
+    rng = np.random.default_rng(2)
+    data = with_sweep(measured(effects, rng, DATA)[0], effects, rng)
+    wanted = {"hysteresis", "coulomb_friction", "presliding_friction"}
+    found = judge(data, fit(data), [one for one in library(data) if one.name in wanted])
+    assert found.leaves_more_than_noise
+    assert found.chosen.label == "hysteresis:mesh"
+    assert not any("presliding" in one.label for one in (*found.equivalent, *found.alternatives))
