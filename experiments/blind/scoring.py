@@ -168,7 +168,7 @@ def _names(one: Hypothesis) -> set[str]:
 
 def _places(one: Hypothesis) -> frozenset[tuple[str, str, float | None]]:
     """Return names, ports and orders: forms of one effect are one member of a class."""
-    return frozenset((c.name, c.port, c.order) for c in one.candidates)
+    return frozenset((one_name(c.name, c.port), c.port, c.order) for c in one.candidates)
 
 
 def coverage_scores(hidden: Hiding, verdict: Verdict) -> Scores:

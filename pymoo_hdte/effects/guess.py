@@ -61,7 +61,7 @@ class Sizes:
     seen : tuple of float
         Orders with significant lines in the records; per turn of the reference shaft.
     clear : tuple of float
-        Further ones, which are sought as harmonics only.
+        All of them, where ``seen`` holds the strongest only: the others are sought as harmonics.
     shown : tuple of float
         All orders at which records could show lines; further harmonics could not be determined.
     together : bool

@@ -14,7 +14,7 @@ from pymoo_hdte.compilation import compiled
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, PortState, Response, Values
-from pymoo_hdte.effects.unknowns import unknown
+from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 SPRINGS = 4
 
@@ -98,15 +98,18 @@ class MaxwellSlip(Aperiodic):
 
 def _slipping(sizes: Sizes) -> list[Guess]:
     """Guess springs that slip; in a motion without reversal they would act as dry friction."""
-    if not sizes.both_ways:
-        return []
+    return [Guess(*springs("force", sizes))] if sizes.both_ways else []
+
+
+def springs(strength: str, sizes: Sizes) -> tuple[tuple[Parameter, ...], list[tuple[float, ...]]]:
+    """Return unknowns and starts of springs that slip, the sum of their forces by its name."""
     travel, force = sizes.travel, sizes.force
     unknowns = (
-        unknown("force", 0.0, sizes.largest, force),
+        unknown(strength, 0.0, sizes.largest, force),
         unknown("torsion", 0.003 * travel, 2.0 * travel, 0.1 * travel),
         unknown("spread", 0.3, 4.0, 1.5),
     )
-    return [Guess(unknowns, [(force, share * travel, 1.5) for share in (0.03, 0.1, 0.4)])]
+    return unknowns, [(force, share * travel, 1.5) for share in (0.03, 0.1, 0.4)]
 
 
 register(

@@ -211,7 +211,10 @@ class Behaviour:
 
     @property
     def before_slip(self) -> Law | None:
-        """What holds a port before its contacts slip; None: it rests up to ``breakaway``."""
+        """What holds the output of a drive in a sweep until its contacts slip; None if these rest.
+
+        They then rest up to ``breakaway``. Only torsion sweeps with a locked input ask for it.
+        """
         return None
 
 

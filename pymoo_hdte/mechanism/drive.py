@@ -82,6 +82,9 @@ def _refuse(coefficients: Coefficients) -> None:
     if any(law.loaded for _, law in coefficients.laws):
         allowed = "effects of motion only: its ports do not know what load the output passes on"
         raise InvalidInput("effects at the input", "load_dependent_friction", allowed)
+    if any(law.before_slip is not None for _, law in coefficients.laws):
+        allowed = "hysteresis, which says the same where a port turns back"
+        raise InvalidInput("effects at the output", "presliding_friction", allowed)
     allowed = "no effect that varies with the input angle"
     if coefficients.stiffness_depth != 0.0:
         raise InvalidInput("effects at the mesh", "mesh_stiffness_variation", allowed)

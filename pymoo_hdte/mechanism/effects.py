@@ -1,11 +1,22 @@
 """Effects that ports of a mechanism may have: every registered one that is a law."""
 
 # The import registers the effects of a drive; some of them are laws, or readings, elsewhere too.
+from typing import Any
+
 from pymoo_hdte.drive import effects as _of_drives  # noqa: F401
 from pymoo_hdte.effects.effect import Effect, known_effects
+from pymoo_hdte.effects.law import Behaviour
 
 
 def law_effects() -> list[Effect]:
-    """Return the effects that are laws, at ports or of readings; none of them of temperature."""
+    """Return the effects that are laws, at ports or of readings.
+
+    None of them of temperature, and none whose contacts bend in torsion sweeps of a drive only:
+    hysteresis says the same at any port.
+    """
     laws = [one for one in known_effects() if one.law is not None]
-    return [one for one in laws if not getattr(one.law, "warmed", False)]
+    return [one for one in laws if not (getattr(one.law, "warmed", False) or _bends(one.law))]
+
+
+def _bends(law: Any) -> bool:
+    return getattr(law, "before_slip", Behaviour.before_slip) is not Behaviour.before_slip

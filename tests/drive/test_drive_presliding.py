@@ -13,11 +13,13 @@ from pymoo_hdte.drive import (
     preset,
     quasi_static_torsion,
 )
-from pymoo_hdte.drive.effects import PreslidingFriction
+from pymoo_hdte.drive.effects import DriveSizes, PreslidingFriction
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.mechanism.drive import drive_mechanism
+from pymoo_hdte.mechanism.effects import law_effects
 
 LEVEL, WAY, SPREAD = 1.5, 4e-5, 1.4
 SWEEP = np.concatenate([np.linspace(a, b, 200) for a, b in [(0, 40), (40, -40), (-40, 40)]])
@@ -59,7 +61,19 @@ def test_a_way_has_to_be_positive(field):
         replace(BENDING, **{field: 0.0})
 
 
-def test_it_is_sought_in_drives_only():
-    """At a port of another mechanism, hysteresis says the same."""
-    sizes = Sizes(force=1.0, residual=0.1, largest=5.0, speed=1.0, travel=0.1)
-    assert effect_named("presliding_friction").guesses(sizes) == []
+def test_it_is_sought_where_a_sweep_shows_it_only():
+    """Records that turn on show dry friction; at a port of another mechanism it is hysteresis."""
+    sizes = {"force": 1.0, "residual": 0.1, "largest": 5.0, "speed": 1.0, "travel": 0.1}
+    effect = effect_named("presliding_friction")
+    assert effect.guesses(Sizes(**sizes)) == []
+    assert effect.guesses(DriveSizes(**sizes)) == []
+    assert len(effect.guesses(DriveSizes(**sizes, swept=True))) == 1
+
+
+def test_a_mechanism_refuses_it_and_says_what_to_take():
+    assert "presliding_friction" not in {one.name for one in law_effects()}
+    linear = replace(preset("published"), effects=())
+    law = LawAtPort("presliding_friction", "output", BENDING)
+    assert drive_mechanism(linear, linear.nominal)[1] == ()
+    with pytest.raises(InvalidInput, match="hysteresis"):
+        drive_mechanism(replace(linear, effects=(law,)), linear.nominal)

@@ -23,7 +23,7 @@ from pymoo_hdte.drive import mean_torsion
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
 ORDERS = np.array([1.0 / 101.0, 1.0, 2.0, 2.02, 3.0, 6.0])
-SCALES = Scales(210.0, 40.0, 0.5, 2000.0, 8.0 * ARCSEC, 0.01, 1.0)
+SCALES = Scales(210.0, 40.0, 0.5, 2000.0, 8.0 * ARCSEC, 0.01, 1.0, swept=True)
 """Of a typical campaign on a drive of this size with something missing."""
 SWEEP_NOISE = 0.05 * ARCSEC
 CONDITIONS = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 30.0, 40.0)]
@@ -103,7 +103,8 @@ def with_sweep(data, effects=(), rng=None, **changes):
 def library(data, seen=()):
     """All candidates; lines of unexpected order at those that were seen."""
     orders = data.features.orders.tolist()
-    return drive_candidates(port_sizes(data.campaign.believed, orders, seen, SCALES))
+    scales = replace(SCALES, swept=bool(data.torsion))
+    return drive_candidates(port_sizes(data.campaign.believed, orders, seen, scales))
 
 
 def listed(data, name, seen=()):

@@ -19,6 +19,7 @@ _ACTING_AT = {"input_damping": "input", "output_damping": "output"}
 """Ports at which base parameters are friction, as a law there is."""
 _COVERED = {"load_inertia": "load_inertia", "damping": "damping_reference"}
 """Base parameters that an effect in the library covers, and the effect."""
+_DRY = ("coulomb_friction", "presliding_friction")
 
 
 def drive_candidates(
@@ -26,9 +27,10 @@ def drive_candidates(
 ) -> list[Candidate]:
     """Return all candidates for a drive, for the sizes of each of its ports.
 
-    None of them is at the place of a believed effect.
+    None of them is at the place of a believed effect; dry friction is there once, bending or not.
     """
     known = {place_of(effect) for effect in believed}
+    known |= {(name, port, order) for one, port, order in known if one in _DRY for name in _DRY}
     found = [
         candidate_of(effect, guess, port, "torque", _standing, sizes[port].slower)
         for effect in drive_effects()

@@ -43,6 +43,8 @@ class Scales:
         From the first record of the session to the last, s.
     changes : tuple of float
         Times between records, none of them near the ends of the session, s.
+    swept : bool
+        Whether there is a torsion sweep.
     error, input_torque, output_torque : float
         Residual of the base in the transmission error, rad, and in the two torques, N.m: root mean
         square over a record, means and lines together.
@@ -62,6 +64,7 @@ class Scales:
     driven: bool = False
     temperature: float = 0.0
     changes: tuple[float, ...] = ()
+    swept: bool = False
 
 
 def scales_of(data: Data, base: Fit) -> Scales:
@@ -95,6 +98,7 @@ def scales_of(data: Data, base: Fit) -> Scales:
         driven=bool(braking.max() > least and braking.min() < -least),
         temperature=_temperature(data),
         changes=_changes(when.elapsed),
+        swept=bool(data.torsion),
     )
 
 
@@ -186,6 +190,7 @@ def port_sizes(
         duration=scales.duration,
         temperature=scales.temperature,
         changes=scales.changes,
+        swept=scales.swept,
     )
     slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
     return {

@@ -103,8 +103,13 @@ class Search(FittedSets):
         if not needed or found.chi_square > best:
             return
         for one in self._prune(self.fitted(needed, values)).freed:
-            if not _covered((one,)):
+            if not self._covered((one,)):
                 self.fitted((one,), values)
+
+    def _covered(self, freed: Effects) -> frozenset[str]:
+        """Return the labels of parameters that an effect in the list covers under another name."""
+        names = {one.name for one in self.candidates}
+        return frozenset(one.label for one in freed if one.covered_by in names)
 
     def _prune(self, one: Hypothesis) -> Hypothesis:
         """Return a set without its needless base parameters, of which one stays.
@@ -112,13 +117,13 @@ class Search(FittedSets):
         Sets of the same effects with covered parameters alone, or with needless ones beside them,
         are left out.
         """
-        best, covered = one, _covered(one.freed)
+        best, covered = one, self._covered(one.freed)
         while len(best.freed) > 1:
             fewer = min((self._kept(best, each) for each in best.freed), key=lambda each: each.bic)
             if not self._needless(best, fewer):
                 break
             best = fewer
-        if label_of(best.freed) <= covered:
+        if len(best.freed) == 1 and label_of(best.freed) <= covered:
             self._by_its_effect(best)
         needed = label_of(best.freed)
         for other in self.found:
@@ -129,10 +134,10 @@ class Search(FittedSets):
         return best
 
     def _needless(self, one: Hypothesis, fewer: Hypothesis) -> bool:
-        """Tell whether what a set has beyond ``fewer`` parameters costs more than it removes.
+        """Tell whether the parameter that a set has beyond ``fewer`` costs more than it removes.
 
-        In units of what is left, where that is more than noise. Beside an effect it is needless,
-        too, where no more than noise is left without it: it may stand for the form of a law.
+        Where more than noise is left, it has to remove as many times more. Beside an effect it is
+        needless, too, where without it no more than noise is left: it may stand for a law's form.
         """
         misfit = max(one.fit.chi_square / self.degrees_of_freedom, 1.0)
         cost = misfit * np.log(len(one.fit.residuals))
@@ -148,7 +153,7 @@ class Search(FittedSets):
         return self.finished(self.fitted(kept, one.values_of(kept), again=True))
 
     def _by_its_effect(self, one: Hypothesis) -> None:
-        """Fit a set with the effect that covers its one freed parameter, from where that led."""
+        """Fit a set with the effect that covers its one freed parameter, beside where that led."""
         (freed,) = one.freed
         for more in self.candidates:
             if more.name == freed.covered_by and _together((*one.effects, more)):
@@ -174,7 +179,7 @@ class Search(FittedSets):
             return
         freed, found = freed_together(self.data, one.fit)
         needed = tuple(each for each in freed if each.outside(self.data.base, found.values))
-        if len(needed) > 1 or not label_of(needed) <= _covered(needed):
+        if len(needed) > 1 or not label_of(needed) <= self._covered(needed):
             self.fitted((*one.candidates, *needed), found.values)
 
     def _prune_near(self, size: int) -> None:
@@ -283,11 +288,6 @@ class Search(FittedSets):
                 if special and all(other.goes_with(each) for each in kept):
                     start = np.append(one.values_of(kept), other.starts[0])
                     self.fitted((*kept, other), start)
-
-
-def _covered(freed: Effects) -> frozenset[str]:
-    """Return the labels of the parameters that an effect covers under another name."""
-    return frozenset(one.label for one in freed if one.covered_by)
 
 
 def _together(effects: Effects) -> bool:

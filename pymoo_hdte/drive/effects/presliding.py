@@ -10,9 +10,8 @@ from pymoo_hdte.drive.effects.base import DriveSizes
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.friction import smoothed_sign
 from pymoo_hdte.effects.guess import Guess, Sizes
-from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.hysteresis import MaxwellSlip, springs
 from pymoo_hdte.effects.law import Aperiodic, PortState, Response
-from pymoo_hdte.effects.unknowns import unknown
 
 
 @dataclass(frozen=True)
@@ -69,18 +68,13 @@ class PreslidingFriction(Aperiodic):
 
 
 def _bending(sizes: Sizes) -> Sequence[Guess]:
-    """Guess contacts of the output of a drive; at other ports hysteresis says the same."""
-    if not isinstance(sizes, DriveSizes):
+    """Guess contacts of the output of a drive, if a sweep shows how they bend.
+
+    Not beside others: in the sweep alone they follow what the form of another law leaves there.
+    """
+    if not (isinstance(sizes, DriveSizes) and sizes.swept):
         return []
-    travel, force = sizes.travel, sizes.force
-    unknowns = (
-        unknown("level", 0.0, sizes.largest, force),
-        unknown("torsion", 0.003 * travel, 2.0 * travel, 0.1 * travel),
-        unknown("spread", 0.3, 4.0, 1.5),
-    )
-    starts = [(force, share * travel, 1.5) for share in (0.03, 0.1, 0.4)]
-    # In the sweep alone it would follow what the form of another law leaves there.
-    return [Guess(unknowns, starts, instead_of=("coulomb_friction", "hysteresis"))]
+    return [Guess(*springs("level", sizes), instead_of=("coulomb_friction", "hysteresis"))]
 
 
 register(

@@ -29,7 +29,8 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     """Return the torsion d along a path of slow load with the input locked, from rest.
 
     Laws at the mesh act unchanged. Dry friction at the output, its level with all of the Stribeck
-    excess, holds the mesh torque until the load differs from it by that much, in either direction.
+    excess, holds the mesh torque until the load differs from it by that much, in either direction;
+    contacts that bend (`PreslidingFriction`) start unbent, and act as springs across the mesh.
     Where a clearance leaves the torsion free, it moves no further than necessary.
 
     The angle of the locked input is not known: a stiffness and clearances that vary with it are

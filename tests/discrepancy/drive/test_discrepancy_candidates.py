@@ -15,9 +15,10 @@ from pymoo_hdte.discrepancy.drive.candidates import drive_candidates, out_of_tol
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes
-from pymoo_hdte.drive import preset
-from pymoo_hdte.drive.effects import effect_from_fields
+from pymoo_hdte.drive import LawAtPort, preset
+from pymoo_hdte.drive.effects import PreslidingFriction, effect_from_fields
 from pymoo_hdte.drive.toml_text import model_toml
+from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.effects.unknowns import line_with_variance, lines_of, polar, starts_along_each, wave
 from pymoo_hdte.io.fields import Fields
@@ -204,6 +205,18 @@ def test_lines_that_bring_no_candidates_are_harmonics_all_the_same():
 
     assert held([turn, 3.0 * turn]) == 3
     assert held([turn]) == 2
+
+
+@pytest.mark.parametrize(
+    "law", [CoulombFriction(1.0), PreslidingFriction(1.0, 1e-4)], ids=lambda law: type(law).__name__
+)
+def test_a_believed_dry_friction_leaves_none_to_be_found_at_its_port(law):
+    name = "coulomb_friction" if type(law) is CoulombFriction else "presliding_friction"
+    sizes = port_sizes(BELIEVED, ORDERS.tolist(), [], SCALES)
+    found = drive_candidates(sizes, [LawAtPort(name, "output", law)])
+    labels = {one.label for one in found}
+    assert not labels & {"coulomb_friction:output", "presliding_friction:output"}
+    assert "coulomb_friction:input" in labels
 
 
 def test_a_believed_order_of_the_error_is_no_further_line_of_it():

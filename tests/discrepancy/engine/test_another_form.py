@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
-from pymoo_hdte.drive import KinematicReaction, LoadInertia
+from pymoo_hdte.drive import DampingReference, KinematicReaction, LoadInertia
 from pymoo_hdte.effects.friction import CoulombFriction, smoothed_sign
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import Aperiodic, Response
@@ -403,6 +403,22 @@ def test_a_parameter_that_an_effect_covers_is_told_as_that_effect(moved):
     search._prune(one)
     assert {each.label for each in search.found[0].candidates} == {REACTION, LOAD}
     assert "parameter:load_inertia" not in {c.label for one in search.found for c in one.candidates}
+
+
+def test_two_covered_parameters_may_both_be_needed():
+    """Then each of them keeps its name: no one effect covers both."""
+    truth = (LoadInertia(0.02), DampingReference(3.0), KinematicReaction(1.0))
+    data = measured(truth, np.random.default_rng(3), DATA)[0]
+    labels = {REACTION, LOAD, "damping_reference:mesh", "coulomb_friction:input"}
+    found = judge(data, fit(data), [one for one in library(DATA) if one.label in labels])
+    assert REACTION in {one.label for one in found.chosen.candidates}
+
+
+def test_a_parameter_is_covered_only_by_an_effect_that_may_be_missing(moved):
+    """A believed effect stands for nothing else."""
+    search, _ = moved
+    freed = search.data.out_of_tolerance(["load_inertia", "damping"], together=True)
+    assert search._covered(freed) == {"parameter:load_inertia"}
 
 
 def test_a_parameter_out_of_tolerance_removes_more_than_the_misfit_lets_it(moved, monkeypatch):

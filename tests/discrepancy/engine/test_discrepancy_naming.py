@@ -164,7 +164,7 @@ def test_evidence_in_closed_form(ripple):
 
 
 def test_a_number_that_no_fit_follows_costs_what_it_was_chosen_from(ripple):
-    """The time of a change is one of as many as were tried; an unknown order would be, too."""
+    """The time of a change is one of as many as were tried."""
     fitted = ripple[1].chosen.fit
     (chosen,) = fitted.candidates
     one_of_12 = replace(fitted, candidates=(replace(chosen, among=12),))
