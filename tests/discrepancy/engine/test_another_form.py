@@ -405,13 +405,24 @@ def test_a_parameter_that_an_effect_covers_is_told_as_that_effect(moved):
     assert "parameter:load_inertia" not in {c.label for one in search.found for c in one.candidates}
 
 
-def test_two_covered_parameters_may_both_be_needed():
-    """Then each of them keeps its name: no one effect covers both."""
-    truth = (LoadInertia(0.02), DampingReference(3.0), KinematicReaction(1.0))
+BOTH = {REACTION, LOAD, "damping_reference:mesh"}
+
+
+def test_no_parameter_is_freed_beside_the_effect_that_covers_it():
+    truth = (LoadInertia(0.03), DampingReference(3.0), KinematicReaction(1.0))
     data = measured(truth, np.random.default_rng(3), DATA)[0]
-    labels = {REACTION, LOAD, "damping_reference:mesh", "coulomb_friction:input"}
-    found = judge(data, fit(data), [one for one in library(DATA) if one.label in labels])
-    assert REACTION in {one.label for one in found.chosen.candidates}
+    found = judge(data, fit(data), [one for one in library(DATA) if one.label in BOTH])
+    assert {one.label for one in found.chosen.candidates} == BOTH
+
+
+def test_two_covered_parameters_that_are_both_needed_stay(moved, monkeypatch):
+    """No one effect covers both."""
+    monkeypatch.setattr(Search, "_needless", lambda self, one, fewer: False)
+    data = moved[0].data
+    search = Search(data, fit(data), [one for one in library(DATA) if one.label in BOTH])
+    freed = data.out_of_tolerance(["load_inertia", "damping"], together=True)
+    one = search.fitted(tuple(freed), search.base.values)
+    assert search._prune(one).freed == tuple(freed)
 
 
 def test_a_parameter_is_covered_only_by_an_effect_that_may_be_missing(moved):
