@@ -179,8 +179,8 @@ class Search(FittedSets):
             return
         freed, found = freed_together(self.data, one.fit)
         names = {each.name for each in one.candidates}
-        freed = [each for each in freed if each.covered_by not in names]
-        needed = tuple(each for each in freed if each.outside(self.data.base, found.values))
+        beside = [each for each in freed if each.covered_by not in names]
+        needed = tuple(each for each in beside if each.outside(self.data.base, found.values))
         if len(needed) > 1 or not label_of(needed) <= self._covered(needed):
             self.fitted((*one.candidates, *needed), found.values)
 
