@@ -254,8 +254,11 @@ def test_all_sets_of_a_size_may_be_known_under_another_name():
     """An inertia in a viscous clutch ended in an error, as none was left of two sets."""
     known = Search.__new__(Search)
     known.degrees_of_freedom = FREEDOM
-    known.data = SimpleNamespace(rules=RULES, out_of_tolerance=lambda names: [])
+    known.data, known.candidates = SimpleNamespace(rules=RULES), [a_law("load_inertia")]
+    # The effect in its place is no better.
+    known._by_its_effect = lambda one: None
     ripple, covered = a_law("ripple"), freed("load_inertia")
+    covered = tuple(replace(one, covered_by="load_inertia") for one in covered)
     sets = [set_of(ripple, *covered, *more, left=1.0) for more in ((), freed("damping"))]
     known._by_label = {label_of(one.candidates): one for one in sets}
     known._left_out = set()
