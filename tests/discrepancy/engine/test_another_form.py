@@ -37,6 +37,11 @@ DATA = known_data(
     [1.0, 2.0, 2.02, 3.0],
 )
 REACTION = "kinematic_reaction:input"
+FEW = known_data(
+    [(10.0, 5.0), (40.0, 40.0), (150.0, 5.0), (500.0, 20.0), (1200.0, 40.0), (2000.0, 10.0)],
+    [1.0, 2.0, 2.02],
+)
+"""Records enough beside a sweep."""
 OF_LOAD, LOAD = "load_dependent_friction:input", "load_inertia:output"
 
 
@@ -363,7 +368,7 @@ def test_dry_friction_whose_bristles_bend_is_no_hysteresis_of_the_mesh():
     """The sweep shows a loop as that of a hysteresis, of which no record has the lines."""
     effect = Correction("output", DryWithBristles(1.2))
     rng = np.random.default_rng(2)
-    data = with_sweep(measured((effect,), rng, DATA)[0], (effect,), rng)
+    data = with_sweep(measured((effect,), rng, FEW)[0], (effect,), rng)
     wanted = {"hysteresis", "coulomb_friction", "presliding_friction"}
     laws = [one for one in library(data) if one.name in wanted]
     found = judge(data, fit(data), laws)
@@ -461,7 +466,7 @@ def test_uneven_springs_of_the_mesh_need_no_friction_whose_contacts_bend():
         for force, torsion, spread in ((1.2, 3e-5, 1.0), (1.2, 3e-4, 2.5))
     )
     rng = np.random.default_rng(2)
-    data = with_sweep(measured(effects, rng, DATA)[0], effects, rng)
+    data = with_sweep(measured(effects, rng, FEW)[0], effects, rng)
     wanted = {"hysteresis", "coulomb_friction", "presliding_friction"}
     found = judge(data, fit(data), [one for one in library(data) if one.name in wanted])
     assert found.leaves_more_than_noise
