@@ -190,11 +190,9 @@ def replaced(search: Search, chosen: Hypothesis, others: Sequence[Candidate]) ->
                 continue
             tried.add(label)
             values = one.values_of(kept)
-            fits = [
-                search.fitted(effects, np.append(values, start), again=True)
-                for start in other.starts
-            ]
-            whole = search.finished(fits[-1])
+            for start in other.starts:
+                whole = search.fitted(effects, np.append(values, start), again=True)
+            whole = search.finished(whole)
             less = rules.form_ratio * left_beyond_noise(search, whole)
             plainly = less <= left_beyond_noise(search, one) or search.enough(whole)
             if plainly and explains_as_listed(search, whole):

@@ -466,7 +466,8 @@ def test_uneven_springs_of_the_mesh_need_no_friction_whose_contacts_bend():
         for force, torsion, spread in ((1.2, 3e-5, 1.0), (1.2, 3e-4, 2.5))
     )
     rng = np.random.default_rng(2)
-    data = with_sweep(measured(effects, rng, FEW)[0], effects, rng)
+    records = known_data([(40.0, 40.0), (150.0, 5.0), (500.0, 20.0), (1200.0, 40.0)], [1.0, 2.0])
+    data = with_sweep(measured(effects, rng, records)[0], effects, rng)
     wanted = {"hysteresis", "coulomb_friction", "presliding_friction"}
     found = judge(data, fit(data), [one for one in library(data) if one.name in wanted])
     assert found.leaves_more_than_noise
