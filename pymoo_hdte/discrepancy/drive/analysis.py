@@ -245,8 +245,8 @@ def _apart(wanted: list[float], campaign: Campaign, kept: list[float], rules: Ru
 def _strong_lines(features: Features, base: Fit, rules: Rules) -> list[float]:
     """Return the orders at which the residual of the base exceeds the noise in any channel.
 
-    The strongest first.
-    If there are several speeds, a line seen at one speed only is a frequency and no order.
+    The strongest first. If there are several speeds, a line seen at one speed only is a frequency
+    and no order.
     """
     misfit: NDArray[np.float64] = (base.residuals[: features.values.size] ** 2).reshape(
         features.values.shape

@@ -20,6 +20,7 @@ _ACTING_AT = {"input_damping": "input", "output_damping": "output"}
 _COVERED = {"load_inertia": "load_inertia", "damping": "damping_reference"}
 """Base parameters that an effect in the library covers, and the effect."""
 _DRY = ("coulomb_friction", "presliding_friction")
+"""Names of dry friction, of which a port has one."""
 
 
 def drive_candidates(

@@ -7,7 +7,12 @@ from collections.abc import Sequence
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vector, fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, hypothesis_of, label_of
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    hypothesis_of,
+    label_of,
+    misfit_of,
+)
 from pymoo_hdte.discrepancy.engine.membership import is_earned
 from pymoo_hdte.discrepancy.engine.starts import best_fit, other_starts
 
@@ -69,10 +74,10 @@ class FittedSets:
         earned = is_earned(self.data, self.base, one, rest, member)
         return earned or self.forms.earns(one, rest)
 
-    def without(self, one: Hypothesis, member: Effects) -> Hypothesis:
-        """Return a set without one of its members, fitted to the end."""
+    def without(self, one: Hypothesis, member: Effects, again: bool = False) -> Hypothesis:
+        """Return a set without one of its members, fitted to the end; ``again`` as of `fitted`."""
         kept = tuple(other for other in one.candidates if other not in member)
-        return self.finished(self.fitted(kept, one.values_of(kept)))
+        return self.finished(self.fitted(kept, one.values_of(kept), again))
 
     def fitted(self, effects: Effects, start: Vector, again: bool = False) -> Hypothesis:
         """Return a set fitted from a start so far as to rank it.
@@ -138,5 +143,5 @@ class FittedSets:
     def may_come_as_near(self, one: Hypothesis, best: Hypothesis) -> bool:
         """Tell whether a set may come as near as the best once both are fitted to the end."""
         near = self.data.rules.refit_margin * self.data.rules.evidence_distance
-        misfit = max(best.fit.chi_square / self.degrees_of_freedom, 1.0)
+        misfit = misfit_of(best, self.degrees_of_freedom)
         return one.bic - best.bic < near * misfit

@@ -187,6 +187,11 @@ def explains(data: Evidence, one: Hypothesis, base: Fit, degrees_of_freedom: int
     return one.explained >= share and not unexplained(data, base, one.fit).any()
 
 
+def misfit_of(one: Hypothesis, degrees_of_freedom: int) -> float:
+    """Return chi-square per degree of freedom that a set leaves, 1 at least: the unit of gains."""
+    return max(one.fit.chi_square / degrees_of_freedom, 1.0)
+
+
 def alike(
     one: Hypothesis,
     chosen: Hypothesis,
@@ -205,7 +210,7 @@ def alike(
     """
     if one.names == chosen.names:
         return False
-    misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
+    misfit = misfit_of(chosen, degrees_of_freedom)
     near = near_by_evidence(one, chosen, degrees_of_freedom, rules)
     if len(one.candidates) != len(chosen.candidates):
         return near and _stands_for_parameters(one, chosen)
@@ -225,7 +230,7 @@ def near_by_evidence(
     one: Hypothesis, chosen: Hypothesis, degrees_of_freedom: int, rules: Rules
 ) -> bool:
     """Tell whether the evidence does not tell a set from the chosen one."""
-    misfit = max(chosen.fit.chi_square / degrees_of_freedom, 1.0)
+    misfit = misfit_of(chosen, degrees_of_freedom)
     return one.fit.evidence - chosen.fit.evidence < rules.evidence_distance * misfit
 
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, misfit_of
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import Screened
 
@@ -80,7 +80,7 @@ def _share(
     named: Sequence[Hypothesis], found: Sequence[Hypothesis], degrees_of_freedom: int
 ) -> float:
     """Return the share of the evidence of all compared sets for a class, the chosen set first."""
-    misfit = max(named[0].fit.chi_square / degrees_of_freedom, 1.0)
+    misfit = misfit_of(named[0], degrees_of_freedom)
     evidence = np.array([one.fit.evidence for one in found])
     weights = np.exp(-(evidence - evidence.min()) / (2.0 * misfit))
     says = [_says(one, named) for one in found]

@@ -23,6 +23,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     is_bounded,
     label_of,
     leave_the_same,
+    misfit_of,
 )
 from pymoo_hdte.discrepancy.engine.membership import ill_explained
 from pymoo_hdte.discrepancy.engine.screening import Screened, most_hopeful, varied
@@ -119,7 +120,9 @@ class Search(FittedSets):
         """
         best, covered = one, self._covered(one.freed)
         while len(best.freed) > 1:
-            fewer = min((self._kept(best, each) for each in best.freed), key=lambda each: each.bic)
+            # Another way may have led the same fewer to a worse minimum before.
+            every = [self.without(best, (each,), again=True) for each in best.freed]
+            fewer = min(every, key=lambda each: each.bic)
             if not self._needless(best, fewer):
                 break
             best = fewer
@@ -139,18 +142,9 @@ class Search(FittedSets):
         Where more than noise is left, it has to remove as many times more. Beside an effect it is
         needless, too, where without it no more than noise is left: it may stand for a law's form.
         """
-        misfit = max(one.fit.chi_square / self.degrees_of_freedom, 1.0)
-        cost = misfit * np.log(len(one.fit.residuals))
+        cost = misfit_of(one, self.degrees_of_freedom) * np.log(len(one.fit.residuals))
         less = fewer.fit.chi_square - one.fit.chi_square <= cost
         return less or (bool(one.effects) and self.enough(fewer))
-
-    def _kept(self, one: Hypothesis, needless: Candidate) -> Hypothesis:
-        """Return a set with one parameter back in its tolerance, fitted from where the set ended.
-
-        Another way may have led the same fewer to a worse minimum before.
-        """
-        kept = tuple(each for each in one.candidates if each is not needless)
-        return self.finished(self.fitted(kept, one.values_of(kept), again=True))
 
     def _by_its_effect(self, one: Hypothesis) -> None:
         """Fit a set with the effect that covers its one freed parameter, beside where that led."""

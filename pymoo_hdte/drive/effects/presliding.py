@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.effects.base import DriveSizes
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.hysteresis import MaxwellSlip, springs
-from pymoo_hdte.effects.law import Aperiodic, PortState, Response
 
 
 @dataclass(frozen=True)
-class PreslidingFriction(Aperiodic):
-    """T = level sign(speed) where the port turns on and on, as `CoulombFriction`.
+class PreslidingFriction(CoulombFriction):
+    """T = level sign(speed) where the port turns on and on.
 
     Where it moves to and fro by little, as the output does while the load is swept with the input
     locked, its contacts bend before they slip: `MaxwellSlip` with the same sum of slip forces.
@@ -37,7 +36,6 @@ class PreslidingFriction(Aperiodic):
         For a number that is not finite, or a torsion or spread that is not above 0.
     """
 
-    level: float
     torsion: float
     spread: float = 1.0
 
@@ -45,21 +43,6 @@ class PreslidingFriction(Aperiodic):
         real_number("presliding_friction.level", self.level)
         real_number("presliding_friction.torsion", self.torsion, above=0.0)
         real_number("presliding_friction.spread", self.spread, above=0.0)
-
-    def respond(self, state: PortState) -> Response:
-        """Return torque and tangents of contacts that all slip."""
-        sign, slope = smoothed_sign(state.speed)
-        return Response(self.level * sign, damping=self.level * slope)
-
-    @property
-    def breakaway(self) -> float:
-        """The level, N.m."""
-        return max(self.level, 0.0)
-
-    @property
-    def constant(self) -> float:
-        """The level, N.m."""
-        return abs(self.level)
 
     @property
     def before_slip(self) -> MaxwellSlip:
