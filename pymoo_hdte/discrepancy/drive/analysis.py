@@ -16,11 +16,11 @@ from pymoo_hdte.discrepancy.campaign.rows.examination import examined_rows
 from pymoo_hdte.discrepancy.campaign.rows.findings import RowFindings
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
 from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
-from pymoo_hdte.discrepancy.drive.features import Features, measure
+from pymoo_hdte.discrepancy.drive.features import Features, measure, unexpected_orders
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
+from pymoo_hdte.discrepancy.drive.rattling import judged
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
 from pymoo_hdte.discrepancy.drive.steady_states import TOLERANCE
-from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
@@ -109,14 +109,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     if any(effect_named(effect.name).rattles for effect in campaign.believed.effects):
         data = data.loaded
     _check_steady(data)
-    base = fit(data)
-    listed = _candidates(data, base)
-    leading = leading_sweep_effect(data, base, listed)
-    if leading is not None and effect_named(leading).rattles:
-        data = data.loaded
-        base = fit(data)
-        listed = _candidates(data, base)
-    verdict = judge(data, base, listed)
+    data, listed, verdict = judged(data, _candidates)
     data, verdict = _with_noise_of(verdict, data, listed)
     return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
 

@@ -18,7 +18,9 @@ from pymoo_hdte.discrepancy.campaign.believed import Rig
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, OrderLines, order_lines
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.campaign.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy.drive.prediction import Conditions, Prediction
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
 MEANS = (0, 1)
 """Channels whose mean is a feature; the others' means are conditions."""
@@ -128,3 +130,28 @@ def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[
     # The load is taken from the measured output torque, whose error changes the predicted torsion.
     covariance[0, 0] += line.covariance[2, 0, 0] / stiffness**2
     return covariance
+
+
+def unexpected_orders(
+    features: Features, ratio: float, rig: Rig, rules: Rules = RULES
+) -> list[float]:
+    """Return orders beyond those of the features at which the residual exceeds the noise.
+
+    The strongest first, summed over channels and records; fixed frequencies, whose order differs
+    from record to record, do not add up and come last.
+    """
+    total: dict[float, float] = {}
+    for record in features.records:
+        orders, amplitudes = residual_spectrum(
+            record, rig, ratio, features.orders, rules.highest_order
+        )
+        power = amplitudes**2
+        threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
+        for place in np.flatnonzero(power.max(axis=0) > threshold):
+            key = round(float(orders[place]), 9)
+            total[key] = total.get(key, 0.0) + float(power[:, place].sum())
+    strongest: list[float] = []
+    for order in sorted(total, key=lambda one: -total[one]):
+        if all(abs(order - other) > 2.5 / ratio for other in strongest):
+            strongest.append(order)
+    return strongest[: rules.most_unexpected_lines]

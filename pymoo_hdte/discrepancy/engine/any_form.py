@@ -175,15 +175,21 @@ class AnyForm:
         """Tell whether a member is earned: what is left without it is no error of form.
 
         The set leaves nothing but noise beyond its forms, and most of what it leaves ``without``
-        the member is gone, more than noise and the model's own error can be.
+        the member is gone, more than noise and the model's own error can be. Or what it leaves
+        without the member contradicts it plainly, and nearly all of that is gone: nothing follows
+        the remainder of another's form so closely.
         """
         both = self.rest(one.fit)
         left = self.rest(without.fit)
-        if both is None or left is None or not both.is_noise:
+        if both is None or left is None:
             return False
+        rules, removed = self.data.rules, left.excess - both.excess
+        plainly = (rules.contradicting_chi_square - 1.0) * self.degrees_of_freedom
+        if left.excess > plainly and removed >= rules.beyond_forms_share * left.excess:
+            return True
         kept = {each.label for each in without.candidates}
         member = [each for each in one.candidates if each.label not in kept]
-        return left.excess - both.excess >= self._least(without, member, left)
+        return both.is_noise and removed >= self._least(without, member, left)
 
     def only_in_another(self, one: Hypothesis, without: Hypothesis) -> bool:
         """Tell whether a member takes less in its listed form than in any, of what others leave."""

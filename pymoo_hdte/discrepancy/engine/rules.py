@@ -211,6 +211,18 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         at_least=0.0,
         at_most=1.0,
     )
+    beyond_forms_share: float = rule(
+        0.95,
+        "share of the excess chi-square beyond all forms",
+        "Share of what plainly contradicts a set in every form of its laws that a further member "
+        "removes to be earned, however little that is of the whole, at whatever port.",
+        "Simulation: beside 12 single effects in foreign forms on a bench written apart that left "
+        "more than noise beyond the corrections of their form no other effect removed more than "
+        "0.37 of it, 0.82 where it was a harmonic of the law; the true second one of pairs whose "
+        "forms were foreign, too, removed 0.97 or more.",
+        at_least=0.0,
+        at_most=1.0,
+    )
     vote_change: float = rule(
         16.0,
         "chi-square",

@@ -61,7 +61,7 @@ class Search(FittedSets):
         self.finish_near(1)
         if not self.enough(self.found[0]):
             self.from_other_starts(self.found[:1])
-        self._special_cases(self.found[0])
+        self._other_forms(self.found[0])
         self.finish_near(1)
 
     def grow(self) -> None:
@@ -80,10 +80,7 @@ class Search(FittedSets):
             self.finish_near(size + 1)
             if size == 1:
                 self._past_resonances(first)
-            for one in self.of_size(size + 1)[:1]:
-                if size == 1:
-                    self._exchange(one)
-                self._special_cases(one)
+            self._vary_best(size + 1)
             self._prune_near(size + 1)
             self.finish_near(size + 1)
 
@@ -256,6 +253,15 @@ class Search(FittedSets):
                     self.fitted(both, np.append(other.fit.values, start))
         self.finish_near(len(chosen.members))
 
+    def _vary_best(self, size: int) -> None:
+        """Fit sets that differ from the best of a size by one member, as long as one is better."""
+        varied: frozenset[str] | None = None
+        while (sets := self.of_size(size)) and (best := label_of(sets[0].candidates)) != varied:
+            varied = best
+            if size == 2:
+                self._exchange(sets[0])
+            self._other_forms(sets[0])
+
     def _exchange(self, one: Hypothesis) -> None:
         """Fit sets in which something else is in the place of one member."""
         for member in one.members:
@@ -275,13 +281,14 @@ class Search(FittedSets):
                     values = np.append(first.fit.values, start)
                     self.fitted((*first.candidates, more), values, again=True)
 
-    def _special_cases(self, one: Hypothesis) -> None:
-        """Fit sets in which one member is replaced by a special case of it at the same port."""
+    def _other_forms(self, one: Hypothesis) -> None:
+        """Fit sets in which one member is a special case of it, or another form, at its port."""
         for member in one.candidates:
             kept = tuple(each for each in one.candidates if each is not member)
             for other in self.candidates:
-                special = other.port == member.port and member.holds(other)
-                if special and all(other.goes_with(each) for each in kept):
+                form = other.name == member.name and other.form != member.form and other.among == 1
+                instead = other.port == member.port and (form or member.holds(other))
+                if instead and all(other.goes_with(each) for each in kept):
                     start = np.append(one.values_of(kept), other.starts[0])
                     self.fitted((*kept, other), start)
 

@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.engine import doubts, verdict
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.fitting import Vote, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import down_to_noise, hypothesis_of
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
@@ -91,6 +92,28 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
     data = planted(FOREIGN[SPRING], *small_drift())
     found = judge(data, fit(data), of_labels(SPRING, DRIFT))
     assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
+
+
+@pytest.mark.parametrize(("plain", "earned"), [(9.0, True), (1000.0, False)])
+def test_what_no_form_of_a_law_follows_is_another_effect_at_its_port(plain, earned):
+    """It takes 3 % of the whole misfit, and nearly all of what the friction leaves in any form."""
+
+    def threefold(state):
+        fallen = exponential(state)
+        return Response(3.0 * fallen.torque, damping=3.0 * fallen.damping)
+
+    friction, reaction = of_labels(FRICTION, "kinematic_reaction:input")
+    strong = Correction("input", AnyForce(threefold))
+    data = planted(strong, *reaction.build((0.3,)))
+    data = replace(data, rules=replace(RULES, contradicting_chi_square=plain))
+    search = Search(data, fit(data), [friction, reaction])
+    start = np.concatenate([search.base.values, friction.starts[0], reaction.starts[0]])
+    both = search.finished(search.fitted((friction, reaction), start))
+    alone = search.without(both, (reaction,))
+    removed = alone.fit.chi_square - both.fit.chi_square
+    assert removed < RULES.second_form_share * search.excess
+    assert not search.enough(both)
+    assert search.forms.earns(both, alone) == earned
 
 
 @pytest.mark.parametrize(("worse", "named"), [(0.0, True), (140.0, False)])

@@ -217,6 +217,17 @@ def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
     assert labels_of(verdict) == {RIPPLE, SOFT}
 
 
+def test_the_other_form_of_a_member_is_tried_beside_the_others():
+    """A spring that stiffens at a corner came nearer alone than the cubic one that was there."""
+    data = planted({CUBIC: (2e9,), DRAG: (0.01, 2.0)})
+    corner, drag = of_labels(["hardening_stiffness/corner:mesh", DRAG])
+    found = search.Search(data, fit(data), of_labels([CUBIC, corner.label, DRAG]))
+    start = np.concatenate([found.base.values, corner.starts[0], drag.starts[0]])
+    found.fitted((corner, drag), start)
+    found._vary_best(2)
+    assert {one.label for one in found.of_size(2)[0].candidates} == {CUBIC, DRAG}
+
+
 def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
     """The believed one may be at the end of its tolerance, which no record tells from the rest."""
     verdict = verdict_on(planted({INERTIA: (0.015,)}), [INERTIA, LINE])

@@ -11,9 +11,9 @@ from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy.drive.features import Features
+from pymoo_hdte.discrepancy.drive.features import Features, unexpected_orders
 from pymoo_hdte.discrepancy.drive.prediction import Conditions
-from pymoo_hdte.discrepancy.drive.sweep_effects import leading_sweep_effect, unexpected_orders
+from pymoo_hdte.discrepancy.drive.rattling import leading_sweep_effect
 from pymoo_hdte.discrepancy.engine import screening
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
