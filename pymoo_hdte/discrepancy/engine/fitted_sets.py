@@ -9,6 +9,7 @@ from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vector, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
+    alike,
     hypothesis_of,
     label_of,
     misfit_of,
@@ -61,6 +62,11 @@ class FittedSets:
     def enough(self, one: Hypothesis) -> bool:
         """Tell whether a set explains the data down to the noise."""
         return self.forms.leaves_noise(one)
+
+    def alike(self, one: Hypothesis, chosen: Hypothesis) -> bool:
+        """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
+        overlap = self.forms.known((*one.candidates, *chosen.candidates))
+        return alike(one, chosen, self.degrees_of_freedom, self.data.rules, overlap)
 
     def earned(self, one: Hypothesis) -> bool:
         """Tell whether each member is earned: without it the rest explains clearly less."""

@@ -238,24 +238,25 @@ class Search(FittedSets):
         return [self._beside_base[one.label] for one in others] if self._beside_base else []
 
     def complete(self, chosen: Hypothesis) -> None:
-        """Fit the sets in which a part of a chosen one is another that leaves the same by itself.
+        """Fit the sets in which a part of a chosen one is another that comes near it by itself.
 
-        Only the better of the two was extended: a screening beside the other would find the same
-        further effects, and takes longest where a line beats with those of the error.
+        Only the better one was extended: a screening beside the other would find the same further
+        effects, and takes longest where a line beats with those of the error.
         """
         whole, rules = label_of(chosen.candidates), self.data.rules
         for part in [one for one in self.found if label_of(one.candidates) < whole]:
             kept = [each for each in chosen.candidates if each not in part.candidates]
             for other in self.of_size(len(part.members)):
                 both = (*other.candidates, *kept)
-                if other is not part and leave_the_same(other, part, rules) and _together(both):
+                near = leave_the_same(other, part, rules) or self.alike(other, part)
+                if other is not part and near and _together(both):
                     start = chosen.values_of(kept)[len(self.base.values) :]
                     self.fitted(both, np.append(other.fit.values, start))
         self.finish_near(len(chosen.members))
 
     def _vary_best(self, size: int) -> None:
         """Fit sets that differ from the best of a size by one member, as long as one is better."""
-        varied: frozenset[str] | None = None
+        varied = frozenset[str]()
         while (sets := self.of_size(size)) and (best := label_of(sets[0].candidates)) != varied:
             varied = best
             if size == 2:

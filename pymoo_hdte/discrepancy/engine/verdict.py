@@ -36,7 +36,6 @@ from pymoo_hdte.discrepancy.engine.doubts import (
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
-    alike,
     contains,
     down_to_noise,
     is_bounded,
@@ -239,9 +238,7 @@ def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
     A law that contains the other one and ends at its bound is the other one. Where its further
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
-    rules, overlap = search.data.rules, search.forms.known((*one.candidates, *other.candidates))
-    near = alike(one, other, search.degrees_of_freedom, rules, overlap)
-    near = near or undecided(one, other, rules)
+    near = search.alike(one, other) or undecided(one, other, search.data.rules)
     return near and not (contains(one, other) and is_bounded(one.fit))
 
 

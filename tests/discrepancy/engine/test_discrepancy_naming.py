@@ -34,6 +34,7 @@ OF_ENCODER = known_data(CONDITIONS[::2], [1.0 / 101.0, SCALE, *ORDERS])
 RIPPLE, LINE = "torque_ripple:input@5", "kinematic_error:mesh@3"
 SOFT, CUBIC = "soft_windup:mesh", "hardening_stiffness:mesh"
 DRAG, OUTPUT_FRICTION = "nonlinear_drag:input", "coulomb_friction:output"
+OF_LOAD = "load_dependent_friction:input"
 REACTION, INERTIA = "kinematic_reaction:input", "load_inertia:output"
 SEEN = [3.0, 5.0]
 FEW = [RIPPLE, LINE, SOFT, REACTION, INERTIA, "nonlinear_drag:input"]
@@ -226,6 +227,23 @@ def test_the_other_form_of_a_member_is_tried_beside_the_others():
     found.fitted((corner, drag), start)
     found._vary_best(2)
     assert {one.label for one in found.of_size(2)[0].candidates} == {CUBIC, DRAG}
+
+
+def test_what_is_alike_alone_is_compared_beside_the_further_effect():
+    """A soft wind-up at its bound beside friction was named in part; the play was never tried."""
+    soft, play, friction = of_labels([SOFT, "backlash:mesh", OF_LOAD], empty=WITH_LOADS)
+    skin, rubbed = (0.9, 2e-5, 4.0), (0.1,)
+    hidden = {SOFT: skin, OF_LOAD: rubbed}
+    data = with_sweep(planted(hidden, empty=WITH_LOADS), soft.build(skin), np.random.default_rng(1))
+    found = search.Search(data, fit(data), [soft, play, friction])
+
+    def fitted(effects, start):
+        return found.finished(found.fitted(effects, np.append(found.base.values, start)))
+
+    of_soft, of_play = fitted((soft,), skin), fitted((play,), (2e-5,))
+    assert not hypothesis.leave_the_same(of_play, of_soft, data.rules)
+    found.complete(fitted((soft, friction), (*skin, *rubbed)))
+    assert {play, friction} in [set(one.candidates) for one in found.of_size(2)]
 
 
 def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
