@@ -154,6 +154,7 @@ print(f"  in each part of the data                 {RULES.explained_part_share:g
 print(f"  by effects of an exact form              {RULES.exact_share:.6f}")
 print(f"chi-square / nu that does for exact forms  {RULES.exact_chi_square:g}")
 print(f"a second effect removes of what is left    {RULES.second_share:g}")
+print(f"  or, beyond all forms of the first        {RULES.beyond_forms_share:g}")
 print(f"hypotheses are alike within an evidence of     {RULES.evidence_distance:g}")
 print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as much")
 

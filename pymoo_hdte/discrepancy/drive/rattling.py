@@ -1,8 +1,8 @@
 """The verdict, with or without the records in which a clearance would rattle.
 
 With a clearance a drive whose load does not hold the tooth flanks together has no steady state that
-could be fitted: such records are predicted without the clearance. Among the data they deny every
-set that has one, and speak for a soft wind-up, which follows the motion within the clearance.
+could be fitted: such records are predicted without the clearance. Where they are fitted, they speak
+against every set that has one, and for a soft wind-up, which follows the motion within it.
 """
 
 from __future__ import annotations
@@ -23,9 +23,10 @@ def judged(
 ) -> tuple[Data, list[Candidate], Verdict]:
     """Return the verdict on some data, with the data and the candidates that it is of.
 
-    Records in which a clearance would rattle are left out where sweeps speak for one. So they are
-    where sweeps speak for something else, which leaves more than noise, if without these records
-    a clearance is named beside it and nothing but noise is left.
+    If sweeps speak for a clearance, records in which it would rattle are left out. If they speak
+    for another effect, and the verdict on all records leaves more than noise, the others are judged
+    alone, too: that verdict is taken if it names a clearance beside another effect and leaves no
+    more than noise.
 
     Parameters
     ----------
@@ -37,12 +38,11 @@ def judged(
     candidates = candidates_of(data, base)
     leading = leading_sweep_effect(data, base, candidates)
     loaded = data if leading is None else data.loaded
-    if loaded is data:
-        return data, candidates, judge(data, base, candidates)
     if leading is not None and effect_named(leading).rattles:
         return _judged_on(loaded, candidates_of)
     verdict = judge(data, base, candidates)
-    if verdict.chosen is None or verdict.leaves_more_than_noise:
+    open_to_more = verdict.status == "unlisted" or verdict.leaves_more_than_noise
+    if loaded is not data and open_to_more:
         again = _judged_on(loaded, candidates_of)
         if _explains_by_a_clearance(again[-1]):
             return again
@@ -59,11 +59,12 @@ def _judged_on(
 
 
 def _explains_by_a_clearance(verdict: Verdict) -> bool:
-    """Tell whether a verdict names or counts among a class a clearance, and leaves only noise."""
+    """Tell whether a clearance beside another effect, perhaps of a class, leaves only noise."""
     if verdict.status not in EXPLAINED or verdict.leaves_more_than_noise:
         return False
     named = [one for one in (verdict.chosen, *verdict.equivalent) if one is not None]
-    listed = {each.name for one in named for each in one.effects if each.listed}
+    several = (one.effects for one in named if len(one.effects) > 1)
+    listed = {each.name for effects in several for each in effects if each.listed}
     return any(effect_named(name).rattles for name in listed)
 
 

@@ -147,12 +147,8 @@ class AnyForm:
     def hopeful_in_another(self, known: Sequence[Screened]) -> list[Screened]:
         """Return the effects that may explain the misfit of the base in some form of their laws.
 
-        To first order beside the base: what comes nearest to it, and what comes about as near.
-
-        Parameters
-        ----------
-        known : sequence of Screened
-            Effects with their signatures beside the base.
+        To first order beside the base: what comes nearest to it, and what comes about as near, of
+        effects that are ``known`` with their signatures beside the base.
         """
         rules = self.data.rules
         columns = [
@@ -175,21 +171,25 @@ class AnyForm:
         """Tell whether a member is earned: what is left without it is no error of form.
 
         The set leaves nothing but noise beyond its forms, and most of what it leaves ``without``
-        the member is gone, more than noise and the model's own error can be. Or what it leaves
-        without the member contradicts it plainly, and nearly all of that is gone: nothing follows
-        the remainder of another's form so closely.
+        the member is gone, more than noise and the model's own error can be. Or nearly all is gone
+        of what contradicts the others in every form, by the listed form of the member, so that no
+        contradiction is left: nothing follows the remainder of another's form so well.
         """
-        both = self.rest(one.fit)
-        left = self.rest(without.fit)
+        both, left = self.rest(one.fit), self.rest(without.fit)
         if both is None or left is None:
             return False
         rules, removed = self.data.rules, left.excess - both.excess
-        plainly = (rules.contradicting_chi_square - 1.0) * self.degrees_of_freedom
-        if left.excess > plainly and removed >= rules.beyond_forms_share * left.excess:
-            return True
         kept = {each.label for each in without.candidates}
         member = [each for each in one.candidates if each.label not in kept]
-        return both.is_noise and removed >= self._least(without, member, left)
+        if both.is_noise and removed >= self._least(without, member, left):
+            return True
+        contradicting = (rules.contradicting_chi_square - 1.0) * self.degrees_of_freedom
+        return (
+            both.excess < contradicting < left.excess
+            and removed >= rules.beyond_forms_share * left.excess
+            and all(each.exact or self.data.corrections(each) for each in without.candidates)
+            and not self.only_in_another(one, without)
+        )
 
     def only_in_another(self, one: Hypothesis, without: Hypothesis) -> bool:
         """Tell whether a member takes less in its listed form than in any, of what others leave."""

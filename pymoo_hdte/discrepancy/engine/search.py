@@ -61,7 +61,7 @@ class Search(FittedSets):
         self.finish_near(1)
         if not self.enough(self.found[0]):
             self.from_other_starts(self.found[:1])
-        self._other_forms(self.found[0])
+        self._exchange_forms(self.found[0])
         self.finish_near(1)
 
     def grow(self) -> None:
@@ -95,14 +95,13 @@ class Search(FittedSets):
         If all of them together do no better than one effect, fewer are not tried.
         """
         freed, found = freed_together(self.data, self.base)
-        values = found.values
-        needed = tuple(one for one in freed if one.outside(self.data.base, values))
+        needed = tuple(one for one in freed if one.outside(self.data.base, found.values))
         best = self.found[0].bic if self.found else np.inf
         if not needed or found.chi_square > best:
             return
-        for one in self._prune(self.fitted(needed, values)).freed:
+        for one in self._prune(self.fitted(needed, found.values)).freed:
             if not self._covered((one,)):
-                self.fitted((one,), values)
+                self.fitted((one,), found.values)
 
     def _covered(self, freed: Effects) -> frozenset[str]:
         """Return the labels of parameters that an effect in the list covers under another name."""
@@ -255,13 +254,13 @@ class Search(FittedSets):
         self.finish_near(len(chosen.members))
 
     def _vary_best(self, size: int) -> None:
-        """Fit sets that differ from the best of a size by one member, as long as one is better."""
+        """Fit sets that differ from the best of a size by one member, until it stays the best."""
         varied = frozenset[str]()
         while (sets := self.of_size(size)) and (best := label_of(sets[0].candidates)) != varied:
             varied = best
             if size == 2:
                 self._exchange(sets[0])
-            self._other_forms(sets[0])
+            self._exchange_forms(sets[0])
 
     def _exchange(self, one: Hypothesis) -> None:
         """Fit sets in which something else is in the place of one member."""
@@ -273,8 +272,8 @@ class Search(FittedSets):
 
         An inertia moves resonances past lines: to first order it does next to nothing for them.
         """
-        plainly = self.data.rules.contradicting_chi_square * self.degrees_of_freedom
-        if self.found[0].fit.chi_square <= plainly:
+        rules = self.data.rules
+        if misfit_of(self.found[0], self.degrees_of_freedom) <= rules.contradicting_chi_square:
             return
         for more in self._further(first):
             if more.exact and len(more.parameters) == 1 and len(more.starts) > 1:
@@ -282,11 +281,12 @@ class Search(FittedSets):
                     values = np.append(first.fit.values, start)
                     self.fitted((*first.candidates, more), values, again=True)
 
-    def _other_forms(self, one: Hypothesis) -> None:
+    def _exchange_forms(self, one: Hypothesis) -> None:
         """Fit sets in which one member is a special case of it, or another form, at its port."""
         for member in one.candidates:
             kept = tuple(each for each in one.candidates if each is not member)
             for other in self.candidates:
+                # The times of a new zero are forms, too, of which each is one among many.
                 form = other.name == member.name and other.form != member.form and other.among == 1
                 instead = other.port == member.port and (form or member.holds(other))
                 if instead and all(other.goes_with(each) for each in kept):

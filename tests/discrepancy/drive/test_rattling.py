@@ -11,26 +11,34 @@ from pymoo_hdte.discrepancy.drive import rattling
 CONDITIONS = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 40.0)]
 
 
-def answer(*names, status="named", more=False):
-    effects = [SimpleNamespace(name=name, listed=True) for name in names]
-    chosen = SimpleNamespace(effects=effects)
-    return SimpleNamespace(status=status, chosen=chosen, equivalent=(), leaves_more_than_noise=more)
+def named(*names):
+    return SimpleNamespace(effects=[SimpleNamespace(name=name, listed=True) for name in names])
 
 
-SOFT = answer("soft_windup", "hardening_stiffness", more=True)
-PLAY = answer("backlash", "hardening_stiffness")
+def answer(*names, status="named", more=False, rivals=()):
+    return SimpleNamespace(
+        status=status, chosen=named(*names), equivalent=rivals, leaves_more_than_noise=more
+    )
+
+
+HARDENING = "hardening_stiffness"
+SOFT = answer("soft_windup", HARDENING, more=True)
+PLAY = answer("backlash", HARDENING)
 
 
 @pytest.mark.parametrize(
     ("of_all", "of_loaded", "kept"),
     [
         (SOFT, PLAY, 6),
-        # Nothing is left that a clearance could be missing from.
+        (answer("soft_windup", status="unlisted"), PLAY, 6),
+        (SOFT, answer("soft_windup", HARDENING, rivals=[named("backlash", HARDENING)]), 6),
+        # All records are explained: there is no reason to leave any out.
         (answer("soft_windup"), PLAY, 8),
-        # The loaded records name no clearance, or do not explain everything by it.
-        (SOFT, answer("soft_windup"), 8),
-        (SOFT, answer("backlash", more=True), 8),
-        (SOFT, answer("backlash", status="unlisted"), 8),
+        # The loaded records show no clearance beside another effect, or it leaves more than noise.
+        (SOFT, answer("soft_windup", HARDENING), 8),
+        (SOFT, answer("backlash"), 8),
+        (SOFT, answer("backlash", HARDENING, more=True), 8),
+        (SOFT, answer("backlash", HARDENING, status="unlisted"), 8),
     ],
 )
 def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
@@ -49,3 +57,14 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
     found, _, verdict = rattling.judged(data, lambda some, base: library(some))
     assert len(found.features.records) == kept
     assert verdict is (of_all if kept == len(CONDITIONS) else of_loaded)
+
+
+@pytest.mark.parametrize(("name", "kept"), [("backlash", 6), (None, 8)])
+def test_records_that_rattle_do_not_count_where_sweeps_speak_for_a_clearance(
+    monkeypatch, name, kept
+):
+    data = known_data(CONDITIONS)
+    monkeypatch.setattr(rattling, "leading_sweep_effect", lambda *_: name)
+    monkeypatch.setattr(rattling, "judge", lambda *_: SOFT)
+    found, _, _ = rattling.judged(data, lambda some, base: [])
+    assert len(found.features.records) == kept

@@ -224,8 +224,7 @@ def test_the_other_form_of_a_member_is_tried_beside_the_others():
     corner, drag = of_labels(["hardening_stiffness/corner:mesh", DRAG])
     found = search.Search(data, fit(data), of_labels([CUBIC, corner.label, DRAG]))
     start = np.concatenate([found.base.values, corner.starts[0], drag.starts[0]])
-    found.fitted((corner, drag), start)
-    found._vary_best(2)
+    found._exchange_forms(found.fitted((corner, drag), start))
     assert {one.label for one in found.of_size(2)[0].candidates} == {CUBIC, DRAG}
 
 
