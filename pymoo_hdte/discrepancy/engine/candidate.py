@@ -117,6 +117,11 @@ class Candidate:
         return all(one.linear for one in self.parameters)
 
     @property
+    def is_curve(self) -> bool:
+        """Whether it is a law without memory, order or exact form: one curve of a motion."""
+        return not (self.exact or self.remembers) and self.order is None
+
+    @property
     def unknowns(self) -> int:
         """Number of parameters that it adds to a fit or sets free."""
         return len(self.parameters) + (self.frees is not None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -151,3 +152,9 @@ class FittedSets:
         near = self.data.rules.refit_margin * self.data.rules.evidence_distance
         misfit = misfit_of(best, self.degrees_of_freedom)
         return one.bic - best.bic < near * misfit
+
+
+def may_be_together(effects: Effects) -> bool:
+    """Tell whether a machine may have all these effects, none of them twice."""
+    twice = len(label_of(effects)) < len(effects)
+    return not twice and all(one.goes_with(other) for one, other in combinations(effects, 2))

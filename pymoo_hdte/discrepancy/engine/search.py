@@ -10,12 +10,11 @@ explains as much by itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.fitted_sets import Effects, FittedSets
+from pymoo_hdte.discrepancy.engine.fitted_sets import Effects, FittedSets, may_be_together
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.freed_parameters import freed_together, gain_of_freed
 from pymoo_hdte.discrepancy.engine.hypothesis import (
@@ -146,7 +145,7 @@ class Search(FittedSets):
         """Fit a set with the effect that covers its one freed parameter, beside where that led."""
         (freed,) = one.freed
         for more in self.candidates:
-            if more.name == freed.covered_by and _together((*one.effects, more)):
+            if more.name == freed.covered_by and may_be_together((*one.effects, more)):
                 values = one.values_of(one.effects)
                 for start in more.starts:
                     self.fitted((*one.effects, more), np.append(values, start), again=True)
@@ -248,7 +247,7 @@ class Search(FittedSets):
             for other in self.of_size(len(part.members)):
                 both = (*other.candidates, *kept)
                 near = leave_the_same(other, part, rules) or self.alike(other, part)
-                if other is not part and near and _together(both):
+                if other is not part and near and may_be_together(both):
                     start = chosen.values_of(kept)[len(self.base.values) :]
                     self.fitted(both, np.append(other.fit.values, start))
         self.finish_near(len(chosen.members))
@@ -282,19 +281,19 @@ class Search(FittedSets):
                     self.fitted((*first.candidates, more), values, again=True)
 
     def _exchange_forms(self, one: Hypothesis) -> None:
-        """Fit sets in which one member is a special case of it, or another form, at its port."""
+        """Fit sets in which one member is another form or a special case of it, at its port.
+
+        Where a set leaves more than noise, each curve is also replaced by each other one: beside a
+        first effect only those were tried that to first order take most of what it leaves.
+        """
+        curves = [] if self.enough(one) else [each for each in self.candidates if each.is_curve]
         for member in one.candidates:
             kept = tuple(each for each in one.candidates if each is not member)
             for other in self.candidates:
                 # The times of a new zero are forms, too, of which each is one among many.
                 form = other.name == member.name and other.form != member.form and other.among == 1
-                instead = other.port == member.port and (form or member.holds(other))
-                if instead and all(other.goes_with(each) for each in kept):
+                curve = member in curves and other in curves
+                instead = other.port == member.port and (form or curve or member.holds(other))
+                if instead and may_be_together((*kept, other)):
                     start = np.append(one.values_of(kept), other.starts[0])
                     self.fitted((*kept, other), start)
-
-
-def _together(effects: Effects) -> bool:
-    """Tell whether a drive may have all these effects, none of them twice."""
-    twice = len(label_of(effects)) < len(effects)
-    return not twice and all(one.goes_with(other) for one, other in combinations(effects, 2))

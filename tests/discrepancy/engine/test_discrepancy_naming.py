@@ -228,6 +228,18 @@ def test_the_other_form_of_a_member_is_tried_beside_the_others():
     assert {one.label for one in found.of_size(2)[0].candidates} == {CUBIC, DRAG}
 
 
+@pytest.mark.parametrize("left", [0.0, 300.0])
+def test_where_more_than_noise_is_left_every_curve_is_tried_for_a_curve(left):
+    """A second spring beside an error's line was named a soft wind-up, and never tried."""
+    cubic, soft, line = of_labels([CUBIC, SOFT, LINE])
+    data = disturbed(planted({SOFT: (0.3, 5e-4, 4.0), LINE: (1.0 * ARCSEC, 0.0)}), left)
+    found = search.Search(data, fit(data), [cubic, soft, line])
+    values = (0.3, 5e-4, 4.0, *line.starts[0])
+    found._exchange_forms(found.fitted((soft, line), np.append(found.base.values, values)))
+    tried = {cubic, line} in [set(one.candidates) for one in found.found]
+    assert tried == (left > 0.0)
+
+
 def test_what_is_alike_alone_is_compared_beside_the_further_effect():
     """A soft wind-up at its bound beside friction was named in part; the play was never tried."""
     soft, play, friction = of_labels([SOFT, "backlash:mesh", OF_LOAD], empty=WITH_LOADS)
