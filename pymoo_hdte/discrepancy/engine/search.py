@@ -283,10 +283,11 @@ class Search(FittedSets):
     def _exchange_forms(self, one: Hypothesis) -> None:
         """Fit sets in which one member is another form or a special case of it, at its port.
 
-        Where a set leaves more than noise, each curve is also replaced by each other one: beside a
-        first effect only those were tried that to first order take most of what it leaves.
+        Each curve is also replaced by each other one where effects alone leave more than noise:
+        beside a first effect only those were tried that to first order take most of the rest.
         """
-        curves = [] if self.enough(one) else [each for each in self.candidates if each.is_curve]
+        more = not (self.enough(one) or one.freed)
+        curves = [each for each in self.candidates if each.is_curve and more]
         for member in one.candidates:
             kept = tuple(each for each in one.candidates if each is not member)
             for other in self.candidates:
