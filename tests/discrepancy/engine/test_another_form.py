@@ -285,9 +285,8 @@ def test_what_contains_a_member_of_a_class_has_to_be_a_rival_of_that(
     further.fit.evidence, further.fit.bound_sides = evidence, np.zeros(2)
     search = SimpleNamespace(
         found=[chosen, rival, further],
-        degrees_of_freedom=1000,
         data=SimpleNamespace(rules=RULES),
-        forms=SimpleNamespace(known=lambda laws: True),
+        alike=lambda one, other: alike(one, other, 1000, RULES, overlap=True),
         earned=lambda one: True,
     )
     assert verdict._rivals(search, chosen) == [rival, further][:members]
