@@ -38,11 +38,12 @@ def judged(
     candidates = candidates_of(data, base)
     leading = leading_sweep_effect(data, base, candidates)
     loaded = data if leading is None else data.loaded
-    if leading is not None and effect_named(leading).rattles:
+    if loaded is data or leading is None:
+        return data, candidates, judge(data, base, candidates)
+    if effect_named(leading).rattles:
         return _judged_on(loaded, candidates_of)
     verdict = judge(data, base, candidates)
-    open_to_more = verdict.status == "unlisted" or verdict.leaves_more_than_noise
-    if loaded is not data and open_to_more:
+    if verdict.status == "unlisted" or verdict.leaves_more_than_noise:
         again = _judged_on(loaded, candidates_of)
         if _explains_by_a_clearance(again[-1]):
             return again

@@ -187,7 +187,7 @@ class AnyForm:
         return (
             both.excess < contradicting < left.excess
             and removed >= rules.beyond_forms_share * left.excess
-            and all(each.exact or self.data.corrections(each) for each in without.candidates)
+            and self.known([each for each in without.candidates if not each.exact])
             and not self.only_in_another(one, without)
         )
 

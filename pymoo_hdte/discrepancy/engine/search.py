@@ -286,14 +286,13 @@ class Search(FittedSets):
         Each curve is also replaced by each other one where effects alone leave more than noise:
         beside a first effect only those were tried that to first order take most of the rest.
         """
-        more = not (self.enough(one) or one.freed)
-        curves = [each for each in self.candidates if each.is_curve and more]
+        open_to_curves = not (self.enough(one) or one.freed)
         for member in one.candidates:
             kept = tuple(each for each in one.candidates if each is not member)
             for other in self.candidates:
                 # The times of a new zero are forms, too, of which each is one among many.
                 form = other.name == member.name and other.form != member.form and other.among == 1
-                curve = member in curves and other in curves
+                curve = open_to_curves and member.is_curve and other.is_curve
                 instead = other.port == member.port and (form or curve or member.holds(other))
                 if instead and may_be_together((*kept, other)):
                     start = np.append(one.values_of(kept), other.starts[0])

@@ -14,6 +14,8 @@ from pymoo_hdte.drive.effects import LawAtPort
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import SoftWindup
 
+LOADED_OR_NOT = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 40.0)]
+
 
 @pytest.fixture(scope="module")
 def data():
@@ -55,7 +57,14 @@ def test_merged_rows_keep_their_own_tangents(data):
         assert all(np.array_equal(one, other) for one, other in zip(mine, own, strict=True))
 
 
-LOADED_OR_NOT = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 40.0)]
+@pytest.fixture(scope="module")
+def swept():
+    """Records whose sweep speaks for a soft wind-up."""
+    rng = np.random.default_rng(5)
+    data, _ = measured((), rng, known_data(LOADED_OR_NOT))
+    data = with_sweep(data, listed(data, "soft_windup").build((0.3, 3e-4, 3.0)), rng)
+    assert rattling.leading_sweep_effect(data, rattling.fit(data), library(data)) == "soft_windup"
+    return data
 
 
 def named(*names):
@@ -89,19 +98,15 @@ PLAY = answer("backlash", HARDENING)
     ],
 )
 def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
-    monkeypatch, of_all, of_loaded, kept
+    monkeypatch, swept, of_all, of_loaded, kept
 ):
     """A play with a soft skin beside a hardening was named a soft wind-up beside it."""
-    rng = np.random.default_rng(5)
-    data, _ = measured((), rng, known_data(LOADED_OR_NOT))
-    data = with_sweep(data, listed(data, "soft_windup").build((0.3, 3e-4, 3.0)), rng)
-    assert rattling.leading_sweep_effect(data, rattling.fit(data), library(data)) == "soft_windup"
 
     def judge(some, base, candidates):
         return of_all if len(some.features.records) == len(LOADED_OR_NOT) else of_loaded
 
     monkeypatch.setattr(rattling, "judge", judge)
-    found, _, verdict = rattling.judged(data, lambda some, base: library(some))
+    found, _, verdict = rattling.judged(swept, lambda some, base: library(some))
     assert len(found.features.records) == kept
     assert verdict is (of_all if kept == len(LOADED_OR_NOT) else of_loaded)
 
