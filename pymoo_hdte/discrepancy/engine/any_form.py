@@ -1,9 +1,9 @@
 """What a set of effects leaves if each of its laws may have any form.
 
-A real law has no form that a library holds exactly. The corrections of its form span what other
-forms of it can do, to first order around the fitted set. What is left beyond them, and beyond all
-parameters, is no error of form: if it is significant, something else is missing, and an effect
-that takes it away is earned however little it is beside the first.
+A real law has no form that a library holds exactly. The corrections of its form span what others of
+it can do, to first order around the fitted set. What is left beyond them, and beyond all
+parameters, is no error of form: if it is significant, something else is missing, and an effect that
+takes it away is earned however little it is.
 """
 
 from __future__ import annotations
@@ -93,6 +93,10 @@ class AnyForm:
             self._rests[fitted] = self._rest(fitted)
         return self._rests[fitted]
 
+    def rest_is_noise(self, fitted: Fit) -> bool:
+        """Tell whether a fit leaves nothing but noise and errors of form."""
+        return (rest := self.rest(fitted)) is not None and rest.is_noise
+
     def explains(self, one: Hypothesis) -> bool:
         """Tell whether a set removes most of the misfit and leaves nothing but errors of form.
 
@@ -100,10 +104,8 @@ class AnyForm:
         """
         rules = self.data.rules
         share = rules.exact_share if one.exact else rules.explained_share
-        if one.explained < share or not gains_enough(one, self.base, rules):
-            return False
-        rest = self.rest(one.fit)
-        return rest is not None and rest.is_noise
+        enough = one.explained >= share and gains_enough(one, self.base, rules)
+        return enough and self.rest_is_noise(one.fit)
 
     def explains_in_another(self, one: Hypothesis) -> bool:
         """Tell whether a set explains the misfit in another form, however little as listed.

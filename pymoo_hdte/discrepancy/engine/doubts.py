@@ -33,7 +33,7 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
             found.append(f"the interval of {candidate.label} contains nothing")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
-    for name in _contradicted(fitted, search.data.rules):
+    for name in _contradicted_in_any_form(search, chosen):
         found.append(f"{name.replace('_', ' ')} ended far beyond what is stated of it")
     curves = [one.label for one in chosen.candidates if not one.exact]
     if not search.enough(chosen):
@@ -99,6 +99,24 @@ def is_harmonic(higher: float, order: float) -> bool:
 def left_by(per_degree: float) -> str:
     """Say what a chi-square per degree of freedom means."""
     return f"what is left is {np.sqrt(per_degree):.3g} times the noise"
+
+
+def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
+    """Return what is `_contradicted` by a set, and not by the listed forms of its laws alone.
+
+    A friction that falls as no listed one does is fitted best with a wrong gain. If in a free form
+    of the laws the gain is as stated and noise is left, which it is in no form without one of them,
+    it stood for the form.
+    """
+    rules, forms = search.data.rules, search.forms
+    found = _contradicted(chosen.fit, rules)
+    free = forms.in_free_form(chosen.fit) if found else chosen.fit
+    if free is chosen.fit or not forms.rest_is_noise(free):
+        return found
+    members = chosen.members if len(chosen.members) > 1 else []
+    if any(forms.rest_is_noise(search.without(chosen, one).fit) for one in members):
+        return found
+    return _contradicted(free, rules)
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:

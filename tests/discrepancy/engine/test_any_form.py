@@ -55,6 +55,13 @@ def rounded(state):
     return Response(size * sign, damping=size * steep)
 
 
+def slowly_falling(state):
+    """Friction that falls so slowly that the best listed curve needs a wrong torque sensor."""
+    sign, steep = smoothed_sign(state.speed)
+    fallen = 0.03 / (1.0 + np.abs(state.speed) / 20.0)
+    return Response((0.02 + fallen) * sign, damping=(0.02 + fallen) * steep - fallen**2 / 0.6)
+
+
 FOREIGN = {
     FRICTION: Correction("input", AnyForce(exponential)),
     SPRING: Correction("mesh", AnyForce(overload)),
@@ -92,6 +99,35 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
     data = planted(FOREIGN[SPRING], *small_drift())
     found = judge(data, fit(data), of_labels(SPRING, DRIFT))
     assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
+
+
+GAIN = "output torque gain ended far beyond what is stated of it"
+
+
+def judged_with_a_gain():
+    """A slowly falling friction beside a drift."""
+    data = planted(Correction("input", AnyForce(slowly_falling)), *small_drift())
+    return judge(data, fit(data), of_labels("coulomb_friction:input", FRICTION, DRIFT))
+
+
+def test_a_gain_that_stands_for_the_form_of_a_law_is_no_doubt():
+    found = judged_with_a_gain()
+    assert (found.status, found.chosen.label) == ("named", f"{FRICTION}+{DRIFT}")
+    names = [one.name for one in found.chosen.fit.parameters]
+    assert found.chosen.fit.bound_sides[names.index("output_torque_gain")] != 0.0
+
+
+@pytest.mark.parametrize("size", [1, 2])
+def test_a_gain_that_the_forms_of_a_set_do_not_need_is_a_doubt(monkeypatch, size):
+    """Where no form leaves noise, or one without a member does."""
+    in_any_form = AnyForm.rest_is_noise
+    noise = {1: True, 2: False}[size]
+    monkeypatch.setattr(
+        AnyForm,
+        "rest_is_noise",
+        lambda self, one: noise if len(one.candidates) == size else in_any_form(self, one),
+    )
+    assert GAIN in judged_with_a_gain().doubts
 
 
 @pytest.mark.parametrize(("plain", "earned"), [(9.0, True), (1000.0, False)])

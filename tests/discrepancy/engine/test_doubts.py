@@ -40,7 +40,10 @@ def doubts(chi_square_per_degree, *candidates, base=(), values=()):
     )
     quiet = chi_square_per_degree < 1.1
     search = SimpleNamespace(
-        data=SimpleNamespace(rules=RULES), degrees_of_freedom=FREEDOM, enough=lambda chosen: quiet
+        data=SimpleNamespace(rules=RULES),
+        degrees_of_freedom=FREEDOM,
+        enough=lambda chosen: quiet,
+        forms=SimpleNamespace(in_free_form=lambda one: one),
     )
     return doubts_of(search, Hypothesis(fitted, bic=0.0, explained=1.0), None)
 
