@@ -3,6 +3,7 @@
 from pymoo_hdte.drive.datasheet import DataSheet
 from pymoo_hdte.drive.datasheet_file import hs_20_100, load_datasheet
 from pymoo_hdte.drive.effects import (
+    CoupledInertia,
     DampingReference,
     DriveEffect,
     Eccentricity,
@@ -33,6 +34,7 @@ __all__ = [
     "PARAMETER_UNITS",
     "PRESETS",
     "Coefficients",
+    "CoupledInertia",
     "DampingReference",
     "DataSheet",
     "DriveEffect",

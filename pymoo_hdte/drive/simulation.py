@@ -139,10 +139,11 @@ def simulate_drive(
         raise InvalidInput("settle", settle, f"at least {margin:.3g} s, the margin of the record")
 
     memory = sum(law.states for law in memories(coefficients))
-    start = np.array([start_up.angle(0.0), *np.zeros(3 + memory)])
+    clutches = len(coefficients.coupled)
+    start = np.array([start_up.angle(0.0), *np.zeros(3 + memory + clutches)])
     # theta_d is of the order of arcseconds and its rate of the order of arcseconds times 100 1/s.
-    atol = np.array([1e-8, 1e-6, 1e-4 * ARCSEC, 1e-2 * ARCSEC, *[1e-4 * ARCSEC] * memory])
-    atol *= rtol / 1e-8
+    further = [*[1e-4 * ARCSEC] * memory, *[1e-2 * ARCSEC] * clutches]
+    atol = np.array([1e-8, 1e-6, 1e-4 * ARCSEC, 1e-2 * ARCSEC, *further]) * (rtol / 1e-8)
     solution = scipy.integrate.solve_ivp(
         equations_of_motion(coefficients, start_up, prescribed=angle == "prescribed"),
         (0.0, times[-1]),

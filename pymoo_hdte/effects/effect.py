@@ -167,7 +167,7 @@ class Effect:
         if any(kind is not None and isinstance(part, kind) for kind in (self.law, self.change)):
             return self.name
         for one in _EFFECTS.values():
-            if one.law is type(part):
+            if type(part) in (one.law, one.change):
                 return one.name
         allowed = "laws of registered effects only"
         raise InvalidInput(f"{self.name}.guess", type(part).__name__, allowed)

@@ -1,4 +1,4 @@
-"""A load that is not rigidly on the output, as a series in the rates of its acceleration."""
+"""A load that is not rigidly on the output: in a clutch, or as a series in its rates."""
 
 from dataclasses import replace
 
@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.drive import hill_steady_state, preset, simulate_drive
+from pymoo_hdte.drive import (
+    CoupledInertia,
+    LoadInertia,
+    hill_steady_state,
+    preset,
+    simulate_drive,
+)
 from pymoo_hdte.drive.effects.base import DriveEffect
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
 from pymoo_hdte.drive.solve.hill import transfer_function
@@ -85,3 +91,70 @@ def test_only_the_harmonic_balance_knows_such_a_load():
 
     with pytest.raises(InvalidInput, match="load_rates"):
         simulate_drive(replace(model, effects=(*model.effects, Clutch())), model.nominal)
+
+
+LATE = 5e-3
+"""s, so that the largest line's w T is two: no series follows it."""
+
+
+def coupled(late):
+    return CoupledInertia(INERTIA, late).apply(small_motion())
+
+
+def lines_of(motion, drive):
+    orders = drive.error_orders.tolist()
+    return np.array([motion.transmission_error[0, motion.torus.place(one)[0]] for one in orders])
+
+
+@pytest.mark.parametrize("late", [TIME, LATE])
+def test_an_inertia_in_a_clutch_moves_as_its_closed_form_says(late):
+    drive = coupled(late)
+    found = []
+    for order, phasor in zip(drive.error_orders.tolist(), drive.error_phasors[0], strict=True):
+        rate = 1j * order * drive.input_speed
+        heavy = drive.output_inertia + INERTIA / (1.0 + rate * late)
+        plain = replace(drive, output_inertia=heavy, coupled=())
+        found.append(transfer_function(plain, np.array([order]))[0, 0] * phasor)
+    balance = harmonic_balance(drive)
+    # Of the input's fluctuation only the second order is left.
+    scale = np.abs(found).max()
+    assert lines_of(balance, drive) == pytest.approx(found, abs=2e-3 * scale)
+
+
+@pytest.mark.parametrize("late", [TIME, LATE])
+def test_the_sensor_at_the_output_reads_what_drags_the_clutch(late):
+    """Without bearing friction the mesh moves the output's own inertia and what is behind it."""
+    drive = replace(coupled(late), output_damping=0.0)
+    found = harmonic_balance(drive)
+    place, _ = found.torus.place(1.0)
+    rate = 1j * drive.input_speed
+    torque = (drive.stiffness[0] + rate * drive.damping[0]) * found.torsion[0, place]
+    behind = INERTIA / (1.0 + rate * late)
+    own = np.ravel(drive.output_inertia)[0] - np.ravel(drive.load_inertia)[0]
+    read = np.ravel(drive.load_inertia)[0] + behind
+    assert found.coupling_torque[0, place] == pytest.approx(torque * read / (own + read), rel=1e-3)
+
+
+def test_a_clutch_that_closes_at_once_is_a_rigid_shaft():
+    drive = coupled(1e-9)
+    rigid = LoadInertia(INERTIA).apply(small_motion())
+    assert lines_of(harmonic_balance(drive), drive) == pytest.approx(
+        lines_of(harmonic_balance(rigid), rigid), rel=1e-5
+    )
+    assert hill_steady_state(drive).phasors == pytest.approx(
+        harmonic_balance(drive).transmission_error
+    )
+
+
+def test_an_inertia_in_a_clutch_is_integrated_over_time_to_the_same_motion():
+    model = preset("calibrated")
+    model = replace(model, effects=(*model.effects, CoupledInertia(INERTIA, 1e-3)))
+    record = simulate_drive(model, model.nominal)
+    balance = harmonic_balance(model.coefficients(model.nominal[None]))
+    angle = record.input_angle
+    turn = np.exp(-1j * np.outer([1.0, 2.0], angle))
+    steps = np.gradient(angle)
+    found = 2.0 * (turn * record.transmission_error) @ steps / steps.sum()
+    places = [balance.torus.place(order)[0] for order in (1.0, 2.0)]
+    expected = balance.transmission_error[0, places]
+    assert np.abs(found - expected).max() < 5e-3 * np.abs(expected).max()

@@ -91,8 +91,8 @@ class Candidate:
         return frozenset(place_of(effect) for effect in self.build(self.starts[0]))
 
     def goes_with(self, other: Candidate) -> bool:
-        """Tell whether a drive may have both: no two of their effects are at one place."""
-        return not self.places & other.places
+        """Tell whether a drive may have both: no two effects at one place, nor forms of one."""
+        return not (self.is_form_of(other) or self.places & other.places)
 
     def beside(self, other: Candidate) -> bool:
         """Tell whether both act at one port, where one may stand for the form of the other."""
@@ -107,6 +107,17 @@ class Candidate:
         return is_contained(other.name, self.name) or (
             self.form != "" and is_contained(other.name, f"{self.name}/{self.form}")
         )
+
+    def is_form_of(self, member: Candidate) -> bool:
+        """Tell whether it is another form of an effect, or of the one that covers a parameter.
+
+        The times of a new zero are forms, too, of which each is one among many: not of these.
+        """
+        if self.form == member.form or self.among > 1:
+            return False
+        if member.covered_by:
+            return self.name == member.covered_by
+        return (self.name, self.port) == (member.name, member.port)
 
     @property
     def linear(self) -> bool:

@@ -283,17 +283,17 @@ class Search(FittedSets):
     def _exchange_forms(self, one: Hypothesis) -> None:
         """Fit sets in which one member is another form or a special case of it, at its port.
 
-        Each curve is also replaced by each other one where effects alone leave more than noise:
-        beside a first effect only those were tried that to first order take most of the rest.
+        Or a form of the effect that covers a base parameter, in place of all that are free. Curves
+        are replaced by each other one, too, where effects alone leave more than noise: beside a
+        first effect only those were tried that to first order take most of the rest.
         """
         open_to_curves = not (self.enough(one) or one.freed)
         for member in one.candidates:
             kept = tuple(each for each in one.candidates if each is not member)
+            kept = one.effects if member.covered_by else kept
             for other in self.candidates:
-                # The times of a new zero are forms, too, of which each is one among many.
-                form = other.name == member.name and other.form != member.form and other.among == 1
                 curve = open_to_curves and member.is_curve and other.is_curve
-                instead = other.port == member.port and (form or curve or member.holds(other))
-                if instead and may_be_together((*kept, other)):
+                special = other.port == member.port and (curve or member.holds(other))
+                if (other.is_form_of(member) or special) and may_be_together((*kept, other)):
                     start = np.append(one.values_of(kept), other.starts[0])
                     self.fitted((*kept, other), start)

@@ -13,11 +13,12 @@ from pymoo_hdte.drive.effects.encoder import ENCODER_LINE, Eccentricity
 from pymoo_hdte.drive.effects.encoder_zero import NewZero, ThermalDrift
 from pymoo_hdte.drive.effects.mesh_stiffness import MeshStiffnessVariation
 from pymoo_hdte.drive.effects.presliding import PreslidingFriction
-from pymoo_hdte.drive.effects.shafts import DampingReference, LoadInertia
+from pymoo_hdte.drive.effects.shafts import CoupledInertia, DampingReference, LoadInertia
 from pymoo_hdte.drive.effects.static_error import KinematicErrorLine, KinematicReaction
 
 __all__ = [
     "ENCODER_LINE",
+    "CoupledInertia",
     "DampingReference",
     "DriveEffect",
     "DriveSizes",

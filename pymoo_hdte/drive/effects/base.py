@@ -40,6 +40,8 @@ class DriveSizes(Sizes):
         Transmission ratio N.
     inertia : float
         Of the load, kg.m2: the size of an inertia that may be missing.
+    swing : float
+        Time in which the torsion of the believed drive swings by a radian, s.
     duration : float
         Of the session, s.
     changes : tuple of float
@@ -53,6 +55,7 @@ class DriveSizes(Sizes):
     believed_orders: tuple[float, ...] = ()
     ratio: float = 1.0
     inertia: float = 0.0
+    swing: float = 0.0
     duration: float = 0.0
     changes: tuple[float, ...] = ()
     swept: bool = False

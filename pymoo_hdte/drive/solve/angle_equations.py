@@ -198,18 +198,32 @@ class AngleEquations:
         """Return the residual of the second equation, N.m."""
         return self.torus.phasors(
             self.output_inertia * motion.output_acceleration
-            + self.of_load_rates(motion)
+            + self.of_loose_loads(motion)
             + self.delivered(motion)
             - motion.mesh_torque
         )
 
-    def of_load_rates(self, motion: TorsionMotion) -> Values | float:
-        """Return the torque of a load that is not rigidly coupled beyond that of its inertia."""
+    def of_loose_loads(self, motion: TorsionMotion) -> Values | float:
+        """Return the torque of loads that are not rigidly coupled, beyond that of the inertia.
+
+        An inertia in a clutch follows as at the mean speed: the input's fluctuation is small.
+        """
         rates, torus = [motion.output_acceleration], self.torus
+        total: Values | float = 0.0
+        if self.coefficients.coupled:
+            lines = torus.phasors(rates[0]) * self._in_clutches(torus.orders * self.speed)
+            total = torus.signal(lines)
         for _ in range(max((k for k, _ in self.coefficients.load_rates), default=0)):
             slope = torus.signal(torus.derivative(torus.phasors(rates[-1])))
             rates.append(motion.angular_speed * slope)
-        return sum(size * rates[k] for k, size in self.coefficients.load_rates)
+        return total + sum(size * rates[k] for k, size in self.coefficients.load_rates)
+
+    def _in_clutches(self, frequency: Values) -> Phasors:
+        """Return what inertias in clutches are at frequencies (n, H), rad/s; complex, kg.m2."""
+        found = np.zeros(frequency.shape, dtype=complex)
+        for inertia, time in self.coefficients.coupled:
+            found += inertia / (1.0 + 1j * frequency * time)
+        return found
 
     def delivered(self, motion: TorsionMotion) -> Values:
         """Return the torque, N.m, that the output passes on to load, bearings and laws there."""
@@ -265,7 +279,8 @@ class AngleEquations:
         frequency = self.torus.orders * self.speed
         damping = self.output_damping + friction
         rates = self.coefficients.load_rates
-        inertia = self.output_inertia + sum(size * (1j * frequency) ** k for k, size in rates)
+        inertia = self.output_inertia + self._in_clutches(frequency)
+        inertia = inertia + sum(size * (1j * frequency) ** k for k, size in rates)
         output = inertia * frequency**2 - 1j * frequency * damping
         coupling = 1j * self.torus.orders * inertia + damping / self.speed
         coupling = coupling / self.coefficients.ratio

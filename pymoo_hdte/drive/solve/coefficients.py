@@ -67,6 +67,9 @@ class Coefficients:
         each a torque of s times the k-th time derivative of the output's acceleration, s in
         N.m.s^(2 + k) per rad. The harmonic balance alone knows them; no effect of the library
         has them.
+    coupled : tuple of (float, float)
+        Inertias beyond the output coupling that a viscous clutch drives: each J in kg.m2 with the
+        time in s after which it has come to speed, J over the damping of the clutch.
 
     Examples
     --------
@@ -94,6 +97,7 @@ class Coefficients:
     reaction: float = 0.0
     temperature: float | NDArray[np.float64] = np.nan
     load_rates: tuple[tuple[int, float], ...] = ()
+    coupled: tuple[tuple[float, float], ...] = ()
 
     def rows(self, rows: slice | NDArray[np.int_]) -> Coefficients:
         """Return the coefficients of some of the designs.

@@ -274,7 +274,7 @@ class _Solver:
             coupling_torque=torus.phasors(
                 equations.load
                 + inertia * motion.output_acceleration
-                + equations.of_load_rates(motion)
+                + equations.of_loose_loads(motion)
             ),
             lead=lead,
             energy=self.energy,

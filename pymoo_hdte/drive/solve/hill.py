@@ -119,7 +119,8 @@ def _solved(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectru
 
     Rows that were not are 0.
     """
-    if coefficients.laws or coefficients.reaction or coefficients.load_rates:
+    loose = coefficients.load_rates or coefficients.coupled
+    if coefficients.laws or coefficients.reaction or loose:
         balance = continued_from_neighbours(coefficients, harmonic_balance(coefficients))
         phasors = np.where(balance.converged[:, None], balance.transmission_error, 0.0)
         return balance.converged, OrderSpectrum(balance.torus.orders, phasors)

@@ -1,7 +1,8 @@
 """Eq. (9) integrated from rest, torque-driven: the reference for the steady state.
 
 The state is (th_in, th_in', th_d, th_d') with th_d = th_in / N - th_out, so that the transmission
-error, a part in 10^4 of the angles, is integrated to its own precision.
+error, a part in 10^4 of the angles, is integrated to its own precision; then the states of laws
+with memory, and by how much each inertia in a clutch is slower than the output.
 """
 
 from __future__ import annotations
@@ -77,7 +78,9 @@ def equations_of_motion(
     inertia_in, bearing_in = float(inertia_in), float(bearing_in)
     inertia_out, bearing_out = coefficients.output_inertia, coefficients.output_damping
     speed = coefficients.input_speed
-    accelerating = (inertia_in + inertia_out / ratio**2) * speed
+    clutches = coefficients.coupled
+    driven = inertia_out + sum(inertia for inertia, _ in clutches)
+    accelerating = (inertia_in + driven / ratio**2) * speed
     holding = bearing_in * speed + coefficients.mean_mesh_torque / ratio
     lines = [
         (float(order), abs(phasor), math.atan2(phasor.imag, phasor.real))
@@ -95,7 +98,7 @@ def equations_of_motion(
 
     # The error of the holding torque is of second order, by fluctuations of speed and torsion.
     remembering = memories(coefficients)
-    places = np.cumsum([4, *(law.states for law in remembering)])[:-1]
+    places = np.cumsum([4, *(law.states for law in remembering)])
     left = _holding_torque(coefficients) - holding - losses(speed)
 
     def right_hand_side(time: float, state: NDArray[np.float64]) -> list[float]:
@@ -115,7 +118,7 @@ def equations_of_motion(
         varying = 1.0 + depth * math.cos(2.0 * position + phase)
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
         mesh_torque += laws("mesh", torsion, torsion_rate, position)
-        kept = np.split(state, places)[1:] if remembering else []
+        *kept, slips = np.split(state, places)[1:]
         for law, states in zip(remembering, kept, strict=True):
             mesh_torque += law.torque(states)
         input_torque = accelerating * envelope_rate + (holding + left) * envelope
@@ -124,7 +127,8 @@ def equations_of_motion(
         output_angle = position / ratio
         delivered = load * envelope + bearing_out * output_speed
         delivered += laws("output", output_angle, output_speed, output_angle)
-        output_acceleration = (mesh_torque - delivered) / inertia_out
+        dragged = sum(j / late * slip for (j, late), slip in zip(clutches, slips, strict=True))
+        output_acceleration = (mesh_torque - delivered - dragged) / inertia_out
         resisting = bearing_in * input_speed
         resisting += laws("input", position, input_speed, position, delivered / ratio)
         lever = 1.0 / ratio - reaction * envelope * slope
@@ -132,6 +136,8 @@ def equations_of_motion(
         rates = [input_speed, acceleration, error_rate, acceleration / ratio - output_acceleration]
         for law, states in zip(remembering, kept, strict=True):
             rates += law.rates(torsion_rate, states).tolist()
+        for (_, late), slip in zip(clutches, slips.tolist(), strict=True):
+            rates.append(output_acceleration - slip / late)
         return rates
 
     return right_hand_side

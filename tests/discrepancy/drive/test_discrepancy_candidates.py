@@ -82,6 +82,10 @@ def test_starts_are_within_the_bounds(candidate):
     assert all(parameter.scale > 0.0 for parameter in candidate.parameters)
 
 
+IN_FILES = {"load_inertia/coupled": "coupled_inertia"}
+"""Effects of a model under a name of their own: it takes the believed inertia beside this form."""
+
+
 @settings(max_examples=15)
 @pytest.mark.parametrize("candidate", LISTED, ids=label)
 @given(data=st.data())
@@ -90,7 +94,8 @@ def test_a_model_takes_the_effects_and_its_file_gives_them_back(candidate, data)
     model = replace(preset("calibrated"), effects=effects)
     tables = tomllib.loads(model_toml(model))["effect"]
     assert tuple(effect_from_fields(Fields(table, "effect")) for table in tables) == effects
-    assert effects[0].name == candidate.name or not candidate.listed
+    named = IN_FILES.get(f"{candidate.name}/{candidate.form}", candidate.name)
+    assert effects[0].name == named or not candidate.listed
 
 
 @given(parts, parts, st.floats(-10.0, 10.0))
@@ -268,3 +273,14 @@ def test_what_is_believed_to_be_nothing_is_not_out_of_tolerance():
 def test_unknowns_count_what_a_fit_gains():
     for candidate in library(known_data(), [3.0]):
         assert candidate.unknowns == len(candidate.parameters)
+
+
+def test_forms_of_one_effect_are_never_together():
+    """Also where they are effects of their own in a model."""
+    inertias = [one for one in LISTED if one.name == "load_inertia"]
+    assert len(inertias) == 2
+    rigid, coupled = inertias
+    assert not rigid.places & coupled.places
+    assert not rigid.goes_with(coupled)
+    assert coupled.is_form_of(rigid)
+    assert rigid.goes_with(next(one for one in LISTED if one.name == "backlash"))

@@ -24,7 +24,7 @@ from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
-from pymoo_hdte.drive import DampingReference, KinematicReaction, LoadInertia
+from pymoo_hdte.drive import CoupledInertia, DampingReference, KinematicReaction, LoadInertia
 from pymoo_hdte.effects.friction import CoulombFriction, smoothed_sign
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import Aperiodic, Response
@@ -407,6 +407,35 @@ def test_a_parameter_that_an_effect_covers_is_told_as_that_effect(moved):
     search._prune(one)
     assert {each.label for each in search.found[0].candidates} == {REACTION, LOAD}
     assert "parameter:load_inertia" not in {c.label for one in search.found for c in one.candidates}
+
+
+IN_A_CLUTCH = "load_inertia/coupled:output"
+
+
+def test_an_inertia_in_a_clutch_is_named_as_such():
+    """Not as a rigid one beside a damping of the torsion that imitates what the clutch loses."""
+    data = measured((CoupledInertia(0.05, 3e-4),), np.random.default_rng(1), DATA)[0]
+    laws = (LOAD, IN_A_CLUTCH, "damping_reference:mesh")
+    found = judge(data, fit(data), [one for one in library(DATA) if one.label in laws])
+    assert (found.status, found.chosen.label) == ("named", IN_A_CLUTCH)
+    values = found.chosen.values_of(found.chosen.candidates)[-2:]
+    deviations = np.sqrt(np.diag(found.chosen.fit.covariance)[-2:])
+    assert np.all(np.abs(values - (0.05, 3e-4)) < 4.0 * deviations)
+
+
+def test_values_that_an_effect_covers_are_replaced_by_a_form_of_it():
+    """A damping and an inertia out of tolerance stood for an inertia in a clutch."""
+    truth = (KinematicReaction(1.0), CoupledInertia(0.05, 3e-4))
+    data = measured(truth, np.random.default_rng(3), DATA)[0]
+    laws = [one for one in library(DATA) if one.label in (REACTION, LOAD, IN_A_CLUTCH)]
+    search = Search(data, fit(data), laws)
+    freed = data.out_of_tolerance(["load_inertia", "damping"], together=True)
+    (reaction,) = [one for one in laws if one.label == REACTION]
+    one = search.fitted((reaction, *freed), np.append(search.base.values, 1.0))
+    search._exchange_forms(one)
+    found = {frozenset(each.label for each in other.candidates) for other in search.found}
+    assert {REACTION, IN_A_CLUTCH} in found
+    assert {REACTION, IN_A_CLUTCH, "parameter:damping"} not in found
 
 
 BOTH = {REACTION, LOAD, "damping_reference:mesh"}
