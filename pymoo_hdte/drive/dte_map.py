@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.model import DriveModel
+from pymoo_hdte.drive.solve.stability import state_matrix
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 _PROMINENCE = 0.02
@@ -79,8 +80,18 @@ class TorsionalMode:
 
 
 def torsional_mode(model: DriveModel) -> TorsionalMode:
-    """Return the torsional mode of the nominal design, its bearings left out."""
+    """Return the torsional mode of the nominal design, its bearings left out.
+
+    With an inertia in a clutch that of its least damped vibration, with bearings.
+    """
     coefficients = model.coefficients(model.nominal[None])
+    if coefficients.coupled:
+        values = np.linalg.eigvals(state_matrix(replace(coefficients, laws=()), 0.0)[0])
+        swinging = values[values.imag > 0.0]
+        if not swinging.size:
+            return TorsionalMode(0.0, 1.0)
+        mode = swinging[np.argmax(swinging.real / np.abs(swinging))]
+        return TorsionalMode(float(abs(mode) / (2.0 * np.pi)), float(-mode.real / abs(mode)))
     input_inertia = coefficients.input_inertia[0] * coefficients.ratio**2
     compliance = 1.0 / input_inertia + 1.0 / coefficients.output_inertia
     stiffness, damping = coefficients.stiffness[0], coefficients.damping[0]

@@ -23,6 +23,8 @@ ANGLES = ("free", "prescribed")
 
 
 _POINTS_PER_TURN = 120
+_CLUTCH_TIMES = 20.0
+"""Of settling, after which exp(-20) of the slip of a clutch at the start is left."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,10 @@ def simulate_drive(
     if times[0] < ramp:
         raise InvalidInput("settle", settle, f"at least {margin:.3g} s, the margin of the record")
 
+    for _, late in coefficients.coupled:
+        if settle < _CLUTCH_TIMES * late:
+            allowed = f"at least {_CLUTCH_TIMES * late:.3g} s, {_CLUTCH_TIMES:g} times of a clutch"
+            raise InvalidInput("settle", settle, allowed)
     memory = sum(law.states for law in memories(coefficients))
     clutches = len(coefficients.coupled)
     start = np.array([start_up.angle(0.0), *np.zeros(3 + memory + clutches)])

@@ -78,6 +78,9 @@ def _refuse(coefficients: Coefficients) -> None:
     if coefficients.reaction != 0.0:
         allowed = "0: errors of a port do not act back on the coordinate that makes them"
         raise InvalidInput("reaction of the static error", coefficients.reaction, allowed)
+    if coefficients.coupled:
+        allowed = "inertias that turn with a coordinate: none in a clutch"
+        raise InvalidInput("effects at the output", "coupled_inertia", allowed)
     # Periodic laws of a mechanism vary with the motion of their port, which here is the torsion.
     if any(law.loaded for _, law in coefficients.laws):
         allowed = "effects of motion only: its ports do not know what load the output passes on"

@@ -9,13 +9,17 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import (
     CoupledInertia,
     LoadInertia,
+    MeshStiffnessVariation,
     hill_steady_state,
     preset,
     simulate_drive,
 )
+from pymoo_hdte.drive.dte_map import torsional_mode
 from pymoo_hdte.drive.effects.base import DriveEffect
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
 from pymoo_hdte.drive.solve.hill import transfer_function
+from pymoo_hdte.drive.solve.stability import UnstableDrive
+from pymoo_hdte.mechanism.drive import drive_mechanism
 
 INERTIA, TIME = 0.05, 2e-4
 """kg.m2, and s after which a viscous clutch has brought it to speed."""
@@ -109,6 +113,9 @@ def lines_of(motion, drive):
 @pytest.mark.parametrize("late", [TIME, LATE])
 def test_an_inertia_in_a_clutch_moves_as_its_closed_form_says(late):
     drive = coupled(late)
+    assert hill_steady_state(drive).phasors == pytest.approx(
+        transfer_function(drive, drive.error_orders) * drive.error_phasors
+    )
     found = []
     for order, phasor in zip(drive.error_orders.tolist(), drive.error_phasors[0], strict=True):
         rate = 1j * order * drive.input_speed
@@ -141,9 +148,43 @@ def test_a_clutch_that_closes_at_once_is_a_rigid_shaft():
     assert lines_of(harmonic_balance(drive), drive) == pytest.approx(
         lines_of(harmonic_balance(rigid), rigid), rel=1e-5
     )
-    assert hill_steady_state(drive).phasors == pytest.approx(
-        harmonic_balance(drive).transmission_error
+    at_once, shaft = (
+        replace(preset("published"), effects=(one,))
+        for one in (CoupledInertia(0.45, 1e-9), LoadInertia(0.45))
     )
+    assert torsional_mode(at_once).frequency == pytest.approx(
+        torsional_mode(shaft).frequency, rel=1e-4
+    )
+    varying = MeshStiffnessVariation(0.95, 0.0)
+    loose = replace(at_once, effects=(varying, *at_once.effects))
+    with pytest.raises(UnstableDrive):
+        loose.dte_arcsec(loose.nominal[None])
+
+
+@pytest.mark.parametrize(("late", "inertia"), [(1e-9, INERTIA), (1e9, 0.0)])
+def test_hill_s_method_knows_clutches_between_a_rigid_inertia_and_none(late, inertia):
+    plain = replace(small_motion(), stiffness_depth=0.05)
+    drive = CoupledInertia(INERTIA, late).apply(plain)
+    rigid = hill_steady_state(LoadInertia(inertia).apply(plain))
+    scale = np.abs(rigid.phasors).max()
+    assert hill_steady_state(drive).phasors == pytest.approx(rigid.phasors, abs=1e-5 * scale)
+
+
+def test_a_clutch_damps_what_it_hardly_lets_swing():
+    """Of a clutch that slips at the torsion's frequency the drive sees a damper, J over T."""
+    model = replace(preset("published"), effects=(CoupledInertia(1.0, 1.0),))
+    free = replace(model, effects=())
+    with_damper, without = (torsional_mode(one) for one in (model, free))
+    assert with_damper.frequency == pytest.approx(without.frequency, rel=0.1)
+    assert with_damper.damping_ratio > without.damping_ratio
+
+
+def test_what_cannot_know_a_clutch_says_so():
+    model = replace(preset("published"), effects=(CoupledInertia(0.1, 0.2),))
+    with pytest.raises(InvalidInput, match="settle"):
+        simulate_drive(model, model.nominal)
+    with pytest.raises(InvalidInput, match="coupled_inertia"):
+        drive_mechanism(model, model.nominal)
 
 
 def test_an_inertia_in_a_clutch_is_integrated_over_time_to_the_same_motion():

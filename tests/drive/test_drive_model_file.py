@@ -140,6 +140,7 @@ def test_a_file_of_version_1_still_holds_its_model():
         "temperature_dependent_friction",
         "new_zero",
         "presliding_friction",
+        "coupled_inertia",
     }
     known = {one.name for one in drive_effects()}
     assert {effect.name for effect in loaded.effects} == known - later

@@ -1,9 +1,9 @@
 """What a set of effects leaves if each of its laws may have any form.
 
-A real law has no form that a library holds exactly. The corrections of its form span what others of
-it can do, to first order around the fitted set. What is left beyond them, and beyond all
-parameters, is no error of form: if it is significant, something else is missing, and an effect that
-takes it away is earned however little it is.
+A real law has no form that a library holds exactly. The corrections of its form span what other
+forms of it can do, to first order around the fitted set. What is left beyond them and all
+parameters is no error of form: if it is significant, something else is missing, and an effect that
+takes it away is earned however little it is beside the first.
 """
 
 from __future__ import annotations

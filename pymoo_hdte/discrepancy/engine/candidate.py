@@ -92,7 +92,8 @@ class Candidate:
 
     def goes_with(self, other: Candidate) -> bool:
         """Tell whether a drive may have both: no two effects at one place, nor forms of one."""
-        return not (self.is_form_of(other) or self.places & other.places)
+        forms = self.form != other.form and (self.name, self.port) == (other.name, other.port)
+        return not (forms or self.places & other.places)
 
     def beside(self, other: Candidate) -> bool:
         """Tell whether both act at one port, where one may stand for the form of the other."""

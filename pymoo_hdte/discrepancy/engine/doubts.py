@@ -105,18 +105,19 @@ def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
     """Return what is `_contradicted` by a set, and not by the listed forms of its laws alone.
 
     A friction that falls as no listed one does is fitted best with a wrong gain. If in a free form
-    of the laws the gain is as stated and noise is left, which it is in no form without one of them,
-    it stood for the form.
+    of several laws all sensors are as stated and noise is left, which is so in no form without one
+    of these laws, the gain stood for their forms. One law in any form follows too much alone.
     """
     rules, forms = search.data.rules, search.forms
     found = _contradicted(chosen.fit, rules)
-    free = forms.in_free_form(chosen.fit) if found else chosen.fit
-    if free is chosen.fit or not forms.rest_is_noise(free):
+    if not found or len(chosen.members) < 2:
         return found
-    members = chosen.members if len(chosen.members) > 1 else []
-    if any(forms.rest_is_noise(search.without(chosen, one).fit) for one in members):
+    free = forms.in_free_form(chosen.fit)
+    if not forms.rest_is_noise(free) or any(_far(free, rules)):
         return found
-    return _contradicted(free, rules)
+    fewer = [search.without(chosen, one).fit for one in chosen.members]
+    every = [*fewer, *map(forms.in_free_form, fewer)]
+    return found if any(map(forms.rest_is_noise, every)) else []
 
 
 def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
@@ -124,12 +125,19 @@ def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
 
     It then takes what the effects leave, and what they are is not known.
     """
+    far = _far(fitted, rules)
     return [
         one.name
-        for one, side, value in zip(
-            fitted.parameters, fitted.bound_sides, fitted.values, strict=True
-        )
-        if side != 0.0 and abs(value - one.start) > rules.false_alarm_deviations * one.prior
+        for one, side, away in zip(fitted.parameters, fitted.bound_sides, far, strict=True)
+        if side != 0.0 and away
+    ]
+
+
+def _far(fitted: Fit, rules: Rules) -> list[bool]:
+    """Return which parameters are far beyond their stated deviation."""
+    return [
+        abs(value - one.start) > rules.false_alarm_deviations * one.prior
+        for one, value in zip(fitted.parameters, fitted.values, strict=True)
     ]
 
 

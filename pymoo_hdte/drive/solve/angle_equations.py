@@ -211,19 +211,12 @@ class AngleEquations:
         rates, torus = [motion.output_acceleration], self.torus
         total: Values | float = 0.0
         if self.coefficients.coupled:
-            lines = torus.phasors(rates[0]) * self._in_clutches(torus.orders * self.speed)
-            total = torus.signal(lines)
+            inertia = self.coefficients.inertia_in_clutches(torus.orders * self.speed)
+            total = torus.signal(torus.phasors(rates[0]) * inertia)
         for _ in range(max((k for k, _ in self.coefficients.load_rates), default=0)):
             slope = torus.signal(torus.derivative(torus.phasors(rates[-1])))
             rates.append(motion.angular_speed * slope)
         return total + sum(size * rates[k] for k, size in self.coefficients.load_rates)
-
-    def _in_clutches(self, frequency: Values) -> Phasors:
-        """Return what inertias in clutches are at frequencies (n, H), rad/s; complex, kg.m2."""
-        found = np.zeros(frequency.shape, dtype=complex)
-        for inertia, time in self.coefficients.coupled:
-            found += inertia / (1.0 + 1j * frequency * time)
-        return found
 
     def delivered(self, motion: TorsionMotion) -> Values:
         """Return the torque, N.m, that the output passes on to load, bearings and laws there."""
@@ -279,7 +272,7 @@ class AngleEquations:
         frequency = self.torus.orders * self.speed
         damping = self.output_damping + friction
         rates = self.coefficients.load_rates
-        inertia = self.output_inertia + self._in_clutches(frequency)
+        inertia = self.output_inertia + self.coefficients.inertia_in_clutches(frequency)
         inertia = inertia + sum(size * (1j * frequency) ** k for k, size in rates)
         output = inertia * frequency**2 - 1j * frequency * damping
         coupling = 1j * self.torus.orders * inertia + damping / self.speed

@@ -142,6 +142,19 @@ class Coefficients:
         """
         return self.load_torque + self.output_damping * self.input_speed / self.ratio
 
+    def inertia_in_clutches(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return what the inertias in clutches are at frequencies of any shape, complex, kg.m2.
+
+        Parameters
+        ----------
+        frequency : ndarray
+            rad/s; negative where the drive turns backward.
+        """
+        found = np.zeros(np.shape(frequency), dtype=complex)
+        for inertia, time in self.coupled:
+            found += inertia / (1.0 + 1j * frequency * time)
+        return found
+
     @property
     def stiffness_variations(self) -> tuple[PeriodicStiffness, ...]:
         """All variations of the stiffness with the input angle: its own order 2, and laws."""

@@ -119,8 +119,7 @@ def _solved(coefficients: Coefficients) -> tuple[NDArray[np.bool_], OrderSpectru
 
     Rows that were not are 0.
     """
-    loose = coefficients.load_rates or coefficients.coupled
-    if coefficients.laws or coefficients.reaction or loose:
+    if coefficients.laws or coefficients.reaction or coefficients.load_rates:
         balance = continued_from_neighbours(coefficients, harmonic_balance(coefficients))
         phasors = np.where(balance.converged[:, None], balance.transmission_error, 0.0)
         return balance.converged, OrderSpectrum(balance.torus.orders, phasors)
@@ -199,11 +198,8 @@ def _free_impedance(
     inertia = coefficients.input_inertia[:, None] * ratio_squared
     damping = coefficients.input_damping[:, None] * ratio_squared
     input_side = 1j * frequency * (damping + 1j * frequency * inertia)
-    output_side = (
-        1j
-        * frequency
-        * (coefficients.output_damping + 1j * frequency * coefficients.output_inertia)
-    )
+    on_output = coefficients.output_inertia + coefficients.inertia_in_clutches(frequency)
+    output_side = 1j * frequency * (coefficients.output_damping + 1j * frequency * on_output)
     moving = np.broadcast_to(frequency != 0.0, input_side.shape)
     total = np.where(moving, input_side + output_side, 1.0)
     return np.where(moving, input_side * output_side / total, 0.0)

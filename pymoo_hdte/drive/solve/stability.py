@@ -44,10 +44,11 @@ class UnstableDrive(ArithmeticError):
 
 
 def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
-    """Return the multipliers over one period of the stiffness, shape (n, 3).
+    """Return the multipliers over one period of the stiffness, shape (n, 3 + c), of c clutches.
 
     The period is that of all orders together: half an input turn for order 2, and for a constant
-    stiffness. Other laws are left out. The state is (th_in', d', d). The transition matrix is a
+    stiffness. Other laws are left out. The state is (th_in', d', d), and by how much inertias in
+    clutches are slower than the output. The transition matrix is a
     product of steps with the stiffness of their midpoints, each the (2, 2) Pade approximant of the
     exponential: it is A-stable, so stiff damping costs no small steps, and of second order in the
     step. Steps resolve the torsional vibration; see `require_stable` for drives so slow that they
@@ -61,7 +62,7 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
 
     Returns
     -------
-    ndarray of complex, shape (n, 3)
+    ndarray of complex, shape (n, 3 + c)
         Dimensionless; a modulus above 1 is a motion that grows.
 
     Examples
@@ -75,11 +76,11 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
     least, most = _LEAST_STEPS * cycles, _MOST_STEPS * cycles
     steps = int(np.clip(np.ceil(_phase(coefficients, period)), least, most))
     step = period / coefficients.input_speed / steps
-    identity = np.eye(3)
+    identity = np.eye(3 + len(coefficients.coupled))
     transition = np.tile(identity, (len(coefficients.stiffness), 1, 1))
     for index in range(steps):
         angle = (index + 0.5) * period / steps
-        scaled = step * _state_matrix(coefficients, angle)
+        scaled = step * state_matrix(coefficients, angle)
         square = scaled @ scaled / 12.0
         forward, backward = identity + scaled / 2.0 + square, identity - scaled / 2.0 + square
         transition[:] = np.linalg.solve(backward, forward @ transition)
@@ -152,7 +153,8 @@ def _bounded(moduli: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(moduli <= 1.0 + _ROUNDING)
 
 
-def _state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.float64]:
+def state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.float64]:
+    """Return the rates of the states of `floquet_multipliers` by these, (n, 3 + c, 3 + c)."""
     variation = sum(
         law.depth * np.cos(law.order * input_angle + law.phase)
         for law in coefficients.stiffness_variations
@@ -160,7 +162,8 @@ def _state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.
     stiffness = coefficients.stiffness * (1.0 + variation)
     ratio, damping = coefficients.ratio, coefficients.damping
     bearing = coefficients.output_damping
-    matrix = np.zeros((len(stiffness), 3, 3))
+    size = 3 + len(coefficients.coupled)
+    matrix = np.zeros((len(stiffness), size, size))
     matrix[:, 0, 0] = -coefficients.input_damping / coefficients.input_inertia
     matrix[:, 0, 1] = -damping / ratio / coefficients.input_inertia
     matrix[:, 0, 2] = -stiffness / ratio / coefficients.input_inertia
@@ -170,4 +173,10 @@ def _state_matrix(coefficients: Coefficients, input_angle: float) -> NDArray[np.
     matrix[:, 1, 1] -= (damping + bearing) / coefficients.output_inertia
     matrix[:, 1, 2] -= stiffness / coefficients.output_inertia
     matrix[:, 2, 1] = 1.0
+    for place, (inertia, time) in enumerate(coefficients.coupled, 3):
+        matrix[:, 1, place] = inertia / time / coefficients.output_inertia
+    output = matrix[:, 0] / ratio - matrix[:, 1]
+    for place, (_, time) in enumerate(coefficients.coupled, 3):
+        matrix[:, place] = output
+        matrix[:, place, place] -= 1.0 / time
     return matrix

@@ -118,7 +118,7 @@ def equations_of_motion(
         varying = 1.0 + depth * math.cos(2.0 * position + phase)
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
         mesh_torque += laws("mesh", torsion, torsion_rate, position)
-        *kept, slips = np.split(state, places)[1:]
+        *kept, slips = np.split(state, places)[1:] if len(state) > 4 else [state[4:]]
         for law, states in zip(remembering, kept, strict=True):
             mesh_torque += law.torque(states)
         input_torque = accelerating * envelope_rate + (holding + left) * envelope

@@ -104,14 +104,14 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
 GAIN = "output torque gain ended far beyond what is stated of it"
 
 
-def judged_with_a_gain():
-    """A slowly falling friction beside a drift."""
-    data = planted(Correction("input", AnyForce(slowly_falling)), *small_drift())
+def judged_with_a_gain(*beside):
+    """A slowly falling friction beside other effects."""
+    data = planted(Correction("input", AnyForce(slowly_falling)), *beside)
     return judge(data, fit(data), of_labels("coulomb_friction:input", FRICTION, DRIFT))
 
 
 def test_a_gain_that_stands_for_the_form_of_a_law_is_no_doubt():
-    found = judged_with_a_gain()
+    found = judged_with_a_gain(*small_drift())
     assert (found.status, found.chosen.label) == ("named", f"{FRICTION}+{DRIFT}")
     names = [one.name for one in found.chosen.fit.parameters]
     assert found.chosen.fit.bound_sides[names.index("output_torque_gain")] != 0.0
@@ -127,6 +127,11 @@ def test_a_gain_that_the_forms_of_a_set_do_not_need_is_a_doubt(monkeypatch, size
         "rest_is_noise",
         lambda self, one: noise if len(one.candidates) == size else in_any_form(self, one),
     )
+    assert GAIN in judged_with_a_gain(*small_drift()).doubts
+
+
+def test_a_gain_beside_one_law_is_a_doubt():
+    """In any form it follows too much."""
     assert GAIN in judged_with_a_gain().doubts
 
 

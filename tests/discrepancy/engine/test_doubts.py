@@ -100,6 +100,54 @@ def test_a_sensor_far_beyond_what_is_stated_of_it_is_a_doubt(prior, value, doubt
     assert bool(doubts(1.0, FRICTION, base=(zero,), values=(value,))) == doubtful
 
 
+@pytest.mark.parametrize(
+    ("zero", "free_leaves_noise", "fewer_do", "doubtful"),
+    [
+        (0.05, True, (), False),
+        (0.9, True, (), True),
+        (0.05, False, (), True),
+        (0.05, True, ("as listed",), True),
+        (0.05, True, ("free",), True),
+    ],
+)
+def test_a_sensor_s_value_is_no_doubt_only_where_the_forms_of_all_laws_explain_it(
+    zero, free_leaves_noise, fewer_do, doubtful
+):
+    """With 0.9, nine deviations, it is no longer at its bound, and as doubtful."""
+    base = (Parameter("output_torque_zero", 0.0, -1.0, 1.0, 0.1, prior=0.1),)
+    fits = {
+        (fewer, free): SimpleNamespace(
+            candidates=(FRICTION, LINE),
+            chi_square=FREEDOM,
+            at_bounds=(),
+            parameters=base,
+            values=np.array([zero if free else 1.0]),
+            bound_sides=np.array([0.0 if free else 1.0]),
+            places=[(each, slice(0, 0)) for each in (FRICTION, LINE)],
+        )
+        for fewer in (False, True)
+        for free in (False, True)
+    }
+    noise = {(False, True)} if free_leaves_noise else set()
+    noise |= {(True, each == "free") for each in fewer_do}
+
+    def place_of(fitted):
+        return next(place for place, one in fits.items() if one is fitted)
+
+    search = SimpleNamespace(
+        data=SimpleNamespace(rules=RULES),
+        degrees_of_freedom=FREEDOM,
+        enough=lambda chosen: True,
+        without=lambda chosen, member: SimpleNamespace(fit=fits[True, False]),
+        forms=SimpleNamespace(
+            in_free_form=lambda fitted: fits[place_of(fitted)[0], True],
+            rest_is_noise=lambda fitted: place_of(fitted) in noise,
+        ),
+    )
+    chosen = Hypothesis(fits[False, False], bic=0.0, explained=1.0)
+    assert bool(doubts_of(search, chosen, None)) == doubtful
+
+
 def test_what_is_left_in_multiples_of_the_noise_is_a_doubt():
     limit = RULES.contradicting_chi_square
     assert not doubts(0.99 * limit, LINE)
