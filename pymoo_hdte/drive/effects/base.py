@@ -41,7 +41,7 @@ class DriveSizes(Sizes):
     inertia : float
         Of the load, kg.m2: the size of an inertia that may be missing.
     swing : float
-        Time in which the torsion of the believed drive swings by a radian, s.
+        Inverse angular frequency of that inertia on the believed spring, s.
     duration : float
         Of the session, s.
     changes : tuple of float

@@ -113,8 +113,9 @@ def _inertia(sizes: DriveSizes) -> list[Guess]:
     """Guess up to ten times the inertia of the load, rigidly there or in a clutch.
 
     An inertia larger by half moves a resonance past lines, so that fits start on both sides of it,
-    and in steps of 2.5 up to where the load hardly moves any more. In a clutch of a fiftieth of the
-    drive's own time it is rigid, of twenty times as much it rests.
+    and in steps of 2.5 up to where the load hardly moves any more. The range of a clutch's time is
+    set by hand: vibrations of the drive see a rigid inertia at its lower end, and at its upper end
+    one that rests.
     """
     size = sizes.inertia
     added = unknown("inertia", 0.0, 10.0 * size, 0.3 * size)
@@ -156,7 +157,6 @@ register(
         _inertia,
         change=LoadInertia,
         of_fit={"time": "time"},
-        special_case_of=("load_inertia/coupled",),
         exact=True,
     )
 )
