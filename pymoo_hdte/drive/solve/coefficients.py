@@ -143,12 +143,17 @@ class Coefficients:
         return self.load_torque + self.output_damping * self.input_speed / self.ratio
 
     def inertia_in_clutches(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return what the inertias in clutches are at frequencies of any shape, complex, kg.m2.
+        """Return what the inertias in clutches are at frequencies.
 
         Parameters
         ----------
-        frequency : ndarray
+        frequency : ndarray, shape (...)
             rad/s; negative where the drive turns backward.
+
+        Returns
+        -------
+        ndarray of complex, shape (...)
+            kg.m2; 0 without clutches.
         """
         found = np.zeros(np.shape(frequency), dtype=complex)
         for inertia, time in self.coupled:
