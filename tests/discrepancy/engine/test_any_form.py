@@ -117,19 +117,6 @@ def test_a_gain_that_stands_for_the_form_of_a_law_is_no_doubt():
     assert found.chosen.fit.bound_sides[names.index("output_torque_gain")] != 0.0
 
 
-@pytest.mark.parametrize("size", [1, 2])
-def test_a_gain_that_the_forms_of_a_set_do_not_need_is_a_doubt(monkeypatch, size):
-    """Where no form leaves noise, or one without a member does."""
-    in_any_form = AnyForm.rest_is_noise
-    noise = {1: True, 2: False}[size]
-    monkeypatch.setattr(
-        AnyForm,
-        "rest_is_noise",
-        lambda self, one: noise if len(one.candidates) == size else in_any_form(self, one),
-    )
-    assert GAIN in judged_with_a_gain(*small_drift()).doubts
-
-
 def test_a_gain_beside_one_law_is_a_doubt():
     """In any form it follows too much."""
     assert GAIN in judged_with_a_gain().doubts
