@@ -186,7 +186,9 @@ def _parameters(
             found |= _line(name.removesuffix("_cosine"), candidate, values[pair], covariance)
         elif not name.endswith("_sine"):
             variance = fitted.covariance[row, row] + _own_variance(values[row], rules)
-            found[name] = quantity(values[row], variance, _unit(candidate, name))
+            # A time or a torsion of a law is above zero, however little the data say of it.
+            least = 0.0 if fitted.parameters[row].lower > 0.0 else -np.inf
+            found[name] = quantity(values[row], variance, _unit(candidate, name), least)
     return found
 
 
@@ -212,13 +214,13 @@ def _line(
     }
 
 
-def quantity(value: float, variance: float, unit: str) -> dict[str, Any]:
-    """Return a value with its unit and its 95 % interval."""
+def quantity(value: float, variance: float, unit: str, least: float = -np.inf) -> dict[str, Any]:
+    """Return a value with its unit and its 95 % interval, which begins at ``least`` or above."""
     half = _DEVIATIONS * float(np.sqrt(max(variance, 0.0)))
     return {
         "value": float(value),
         "unit": unit,
-        "interval95": [float(value) - half, float(value) + half],
+        "interval95": [max(float(value) - half, least), float(value) + half],
     }
 
 

@@ -257,6 +257,17 @@ def test_what_is_alike_alone_is_compared_beside_the_further_effect():
     assert {play, friction} in [set(one.candidates) for one in found.of_size(2)]
 
 
+def test_no_interval_of_a_torsion_holds_what_is_below_zero():
+    """A time of a clutch was told as -7e-4 to 7e-4 s."""
+    verdict = verdict_on(planted({SOFT: (0.3, 2e-4, 3.0)}), [SOFT])
+    fitted = verdict.chosen.fit
+    vague = replace(fitted, jacobian=1e-3 * fitted.jacobian)
+    (effect,) = effects_of(replace(verdict, chosen=replace(verdict.chosen, fit=vague)))
+    lower, upper = effect["parameters"]["torsion"]["interval95"]
+    assert lower == 0.0 < upper
+    assert effect["parameters"]["softening"]["interval95"][0] < 0.0
+
+
 def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
     """The believed one may be at the end of its tolerance, which no record tells from the rest."""
     verdict = verdict_on(planted({INERTIA: (0.015,)}), [INERTIA, LINE])
