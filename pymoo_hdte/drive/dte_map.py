@@ -86,7 +86,8 @@ def torsional_mode(model: DriveModel) -> TorsionalMode:
     """
     coefficients = model.coefficients(model.nominal[None])
     if coefficients.coupled:
-        values = np.linalg.eigvals(state_matrix(replace(coefficients, laws=()), 0.0)[0])
+        steady = replace(coefficients, laws=(), stiffness_depth=0.0)
+        values = np.linalg.eigvals(state_matrix(steady, 0.0)[0])
         swinging = values[values.imag > 0.0]
         if not swinging.size:
             return TorsionalMode(0.0, 1.0)

@@ -157,6 +157,8 @@ def test_a_clutch_that_closes_at_once_is_a_rigid_shaft():
     )
     varying = MeshStiffnessVariation(0.95, 0.0)
     loose = replace(at_once, effects=(varying, *at_once.effects))
+    # A stiffness that varies has the mode of its mean.
+    assert torsional_mode(loose).frequency == pytest.approx(torsional_mode(at_once).frequency)
     with pytest.raises(UnstableDrive):
         loose.dte_arcsec(loose.nominal[None])
 
