@@ -119,6 +119,11 @@ class RobustDTEGrades(StoredFront, RobustProblem):
         self.margin = real_number("margin", margin, above=0.0, below=1.0)
         self.model, self.conditions = response.model, response.conditions
         self.nominal = response.nominal
+        coefficients = self.model.coefficients(self.model.nominal[None])
+        if coefficients.coupled:
+            allowed = "inertias rigidly on the output, whose resonance is known in closed form"
+            raise InvalidInput("model.effects", "coupled_inertia", allowed)
+        self._output_inertia = coefficients.output_inertia
         classes = _classes(self.model)
         sources = np.array([len(_sources(self.model.sheet, names)) for names in classes])
         self.cost_shares = sources / sources.sum()
@@ -141,11 +146,6 @@ class RobustDTEGrades(StoredFront, RobustProblem):
         moments = ExactMoments(self.surrogate, self.inputs, space)
         RobustProblem.__init__(self, moments, OBJECTIVES, UNITS | dict.fromkeys(names, "1"))
         self.n_ieq_constr = 2
-        coefficients = self.model.coefficients(self.model.nominal[None])
-        if coefficients.coupled:
-            allowed = "inertias rigidly on the output, whose resonance is known in closed form"
-            raise InvalidInput("model.effects", "coupled_inertia", allowed)
-        self._output_inertia = coefficients.output_inertia
 
     def dte_arcsec(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the DTE by the drive model, averaged over the conditions, shape (n,), in arcsec.

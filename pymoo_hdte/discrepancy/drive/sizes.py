@@ -169,7 +169,6 @@ def port_sizes(
         "sensor": 0.0,
     }
     lines = zip(believed.error_orders, believed.error_amplitudes, strict=True)
-    inertia = max(believed.load_inertia, 10.0 * believed.output_inertia)
     shared = DriveSizes(
         force=0.0,
         residual=0.0,
@@ -187,8 +186,7 @@ def port_sizes(
         # A line believed to have amplitude zero may be missing.
         believed_orders=tuple(order for order, amplitude in lines if amplitude > 0.0),
         ratio=believed.ratio,
-        inertia=inertia,
-        swing=float(np.sqrt(inertia / believed.stiffness)),
+        inertia=max(believed.load_inertia, 10.0 * believed.output_inertia),
         duration=scales.duration,
         temperature=scales.temperature,
         changes=scales.changes,

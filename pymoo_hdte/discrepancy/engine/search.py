@@ -289,8 +289,8 @@ class Search(FittedSets):
         """
         open_to_curves = not (self.enough(one) or one.freed)
         for member in one.candidates:
-            kept = tuple(each for each in one.candidates if each is not member)
-            kept = one.effects if member.covered_by else kept
+            others = tuple(each for each in one.candidates if each is not member)
+            kept = one.effects if member.covered_by else others
             for other in self.candidates:
                 curve = open_to_curves and member.is_curve and other.is_curve
                 special = other.port == member.port and (curve or member.holds(other))

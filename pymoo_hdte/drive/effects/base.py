@@ -40,8 +40,6 @@ class DriveSizes(Sizes):
         Transmission ratio N.
     inertia : float
         Of the load, kg.m2: the size of an inertia that may be missing.
-    swing : float
-        Inverse angular frequency of that inertia on the believed spring, s.
     duration : float
         Of the session, s.
     changes : tuple of float
@@ -55,7 +53,6 @@ class DriveSizes(Sizes):
     believed_orders: tuple[float, ...] = ()
     ratio: float = 1.0
     inertia: float = 0.0
-    swing: float = 0.0
     duration: float = 0.0
     changes: tuple[float, ...] = ()
     swept: bool = False

@@ -6,6 +6,7 @@ with the printed values respond to the static error as a rigid drive would.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -120,10 +121,12 @@ def _inertia(sizes: DriveSizes) -> list[Guess]:
     size = sizes.inertia
     added = unknown("inertia", 0.0, 10.0 * size, 0.3 * size)
     rigid = Guess((added,), [(share * size,) for share in (0.15, 0.4, 1.0, 2.5, 6.0)])
-    if sizes.swing == 0.0:
+    if size == 0.0:
         return [rigid]
-    time = unknown("time", 0.02 * sizes.swing, 20.0 * sizes.swing, sizes.swing)
-    starts = [(share * size, late * sizes.swing) for share in (0.4, 1.5) for late in (0.2, 1.0)]
+    # The inverse angular frequency of that inertia on the believed spring.
+    swing = math.sqrt(size / sizes.stiffness)
+    time = unknown("time", 0.02 * swing, 20.0 * swing, swing)
+    starts = [(share * size, late * swing) for share in (0.4, 1.5) for late in (0.2, 1.0)]
     coupled = Guess(
         (added, time),
         starts,

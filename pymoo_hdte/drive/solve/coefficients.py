@@ -153,11 +153,11 @@ class Coefficients:
         Returns
         -------
         ndarray of complex, shape (...)
-            kg.m2; 0 without clutches.
+            kg.m2; without clutches one 0, of shape ().
         """
-        found = np.zeros(np.shape(frequency), dtype=complex)
+        found = np.zeros((), dtype=complex)
         for inertia, time in self.coupled:
-            found += inertia / (1.0 + 1j * frequency * time)
+            found = found + inertia / (1.0 + 1j * frequency * time)
         return found
 
     @property

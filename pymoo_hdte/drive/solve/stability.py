@@ -48,12 +48,12 @@ def floquet_multipliers(coefficients: Coefficients) -> NDArray[np.complex128]:
 
     The period is that of all orders together: half an input turn for order 2, and for a constant
     stiffness. Other laws are left out. The state is (th_in', d', d), and by how much inertias in
-    clutches are slower than the output. The transition matrix is a
-    product of steps with the stiffness of their midpoints, each the (2, 2) Pade approximant of the
-    exponential: it is A-stable, so stiff damping costs no small steps, and of second order in the
-    step. Steps resolve the torsional vibration; see `require_stable` for drives so slow that they
-    cannot. Floquet theory: Nayfeh and Mook, Nonlinear Oscillations, Wiley 1979; Pade approximants:
-    Moler and Van Loan, SIAM Review 20, 1978.
+    clutches are slower than the output. The transition matrix is a product of steps with the
+    stiffness of their midpoints, each the (2, 2) Pade approximant of the exponential: it is
+    A-stable, so stiff damping costs no small steps, and of second order in the step. Steps resolve
+    the torsional vibration; see `require_stable` for drives so slow that they cannot. Floquet
+    theory: Nayfeh and Mook, Nonlinear Oscillations, Wiley 1979; Pade approximants: Moler and Van
+    Loan, SIAM Review 20, 1978.
 
     Parameters
     ----------

@@ -99,6 +99,7 @@ def equations_of_motion(
     # The error of the holding torque is of second order, by fluctuations of speed and torsion.
     remembering = memories(coefficients)
     places = np.cumsum([4, *(law.states for law in remembering)])
+    *of_laws, of_clutches = places.tolist()
     left = _holding_torque(coefficients) - holding - losses(speed)
 
     def right_hand_side(time: float, state: NDArray[np.float64]) -> list[float]:
@@ -118,7 +119,8 @@ def equations_of_motion(
         varying = 1.0 + depth * math.cos(2.0 * position + phase)
         mesh_torque = stiffness * varying * torsion + damping * torsion_rate
         mesh_torque += laws("mesh", torsion, torsion_rate, position)
-        *kept, slips = np.split(state, places)[1:] if len(state) > 4 else [state[4:]]
+        kept = np.split(state[:of_clutches], of_laws)[1:] if remembering else []
+        slips = state[of_clutches:].tolist()
         for law, states in zip(remembering, kept, strict=True):
             mesh_torque += law.torque(states)
         input_torque = accelerating * envelope_rate + (holding + left) * envelope
@@ -136,7 +138,7 @@ def equations_of_motion(
         rates = [input_speed, acceleration, error_rate, acceleration / ratio - output_acceleration]
         for law, states in zip(remembering, kept, strict=True):
             rates += law.rates(torsion_rate, states).tolist()
-        for (_, late), slip in zip(clutches, slips.tolist(), strict=True):
+        for (_, late), slip in zip(clutches, slips, strict=True):
             rates.append(output_acceleration - slip / late)
         return rates
 

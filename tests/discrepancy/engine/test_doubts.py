@@ -26,10 +26,10 @@ def one(label, *, exact, frees=None):
     return SimpleNamespace(label=label, exact=exact, frees=frees, parameters=(), **of_place)
 
 
-def doubts(chi_square_per_degree, *candidates, base=(), values=()):
-    """Doubts about a set that leaves so much, with no held-out record."""
+def fit_of(chi_square_per_degree, candidates, base=(), values=()):
+    """A fit of these that leaves so much, with the values of base parameters."""
     layout = Layout(base)
-    fitted = SimpleNamespace(
+    return SimpleNamespace(
         candidates=candidates,
         chi_square=chi_square_per_degree * FREEDOM,
         at_bounds=(),
@@ -38,6 +38,11 @@ def doubts(chi_square_per_degree, *candidates, base=(), values=()):
         bound_sides=1.0 * (values >= layout.array("upper")) if base else np.zeros(0),
         places=[(each, slice(0, 0)) for each in candidates],
     )
+
+
+def doubts(chi_square_per_degree, *candidates, base=(), values=()):
+    """Doubts about a set that leaves so much, with no held-out record."""
+    fitted = fit_of(chi_square_per_degree, candidates, base, values)
     quiet = chi_square_per_degree < 1.1
     search = SimpleNamespace(
         data=SimpleNamespace(rules=RULES),
@@ -116,15 +121,7 @@ def test_a_sensor_s_value_is_no_doubt_only_where_the_forms_of_all_laws_explain_i
     """With 0.9, nine deviations, it is no longer at its bound, and as doubtful."""
     base = (Parameter("output_torque_zero", 0.0, -1.0, 1.0, 0.1, prior=0.1),)
     fits = {
-        (fewer, free): SimpleNamespace(
-            candidates=(FRICTION, LINE),
-            chi_square=FREEDOM,
-            at_bounds=(),
-            parameters=base,
-            values=np.array([zero if free else 1.0]),
-            bound_sides=np.array([0.0 if free else 1.0]),
-            places=[(each, slice(0, 0)) for each in (FRICTION, LINE)],
-        )
+        (fewer, free): fit_of(1.0, (FRICTION, LINE), base, (zero if free else 1.0,))
         for fewer in (False, True)
         for free in (False, True)
     }
