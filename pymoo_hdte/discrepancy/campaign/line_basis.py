@@ -1,4 +1,4 @@
-"""The least squares behind order lines: a straight line in time, waves over the angle, jumps."""
+"""The least squares behind order lines: a straight line, waves over the angle, decay and jumps."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class LineFit:
     of all rows is that of the triangle of those before and of a block (Golub and Van Loan, Matrix
     Computations, 2013, 5.2.9), and a block of the basis follows from the triangle.
 
-    Columns are 1, the time from the middle of the record, the cosines, minus the sines, and a step
-    of one at each of the record's jumps: p = 2 + 2 m + number of jumps.
+    Columns are 1, the time from the middle of the record, the cosines, minus the sines, the decay
+    of a record that begins unsettled, and a step of one at each of the record's jumps.
 
     Attributes
     ----------
@@ -120,11 +120,22 @@ class LineFit:
 
 
 def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> NDArray[np.float64]:
-    """Return the columns of the fit in some rows: a straight line, cosines, sines and jumps."""
+    """Return the columns of the fit in some rows, (b, p), as `LineFit` has them."""
     angle = np.outer(record.input_angle[part], orders)
     time = centred(record, part)
+    begun = [] if record.settling is None else [record.settling]
+    settling = decay(record.time[part], np.full(len(begun), record.time[0]), np.array(begun))
     steps = [record.time[part] >= jump.time for jump in record.jumps]
-    return np.column_stack([np.ones_like(time), time, np.cos(angle), -np.sin(angle), *steps])
+    lines = np.cos(angle), -np.sin(angle)
+    return np.column_stack([np.ones_like(time), time, *lines, settling, *steps])
+
+
+def decay(
+    time: NDArray[np.float64], starts: NDArray[np.float64], constants: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return decays of one from their starts (k,) on, zero before, at times (b,), s; (b, k)."""
+    since = time[:, None] - starts
+    return np.where(since >= 0.0, np.exp(-np.maximum(since, 0.0) / constants), 0.0)
 
 
 def centred(record: RunningRecord, part: slice) -> NDArray[np.float64]:

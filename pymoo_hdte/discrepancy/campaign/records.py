@@ -74,6 +74,9 @@ class RunningRecord:
         Of the drive in kelvin, near its lubricant; the mean over the record.
     jumps : tuple of Jump
         Jumps of a sensor that were taken out of the rows; none in a record as it was measured.
+    settling : float, optional
+        Time constant in s of the decay with which the rows begin, which is fitted with the lines;
+        None in a record as it was measured.
 
     Raises
     ------
@@ -104,6 +107,7 @@ class RunningRecord:
     load_range: tuple[float, ...] = ()
     temperature: float | None = None
     jumps: tuple[Jump, ...] = ()
+    settling: float | None = None
 
     def __post_init__(self) -> None:
         for name, inside in (("speed_range", self.input_speed), ("load_range", self.load_torque)):

@@ -20,6 +20,7 @@ _NOUNS = {
     "spike": ("spike", "spikes"),
     "jump": ("jump", "jumps"),
     "new zero": ("new zero of an encoder", "new zeros of an encoder"),
+    "settling": ("beginning that has not settled", "beginnings that have not settled"),
     "gap": ("gap", "gaps"),
     "repeated": ("run of repeated rows", "runs of repeated rows"),
 }
@@ -79,6 +80,8 @@ def _treatment(findings: RowFindings) -> str:
     modelled = {fault.kind for fault in findings.faults if fault.treatment == "modelled"}
     if "jump" in modelled:
         done.append("jumps are fitted with the order lines")
+    if "settling" in modelled:
+        done.append("the decay at the beginning is fitted with the order lines")
     if "new zero" in modelled:
         done.append("the records after a new zero are shifted back")
     if findings.left_out:

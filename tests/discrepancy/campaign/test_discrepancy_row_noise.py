@@ -141,6 +141,38 @@ def test_a_record_of_two_loads_is_left_out_and_said(clean):
     assert clean.running[6].name in rows_sentence(found)
 
 
+def unsettled(campaign, sizes, constant=0.15):
+    """Let the motor run out into the motion at the beginning of each record: sizes (r,), rad."""
+    running = []
+    for one, size in zip(campaign.running, sizes, strict=True):
+        decay = size * np.exp(-(one.time - one.time[0]) / constant)
+        turned = one.output_angle + decay / campaign.believed.ratio
+        running.append(replace(one, input_angle=one.input_angle + decay, output_angle=turned))
+    return replace(campaign, running=tuple(running))
+
+
+def test_a_clean_drive_in_records_that_begin_unsettled_is_adequate(clean):
+    loads = np.array([one.load_torque for one in clean.running])
+    campaign = unsettled(clean, 2e-4 * loads)
+    analysis = analyse(campaign)
+    assert analysis.verdict.status == "adequate"
+    faults = analysis.finding.rows.faults
+    assert {one.kind for one in faults} == {"settling"}
+    assert "beginnings that have not settled" in rows_sentence(analysis.finding.rows)
+
+
+def test_where_several_records_begin_unsettled_all_are_fitted_so(clean):
+    """Of a decay below the noise a slow line of a short record takes the most."""
+    plain, slight = np.zeros(len(clean.running)), len(clean.running) - 1
+    for several in (1, 2):
+        sizes = plain.copy()
+        sizes[:several] = 6e-3
+        sizes[slight] = 2e-4
+        changed, found = examined(unsettled(clean, sizes))
+        assert len(found.faults) == several
+        assert (changed.running[slight].settling is not None) == (several == 2)
+
+
 def in_session(campaign, change):
     """Change the output angle of each record by its place in the session, from 0 to 1."""
     last = max(record.elapsed for record in campaign.running)

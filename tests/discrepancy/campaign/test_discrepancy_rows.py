@@ -236,3 +236,41 @@ def test_spikes_of_a_sweep_are_left_out(rng):
         ("output_angle", 100), ("output_angle", 777), ("output_torque", 300)
     ]  # fmt: skip
     assert len(shorter.time) == 1197
+
+
+def unsettled(record, constant, size):
+    """A record whose input angle and torque run out into the motion."""
+    decay = np.exp(-TIME / constant)
+    angle = record.input_angle + size * decay
+    torque = record.input_torque - 0.5 * size * decay
+    return replace(record, input_angle=angle, input_torque=torque)
+
+
+@given(constant=st.floats(0.05, 0.4), size=st.floats(1.5e-3, 1e-2), seed=st.integers(0, 9999))
+@settings(max_examples=25, deadline=None)
+def test_lines_of_a_record_that_begins_unsettled_scatter_as_their_covariance_says(
+    constant, size, seed
+):
+    rng = np.random.default_rng(seed)
+    record = run(rng)
+    result = repaired(unsettled(record, constant, size))
+    (fault,) = result.faults
+    assert (fault.kind, fault.channel, fault.row) == ("settling", "input_angle", 0)
+    assert abs(fault.size - size) < 0.3 * size
+    assert 0.7 * constant < result.record.settling < 1.4 * constant
+    assert_lines_as_of(result.record, record)
+
+
+def test_left_alone_the_decay_is_taken_for_slow_lines(rng):
+    record = run(rng)
+    with pytest.raises(AssertionError):
+        assert_lines_as_of(unsettled(record, 0.15, 2e-3), record)
+
+
+def test_what_settles_over_most_of_a_record_or_begins_later_is_a_motion(rng):
+    record = run(rng)
+    slow = 3e-3 * np.exp(-TIME / 2.0)
+    later = np.where(TIME < 2.0, 0.0, 3e-3 * np.exp(-(TIME - 2.0) / 0.15))
+    for motion in (slow, later):
+        result = repaired(replace(record, input_angle=record.input_angle + motion))
+        assert result.record.settling is None

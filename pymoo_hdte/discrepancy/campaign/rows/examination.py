@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from scipy.stats import norm
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
-from pymoo_hdte.discrepancy.campaign.records import TorsionRecord
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.campaign.rows.faults import WINDOWS
 from pymoo_hdte.discrepancy.campaign.rows.findings import NoiseFinding, RowFault, RowFindings
 from pymoo_hdte.discrepancy.campaign.rows.noise_estimate import (
@@ -26,6 +27,9 @@ from pymoo_hdte.discrepancy.campaign.rows.repair import (
 )
 from pymoo_hdte.discrepancy.campaign.rows.session_zero import with_one_zero
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
+
+_SEVERAL = 2
+"""Records that begin unsettled from which on it is not one of them but how all are taken."""
 
 
 def examined_rows(
@@ -58,7 +62,7 @@ def examined_rows(
     kept = [one for one in runs if one.record.name not in left_out]
     noise = _noise(campaign, kept, [record for record, _ in sweeps], rules)
     rig = with_noise(campaign.rig, noise)
-    records = [one.record for one in kept]
+    records = _unsettled([one.record for one in kept], rules)
     running, new_zero = with_one_zero(records, campaign.believed, rig, rules)
     changed: dict[str, Any] = {
         "running": running,
@@ -71,6 +75,22 @@ def examined_rows(
     faults += [fault for _, found in sweeps for fault in found]
     final = [_final(fault, left_out) for fault in faults]
     return campaign, RowFindings(n_rows, (*final, *new_zero), left_out, noise)
+
+
+def _unsettled(records: Sequence[RunningRecord], rules: Rules) -> list[RunningRecord]:
+    """Return records that all begin with a decay if several plainly do.
+
+    Where it is not clear of the noise, the slow lines take the most of it: in a short record.
+    """
+    found = [one.settling for one in records if one.settling is not None]
+    if len(found) < _SEVERAL:
+        return list(records)
+    usual = float(np.median(found))
+    shares = [usual / float(np.ptp(one.time)) for one in records]
+    return [
+        one if one.settling or share > rules.longest_settling else replace(one, settling=usual)
+        for one, share in zip(records, shares, strict=True)
+    ]
 
 
 def _same(old: object, new: object) -> bool:

@@ -24,9 +24,10 @@ class RowFault:
     ----------
     record : str
         Name of the record.
-    kind : {"spike", "jump", "gap", "repeated", "new zero"}
+    kind : {"spike", "jump", "gap", "repeated", "new zero", "settling"}
         One to a few rows that depart from both sides; a constant offset from a row on; rows that
-        are missing; rows that repeat the one before; a constant offset from this record on.
+        are missing; rows that repeat the one before; a constant offset from this record on; a decay
+        at the first rows.
     channel : str
         ``"input_angle"``, ``"output_angle"``, ``"input_torque"``, ``"output_torque"``; ``"time"``
         where both encoders agree that the time of the rows is wrong; ``"rows"`` for all of them.
@@ -34,7 +35,7 @@ class RowFault:
         First row concerned, from 0 in the file.
     rows : int
         How many; of a gap, how many are missing; of a jump, all rows to the end of the record, of a
-        new zero, to the end of the session.
+        new zero, to the end of the session; of a decay, three time constants.
     size : float
         Largest departure, the offset, or the length of a gap, in `UNITS` of the channel.
     treatment : {"left out", "modelled", "none needed"}

@@ -29,6 +29,7 @@ from pymoo_hdte.discrepancy.campaign.rows.faults import (
 )
 from pymoo_hdte.discrepancy.campaign.rows.findings import RowFault
 from pymoo_hdte.discrepancy.campaign.rows.search import Rows, RowSearch, Spikes
+from pymoo_hdte.discrepancy.campaign.rows.settling import settling
 from pymoo_hdte.discrepancy.engine.rules import Rules
 
 RUNNING = ("input_angle", "output_angle", "input_torque", "output_torque")
@@ -64,7 +65,7 @@ class RepairedRun:
 def repaired_run(
     record: RunningRecord, ratio: float, orders: Sequence[float], deviations: float, rules: Rules
 ) -> RepairedRun:
-    """Return a running record without spikes, jumps and repeated rows.
+    """Return a running record without spikes, jumps, repeated rows and settling.
 
     Parameters
     ----------
@@ -118,7 +119,7 @@ class _RunSearch(RowSearch[RunningRecord]):
         self.usable = True
 
     def run(self, orders: Sequence[float]) -> Rows:
-        """Take out spikes and jumps until there are none; return the residual of the lines.
+        """Take out spikes, jumps and a decay until there are none; return the lines' residual.
 
         Where jumps do not end, they are a motion, and none is taken out.
         """
@@ -126,6 +127,9 @@ class _RunSearch(RowSearch[RunningRecord]):
         for taken in range(self.rules.most_jumps + 1):
             fit = self._without_spikes(orders)
             found = self._clearest_step(fit)
+            if self._take_settling(fit, 0.0 if found is None else found[0].deviations):
+                fit = self._without_spikes(orders)
+                found = self._clearest_step(fit)
             if found is None:
                 return fit.whole_residual
             rough = rough or (self.record, self.rows, list(self.faults))
@@ -134,6 +138,20 @@ class _RunSearch(RowSearch[RunningRecord]):
         if rough is not None:
             self.record, self.rows, self.faults = rough
         return LineFit.of(self.record, self.ratio, orders).whole_residual
+
+    def _take_settling(self, fit: LineFit, step: float) -> bool:
+        """Have a decay at the first rows fitted with the lines, if it is clearer than a step."""
+        if self.record.settling is not None:
+            return False
+        found = settling(fit, self.deviations, self.rules)
+        if found is None or found.deviations < step:
+            return False
+        channel = ("output_angle", "input_torque", "output_torque", "input_angle")[found.place]
+        size = -found.size if channel == "output_angle" else found.size
+        lasting = np.count_nonzero(self.record.time < self.record.time[0] + 3.0 * found.time)
+        self.note("settling", channel, 0, int(lasting), size, "modelled")
+        self.record = replace(self.record, settling=found.time)
+        return True
 
     def _without_spikes(self, orders: Sequence[float]) -> LineFit:
         """Leave out spikes, the small ones once the large ones are gone, and return the fit."""

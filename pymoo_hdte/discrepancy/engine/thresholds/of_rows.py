@@ -17,7 +17,8 @@ class RowRules(RuleSet):
     row_fault_chance: float = rule(
         1e-3,
         "probability",
-        "Chance that noise alone shows any spike or jump in a whole campaign, or a wrong noise.",
+        "Chance that noise alone shows any spike, jump or decay in a whole campaign, or a wrong "
+        "noise.",
         "Test level by the normal distribution: all rows of all channels share the chance "
         "(Bonferroni), which takes 6.4 standard deviations at 100,000 rows.",
         at_most=1.0,
@@ -25,8 +26,8 @@ class RowRules(RuleSet):
     fault_prominence: float = rule(
         2.0,
         "ratio",
-        "A spike or a jump stands out of the largest similar changes of its record, those that are "
-        "too many to be faults, by this factor.",
+        "A spike, a jump or a decay stands out of the largest similar changes of its record, those "
+        "that are too many to be faults, by this factor.",
         f"{BY_HAND}: a motion that is rough in some rows, as rattling is, is rough in many. The "
         "hundredth row of normal noise lies at 2.6 standard deviations, so that pure noise never "
         "comes into question.",
@@ -51,6 +52,14 @@ class RowRules(RuleSet):
         "1",
         "Most jumps of a sensor in one record; more are a motion.",
         f"{BY_HAND}: a sensor that jumps more often has to be repaired first.",
+    )
+    longest_settling: float = rule(
+        0.1,
+        "share of the record",
+        "A decay at the first rows of a record counts as settling up to this time constant.",
+        f"{BY_HAND}: three time constants leave two thirds of the record to the steady motion; "
+        "what takes longer is a drift, which a straight line and the slow lines follow.",
+        at_most=0.3,
     )
     gap_of_rows: float = rule(
         1.5,
