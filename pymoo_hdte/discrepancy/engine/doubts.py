@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     expected_values,
     explains,
 )
+from pymoo_hdte.discrepancy.engine.membership import beyond_stated
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.search import Search
 
@@ -113,7 +114,7 @@ def _contradicted_in_any_form(search: Search, chosen: Hypothesis) -> list[str]:
     if not found or len(chosen.members) < 2:
         return found
     free = forms.in_free_form(chosen.fit)
-    if not forms.rest_is_noise(free) or any(_far(free, rules)):
+    if not forms.rest_is_noise(free) or beyond_stated(free, rules).any():
         return found
     fewer = [search.without(chosen, one).fit for one in chosen.members]
     every = [*fewer, *map(forms.in_free_form, fewer)]
@@ -125,19 +126,11 @@ def _contradicted(fitted: Fit, rules: Rules) -> list[str]:
 
     It then takes what the effects leave, and what they are is not known.
     """
-    far = _far(fitted, rules)
+    far = beyond_stated(fitted, rules)
     return [
         one.name
         for one, side, away in zip(fitted.parameters, fitted.bound_sides, far, strict=True)
         if side != 0.0 and away
-    ]
-
-
-def _far(fitted: Fit, rules: Rules) -> list[bool]:
-    """Return which parameters are far beyond their stated deviation."""
-    return [
-        abs(value - one.start) > rules.false_alarm_deviations * one.prior
-        for one, value in zip(fitted.parameters, fitted.values, strict=True)
     ]
 
 

@@ -12,10 +12,11 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     alike,
     hypothesis_of,
+    is_bounded,
     label_of,
     misfit_of,
 )
-from pymoo_hdte.discrepancy.engine.membership import is_earned
+from pymoo_hdte.discrepancy.engine.membership import beyond_stated, is_earned
 from pymoo_hdte.discrepancy.engine.starts import best_fit, other_starts
 
 Effects = tuple[Candidate, ...]
@@ -64,6 +65,17 @@ class FittedSets:
         """Tell whether a set explains the data down to the noise."""
         return self.forms.leaves_noise(one)
 
+    def could_count(self, one: Hypothesis) -> bool:
+        """Tell whether a further effect could be justified.
+
+        One at a bound may stand for two, and so may a sensor's gain far beyond what is stated.
+        """
+        if self.beyond_stated(one.fit):
+            return True
+        if self.enough(one):
+            return is_bounded(one.fit)
+        return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
+
     def alike(self, one: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
         overlap = self.forms.known((*one.candidates, *chosen.candidates))
@@ -79,7 +91,22 @@ class FittedSets:
     def _earns(self, one: Hypothesis, member: Effects, rest: Hypothesis) -> bool:
         """Tell whether a member is earned, as the listed laws go or in any form of the others."""
         earned = is_earned(self.data, self.base, one, rest, member)
-        return earned or self.forms.earns(one, rest)
+        return earned or self.forms.earns(one, rest) or self._brings_sensors_back(one, rest)
+
+    def _brings_sensors_back(self, one: Hypothesis, rest: Hypothesis) -> bool:
+        """Tell whether sensors are as stated in a set, and in no form of the rest.
+
+        A friction that grows with the load is a gain of the torque sensor nearly as well.
+        """
+        far, least = self.beyond_stated, self.data.rules.single_effect_gain
+        removed = rest.fit.chi_square - one.fit.chi_square
+        if removed < least * misfit_of(one, self.degrees_of_freedom) or not far(rest.fit):
+            return False
+        return bool(far(self.forms.in_free_form(rest.fit))) and not far(one.fit)
+
+    def beyond_stated(self, fitted: Fit) -> float:
+        """Return the chi-square of sensors' zeros and gains far beyond what is stated of them."""
+        return float(beyond_stated(fitted, self.data.rules).sum())
 
     def without(self, one: Hypothesis, member: Effects, again: bool = False) -> Hypothesis:
         """Return a set without one of its members, fitted to the end; ``again`` as of `fitted`."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.excess import Excess
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, down_to_noise
@@ -64,3 +65,13 @@ def ill_explained(before: Excess, after: Excess, rules: Rules) -> list[int]:
     residual = after.of_parts[wrong] / before.of_parts[wrong]
     ranked = wrong[np.argsort(-residual)].tolist()
     return ranked[: max(1, int(np.sum(residual > 1.0 - rules.explained_part_share)))]
+
+
+def beyond_stated(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
+    """Return the chi-square by which zeros and gains of sensors are far beyond what is stated.
+
+    Of each parameter, shape (n_parameters,); zero where it is near or nothing is stated.
+    """
+    stated = Layout(fitted.parameters)
+    away = (fitted.values - stated.array("start")) / stated.array("prior")
+    return np.where(np.abs(away) > rules.false_alarm_deviations, away**2, 0.0)

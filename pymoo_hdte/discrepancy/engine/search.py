@@ -19,7 +19,6 @@ from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit
 from pymoo_hdte.discrepancy.engine.freed_parameters import freed_together, gain_of_freed
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
-    is_bounded,
     label_of,
     leave_the_same,
     misfit_of,
@@ -66,13 +65,14 @@ class Search(FittedSets):
     def grow(self) -> None:
         """Fit sets of more effects as long as what is left could be that of a further one."""
         rules, first = self.data.rules, self.found[0]
-        if self.enough(first) or not self._could_count(first):
+        done = self.enough(first) and not self.beyond_stated(first.fit)
+        if done or not self.could_count(first):
             self._extend_beyond_forms(first)
             return
         for size in range(1, rules.most_effects):
             grown = self.of_size(size)[: rules.most_firsts if size == 1 else 1]
             for one in grown:
-                if not self._could_count(one):
+                if not self.could_count(one):
                     continue
                 if one is grown[0] or not leave_the_same(one, grown[0], rules):
                     self._extend(one)
@@ -182,12 +182,6 @@ class Search(FittedSets):
             if self.may_come_as_near(one, self.of_size(size)[0]):
                 self._prune(self.finished(one))
 
-    def _could_count(self, one: Hypothesis) -> bool:
-        """Tell whether a further effect could be justified; one at a bound may stand for two."""
-        if self.enough(one):
-            return is_bounded(one.fit)
-        return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
-
     def _extend(self, one: Hypothesis, by_part: bool = True) -> None:
         """Fit a set with each of the effects that would remove most of what it leaves.
 
@@ -206,6 +200,7 @@ class Search(FittedSets):
             self._extend_beyond_forms(one)
             return
         rules, left = self.data.rules, one.fit.chi_square - self.degrees_of_freedom
+        left = min(left, self.beyond_stated(one.fit) or left)
         before, after = (self.data.excess(each) for each in (self.base, one.fit))
         ill = ill_explained(before, after, rules) if by_part and not one.exact else []
         of_ill = [(part, float(after.of_parts[part])) for part in ill]

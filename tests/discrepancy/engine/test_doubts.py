@@ -294,6 +294,44 @@ def test_a_set_far_behind_several_effects_that_leave_noise_is_not_finished(
     assert done == finished
 
 
+@pytest.mark.parametrize(
+    ("rest", "free_form_of_rest", "both", "removed", "earned"),
+    [
+        (0.6, 0.6, 0.1, 30.0, True),
+        (0.3, 0.3, 0.1, 30.0, False),
+        (0.6, 0.1, 0.1, 30.0, False),
+        (0.6, 0.6, 0.5, 30.0, False),
+        (0.6, 0.6, 0.1, 20.0, False),
+    ],
+)
+def test_what_brings_a_sensor_s_gain_back_is_earned_also_beside_noise(
+    rest, free_form_of_rest, both, removed, earned
+):
+    """A friction that grows with the load was left out beside a hysteresis and a gain of 6 sigma.
+
+    Not what no far gain asks for, what another form of the rest does as well, or what removes no
+    more than noise gives.
+    """
+    gain = (Parameter("input_torque_gain", 0.0, -1.0, 1.0, 0.1, prior=0.1),)
+    fits = {
+        name: fit_of(left, (FRICTION,), gain, (value,))
+        for name, left, value in (
+            ("rest", 1.0, rest),
+            ("free", 1.0, free_form_of_rest),
+            ("both", 1.0 - removed / FREEDOM, both),
+        )
+    }
+    known = FittedSets.__new__(FittedSets)
+    known.data, known.degrees_of_freedom = SimpleNamespace(rules=RULES), FREEDOM
+    known.base = SimpleNamespace(residuals=np.zeros(FREEDOM), values=())
+    known.forms = SimpleNamespace(
+        earns=lambda one, rest: False, in_free_form=lambda fitted: fits["free"]
+    )
+    known.without = lambda one, member: SimpleNamespace(fit=fits["rest"])
+    whole = SimpleNamespace(fit=fits["both"], members=[(LINE,), (FRICTION,)])
+    assert known.earned(whole) == earned
+
+
 def freed(*names):
     return tuple(replace(a_law("parameter", name), port=name) for name in names)
 
