@@ -141,11 +141,11 @@ def test_a_record_of_two_loads_is_left_out_and_said(clean):
     assert clean.running[6].name in rows_sentence(found)
 
 
-def unsettled(campaign, sizes, constant=0.15):
+def unsettled(campaign, sizes, constant=lambda record: 0.15):
     """Let the motor run out into the motion at the beginning of each record: sizes (r,), rad."""
     running = []
     for one, size in zip(campaign.running, sizes, strict=True):
-        decay = size * np.exp(-(one.time - one.time[0]) / constant)
+        decay = size * np.exp(-(one.time - one.time[0]) / constant(one))
         turned = one.output_angle + decay / campaign.believed.ratio
         running.append(replace(one, input_angle=one.input_angle + decay, output_angle=turned))
     return replace(campaign, running=tuple(running))
@@ -161,16 +161,24 @@ def test_a_clean_drive_in_records_that_begin_unsettled_is_adequate(clean):
     assert "beginnings that have not settled" in rows_sentence(analysis.finding.rows)
 
 
-def test_where_several_records_begin_unsettled_all_are_fitted_so(clean):
+@pytest.mark.parametrize(
+    "constant", [lambda record: 0.15, lambda record: 15.0 / abs(record.input_speed)]
+)
+def test_where_several_records_begin_unsettled_all_are_fitted_so(clean, constant):
     """Of a decay below the noise a slow line of a short record takes the most."""
-    plain, slight = np.zeros(len(clean.running)), len(clean.running) - 1
-    for several in (1, 2):
-        sizes = plain.copy()
+    number = len(clean.running)
+    slight = number - 1
+    for several in (1, 3):
+        sizes = np.zeros(number)
         sizes[:several] = 6e-3
         sizes[slight] = 2e-4
-        changed, found = examined(unsettled(clean, sizes))
+        changed, found = examined(unsettled(clean, sizes, constant))
         assert len(found.faults) == several
-        assert (changed.running[slight].settling is not None) == (several == 2)
+        last = changed.running[slight]
+        if several == 1:
+            assert last.settling is None
+        else:
+            assert last.settling == pytest.approx(constant(last), rel=0.3)
 
 
 def in_session(campaign, change):

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import norm
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
+from pymoo_hdte.discrepancy.campaign.line_basis import mean_speed
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.campaign.rows.faults import WINDOWS
 from pymoo_hdte.discrepancy.campaign.rows.findings import NoiseFinding, RowFault, RowFindings
@@ -80,17 +81,22 @@ def examined_rows(
 def _unsettled(records: Sequence[RunningRecord], rules: Rules) -> list[RunningRecord]:
     """Return records that all begin with a decay if several plainly do.
 
-    Where it is not clear of the noise, the slow lines take the most of it: in a short record.
+    Where it is not clear of the noise, the slow lines take the most of it: in a short record. It
+    lasts for a time, or for a way of the input, as a hysteresis does: what differs less.
     """
-    found = [one.settling for one in records if one.settling is not None]
-    if len(found) < _SEVERAL:
+    known = [one for one in records if one.settling is not None]
+    if len(known) < _SEVERAL:
         return list(records)
-    usual = float(np.median(found))
-    shares = [usual / float(np.ptp(one.time)) for one in records]
-    return [
-        one if one.settling or share > rules.longest_settling else replace(one, settling=usual)
-        for one, share in zip(records, shares, strict=True)
-    ]
+    times = np.array([one.settling for one in known], dtype=float)
+    ways = times * [mean_speed(one) for one in known]
+    of_time = np.std(np.log(times)) <= np.std(np.log(ways))
+    usual = float(np.median(times if of_time else ways))
+    found = []
+    for one in records:
+        lasting = usual if of_time else usual / mean_speed(one)
+        short = lasting <= rules.longest_settling * float(np.ptp(one.time))
+        found.append(replace(one, settling=lasting) if one.settling is None and short else one)
+    return found
 
 
 def _same(old: object, new: object) -> bool:
