@@ -30,7 +30,8 @@ class LineFit:
     Computations, 2013, 5.2.9), and a block of the basis follows from the triangle.
 
     Columns are 1, the time from the middle of the record, the cosines, minus the sines, the decay
-    of a record that begins unsettled, and a step of one at each of the record's jumps.
+    of a record that begins unsettled with its derivative by the time constant, which is known no
+    better than the rows show it, and a step of one at each of the record's jumps.
 
     Attributes
     ----------
@@ -123,11 +124,13 @@ def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> 
     """Return the columns of the fit in some rows, (b, p), as `LineFit` has them."""
     angle = np.outer(record.input_angle[part], orders)
     time = centred(record, part)
-    begun = [] if record.settling is None else [record.settling]
-    settling = decay(record.time[part], np.full(len(begun), record.time[0]), np.array(begun))
+    settling = []
+    if record.settling is not None:
+        (ending,) = decay(record.time[part], record.time[:1], np.array([record.settling])).T
+        settling = [ending, ending * (record.time[part] - record.time[0]) / record.settling]
     steps = [record.time[part] >= jump.time for jump in record.jumps]
     lines = np.cos(angle), -np.sin(angle)
-    return np.column_stack([np.ones_like(time), time, *lines, settling, *steps])
+    return np.column_stack([np.ones_like(time), time, *lines, *settling, *steps])
 
 
 def decay(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
+from pymoo_hdte.discrepancy.campaign.rows.settling import unsettled_rows
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.drive.features import MEANS
@@ -238,11 +239,12 @@ def _metrics(dte: Values) -> tuple[ValidationMetrics, ValidationMetrics] | None:
 
 
 def _overlay(data: Data, predicted: Values, record: int, name: str) -> Overlay:
-    """Return measured, before and after of a record, from the start of its first input turn."""
+    """Return measured, before and after of a record, from the start of its first settled turn."""
     unit, size = SHOWN_IN[name]
     channel = CHANNELS.index(name)
     raw = data.features.records[record]
-    first = np.ceil(raw.input_angle.min() / (2.0 * np.pi))
+    settled = raw.input_angle[unsettled_rows(raw) :]
+    first = np.ceil(settled.min() / (2.0 * np.pi))
     turns = np.linspace(0.0, _OVERLAY_TURNS, _OVERLAY_POINTS)
     waves = np.exp(2j * np.pi * np.outer(data.features.orders, first + turns))
     measured = data.features.values[record]

@@ -192,7 +192,8 @@ def replaced(search: Search, chosen: Hypothesis, others: Sequence[Candidate]) ->
             values = one.values_of(kept)
             for start in other.starts:
                 whole = search.fitted(effects, np.append(values, start), again=True)
-            whole = search.finished(whole)
+            if left_beyond_noise(search, whole) <= left_beyond_noise(search, one):
+                whole = search.finished(whole)
             less = rules.form_ratio * left_beyond_noise(search, whole)
             plainly = less <= left_beyond_noise(search, one) or search.enough(whole)
             if plainly and explains_as_listed(search, whole):

@@ -68,7 +68,7 @@ class FittedSets:
     def could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified.
 
-        One at a bound may stand for two, and so may a sensor's gain far beyond what is stated.
+        One at a bound may stand for two, and so may a zero or gain far beyond what is stated.
         """
         if self.beyond_stated(one.fit):
             return True
@@ -98,11 +98,11 @@ class FittedSets:
 
         A friction that grows with the load is a gain of the torque sensor nearly as well.
         """
-        far, least = self.beyond_stated, self.data.rules.single_effect_gain
-        removed = rest.fit.chi_square - one.fit.chi_square
-        if removed < least * misfit_of(one, self.degrees_of_freedom) or not far(rest.fit):
+        least = self.data.rules.single_effect_gain * misfit_of(one, self.degrees_of_freedom)
+        if rest.fit.chi_square - one.fit.chi_square < least or not self.beyond_stated(rest.fit):
             return False
-        return bool(far(self.forms.in_free_form(rest.fit))) and not far(one.fit)
+        free = self.forms.in_free_form(rest.fit)
+        return self.beyond_stated(free) > 0.0 and self.beyond_stated(one.fit) == 0.0
 
     def beyond_stated(self, fitted: Fit) -> float:
         """Return the chi-square of sensors' zeros and gains far beyond what is stated of them."""

@@ -49,7 +49,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         "standard deviations",
         "A model is adequate while its chi-square exceeds the degrees of freedom by no more than "
         "this many standard deviations, sqrt(2 x degrees of freedom). A sensor's zero or gain "
-        "contradicts what is stated of it if it ended at a bound more than so many of its own off.",
+        "contradicts what is stated of it if it ended at a bound more than so many of its own off; "
+        "away from its bound the search goes on, for an effect that brings it back.",
         "Test level: noise alone exceeds it with a chance of 3e-4 (100 degrees of freedom) to 6e-5 "
         "(1400), by the chi-square distribution.",
     )
@@ -58,7 +59,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         "chi-square",
         "A base that is adequate as a whole is not, if one candidate would reduce chi-square by "
         "this much: one line of one channel is lost among a thousand features. A further effect "
-        "beside named ones that leave no more than noise, in any form of them, has to as well.",
+        "beside named ones that leave no more than noise, in any form of them, has to as well; so "
+        "has one that brings a sensor back to what is stated of it.",
         "Simulation: of 1000 campaigns of noise alone one gave some candidate of 28 this much; one "
         "in 100 gave 18.",
     )

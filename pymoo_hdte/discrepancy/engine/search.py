@@ -200,7 +200,9 @@ class Search(FittedSets):
             self._extend_beyond_forms(one)
             return
         rules, left = self.data.rules, one.fit.chi_square - self.degrees_of_freedom
-        left = min(left, self.beyond_stated(one.fit) or left)
+        if far := self.beyond_stated(one.fit):
+            # What brings a sensor back to what is stated removes at least that, of noise as well.
+            left = far if self.enough(one) else min(left, far)
         before, after = (self.data.excess(each) for each in (self.base, one.fit))
         ill = ill_explained(before, after, rules) if by_part and not one.exact else []
         of_ill = [(part, float(after.of_parts[part])) for part in ill]

@@ -25,9 +25,13 @@ DEVIATIONS = 6.5
 NOISE = dict(zip(RUNNING, (RATIO * RIG.angle_noise, RIG.angle_noise, 0.003, 0.2), strict=True))
 
 
-def run(rng, motion=0.0, name="run"):
-    """A record of three lines and noise; ``motion`` is one more of the output (n,), rad."""
-    angle = 40.0 + SPEED * TIME + 1e-3 * np.sin(SPEED * TIME)
+def run(rng, motion=0.0, turned=0.0, name="run"):
+    """A record of three lines and noise; ``motion`` is one more of the output (n,), rad.
+
+    The input has ``turned`` (n,) farther, rad.
+    """
+    angle = 40.0 + SPEED * TIME + turned
+    angle = angle + 1e-3 * np.sin(angle)
     error = ERROR * (np.sin(angle) + np.sin(2.0 * angle + 1.0)) + motion
     noise = {one: size * rng.standard_normal(N_ROWS) for one, size in NOISE.items()}
     true = {
@@ -238,33 +242,60 @@ def test_spikes_of_a_sweep_are_left_out(rng):
     assert len(shorter.time) == 1197
 
 
-def unsettled(record, constant, size):
-    """A record whose input angle and torque run out into the motion."""
-    decay = np.exp(-TIME / constant)
-    angle = record.input_angle + size * decay
-    torque = record.input_torque - 0.5 * size * decay
-    return replace(record, input_angle=angle, input_torque=torque)
+def decayed(constant, size):
+    return size * np.exp(-TIME / constant)
 
 
-@given(constant=st.floats(0.05, 0.4), size=st.floats(1.5e-3, 1e-2), seed=st.integers(0, 9999))
+@given(constant=st.floats(0.05, 0.4), size=st.floats(1.5e-3, 0.3), seed=st.integers(0, 9999))
 @settings(max_examples=25, deadline=None)
 def test_lines_of_a_record_that_begins_unsettled_scatter_as_their_covariance_says(
     constant, size, seed
 ):
-    rng = np.random.default_rng(seed)
-    record = run(rng)
-    result = repaired(unsettled(record, constant, size))
+    record = run(np.random.default_rng(seed))
+    late = run(np.random.default_rng(seed), turned=decayed(constant, size))
+    late = changed(late, "input_torque", slice(None), -0.5 * decayed(constant, size))
+    result = repaired(late)
     (fault,) = result.faults
     assert (fault.kind, fault.channel, fault.row) == ("settling", "input_angle", 0)
-    assert abs(fault.size - size) < 0.3 * size
+    assert abs(fault.size - size) < 0.3 * min(size, 5e-3)
     assert 0.7 * constant < result.record.settling < 1.4 * constant
     assert_lines_as_of(result.record, record)
 
 
-def test_left_alone_the_decay_is_taken_for_slow_lines(rng):
-    record = run(rng)
+def test_left_alone_the_decay_is_taken_for_slow_lines():
+    record, late = (
+        run(np.random.default_rng(1), turned=turned) for turned in (0.0, decayed(0.15, 2e-3))
+    )
     with pytest.raises(AssertionError):
-        assert_lines_as_of(unsettled(record, 0.15, 2e-3), record)
+        assert_lines_as_of(late, record)
+
+
+def test_a_jump_beside_a_decay_is_found_as_it_is_without(rng):
+    late = run(rng, turned=decayed(0.15, 2e-3))
+    result = repaired(changed(late, "input_torque", slice(1500, None), 0.02))
+    assert {one.kind: one.row for one in result.faults} == {"settling": 0, "jump": 1500}
+
+
+def test_a_jump_after_the_first_rows_and_events_that_come_again_are_no_settling(rng):
+    early = changed(run(rng), "input_torque", slice(10), 0.05)
+    again = np.zeros(N_ROWS)
+    for row in range(0, N_ROWS, 430):
+        again[row:] += 0.02 * np.exp(-(TIME[row:] - TIME[row]) / 0.05)
+    for record in (early, changed(run(rng), "input_torque", slice(None), again)):
+        assert repaired(record).record.settling is None
+
+
+def test_a_channel_without_noise_hides_no_decay_of_another(rng):
+    late = run(rng, turned=decayed(0.15, 2e-3))
+    torque = 3.0 * np.round(late.output_torque / 3.0)
+    assert repaired(replace(late, output_torque=torque)).record.settling is not None
+
+
+def test_a_gap_hides_no_decay(rng):
+    late = run(rng, turned=decayed(0.15, 2e-2))
+    kept = np.ones(N_ROWS, dtype=bool)
+    kept[600:1100] = False
+    assert repaired(without(late, kept)).record.settling == pytest.approx(0.15, rel=0.1)
 
 
 def test_what_settles_over_most_of_a_record_or_begins_later_is_a_motion(rng):

@@ -27,10 +27,8 @@ from pymoo_hdte.discrepancy.campaign.rows.repair import (
     repaired_sweep,
 )
 from pymoo_hdte.discrepancy.campaign.rows.session_zero import with_one_zero
+from pymoo_hdte.discrepancy.campaign.rows.settling import unsettled_rows
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-
-_SEVERAL = 2
-"""Records that begin unsettled from which on it is not one of them but how all are taken."""
 
 
 def examined_rows(
@@ -73,6 +71,8 @@ def examined_rows(
     if any(not _same(getattr(campaign, name), value) for name, value in changed.items()):
         campaign = replace(campaign, **changed, rules=rules)
     faults = [fault for one in runs for fault in one.faults]
+    faults += [_hidden_decay(one) for one, own in zip(records, kept, strict=True)
+               if one is not own.record]  # fmt: skip
     faults += [fault for _, found in sweeps for fault in found]
     final = [_final(fault, left_out) for fault in faults]
     return campaign, RowFindings(n_rows, (*final, *new_zero), left_out, noise)
@@ -85,7 +85,7 @@ def _unsettled(records: Sequence[RunningRecord], rules: Rules) -> list[RunningRe
     lasts for a time, or for a way of the input, as a hysteresis does: what differs less.
     """
     known = [one for one in records if one.settling is not None]
-    if len(known) < _SEVERAL:
+    if len(known) < rules.fewest_unsettled:
         return list(records)
     times = np.array([one.settling for one in known], dtype=float)
     ways = times * [mean_speed(one) for one in known]
@@ -97,6 +97,13 @@ def _unsettled(records: Sequence[RunningRecord], rules: Rules) -> list[RunningRe
         short = lasting <= rules.longest_settling * float(np.ptp(one.time))
         found.append(replace(one, settling=lasting) if one.settling is None and short else one)
     return found
+
+
+def _hidden_decay(record: RunningRecord) -> RowFault:
+    """Return what is said of a record that is taken to begin with a decay, as others do."""
+    length = 3.0 * (record.settling or 0.0)
+    rows = unsettled_rows(record)
+    return RowFault(record.name, "settling", "rows", 0, rows, length, "modelled")
 
 
 def _same(old: object, new: object) -> bool:

@@ -30,14 +30,16 @@ class RowFault:
         at the first rows.
     channel : str
         ``"input_angle"``, ``"output_angle"``, ``"input_torque"``, ``"output_torque"``; ``"time"``
-        where both encoders agree that the time of the rows is wrong; ``"rows"`` for all of them.
+        where both encoders agree that the time of the rows is wrong; ``"rows"`` for all of them,
+        and for a decay that other records show and the noise of this one hides.
     row : int
         First row concerned, from 0 in the file.
     rows : int
         How many; of a gap, how many are missing; of a jump, all rows to the end of the record, of a
         new zero, to the end of the session; of a decay, three time constants.
     size : float
-        Largest departure, the offset, or the length of a gap, in `UNITS` of the channel.
+        Largest departure, the offset, or the length of a gap or of a hidden decay, in `UNITS` of
+        the channel.
     treatment : {"left out", "modelled", "none needed"}
         What became of the rows; where a record is left out, that of its faults is ``"left out"``.
     """

@@ -29,11 +29,14 @@ from pymoo_hdte.discrepancy.campaign.rows.faults import (
 )
 from pymoo_hdte.discrepancy.campaign.rows.findings import RowFault
 from pymoo_hdte.discrepancy.campaign.rows.search import Rows, RowSearch, Spikes
-from pymoo_hdte.discrepancy.campaign.rows.settling import settling
+from pymoo_hdte.discrepancy.campaign.rows.settling import settling, unsettled_rows
 from pymoo_hdte.discrepancy.engine.rules import Rules
 
 RUNNING = ("input_angle", "output_angle", "input_torque", "output_torque")
 SWEPT = ("output_angle", "output_torque")
+
+FoundStep = tuple[Step, str, float]
+"""A jump in what the lines leave, the channel of the record that jumps, and by how much."""
 
 _ROUNDS = 20
 """Most rounds of a search, each of which removes what hides smaller faults."""
@@ -126,31 +129,34 @@ class _RunSearch(RowSearch[RunningRecord]):
         rough: tuple[RunningRecord, NDArray[np.int_], list[RowFault]] | None = None
         for taken in range(self.rules.most_jumps + 1):
             fit = self._without_spikes(orders)
-            found = self._clearest_step(fit)
-            if self._take_settling(fit, 0.0 if found is None else found[0].deviations):
+            found = self._steps(fit)
+            if self._take_settling(fit, found):
                 fit = self._without_spikes(orders)
-                found = self._clearest_step(fit)
-            if found is None:
+                found = self._steps(fit)
+            if not found:
                 return fit.whole_residual
+            self._compare(found)
             rough = rough or (self.record, self.rows, list(self.faults))
-            if taken == self.rules.most_jumps or not self._take_step(*found, orders):
+            if taken == self.rules.most_jumps or not self._take_step(*found[0], orders):
                 break
         if rough is not None:
             self.record, self.rows, self.faults = rough
-        return LineFit.of(self.record, self.ratio, orders).whole_residual
+        fit = LineFit.of(self.record, self.ratio, orders)
+        if self._take_settling(fit, ()):
+            fit = LineFit.of(self.record, self.ratio, orders)
+        return fit.whole_residual
 
-    def _take_settling(self, fit: LineFit, step: float) -> bool:
-        """Have a decay at the first rows fitted with the lines, if it is clearer than a step."""
+    def _take_settling(self, fit: LineFit, steps: Sequence[FoundStep]) -> bool:
+        """Have a decay at the first rows fitted with the lines, if it is clearer than all steps."""
         if self.record.settling is not None:
             return False
         found = settling(fit, self.deviations, self.rules)
-        if found is None or found.deviations < step:
+        if found is None or any(found.deviations < one.deviations for one, _, _ in steps):
             return False
         channel = ("output_angle", "input_torque", "output_torque", "input_angle")[found.place]
         size = -found.size if channel == "output_angle" else found.size
-        lasting = np.count_nonzero(self.record.time < self.record.time[0] + 3.0 * found.time)
-        self.note("settling", channel, 0, int(lasting), size, "modelled")
-        self.record = replace(self.record, settling=found.time)
+        self.record = replace(self.record, settling=found.constant)
+        self.note("settling", channel, 0, unsettled_rows(self.record), size, "modelled")
         return True
 
     def _without_spikes(self, orders: Sequence[float]) -> LineFit:
@@ -192,9 +198,9 @@ class _RunSearch(RowSearch[RunningRecord]):
         """Return whether a time is that of lost or repeated rows, not of a motion."""
         return np.abs(time) * self.record.sample_rate > self.rules.gap_of_rows - 1.0
 
-    def _clearest_step(self, fit: LineFit) -> tuple[Step, str, float] | None:
-        """Return the jump that stands out most, the channel that jumps, and by how much."""
-        residual, found = fit.whole_residual, list[tuple[Step, str, float]]()
+    def _steps(self, fit: LineFit) -> list[FoundStep]:
+        """Return the jump of each channel that stands out most, the clearest first."""
+        residual, found = fit.whole_residual, list[FoundStep]()
         lines = Lines(fit)
         for place in range(residual.shape[1]):
             one = step(residual[:, place], lines, self.deviations, self.rules)
@@ -203,17 +209,13 @@ class _RunSearch(RowSearch[RunningRecord]):
             channel, size = self._jumped(place, one, residual)
             if channel != "time" or self._is_of_rows(size):
                 found.append((one, channel, size))
-        best = max(found, key=lambda one: one[0].deviations, default=None)
-        if best is not None:
-            self._compare(best, found)
-        return best
+        return sorted(found, key=lambda one: -one[0].deviations)
 
-    def _compare(
-        self, best: tuple[Step, str, float], found: Sequence[tuple[Step, str, float]]
-    ) -> None:
-        """Note jumps of further channels at the row of one: the record is of two tests then."""
+    def _compare(self, found: Sequence[FoundStep]) -> None:
+        """Note jumps of further channels at the row of the first: the record is of two tests."""
         angles = ("time", "input_angle", "output_angle")
-        for one, channel, size in found:
+        best, *further = found
+        for one, channel, size in further:
             both_angles = channel in angles and best[1] in angles
             if channel != best[1] and not both_angles and abs(one.row - best[0].row) <= WINDOWS[1]:
                 self.note("jump", channel, one.row, len(self.rows) - one.row, size, "modelled")

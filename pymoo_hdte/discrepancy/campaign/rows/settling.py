@@ -11,38 +11,45 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, decay
+from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.campaign.rows.faults import scatter
 from pymoo_hdte.discrepancy.engine.rules import Rules
 
 Rows = NDArray[np.float64]
 
-# Shapes of the search; what its result is compared with are rules.
-_CONSTANTS = 25
-"""Time constants that are compared, from `_SHORTEST` rows to `_LONGEST` of the record."""
-_SHORTEST = 4
-"""Rows; a shorter decay is a spike."""
+# Shapes of the search; that a decay stands out is a matter of rules.
+_SHORTEST = 16
+"""Rows; what is shorter may be a jump after the first rows, as `faults` has them."""
 _LONGEST = 0.5
 """Share of the record, far beyond what counts as settling: a slow drift must not pass for it."""
-_NARROWED = 9
-"""Time constants between the neighbours of the best one."""
-_PLACES = 24
-"""Places in the record where a decay could begin as well."""
+_CONSTANTS = 25
+"""Time constants that are compared at once."""
+_NARROWED = 3
+"""Times that as many are compared between the neighbours of the best one: to 1e-4 of it."""
 _INDEPENDENT = 1e-3
-"""Least share of a decay's power that the lines do not take."""
+"""Least share of a decay's power that the lines do not take; the fit is ill-posed below."""
 
 
 class Settling(NamedTuple):
-    """A decay: time constant in s, the channel of the lines that shows it best, size there.
+    """A decay.
 
-    And how far it stands out of the noise, in standard deviations.
+    Its time constant in s, the channel of the lines that shows it best, its size there, and how
+    far it stands out of the noise in standard deviations.
     """
 
-    time: float
+    constant: float
     place: int
     size: float
     deviations: float
+
+
+def unsettled_rows(record: RunningRecord) -> int:
+    """Return the number of rows of a record within three time constants of its decay."""
+    ends = record.time[0] + 3.0 * (record.settling or 0.0)
+    return int(np.count_nonzero(record.time < ends))
 
 
 def settling(fit: LineFit, deviations: float, rules: Rules) -> Settling | None:
@@ -56,49 +63,61 @@ def settling(fit: LineFit, deviations: float, rules: Rules) -> Settling | None:
         Least size of a decay in standard deviations of its own.
     rules : Rules
     """
-    time, residual = fit.record.time, fit.whole_residual
-    length = float(time[-1] - time[0])
+    record, residual = fit.record, fit.whole_residual
+    length = float(record.time[-1] - record.time[0])
     noise = np.array([scatter(one) for one in residual.T])
-    if not noise.all():
+    low, high = shortest, longest = _SHORTEST / record.sample_rate, _LONGEST * length
+    if low >= high:
         return None
-    constants = np.geomspace(_SHORTEST / fit.record.sample_rate, _LONGEST * length, _CONSTANTS)
-    best = int(np.argmax(_strength(fit, residual, noise, constants).max(axis=1)))
-    near = constants[max(best - 1, 0)], constants[min(best + 1, _CONSTANTS - 1)]
-    constants = np.geomspace(*near, _NARROWED)
-    strength = _strength(fit, residual, noise, constants)
-    best, place = divmod(int(np.argmax(strength)), strength.shape[1])
+    for _ in range(1 + _NARROWED):
+        constants = np.geomspace(low, high, _CONSTANTS)
+        strength = _strength(fit, residual, noise, constants)
+        best, place = divmod(int(np.argmax(strength)), strength.shape[1])
+        low, high = constants[max(best - 1, 0)], constants[min(best + 1, _CONSTANTS - 1)]
     constant, clear = float(constants[best]), float(strength[best, place])
-    if clear < deviations or constant > rules.longest_settling * length:
+    within = shortest < constant <= min(rules.longest_settling * length, 0.99 * longest)
+    if clear < deviations or not within:
         return None
-    starts = time[0] + length * np.arange(_PLACES + 1) / (_PLACES + 1)
-    shared, products = _sums(fit, residual, starts, np.full(len(starts), constant))
-    size = products[0, place] / shared[0, 0]
-    elsewhere = (products[1:, place] - size * shared[1:, 0]) / np.sqrt(np.diag(shared)[1:])
-    common = float(np.abs(elsewhere).max()) / noise[place]
-    if clear < rules.fault_prominence * common:
+    shape = _beyond_lines(fit, constant)
+    size = float(shape @ residual[:, place] / (shape @ shape))
+    later = _as_from_each_row(record, residual[:, place] - size * shape, constant)
+    later[record.time < record.time[0] + 3.0 * constant] = 0.0
+    first = _as_from_each_row(record, residual[:, place], constant)[0]
+    if abs(first) < rules.fault_prominence * np.abs(later).max():
         return None
-    return Settling(constant, place, float(size), clear)
+    return Settling(constant, place, size, clear)
 
 
 def _strength(fit: LineFit, residual: Rows, noise: Rows, constants: Rows) -> Rows:
-    """Return how strongly each channel speaks for each decay, (k, 4), in standard deviations."""
+    """Return how strongly each channel speaks for each decay, (k, 4), in standard deviations.
+
+    Zero for a channel without noise, and for decays that the lines follow.
+    """
     starts = np.full(len(constants), fit.record.time[0])
-    shared, products = _sums(fit, residual, starts, constants)
-    power = np.diag(shared)
-    whole = constants * fit.record.sample_rate / 2.0
-    known = power > _INDEPENDENT * whole
-    found = np.abs(products) / np.sqrt(np.where(known, power, 1.0))[:, None] / noise
-    return np.where(known[:, None], found, 0.0)
-
-
-def _sums(fit: LineFit, residual: Rows, starts: Rows, constants: Rows) -> tuple[Rows, Rows]:
-    """Return the products of k decays beyond the lines, (k, k), and with a residual, (k, 4)."""
-    squares = np.zeros((len(starts), len(starts)))
-    lines = np.zeros((len(fit.triangle), len(starts)))
-    products = np.zeros((len(starts), residual.shape[1]))
+    power, products = np.zeros(len(constants)), np.zeros((len(constants), residual.shape[1]))
+    lines = np.zeros((len(fit.triangle), len(constants)))
     for part in fit.parts:
         decays = decay(fit.record.time[part], starts, constants)
-        squares += decays.T @ decays
+        power += np.sum(decays**2, axis=0)
         lines += fit.basis(part).T @ decays
         products += decays.T @ residual[part]
-    return squares - lines.T @ lines, products
+    left = power - np.sum(lines**2, axis=0)
+    known = (left > _INDEPENDENT * power)[:, None] & (noise > 0.0)
+    scale = np.sqrt(np.where(left > 0.0, left, 1.0))[:, None] * np.where(noise > 0.0, noise, 1.0)
+    return np.where(known, np.abs(products) / scale, 0.0)
+
+
+def _beyond_lines(fit: LineFit, constant: float) -> Rows:
+    """Return what the lines leave of a decay of one at the first row, shape (n,)."""
+    one = np.array([constant])
+    shape = decay(fit.record.time, fit.record.time[:1], one)[:, 0]
+    share = sum(fit.basis(part).T @ shape[part] for part in fit.parts)
+    for part in fit.parts:
+        shape[part] -= fit.basis(part) @ share
+    return shape
+
+
+def _as_from_each_row(record: RunningRecord, values: Rows, constant: float) -> Rows:
+    """Return the products of values (n,) with a decay from each row on, as rows in one step."""
+    kept = np.exp(-1.0 / (record.sample_rate * constant))
+    return np.asarray(lfilter([1.0], [1.0, -kept], values[::-1])[::-1])

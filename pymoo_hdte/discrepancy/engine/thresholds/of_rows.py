@@ -61,6 +61,13 @@ class RowRules(RuleSet):
         "what takes longer is a drift, which a straight line and the slow lines follow.",
         at_most=0.3,
     )
+    fewest_unsettled: int = rule(
+        2,
+        "records",
+        "From so many records on that plainly begin unsettled all are taken to do so.",
+        f"{BY_HAND}: one record may be started in haste; two show how a session was run. A record "
+        "that had settled loses next to nothing by one more unknown.",
+    )
     gap_of_rows: float = rule(
         1.5,
         "time steps",
