@@ -110,7 +110,7 @@ def test_quality_decides_what_is_offered():
     ("kwargs", "first", "last"),
     [
         ({}, 10, 22),
-        ({"n_offsprings": 1}, 10, 22),
+        pytest.param({"n_offsprings": 1}, 10, 22, marks=pytest.mark.nightly),
         ({"pop_size": 40}, 40, 40),
         ({"sampling": np.zeros((7, 3))}, 7, 7),
     ],

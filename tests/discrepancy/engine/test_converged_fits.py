@@ -132,7 +132,8 @@ def test_an_inertia_beyond_the_load_s_is_found_past_the_resonance(inertia, stiff
     assert verdict.chosen.fit.values[-1] == pytest.approx(inertia, abs=0.02)
 
 
-@pytest.mark.parametrize("order", [3.0, pytest.param(5.0, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("order", [3.0, 5.0])
 def test_an_inertia_that_moves_a_resonance_past_the_lines_of_an_error_is_found_with_it(
     order, monkeypatch
 ):

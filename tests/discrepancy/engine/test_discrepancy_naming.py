@@ -240,6 +240,7 @@ def test_where_more_than_noise_is_left_every_curve_is_tried_for_a_curve(left):
     assert tried == (left > 0.0)
 
 
+@pytest.mark.nightly
 def test_what_is_alike_alone_is_compared_beside_the_further_effect():
     """A soft wind-up at its bound beside friction was named in part; the play was never tried."""
     soft, play, friction = of_labels([SOFT, "backlash:mesh", OF_LOAD], empty=WITH_LOADS)
@@ -277,6 +278,7 @@ def test_an_inertia_is_as_certain_as_the_interval_that_is_told_of_it():
     assert (verdict.status, verdict.doubts) == ("named", ())
 
 
+@pytest.mark.nightly
 def test_a_second_effect_shows_where_no_single_part_contradicts_the_first():
     """The whole does, by little, and friction of the load takes nearly all of it."""
     friction = "load_dependent_friction:input"
@@ -288,7 +290,10 @@ def test_a_second_effect_shows_where_no_single_part_contradicts_the_first():
     assert labels_of(verdict) == {SOFT, friction}
 
 
-@pytest.mark.parametrize(("listed", "status"), [((), "partial"), (("backlash:mesh",), "class")])
+@pytest.mark.parametrize(
+    ("listed", "status"),
+    [((), "partial"), pytest.param(("backlash:mesh",), "class", marks=pytest.mark.nightly)],
+)
 def test_a_play_is_no_wind_up_of_straight_pieces(listed, status):
     """Such a wind-up that loses all its stiffness is a play: its softening ends at a bound."""
     (play,) = of_labels(["backlash:mesh"], empty=WITH_LOADS)
@@ -347,9 +352,11 @@ def test_no_value_is_freed_for_what_another_form_of_the_law_explains(monkeypatch
     ("label", "value", "beside"),
     [
         (INERTIA, 0.02, {}),
-        (INERTIA, 0.02, {RIPPLE: (0.003, 0.001)}),
+        pytest.param(INERTIA, 0.02, {RIPPLE: (0.003, 0.001)}, marks=pytest.mark.nightly),
         ("damping_reference:mesh", 3.0, {}),
-        ("damping_reference:mesh", 3.0, {LINE: (2e-6, 1e-6)}),
+        pytest.param(
+            "damping_reference:mesh", 3.0, {LINE: (2e-6, 1e-6)}, marks=pytest.mark.nightly
+        ),
     ],
 )
 def test_an_effect_has_no_rival_in_the_base_parameter_that_it_changes(label, value, beside):
