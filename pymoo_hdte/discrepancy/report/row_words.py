@@ -55,14 +55,15 @@ class NoiseRow:
 def rows_sentence(findings: RowFindings) -> str:
     """Return what was wrong with rows and stated noise, in words; empty if nothing was."""
     words = []
-    kinds = [fault.kind for fault in findings.faults]
+    shown = [fault for fault in findings.faults if not _hidden(fault)]
+    kinds = [fault.kind for fault in shown]
     counted = [
         f"{kinds.count(kind)} {nouns[kinds.count(kind) > 1]}"
         for kind, nouns in _NOUNS.items()
         if kind in kinds
     ]
     if counted:
-        records = {fault.record for fault in findings.faults}
+        records = {fault.record for fault in shown}
         where = next(iter(records)) if len(records) == 1 else f"{len(records)} records"
         words.append(f"{listed(counted)} in {where}: {_treatment(findings)}.")
     changed = [one for one in findings.noise if one.replaced]
@@ -71,6 +72,11 @@ def rows_sentence(findings: RowFindings) -> str:
         words.append(f"The noise is not the stated one but {ratios}; what was found is used.")
     sentence = " ".join(words)
     return sentence[:1].upper() + sentence[1:]
+
+
+def _hidden(fault: RowFault) -> bool:
+    """Tell whether a fault is a decay that other records show."""
+    return fault.kind == "settling" and fault.channel == "rows"
 
 
 def _treatment(findings: RowFindings) -> str:
@@ -82,6 +88,8 @@ def _treatment(findings: RowFindings) -> str:
         done.append("jumps are fitted with the order lines")
     if "settling" in modelled:
         done.append("the decay at the beginning is fitted with the order lines")
+        if hidden := sum(map(_hidden, findings.faults)):
+            done[-1] += f", also in {hidden} more, where noise may hide it"
     if "new zero" in modelled:
         done.append("the records after a new zero are shifted back")
     if findings.left_out:

@@ -181,6 +181,8 @@ def test_where_several_records_begin_unsettled_all_are_fitted_so(clean, constant
             assert found.faults == tuple(plain)
         else:
             assert last.name in {one.record for one in found.faults}
+            hidden = len(found.faults) - several
+            assert f"also in {hidden} more" in rows_sentence(found)
             assert last.settling == pytest.approx(constant(last), rel=0.3)
 
 

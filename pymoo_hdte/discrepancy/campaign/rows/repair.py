@@ -126,6 +126,8 @@ class _RunSearch(RowSearch[RunningRecord]):
 
         Where jumps do not end, they are a motion, and none is taken out.
         """
+        # Its first rows depart from each other as spikes do.
+        self._take_settling(LineFit.of(self.record, self.ratio, orders), ())
         rough: tuple[RunningRecord, NDArray[np.int_], list[RowFault]] | None = None
         for taken in range(self.rules.most_jumps + 1):
             fit = self._without_spikes(orders)
