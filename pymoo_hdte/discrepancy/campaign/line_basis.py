@@ -126,19 +126,18 @@ def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> 
     time = centred(record, part)
     settling = []
     if record.settling is not None:
-        (ending,) = decay(record.time[part], record.time[:1], np.array([record.settling])).T
+        (ending,) = decays(record, part, np.array([record.settling])).T
         settling = [ending, ending * (record.time[part] - record.time[0]) / record.settling]
     steps = [record.time[part] >= jump.time for jump in record.jumps]
     lines = np.cos(angle), -np.sin(angle)
     return np.column_stack([np.ones_like(time), time, *lines, *settling, *steps])
 
 
-def decay(
-    time: NDArray[np.float64], starts: NDArray[np.float64], constants: NDArray[np.float64]
+def decays(
+    record: RunningRecord, part: slice, constants: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return decays of one from their starts (k,) on, zero before, at times (b,), s; (b, k)."""
-    since = time[:, None] - starts
-    return np.where(since >= 0.0, np.exp(-np.maximum(since, 0.0) / constants), 0.0)
+    """Return decays from one at the first row, by time constants (k,), s, in some rows; (b, k)."""
+    return np.exp(-np.divide.outer(record.time[part] - record.time[0], constants))
 
 
 def centred(record: RunningRecord, part: slice) -> NDArray[np.float64]:

@@ -119,6 +119,8 @@ class RunningRecord:
         real_number("elapsed", self.elapsed, at_least=0.0)
         if self.temperature is not None:
             real_number("temperature", self.temperature, above=0.0)
+        if self.settling is not None:
+            real_number("settling", self.settling, above=0.0)
         _check_record(self, ("input_angle", "output_angle", "input_torque", "output_torque"))
 
     def transmission_error(self, ratio: float) -> NDArray[np.float64]:

@@ -71,8 +71,8 @@ def examined_rows(
     if any(not _same(getattr(campaign, name), value) for name, value in changed.items()):
         campaign = replace(campaign, **changed, rules=rules)
     faults = [fault for one in runs for fault in one.faults]
-    faults += [_hidden_decay(one) for one, own in zip(records, kept, strict=True)
-               if one is not own.record]  # fmt: skip
+    pairs = zip(records, kept, strict=True)
+    faults += [_hidden_decay(one) for one, own in pairs if one is not own.record]
     faults += [fault for _, found in sweeps for fault in found]
     final = [_final(fault, left_out) for fault in faults]
     return campaign, RowFindings(n_rows, (*final, *new_zero), left_out, noise)

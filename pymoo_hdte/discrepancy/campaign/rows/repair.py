@@ -120,6 +120,7 @@ class _RunSearch(RowSearch[RunningRecord]):
         super().__init__(record, RUNNING, deviations, rules)
         self.ratio = ratio
         self.usable = True
+        self._steady: RunningRecord | None = None
 
     def run(self, orders: Sequence[float]) -> Rows:
         """Take out spikes, jumps and a decay until there are none; return the lines' residual.
@@ -150,8 +151,9 @@ class _RunSearch(RowSearch[RunningRecord]):
 
     def _take_settling(self, fit: LineFit, steps: Sequence[FoundStep]) -> bool:
         """Have a decay at the first rows fitted with the lines, if it is clearer than all steps."""
-        if self.record.settling is not None:
+        if self.record.settling is not None or self.record is self._steady:
             return False
+        self._steady = self.record
         found = settling(fit, self.deviations, self.rules)
         if found is None or any(found.deviations < one.deviations for one, _, _ in steps):
             return False

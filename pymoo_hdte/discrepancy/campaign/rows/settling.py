@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, decay
+from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, decays
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.campaign.rows.faults import scatter
 from pymoo_hdte.discrepancy.engine.rules import Rules
@@ -29,6 +29,8 @@ _CONSTANTS = 25
 """Time constants that are compared at once."""
 _NARROWED = 3
 """Times that as many are compared between the neighbours of the best one: to 1e-4 of it."""
+_COARSE = 0.95
+"""Least share of a decay's size that the nearest constant of the first comparison shows."""
 _INDEPENDENT = 1e-3
 """Least share of a decay's power that the lines do not take; the fit is ill-posed below."""
 
@@ -66,17 +68,19 @@ def settling(fit: LineFit, deviations: float, rules: Rules) -> Settling | None:
     record, residual = fit.record, fit.whole_residual
     length = float(record.time[-1] - record.time[0])
     noise = np.array([scatter(one) for one in residual.T])
-    low, high = shortest, longest = _SHORTEST / record.sample_rate, _LONGEST * length
+    shortest = low = _SHORTEST / record.sample_rate
+    high = _LONGEST * length
     if low >= high:
         return None
     for _ in range(1 + _NARROWED):
         constants = np.geomspace(low, high, _CONSTANTS)
         strength = _strength(fit, residual, noise, constants)
         best, place = divmod(int(np.argmax(strength)), strength.shape[1])
+        if strength[best, place] < _COARSE * deviations:
+            return None
         low, high = constants[max(best - 1, 0)], constants[min(best + 1, _CONSTANTS - 1)]
     constant, clear = float(constants[best]), float(strength[best, place])
-    within = shortest < constant <= min(rules.longest_settling * length, 0.99 * longest)
-    if clear < deviations or not within:
+    if clear < deviations or not shortest < constant <= rules.longest_settling * length:
         return None
     shape = _beyond_lines(fit, constant)
     size = float(shape @ residual[:, place] / (shape @ shape))
@@ -93,14 +97,13 @@ def _strength(fit: LineFit, residual: Rows, noise: Rows, constants: Rows) -> Row
 
     Zero for a channel without noise, and for decays that the lines follow.
     """
-    starts = np.full(len(constants), fit.record.time[0])
     power, products = np.zeros(len(constants)), np.zeros((len(constants), residual.shape[1]))
     lines = np.zeros((len(fit.triangle), len(constants)))
     for part in fit.parts:
-        decays = decay(fit.record.time[part], starts, constants)
-        power += np.sum(decays**2, axis=0)
-        lines += fit.basis(part).T @ decays
-        products += decays.T @ residual[part]
+        some = decays(fit.record, part, constants)
+        power += np.sum(some**2, axis=0)
+        lines += fit.basis(part).T @ some
+        products += some.T @ residual[part]
     left = power - np.sum(lines**2, axis=0)
     known = (left > _INDEPENDENT * power)[:, None] & (noise > 0.0)
     scale = np.sqrt(np.where(left > 0.0, left, 1.0))[:, None] * np.where(noise > 0.0, noise, 1.0)
@@ -109,8 +112,7 @@ def _strength(fit: LineFit, residual: Rows, noise: Rows, constants: Rows) -> Row
 
 def _beyond_lines(fit: LineFit, constant: float) -> Rows:
     """Return what the lines leave of a decay of one at the first row, shape (n,)."""
-    one = np.array([constant])
-    shape = decay(fit.record.time, fit.record.time[:1], one)[:, 0]
+    shape = decays(fit.record, slice(None), np.array([constant]))[:, 0]
     share = sum(fit.basis(part).T @ shape[part] for part in fit.parts)
     for part in fit.parts:
         shape[part] -= fit.basis(part) @ share
