@@ -70,7 +70,7 @@ class FittedSets:
 
         One at a bound may stand for two, and so may a zero or gain far beyond what is stated.
         """
-        if self.beyond_stated(one.fit):
+        if self.held_by_sensors(one):
             return True
         if self.enough(one):
             return is_bounded(one.fit)
@@ -103,6 +103,14 @@ class FittedSets:
             return False
         free = self.forms.in_free_form(rest.fit)
         return self.beyond_stated(free) > 0.0 and self.beyond_stated(one.fit) == 0.0
+
+    def held_by_sensors(self, one: Hypothesis) -> float:
+        """Return `beyond_stated` of a set that explains nearly all; 0 of others.
+
+        Where more is left, sensors take a share of it whatever is missing.
+        """
+        nearly = self.enough(one) or one.explained >= self.data.rules.explained_share
+        return self.beyond_stated(one.fit) if nearly else 0.0
 
     def beyond_stated(self, fitted: Fit) -> float:
         """Return the chi-square of sensors' zeros and gains far beyond what is stated of them."""

@@ -65,7 +65,7 @@ class Search(FittedSets):
     def grow(self) -> None:
         """Fit sets of more effects as long as what is left could be that of a further one."""
         rules, first = self.data.rules, self.found[0]
-        done = self.enough(first) and not self.beyond_stated(first.fit)
+        done = self.enough(first) and not self.held_by_sensors(first)
         if done or not self.could_count(first):
             self._extend_beyond_forms(first)
             return
@@ -200,7 +200,7 @@ class Search(FittedSets):
             self._extend_beyond_forms(one)
             return
         rules, left = self.data.rules, one.fit.chi_square - self.degrees_of_freedom
-        if far := self.beyond_stated(one.fit):
+        if far := self.held_by_sensors(one):
             # What brings a sensor back to what is stated removes at least that, of noise as well.
             left = far if self.enough(one) else min(left, far)
         before, after = (self.data.excess(each) for each in (self.base, one.fit))
