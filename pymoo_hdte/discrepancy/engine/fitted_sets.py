@@ -105,12 +105,13 @@ class FittedSets:
         return self.beyond_stated(free) > 0.0 and self.beyond_stated(one.fit) == 0.0
 
     def held_by_sensors(self, one: Hypothesis) -> float:
-        """Return `beyond_stated` of a set that explains nearly all; 0 of others.
+        """Return `beyond_stated` of a set that could be named plainly; 0 of others.
 
         Where more is left, sensors take a share of it whatever is missing.
         """
-        nearly = self.enough(one) or one.explained >= self.data.rules.explained_share
-        return self.beyond_stated(one.fit) if nearly else 0.0
+        left = misfit_of(one, self.degrees_of_freedom)
+        plain = left <= self.data.rules.contradicting_chi_square
+        return self.beyond_stated(one.fit) if plain else 0.0
 
     def beyond_stated(self, fitted: Fit) -> float:
         """Return the chi-square of sensors' zeros and gains far beyond what is stated of them."""
