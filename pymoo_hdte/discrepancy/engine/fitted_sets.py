@@ -99,10 +99,10 @@ class FittedSets:
         A friction that grows with the load is a gain of the torque sensor nearly as well.
         """
         least = self.data.rules.single_effect_gain * misfit_of(one, self.degrees_of_freedom)
-        if rest.fit.chi_square - one.fit.chi_square < least or not self.beyond_stated(rest.fit):
-            return False
-        free = self.forms.in_free_form(rest.fit)
-        return self.beyond_stated(free) > 0.0 and self.beyond_stated(one.fit) == 0.0
+        clear = rest.fit.chi_square - one.fit.chi_square >= least
+        back = self.beyond_stated(rest.fit) > 0.0 and self.beyond_stated(one.fit) == 0.0
+        # A fit in a free form takes as long as several others.
+        return clear and back and self.beyond_stated(self.forms.in_free_form(rest.fit)) > 0.0
 
     def held_by_sensors(self, one: Hypothesis) -> float:
         """Return `beyond_stated` of a set that could be named plainly; 0 of others.

@@ -133,15 +133,15 @@ def test_an_inertia_beyond_the_load_s_is_found_past_the_resonance(inertia, stiff
 
 
 @pytest.mark.nightly
+@pytest.mark.parametrize("order", [3.0, 5.0])
 def test_an_inertia_that_moves_a_resonance_past_the_lines_of_an_error_is_found_with_it(
-    monkeypatch,
+    order, monkeypatch
 ):
     """To first order it does next to nothing for the error alone: a pair was called unlisted."""
-    order = 3.0
     speeds, loads = [10.0, 40.0, 150.0, *range(400, 2001, 200)], (5.0, 40.0, 20.0, 10.0, 30.0)
     conditions = [(speed, loads[k % 5]) for k, speed in enumerate(speeds)]
     there = known_data(conditions, [1.0, 2.0, 2.02, order])
-    hidden = [KinematicErrorLine(order, 1.7e-5, 1.0), LoadInertia(0.05)]
+    hidden = [KinematicErrorLine(order, 1.7e-5, 1.0), LoadInertia(0.05 if order == 3.0 else 0.027)]
     data = measured(hidden, np.random.default_rng(1), there)[0]
     laws = [listed(data, name, (order,)) for name in ("load_inertia", "encoder_line")]
     laws += [
@@ -151,6 +151,9 @@ def test_an_inertia_that_moves_a_resonance_past_the_lines_of_an_error_is_found_w
     both = {f"kinematic_error:mesh@{order:g}", "load_inertia:output"}
     found = judge(data, base, laws)
     assert (found.status, {one.label for one in found.chosen.candidates}) == ("named", both)
+    if order == 5.0:
+        # The mend is not needed here: the same pair is found without it.
+        return
     # That gains of sensors are far beyond what is stated leads to it as well, where it is so.
     monkeypatch.setattr(Search, "beyond_stated", lambda self, fitted: 0.0)
     monkeypatch.setattr(Search, "_past_resonances", lambda self, first: None)

@@ -27,7 +27,7 @@ from pymoo_hdte.discrepancy.campaign.rows.repair import (
     repaired_sweep,
 )
 from pymoo_hdte.discrepancy.campaign.rows.session_zero import with_one_zero
-from pymoo_hdte.discrepancy.campaign.rows.settling import unsettled_rows
+from pymoo_hdte.discrepancy.campaign.rows.settling import SETTLED, unsettled_rows
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
 
@@ -101,7 +101,7 @@ def _unsettled(records: Sequence[RunningRecord], rules: Rules) -> list[RunningRe
 
 def _hidden_decay(record: RunningRecord) -> RowFault:
     """Return what is said of a record that is taken to begin with a decay, as others do."""
-    length = 3.0 * (record.settling or 0.0)
+    length = SETTLED * (record.settling or 0.0)
     rows = unsettled_rows(record)
     return RowFault(record.name, "settling", "rows", 0, rows, length, "modelled")
 

@@ -120,7 +120,8 @@ class _RunSearch(RowSearch[RunningRecord]):
         super().__init__(record, RUNNING, deviations, rules)
         self.ratio = ratio
         self.usable = True
-        self._steady: RunningRecord | None = None
+        self._asked: RunningRecord | None = None
+        self._fit: LineFit | None = None
 
     def run(self, orders: Sequence[float]) -> Rows:
         """Take out spikes, jumps and a decay until there are none; return the lines' residual.
@@ -128,7 +129,7 @@ class _RunSearch(RowSearch[RunningRecord]):
         Where jumps do not end, they are a motion, and none is taken out.
         """
         # Its first rows depart from each other as spikes do.
-        self._take_settling(LineFit.of(self.record, self.ratio, orders), ())
+        self._take_settling(self._fitted(orders), ())
         rough: tuple[RunningRecord, NDArray[np.int_], list[RowFault]] | None = None
         for taken in range(self.rules.most_jumps + 1):
             fit = self._without_spikes(orders)
@@ -144,16 +145,20 @@ class _RunSearch(RowSearch[RunningRecord]):
                 break
         if rough is not None:
             self.record, self.rows, self.faults = rough
-        fit = LineFit.of(self.record, self.ratio, orders)
-        if self._take_settling(fit, ()):
-            fit = LineFit.of(self.record, self.ratio, orders)
-        return fit.whole_residual
+        self._take_settling(self._fitted(orders), ())
+        return self._fitted(orders).whole_residual
+
+    def _fitted(self, orders: Sequence[float]) -> LineFit:
+        """Return the lines of the rows as they are by now, fitted once for the same rows."""
+        if self._fit is None or self._fit.record is not self.record:
+            self._fit = LineFit.of(self.record, self.ratio, orders)
+        return self._fit
 
     def _take_settling(self, fit: LineFit, steps: Sequence[FoundStep]) -> bool:
         """Have a decay at the first rows fitted with the lines, if it is clearer than all steps."""
-        if self.record.settling is not None or self.record is self._steady:
+        if self.record.settling is not None or self.record is self._asked:
             return False
-        self._steady = self.record
+        self._asked = self.record
         found = settling(fit, self.deviations, self.rules)
         if found is None or any(found.deviations < one.deviations for one, _, _ in steps):
             return False
@@ -166,7 +171,7 @@ class _RunSearch(RowSearch[RunningRecord]):
     def _without_spikes(self, orders: Sequence[float]) -> LineFit:
         """Leave out spikes, the small ones once the large ones are gone, and return the fit."""
         for _ in range(_ROUNDS):
-            fit = LineFit.of(self.record, self.ratio, orders)
+            fit = self._fitted(orders)
             found = self._spikes(fit.whole_residual)
             if not found:
                 break

@@ -20,6 +20,9 @@ from pymoo_hdte.discrepancy.engine.rules import Rules
 
 Rows = NDArray[np.float64]
 
+SETTLED = 3.0
+"""Time constants after which a twentieth of a decay is left: its rows are those before."""
+
 # Shapes of the search; that a decay stands out is a matter of rules.
 _SHORTEST = 16
 """Rows; what is shorter may be a jump after the first rows, as `faults` has them."""
@@ -49,8 +52,8 @@ class Settling(NamedTuple):
 
 
 def unsettled_rows(record: RunningRecord) -> int:
-    """Return the number of rows of a record within three time constants of its decay."""
-    ends = record.time[0] + 3.0 * (record.settling or 0.0)
+    """Return the number of rows of a record before its decay is `SETTLED`."""
+    ends = record.time[0] + SETTLED * (record.settling or 0.0)
     return int(np.count_nonzero(record.time < ends))
 
 
@@ -85,7 +88,7 @@ def settling(fit: LineFit, deviations: float, rules: Rules) -> Settling | None:
     shape = _beyond_lines(fit, constant)
     size = float(shape @ residual[:, place] / (shape @ shape))
     later = _as_from_each_row(record, residual[:, place] - size * shape, constant)
-    later[record.time < record.time[0] + 3.0 * constant] = 0.0
+    later[record.time < record.time[0] + SETTLED * constant] = 0.0
     first = _as_from_each_row(record, residual[:, place], constant)[0]
     if abs(first) < rules.fault_prominence * np.abs(later).max():
         return None
