@@ -139,7 +139,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         "error and no second effect at another port. Less is enough for a second one beside "
         "laws without memory that leave little: if their listed forms leave a share of the "
         "excess, other forms leave its square at most. And up to here what the special case of a "
-        "law leaves beyond it is none of the law's.",
+        "law leaves beyond it is none of the law's. Values of laws with memory are not stated more "
+        "closely either.",
         "Simulation: with three times as many harmonics what the drive model predicts for an "
         "effect changes by up to 1.9e-2 (springs of a fortieth of the load that slip at a tenth of "
         "the wind-up; others 2e-5 or less).",

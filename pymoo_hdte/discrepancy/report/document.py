@@ -148,7 +148,7 @@ def effects_of(verdict: Verdict) -> list[dict[str, Any]]:
     """Return the accepted effects; none unless the verdict names or classes them."""
     fitted, found = verdict.accepted, []
     for candidate, place in fitted.places:
-        rows = range(place.start, place.stop)
+        rows, accuracy = range(place.start, place.stop), _accuracy(candidate, verdict)
         bounded = [fitted.parameters[row].name for row in rows if fitted.bound_sides[row] != 0.0]
         found.append(
             {
@@ -156,7 +156,7 @@ def effects_of(verdict: Verdict) -> list[dict[str, Any]]:
                 "port": candidate.port,
                 "order": candidate.order,
                 "sentence": candidate.sentence,
-                "parameters": _parameters(candidate, fitted, rows, verdict.rules),
+                "parameters": _parameters(candidate, fitted, rows, verdict.rules, accuracy),
                 "at_bound": bounded,
                 "explained": verdict.chosen.explained if verdict.chosen else None,
             }
@@ -164,10 +164,27 @@ def effects_of(verdict: Verdict) -> list[dict[str, Any]]:
     return found
 
 
+def _accuracy(candidate: Candidate, verdict: Verdict) -> float:
+    """Return how closely the values of an effect are known at best, as a relative half-width.
+
+    That of the model's own predictions of it. Where a law of no exact form leaves more than noise,
+    the real one has another: the share of the misfit's amplitude that is left is a standard
+    deviation of its values, up to what the form of a curve may leave.
+    """
+    rules, chosen = verdict.rules, verdict.chosen
+    accuracy = rules.model_accuracy if candidate.remembers else rules.exact_model_accuracy
+    if chosen is None or candidate.exact or not verdict.leaves_more_than_noise:
+        return accuracy
+    left = 1.0 - max(chosen.explained, rules.explained_share)
+    return float(np.hypot(accuracy, _DEVIATIONS * np.sqrt(max(left, 0.0))))
+
+
 def _parameters(
-    candidate: Candidate, fitted: Fit, rows: Sequence[int], rules: Rules
+    candidate: Candidate, fitted: Fit, rows: Sequence[int], rules: Rules, accuracy: float
 ) -> dict[str, Any]:
     """Return values with intervals; cosine and sine part as amplitude and phase.
+
+    No value is told more closely than to a relative ``accuracy``, however little noise there is.
 
     For a base parameter out of tolerance, its fitted value.
 
@@ -181,20 +198,16 @@ def _parameters(
         name = fitted.parameters[row].name
         if name.endswith("_cosine"):
             pair = np.array([row, row + 1])
-            own = _own_variance(np.hypot(*values[pair]), rules) * np.eye(2)
+            own = (accuracy * np.hypot(*values[pair]) / _DEVIATIONS) ** 2 * np.eye(2)
             covariance = fitted.covariance[np.ix_(pair, pair)] + own
             found |= _line(name.removesuffix("_cosine"), candidate, values[pair], covariance)
         elif not name.endswith("_sine"):
-            variance = fitted.covariance[row, row] + _own_variance(values[row], rules)
+            own = float(accuracy * values[row] / _DEVIATIONS) ** 2
+            variance = fitted.covariance[row, row] + own
             # A time or a torsion of a law is above zero, however little the data say of it.
             least = 0.0 if fitted.parameters[row].lower > 0.0 else -np.inf
             found[name] = quantity(values[row], variance, _unit(candidate, name), least)
     return found
-
-
-def _own_variance(value: float, rules: Rules) -> float:
-    """Return the variance of a value by the error of the model itself, however little noise is."""
-    return float((rules.exact_model_accuracy * value / _DEVIATIONS) ** 2)
 
 
 def _unit(candidate: Candidate, name: str) -> str:

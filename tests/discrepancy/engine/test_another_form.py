@@ -24,6 +24,7 @@ from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
+from pymoo_hdte.discrepancy.report.document import effects_of
 from pymoo_hdte.drive import CoupledInertia, DampingReference, KinematicReaction, LoadInertia
 from pymoo_hdte.effects.friction import CoulombFriction, smoothed_sign
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
@@ -185,10 +186,8 @@ def forms_that_explain(which):
     return SimpleNamespace(explains_in_another=which, in_free_form=lambda fitted: fitted)
 
 
-@pytest.mark.parametrize(
-    ("inertia", "status"),
-    [pytest.param(0.03, "partial", marks=pytest.mark.nightly), (0.0, "unlisted")],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize(("inertia", "status"), [(0.03, "partial"), (0.0, "unlisted")])
 def test_a_form_of_an_inertia_that_is_not_there_names_none(inertia, status):
     """A load on a soft sensor moves as further inertia would that hangs on a spring."""
     loose = [LoadRate(2, 3e-8), LoadRate(1, -1.5e-5), LoadRate(4, 2e-15)]
@@ -441,6 +440,7 @@ def test_values_that_an_effect_covers_are_replaced_by_a_form_of_it():
 BOTH = {REACTION, LOAD, "damping_reference:mesh"}
 
 
+@pytest.mark.nightly
 def test_no_parameter_is_freed_beside_the_effect_that_covers_it():
     truth = (LoadInertia(0.03), DampingReference(3.0), KinematicReaction(1.0))
     data = measured(truth, np.random.default_rng(3), DATA)[0]
@@ -487,6 +487,23 @@ def test_a_parameter_out_of_tolerance_removes_more_than_the_misfit_lets_it(moved
     assert needless(freedom, 3.0 * cost)
 
 
+def test_the_force_of_uneven_springs_lies_in_the_interval_that_is_told_of_it():
+    """On a bench written apart two of nine did: the error of a form counted as noise."""
+    rng = np.random.default_rng(1)
+    shares, slips = rng.exponential(1.0, 12), np.exp(rng.uniform(np.log(3e-5), np.log(6e-4), 12))
+    effects = tuple(
+        Correction("mesh", MaxwellSlip(2.0 * share, slip, 1e-3))
+        for share, slip in zip(shares / shares.sum(), slips, strict=True)
+    )
+    records = known_data([(40.0, 40.0), (150.0, 5.0), (500.0, 20.0), (1200.0, 40.0)], [1.0, 2.0])
+    data = with_sweep(measured(effects, rng, records)[0], effects, rng)
+    found = judge(data, fit(data), [one for one in library(data) if one.name == "hysteresis"])
+    lower, upper = effects_of(found)[0]["parameters"]["force"]["interval95"]
+    assert lower < 2.0 < upper
+    assert upper - lower < 0.2 * 2.0
+
+
+@pytest.mark.nightly
 def test_uneven_springs_of_the_mesh_need_no_friction_whose_contacts_bend():
     """Friction that shows in the sweep alone could follow whatever another form leaves there."""
     effects = tuple(
