@@ -173,6 +173,7 @@ class TestAgreement:
 class TestFindings:
     """A drive of size 32 whose optimum on surrogates was promised 13.2 arcsec and had 85.0."""
 
+    @pytest.mark.nightly
     def test_its_most_accurate_design_is_as_good_as_a_direct_search(self):
         settings = Settings(0.05, 0.25, None, 600, 1)
         found = run_design_study(size_32("csg32_model"), "accuracy_first", settings)

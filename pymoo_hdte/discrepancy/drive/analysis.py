@@ -158,7 +158,7 @@ def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tup
     if ratio.max() <= rules.changed_noise_ratio:
         return data, verdict
     known = (verdict.chosen, *verdict.alternatives)
-    again = judge(renewed, fit(renewed), listed, known)
+    again = judge(renewed, fit(renewed, start=verdict.base.values), listed, known)
     return (data, verdict) if again.chosen is None else (renewed, again)
 
 

@@ -158,10 +158,16 @@ class FittedSets:
         return self._by_label[label]
 
     def resume(self, known: Sequence[Hypothesis]) -> None:
-        """Fit sets from the values that another search has found on nearly the same data."""
+        """Fit sets from the values that another search has found on nearly the same data.
+
+        Those that came nowhere near the best one are only evaluated there.
+        """
         self._resumed = True
+        best, trial = min(known, key=lambda one: one.bic), self.data.rules.trial_gain
         for one in known:
-            self.fitted(one.candidates, one.fit.values)
+            steps = None if self.may_come_as_near(one, best) else 0
+            found = fit(self.data, one.candidates, one.fit.values, steps, settled=trial)
+            self._by_label[label_of(one.candidates)] = hypothesis_of(found, self.excess)
         for size in {len(one.members) for one in known}:
             self.finish_near(size)
 
@@ -172,13 +178,13 @@ class FittedSets:
     def finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near.
 
-        If the best set has several effects and leaves no more than noise, only those that may come
-        as near.
+        If the best set has several effects and leaves no more than noise, or the sets are known
+        from another search, only those that may come as near.
         """
         for place in range(len(self.of_size(size))):
             same = self.of_size(size)
             best, one = same[0], same[place]
-            alone = size > 1 and self.enough(best)
+            alone = self._resumed or (size > 1 and self.enough(best))
             first = place < (1 if alone else self.data.rules.most_firsts)
             if first or self.may_come_as_near(one, best):
                 self.finished(one)

@@ -110,6 +110,7 @@ def judged_with_a_gain(*beside):
     return judge(data, fit(data), of_labels("coulomb_friction:input", FRICTION, DRIFT))
 
 
+@pytest.mark.nightly
 def test_a_gain_that_stands_for_the_form_of_a_law_is_no_doubt():
     found = judged_with_a_gain(*small_drift())
     assert (found.status, found.chosen.label) == ("named", f"{FRICTION}+{DRIFT}")
@@ -215,6 +216,7 @@ def test_a_form_is_known_to_the_square_of_what_its_listed_one_leaves(further, na
     assert {one.label for one in found.chosen.candidates} == {waving, DRIFT} if named else {waving}
 
 
+@pytest.mark.nightly
 def test_beside_two_effects_a_third_is_not_fitted_to_errors_of_their_forms(monkeypatch):
     """A pair took 70 s, most of it for third effects that its spring's form explained as well."""
     line = "kinematic_error:mesh@3"
@@ -245,7 +247,7 @@ def test_without_forms_a_small_effect_beside_another_form_is_hidden(monkeypatch)
     assert {one.label for one in found.chosen.candidates} == {SPRING}
 
 
-@pytest.mark.parametrize("listed", [True, False])
+@pytest.mark.parametrize("listed", [True, pytest.param(False, marks=pytest.mark.nightly)])
 def test_one_effect_is_named_alone_unless_the_evidence_speaks_for_another(monkeypatch, listed):
     """A drag was named with a damping out of tolerance at a probability of 1e-19."""
     (law,) = of_labels(SPRING)

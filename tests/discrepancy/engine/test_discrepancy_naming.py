@@ -194,6 +194,17 @@ def test_a_part_that_an_effect_does_not_have_speaks_not_against_it(label, values
     assert (verdict.status, verdict.doubts) == ("named", ())
 
 
+def test_what_came_nowhere_near_is_only_evaluated_when_the_noise_is_renewed(ripple):
+    data, verdict = ripple
+    again, chosen = search.Search(data, verdict.base, ()), verdict.chosen
+    far = hypothesis.hypothesis_of(fit(data, of_labels([LINE]), steps=0), again.excess)
+    moved = replace(chosen, fit=replace(chosen.fit, values=1.001 * chosen.fit.values))
+    again.resume([moved, far])
+    found = {one.label: one.fit for one in again.found}
+    assert found[chosen.label].chi_square == pytest.approx(chosen.fit.chi_square, abs=0.1)
+    assert np.array_equal(found[far.label].values, far.fit.values)
+
+
 def test_two_effects_are_both_named():
     data = planted({RIPPLE: (0.003, 0.0), LINE: (1.0 * ARCSEC, 0.0)})
     verdict = verdict_on(data, FEW)
@@ -201,6 +212,7 @@ def test_two_effects_are_both_named():
     assert labels_of(verdict) == {RIPPLE, LINE}
 
 
+@pytest.mark.nightly
 def test_a_set_that_only_the_removal_of_a_member_gives_is_named(monkeypatch):
     """Beside the first effect another one looks better than the second, which makes it needless."""
     ways = {(RIPPLE,): [DRAG], (RIPPLE, DRAG): [SOFT]}
@@ -406,6 +418,7 @@ def test_what_nothing_tells_apart_is_a_class_also_where_more_is_missing():
     assert verdict.probability == pytest.approx(RULES.partial_right, abs=0.01)
 
 
+@pytest.mark.nightly
 def test_what_nothing_tells_apart_is_a_class_beside_two_other_effects():
     """Of a line of the encoder or of the drive the likelier pair alone was extended by a third."""
     line = "eccentricity:sensor@0.009901"
@@ -622,6 +635,7 @@ def test_a_second_effect_is_looked_for_in_the_sweep_alone(looked_at, monkeypatch
     assert excess.degrees_of_freedom[-1].tolist() == [0.0] * 4 + [len(data.torsion[0].angle) - 1]
 
 
+@pytest.mark.nightly
 def test_a_second_effect_beside_a_curve_must_count_beside_the_whole():
     data = planted({CUBIC: (6e9,), LINE: (0.034 * ARCSEC, 0.0)})
     verdict = verdict_on(data, [CUBIC, LINE])

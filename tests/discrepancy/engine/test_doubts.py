@@ -270,24 +270,30 @@ def search_among(*found):
 
 
 @pytest.mark.parametrize(
-    ("size", "behind", "enough", "finished"),
+    ("size", "behind", "enough", "resumed", "finished"),
     [
-        (2, 1e4, True, [0]),
-        (2, 10.0, True, [0, 1]),
-        (2, 1e4, False, [0, 1]),
-        (1, 1e4, True, [0, 1]),
+        (2, 1e4, True, False, [0]),
+        (2, 10.0, True, False, [0, 1]),
+        (2, 1e4, False, False, [0, 1]),
+        (1, 1e4, True, False, [0, 1]),
+        (1, 1e4, True, True, [0]),
+        (1, 10.0, True, True, [0, 1]),
     ],
 )
-def test_a_set_far_behind_several_effects_that_leave_noise_is_not_finished(
-    size, behind, enough, finished
+def test_a_set_far_behind_is_not_finished_where_another_explains_all_or_it_was_before(
+    size, behind, enough, resumed, finished
 ):
-    """Springs that slip took two minutes to end far behind a damping that explained all."""
+    """Springs that slip took two minutes to end far behind a damping that explained all.
+
+    A friction far behind a reaction took ten seconds again when the noise was renewed.
+    """
     sets = [SimpleNamespace(place=0, bic=0.0), SimpleNamespace(place=1, bic=behind)]
     for one in sets:
         one.fit = SimpleNamespace(chi_square=float(FREEDOM))
     done = []
     known = FittedSets.__new__(FittedSets)
     known.data, known.degrees_of_freedom = SimpleNamespace(rules=RULES), FREEDOM
+    known._resumed = resumed
     known.of_size, known.enough = lambda wanted: sets, lambda one: enough
     known.finished = lambda one: done.append(one.place)
     known.finish_near(size)

@@ -78,6 +78,7 @@ def test_a_name_that_the_held_out_record_contradicts_is_not_given():
     assert simulated.before == simulated.after == pytest.approx(before**0.5)
 
 
+@pytest.mark.nightly
 def test_a_name_that_the_held_out_record_shows_is_given_and_one_at_rest_says_nothing():
     train = rig.record_of(dry, seed=4)
     shown = rig.record_of(dry, "held_out", seed=3, duration=rig.HELD_OUT)

@@ -91,6 +91,7 @@ def test_nothing_hidden_is_adequate_however_coarse_the_samples(every):
     assert examine_mechanism(OSCILLATOR, records).verdict.status == "adequate"
 
 
+@pytest.mark.nightly
 def test_a_record_that_is_fine_enough_stays_as_it_is():
     records = [record_of(cubic), record_of(cubic, "held_out", seed=3, duration=4.0)]
     finding = examine_mechanism(OSCILLATOR, records)
