@@ -142,7 +142,7 @@ def uncertain(fitted: Fit, rules: Rules) -> list[Candidate]:
 
 
 def strength_is_certain(fitted: Fit, candidate: Candidate, place: slice, rules: Rules) -> bool:
-    """Tell whether the strength of an effect differs from nothing, by the interval it is told with.
+    """Tell whether the strength of an effect differs from nothing, by the noise of the records.
 
     Strengths are the unknowns that may be zero, lines with both their parts; one of them is enough:
     friction that falls with speed may have no level. Shapes, which are not zero, do not count.

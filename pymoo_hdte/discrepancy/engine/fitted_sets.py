@@ -160,14 +160,18 @@ class FittedSets:
     def resume(self, known: Sequence[Hypothesis]) -> None:
         """Fit sets from the values that another search has found on nearly the same data.
 
-        Those that came nowhere near the best one are only evaluated there.
+        The chosen one first. Those that came nowhere near it or the best one are only evaluated.
         """
         self._resumed = True
-        best, trial = min(known, key=lambda one: one.bic), self.data.rules.trial_gain
+        chosen, best = known[0], min(known, key=lambda one: one.bic)
+        rivals = [chosen, *(one for one in known[1:] if self.alike(one, chosen))]
         for one in known:
-            steps = None if self.may_come_as_near(one, best) else 0
+            hopeful = one in rivals or self.may_come_as_near(one, best)
+            steps, trial = None if hopeful else 0, self.data.rules.trial_gain
             found = fit(self.data, one.candidates, one.fit.values, steps, settled=trial)
-            self._by_label[label_of(one.candidates)] = hypothesis_of(found, self.excess)
+            self._by_label.setdefault(label_of(one.candidates), hypothesis_of(found, self.excess))
+        for one in rivals:
+            self.finished(self._by_label[label_of(one.candidates)])
         for size in {len(one.members) for one in known}:
             self.finish_near(size)
 

@@ -79,7 +79,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         "Least share of the excess that effects remove if they do not fit down to the noise, and "
         "of what a first effect of exact form leaves that a second one removes.",
         f"{BY_HAND}, after 70 simulated campaigns of 14 effects (97 % named rightly, none "
-        "wrongly); up to a third of the amplitude, sqrt(0.1), may be the form of a curve.",
+        "wrongly); up to a third of the amplitude, sqrt(0.1), may be the form of a curve, which is "
+        "the most that intervals of its values allow for it.",
         at_most=1.0,
     )
     partial_share: float = rule(

@@ -18,7 +18,7 @@ from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.parameters import base_unit
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, expected_values
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, adequate, expected_values
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.effects.sentence_blanks import in_words, joined_sentences
@@ -167,16 +167,18 @@ def effects_of(verdict: Verdict) -> list[dict[str, Any]]:
 def _accuracy(candidate: Candidate, verdict: Verdict) -> float:
     """Return how closely the values of an effect are known at best, as a relative half-width.
 
-    That of the model's own predictions of it. Where a law of no exact form leaves more than noise,
-    the real one has another: the share of the misfit's amplitude that is left is a standard
-    deviation of its values, up to what the form of a curve may leave.
+    No closer than the model predicts the effect. And where a law of no exact form leaves more than
+    noise, the real law has another form: a standard deviation of its values is the share that it
+    leaves of the misfit's amplitude, beyond what may be noise. It counts up to what the form of a
+    curve may leave: an effect that explains less is named in part, and what is told is its size.
     """
-    rules, chosen = verdict.rules, verdict.chosen
+    rules, chosen, freedom = verdict.rules, verdict.chosen, verdict.degrees_of_freedom
     accuracy = rules.model_accuracy if candidate.remembers else rules.exact_model_accuracy
     if chosen is None or candidate.exact or not verdict.leaves_more_than_noise:
         return accuracy
-    left = 1.0 - max(chosen.explained, rules.explained_share)
-    return float(np.hypot(accuracy, _DEVIATIONS * np.sqrt(max(left, 0.0))))
+    beyond = chosen.fit.chi_square - adequate(freedom, rules) * freedom
+    left = min(beyond / (verdict.base.chi_square - freedom), 1.0 - rules.explained_share)
+    return float(np.hypot(accuracy, _DEVIATIONS * np.sqrt(left)))
 
 
 def _parameters(

@@ -502,6 +502,19 @@ def test_the_force_of_uneven_springs_lies_in_the_interval_that_is_told_of_it():
     assert lower < 2.0 < upper
     assert upper - lower < 0.2 * 2.0
 
+    def half_width(left):
+        """Without noise, were so many times as much left."""
+        quiet = replace(found.chosen.fit, jacobian=1e6 * found.chosen.fit.jacobian)
+        quiet = replace(quiet, residuals=np.sqrt(left) * quiet.residuals)
+        (effect,) = effects_of(replace(found, chosen=replace(found.chosen, fit=quiet)))
+        stated = effect["parameters"]["force"]
+        return (stated["interval95"][1] - stated["value"]) / stated["value"]
+
+    assert half_width(1e-3) == pytest.approx(RULES.model_accuracy, rel=1e-3)
+    most = 1.96 * np.sqrt(1.0 - RULES.explained_share)
+    assert RULES.model_accuracy < half_width(1.0) < half_width(2.0) < half_width(1e5)
+    assert [half_width(1e5), half_width(1e6)] == pytest.approx([most, most], rel=1e-2)
+
 
 @pytest.mark.nightly
 def test_uneven_springs_of_the_mesh_need_no_friction_whose_contacts_bend():

@@ -110,7 +110,6 @@ def judged_with_a_gain(*beside):
     return judge(data, fit(data), of_labels("coulomb_friction:input", FRICTION, DRIFT))
 
 
-@pytest.mark.nightly
 def test_a_gain_that_stands_for_the_form_of_a_law_is_no_doubt():
     found = judged_with_a_gain(*small_drift())
     assert (found.status, found.chosen.label) == ("named", f"{FRICTION}+{DRIFT}")

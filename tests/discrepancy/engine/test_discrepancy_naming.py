@@ -143,6 +143,10 @@ def test_no_interval_is_narrower_than_the_error_of_the_model_itself(ripple):
     lower, upper = stated["interval95"]
     half = RULES.exact_model_accuracy * stated["value"]
     assert (upper - lower) / 2.0 == pytest.approx(half, rel=0.01)
+    # Its form is exact: what is left is no error of it.
+    left = replace(quiet, residuals=1.5 * quiet.residuals)
+    (again,) = effects_of(replace(verdict, chosen=replace(verdict.chosen, fit=left)))
+    assert again["parameters"]["amplitude"]["interval95"] == pytest.approx([lower, upper], rel=1e-5)
     (loud,) = effects_of(verdict)
     lower, upper = loud["parameters"]["amplitude"]["interval95"]
     assert (upper - lower) / 2.0 > 2.0 * half

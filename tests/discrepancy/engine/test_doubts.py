@@ -280,9 +280,7 @@ def search_among(*found):
         (1, 10.0, True, True, [0, 1]),
     ],
 )
-def test_a_set_far_behind_is_not_finished_where_another_explains_all_or_it_was_before(
-    size, behind, enough, resumed, finished
-):
+def test_sets_far_behind_are_not_finished(size, behind, enough, resumed, finished):
     """Springs that slip took two minutes to end far behind a damping that explained all.
 
     A friction far behind a reaction took ten seconds again when the noise was renewed.
