@@ -396,6 +396,28 @@ def test_orders_need_the_fewest_angles():
     assert fundamental_orders([2.02, 4.06, 1.98]) == pytest.approx((1.0, 0.02))
 
 
+def test_a_crest_with_many_harmonics_takes_one_angle_and_moves_alike():
+    """Each angle more multiplies the equations: such a pair was judged for 42 minutes."""
+    multiples = np.array([1, 2, 5, 10]) / 101.0
+    lines = [KinematicErrorLine(order, 2.0 * ARCSEC, 0.7) for order in multiples]
+    model = with_effects(
+        preset("resonant"), *lines, LawAtPort("soft_windup", "mesh", SoftWindup(0.3, 3e-4))
+    )
+    coefficients = model.coefficients(model.nominal[None])
+    fundamentals = fundamental_orders([1.0, 2.0, *multiples])
+    assert fundamentals == pytest.approx((1.0, 1.0 / 101.0))
+    one = harmonic_balance(coefficients)
+    several = Torus((1.0, 1.0 / 101.0, 5.0 / 101.0), (one.torus.highest[0], 3, 3))
+    other = harmonic_balance(coefficients, torus=several)
+    assert 2 * len(one.torus.orders) < len(several.orders)
+    for order in (1.0, 2.0, *multiples, 1.0 + multiples[3]):
+        (here, _), (there, _) = one.torus.place(order), several.place(order)
+        size = np.abs(one.torsion).max()
+        assert abs(one.torsion[0, here]) == pytest.approx(
+            abs(other.torsion[0, there]), abs=1e-6 * size
+        )
+
+
 @given(st.lists(st.floats(0.05, 6.0), min_size=1, max_size=3), st.integers(1, 3))
 def test_all_orders_are_sums_of_their_fundamentals(orders, harmonics):
     multiples = [k * order for order in orders for k in range(1, harmonics + 1)]

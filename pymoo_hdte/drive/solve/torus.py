@@ -21,8 +21,10 @@ from pymoo_hdte.checks import InvalidInput
 Matrices = NDArray[np.float64]
 
 _TOLERANCE = 1e-8
-_LARGEST_MULTIPLE = 4
-"""An order whose fraction is at most this multiple of a known one needs no angle of its own."""
+_MULTIPLES = (4, 16)
+"""An order whose fraction is at most this multiple of a known one needs no angle of its own.
+
+The second where a torus is smaller with it: for a crest with many harmonics of the output turn."""
 
 
 def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
@@ -32,30 +34,41 @@ def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
     harmonics of 0.5644, for instance, lie at the fractions 0.4356, 0.1287 and 0.3069 of a turn,
     of which the second and third are multiples of the first, up to whole turns.
     """
+    found = [_fundamentals(orders, most) for most in _MULTIPLES]
+    sizes = [[2 * one + 1 for one in largest_multiples(each, orders)[1:]] for each in found]
+    return found[int(np.argmin([np.prod(one) for one in sizes]))]
+
+
+def _fundamentals(orders: Sequence[float], most: int) -> tuple[float, ...]:
+    """Return `fundamental_orders` with multiples up to ``most``."""
     left = sorted({round(abs(order - np.rint(order)), 9) for order in orders} - {0.0})
     found: list[float] = []
     while left:
         # Of equally good ones the smallest.
-        best = max(left, key=lambda one: (sum(_follows(other, one) for other in left), -one))
+        follow = {one: [_follows(other, one, most) for other in left] for one in left}
+        best = max(left, key=lambda one: (sum(follow[one]), -one))
         found.append(best)
-        left = [other for other in left if not _follows(other, best)]
+        left = [other for other in left if not _follows(other, best, most)]
     return (1.0, *sorted(found))
 
 
-def _follows(fraction: float, known: float) -> bool:
-    """Tell whether a fraction is a small multiple of a known one, up to whole turns and sign."""
-    multiples = known * np.arange(1, _LARGEST_MULTIPLE + 1)
+def _follows(fraction: float, known: float, most: int) -> bool:
+    """Tell whether a fraction is a multiple of a known one, up to whole turns and sign."""
+    multiples = known * np.arange(1, most + 1)
     return bool(np.any(np.abs(np.abs(multiples - np.rint(multiples)) - fraction) < _TOLERANCE))
 
 
 @lru_cache(maxsize=1024)
 def multiples_of(fundamentals: tuple[float, ...], order: float) -> NDArray[np.int_]:
     """Return the smallest whole multiples of the fundamentals, 1 first, that sum to ``order``."""
-    spans = [range(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1) for _ in fundamentals[1:]]
-    for parts in sorted(product(*spans), key=lambda parts: sum(map(abs, parts))):
-        rest = order - float(np.dot(parts, fundamentals[1:]))
-        if abs(rest - round(rest)) < _TOLERANCE:
-            found = np.array([round(rest), *parts])
+    for most in _MULTIPLES:
+        n = len(fundamentals) - 1
+        parts = np.indices((2 * most + 1,) * n).reshape(n, (2 * most + 1) ** n).T - most
+        rest = order - parts @ np.array(fundamentals[1:])
+        fits = np.flatnonzero(np.abs(rest - np.rint(rest)) < _TOLERANCE)
+        if len(fits):
+            best = fits[np.argmin(np.abs(parts[fits]).sum(axis=1))]
+            found = np.array([int(np.rint(rest[best])), *parts[best]])
             # All callers share it.
             found.flags.writeable = False
             return found
@@ -174,7 +187,7 @@ class Torus:
 
     def phase(self, order: float) -> NDArray[np.float64]:
         """Return ``order`` times the input angle on the grid, shape (G,), up to whole turns."""
-        return self._find(order) @ self._phases
+        return np.asarray(multiples_of(self.fundamentals, order) @ self._phases)
 
     def place(self, order: float) -> tuple[int, bool]:
         """Return the index of an order among the harmonics, and whether it is there as -o."""
@@ -195,9 +208,6 @@ class Torus:
             if places.size:
                 return int(places[0]), sign < 0.0
         return None
-
-    def _find(self, order: float) -> NDArray[np.int_]:
-        return multiples_of(self.fundamentals, order)
 
     def path(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return grid values (n, G) in the order in which a slow beat passes them, twice over.
