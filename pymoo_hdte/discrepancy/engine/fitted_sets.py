@@ -122,15 +122,17 @@ class FittedSets:
         kept = tuple(other for other in one.candidates if other not in member)
         return self.finished(self.fitted(kept, one.values_of(kept), again))
 
-    def fitted(self, effects: Effects, start: Vector, again: bool = False) -> Hypothesis:
-        """Return a set fitted from a start so far as to rank it.
+    def fitted(
+        self, effects: Effects, start: Vector, again: bool = False, steps: int | None = None
+    ) -> Hypothesis:
+        """Return a set fitted from a start so far as to rank it, in ``steps`` as of `fit`.
 
         A set that is known already is fitted ``again`` only where that is asked for; the better
         of both fits is kept.
         """
         label = label_of(effects)
         if label not in self._by_label or again:
-            found = fit(self.data, effects, start, settled=self.data.rules.trial_gain)
+            found = fit(self.data, effects, start, steps, self.data.rules.trial_gain)
             trial, known = hypothesis_of(found, self.excess), self._by_label.get(label)
             if known is None or trial.bic < known.bic:
                 self._by_label[label] = trial
@@ -167,9 +169,7 @@ class FittedSets:
         rivals = [chosen, *(one for one in known[1:] if self.alike(one, chosen))]
         for one in known:
             hopeful = one in rivals or self.may_come_as_near(one, best)
-            steps, trial = None if hopeful else 0, self.data.rules.trial_gain
-            found = fit(self.data, one.candidates, one.fit.values, steps, settled=trial)
-            self._by_label.setdefault(label_of(one.candidates), hypothesis_of(found, self.excess))
+            self.fitted(one.candidates, one.fit.values, steps=None if hopeful else 0)
         for one in rivals:
             self.finished(self._by_label[label_of(one.candidates)])
         for size in {len(one.members) for one in known}:

@@ -23,7 +23,6 @@ Matrices = NDArray[np.float64]
 _TOLERANCE = 1e-8
 _MULTIPLES = (4, 16)
 """An order whose fraction is at most this multiple of a known one needs no angle of its own.
-
 The second where a torus is smaller with it: for a crest with many harmonics of the output turn."""
 
 
@@ -34,13 +33,14 @@ def fundamental_orders(orders: Sequence[float]) -> tuple[float, ...]:
     harmonics of 0.5644, for instance, lie at the fractions 0.4356, 0.1287 and 0.3069 of a turn,
     of which the second and third are multiples of the first, up to whole turns.
     """
-    found = [_fundamentals(orders, most) for most in _MULTIPLES]
+    found = [_fundamentals(tuple(orders), most) for most in _MULTIPLES]
     sizes = [[2 * one + 1 for one in largest_multiples(each, orders)[1:]] for each in found]
     return found[int(np.argmin([np.prod(one) for one in sizes]))]
 
 
-def _fundamentals(orders: Sequence[float], most: int) -> tuple[float, ...]:
-    """Return `fundamental_orders` with multiples up to ``most``."""
+@lru_cache(maxsize=1024)
+def _fundamentals(orders: tuple[float, ...], most: int) -> tuple[float, ...]:
+    """Return `fundamental_orders` with multiples up to ``most``; each prediction asks for them."""
     left = sorted({round(abs(order - np.rint(order)), 9) for order in orders} - {0.0})
     found: list[float] = []
     while left:
@@ -48,7 +48,7 @@ def _fundamentals(orders: Sequence[float], most: int) -> tuple[float, ...]:
         follow = {one: [_follows(other, one, most) for other in left] for one in left}
         best = max(left, key=lambda one: (sum(follow[one]), -one))
         found.append(best)
-        left = [other for other in left if not _follows(other, best, most)]
+        left = [other for other, done in zip(left, follow[best], strict=True) if not done]
     return (1.0, *sorted(found))
 
 
@@ -61,9 +61,10 @@ def _follows(fraction: float, known: float, most: int) -> bool:
 @lru_cache(maxsize=1024)
 def multiples_of(fundamentals: tuple[float, ...], order: float) -> NDArray[np.int_]:
     """Return the smallest whole multiples of the fundamentals, 1 first, that sum to ``order``."""
-    for most in _MULTIPLES:
-        n = len(fundamentals) - 1
-        parts = np.indices((2 * most + 1,) * n).reshape(n, (2 * most + 1) ** n).T - most
+    n, (near, far) = len(fundamentals) - 1, _MULTIPLES
+    sums = np.indices((2 * near + 1,) * n).reshape(n, (2 * near + 1) ** n).T - near
+    # What follows a fraction in a large multiple is a multiple of that one alone.
+    for parts in (sums, np.kron(np.arange(-far, far + 1)[:, None], np.eye(n, dtype=int))):
         rest = order - parts @ np.array(fundamentals[1:])
         fits = np.flatnonzero(np.abs(rest - np.rint(rest)) < _TOLERANCE)
         if len(fits):
@@ -78,8 +79,7 @@ def multiples_of(fundamentals: tuple[float, ...], order: float) -> NDArray[np.in
 def largest_multiples(fundamentals: tuple[float, ...], orders: Sequence[float]) -> list[int]:
     """Return the largest multiple of each fundamental in any of the ``orders``."""
     found = np.array([multiples_of(fundamentals, order) for order in orders], dtype=int)
-    most = np.abs(found.reshape(-1, len(fundamentals))).max(axis=0, initial=0)
-    return [int(multiple) for multiple in most]
+    return [int(one) for one in np.abs(found.reshape(-1, len(fundamentals))).max(0, initial=0)]
 
 
 @lru_cache(maxsize=8)
