@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,22 +142,14 @@ def _check_steady(data: Data) -> None:
 
 
 def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
-    """Judge again if the named effect changes the drive's response to non-repeatable errors.
-
-    The non-repeatable error is a motion, which reaches all channels through the model's response.
-    """
-    rules = data.rules
-    if verdict.chosen is None or verdict.chosen.explained < rules.explained_share:
+    """Judge again if the named effect changes the noise."""
+    chosen = verdict.chosen
+    if chosen is None or chosen.explained < data.rules.explained_share:
         return data, verdict
-    fitted = verdict.chosen.fit
-    values = fitted.values[: len(data.base)]
-    renewed = replace(data, reference=values, reference_effects=fitted.effects)
-    ratio = np.diagonal(renewed.covariance, axis1=1, axis2=2) / np.diagonal(
-        data.covariance, axis1=1, axis2=2
-    )
-    if ratio.max() <= rules.changed_noise_ratio:
+    renewed = data.with_noise_of(chosen.fit)
+    if renewed is None:
         return data, verdict
-    known = (verdict.chosen, *verdict.alternatives)
+    known = (chosen, *verdict.alternatives)
     again = judge(renewed, fit(renewed, start=verdict.base.values), listed, known)
     return (data, verdict) if again.chosen is None else (renewed, again)
 

@@ -157,6 +157,18 @@ class Data(Observations):
             features = features.rows(np.flatnonzero(held))
         return replace(self, features=features, torsion=()) if features.records else None
 
+    def with_noise_of(self, fitted: Fit) -> Data | None:
+        """Return the data with the noise of another model; None where theirs is about the same.
+
+        The non-repeatable error is a motion, which reaches all channels through the response of
+        the drive, its effects included.
+        """
+        base = fitted.values[: len(self.base)]
+        renewed = replace(self, reference=base, reference_effects=fitted.effects)
+        variances = (np.diagonal(one.covariance, axis1=1, axis2=2) for one in (renewed, self))
+        ratio = np.divide(*variances).max()
+        return renewed if ratio > self.rules.changed_noise_ratio else None
+
     @property
     def loaded(self) -> Data:
         """The data without records whose load does not hold the tooth flanks together.

@@ -39,15 +39,15 @@ def judged(
     leading = leading_sweep_effect(data, base, candidates)
     loaded = data if leading is None else data.loaded
     if loaded is data or leading is None:
-        return data, candidates, judge(data, base, candidates)
+        return _judged_from(data, base, candidates)
     if effect_named(leading).rattles:
         return _judged_on(loaded, candidates_of)
-    verdict = judge(data, base, candidates)
-    if verdict.status == "unlisted" or verdict.leaves_more_than_noise:
+    first = _judged_from(data, base, candidates)
+    if first[-1].status == "unlisted" or first[-1].leaves_more_than_noise:
         again = _judged_on(loaded, candidates_of)
         if _explains_by_a_clearance(again[-1]):
             return again
-    return data, candidates, verdict
+    return first
 
 
 def _judged_on(
@@ -55,8 +55,16 @@ def _judged_on(
 ) -> tuple[Data, list[Candidate], Verdict]:
     """Return data, candidates and the verdict on all these data."""
     base = fit(data)
-    candidates = candidates_of(data, base)
-    return data, candidates, judge(data, base, candidates)
+    return _judged_from(data, base, candidates_of(data, base))
+
+
+def _judged_from(
+    data: Data, base: Fit, candidates: list[Candidate]
+) -> tuple[Data, list[Candidate], Verdict]:
+    """Return data, with the noise that they were judged with, candidates and the verdict."""
+    verdict = judge(data, base, candidates)
+    renewed = None if verdict.noise_of is None else data.with_noise_of(verdict.noise_of)
+    return data if renewed is None else renewed, candidates, verdict
 
 
 def _explains_by_a_clearance(verdict: Verdict) -> bool:

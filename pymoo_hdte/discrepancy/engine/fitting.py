@@ -237,6 +237,10 @@ class Evidence(Protocol):
         """Return what the records kept out of the fit say of two fits; None without any."""
         ...
 
+    def with_noise_of(self, fitted: Fit) -> Evidence | None:
+        """Return the data with the noise of another model; None where theirs is about the same."""
+        ...
+
 
 class Unknowns:
     """Unknowns of a fit with a set of candidates: base parameters first, then theirs.

@@ -2,9 +2,8 @@
 
 Sets grow by the effects that could remove most of what is left, in total, in the part of the data
 that is explained worst, or beyond all forms of their laws, and by the base parameters that they
-leave at the bounds of their tolerances. Members of sets are tried by exchange, too, and each has to
-be earned. The chosen set is compared with those in which a part is replaced by another that
-explains as much by itself.
+leave at bounds. Members are tried by exchange, too, and each has to be earned. The chosen set is
+compared with those in which another effect that explains as much stands for a part of it.
 """
 
 from __future__ import annotations
@@ -37,18 +36,24 @@ class Search(FittedSets):
         Without any of them.
     candidates : sequence of Candidate
         Effects that may be missing, and base parameters that may be out of tolerance.
+    screened : sequence of Screened
+        The same beside the base, where they were screened.
     """
 
-    def __init__(self, data: Evidence, base: Fit, candidates: Sequence[Candidate]) -> None:
+    def __init__(
+        self,
+        data: Evidence,
+        base: Fit,
+        candidates: Sequence[Candidate],
+        screened: Sequence[Screened] = (),
+    ) -> None:
         super().__init__(data, base)
-        self.candidates = candidates
+        self.candidates, self.screened = candidates, screened
         self._extended: set[frozenset[str]] = set()
-        self._beside_base: dict[str, Screened] = {}
 
-    def singles(self, screened: Sequence[Screened]) -> None:
+    def singles(self) -> None:
         """Fit the most promising single effects, and the base parameters out of tolerance."""
-        rules = self.data.rules
-        self._beside_base = {one.candidate.label: one for one in screened}
+        rules, screened = self.data.rules, self.screened
         least = rules.promising_share * screened[0].reduction
         promising = [one for one in screened if one.reduction >= least]
         for one in varied(promising, rules.most_of_one_name)[: rules.most_fitted]:
@@ -72,9 +77,8 @@ class Search(FittedSets):
         for size in range(1, rules.most_effects):
             grown = self.of_size(size)[: rules.most_firsts if size == 1 else 1]
             for one in grown:
-                if not self.could_count(one):
-                    continue
-                if one is grown[0] or not leave_the_same(one, grown[0], rules):
+                same = one is not grown[0] and leave_the_same(one, grown[0], rules)
+                if self.could_count(one) and not same:
                     self._extend(one)
             self.finish_near(size + 1)
             if size == 1:
@@ -183,10 +187,7 @@ class Search(FittedSets):
                 self._prune(self.finished(one))
 
     def _extend(self, one: Hypothesis, by_part: bool = True) -> None:
-        """Fit a set with each of the effects that would remove most of what it leaves.
-
-        And with the base parameters that it leaves at their bounds, free.
-        """
+        """Fit a set with each effect that removes most of what it leaves, or with freed bounds."""
         label = label_of(one.candidates)
         if label in self._extended or label in self._left_out:
             return
@@ -230,7 +231,8 @@ class Search(FittedSets):
 
     def _known(self, others: Sequence[Candidate]) -> list[Screened]:
         """Return effects as screened beside the base; none where none was."""
-        return [self._beside_base[one.label] for one in others] if self._beside_base else []
+        known = {one.candidate.label: one for one in self.screened}
+        return [known[one.label] for one in others] if known else []
 
     def complete(self, chosen: Hypothesis) -> None:
         """Fit the sets in which a part of a chosen one is another that comes near it by itself.
@@ -281,8 +283,8 @@ class Search(FittedSets):
         """Fit sets in which one member is another form or a special case of it, at its port.
 
         Or a form of the effect that covers a base parameter, in place of all that are free. Curves
-        are replaced by each other one, too, where effects alone leave more than noise: beside a
-        first effect only those were tried that to first order take most of the rest.
+        are replaced by each other one, too, where effects alone leave more than noise: only those
+        that to first order take most of the rest were tried before.
         """
         open_to_curves = not (self.enough(one) or one.freed)
         for member in one.candidates:

@@ -33,7 +33,7 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     left_by,
     other_forms,
 )
-from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote
+from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     contains,
@@ -78,6 +78,8 @@ class Verdict:
     in_another_form : float or None
         Share of the misfit that another form of the named law removes, where only such a form
         explains it.
+    noise_of : Fit or None
+        Model with whose noise the data were judged, where it is not the one that they came with.
     """
 
     status: str
@@ -91,6 +93,7 @@ class Verdict:
     shown_in_held_out: bool = True
     probability: float | None = None
     in_another_form: float | None = None
+    noise_of: Fit | None = None
 
     @property
     def accepted(self) -> Fit:
@@ -138,11 +141,13 @@ def judge(
         return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
-    search = Search(data, base, searched)
+    search, noise_of = Search(data, base, searched, screened), None
     if known:
         search.resume(known)
     else:
-        search.singles(screened)
+        search.singles()
+        search, noise_of = _with_noise_of_first(search)
+        data, base = search.data, search.base
         search.grow()
     chosen = _chosen(search)
     if not known and len(chosen.members) > 1:
@@ -156,7 +161,7 @@ def judge(
         chosen = simpler_law(search, chosen)
     foreign: list[Hypothesis] = []
     if not (certain and chosen.listed):
-        foreign = in_another_form(search, chosen, () if known else screened)
+        foreign = in_another_form(search, chosen, () if known else search.screened)
         if not certain and explains_in_any_form(search, best_set(search)):
             # One of the effects that were fitted only now does so as it is listed.
             chosen, certain, foreign = _chosen(search), True, []
@@ -200,7 +205,28 @@ def judge(
         shown,
         sure,
         search.forms.share_in_another(chosen) if foreign else None,
+        noise_of,
     )
+
+
+def _with_noise_of_first(search: Search) -> tuple[Search, Fit | None]:
+    """Return the search with the noise of the first single effect, if that is then all there is.
+
+    With less noise than there is, further effects would be sought for what is none.
+    """
+    data, first = search.data, search.found[0]
+    if search.enough(first) or first.explained < data.rules.explained_share:
+        return search, None
+    renewed = data.with_noise_of(first.fit)
+    if renewed is None:
+        return search, None
+    fitted = fit(renewed, first.candidates, first.fit.values)
+    if not down_to_noise(fitted, search.degrees_of_freedom, data.rules):
+        return search, None
+    base, candidates = fit(renewed, start=search.base.values), search.candidates
+    again = Search(renewed, base, candidates, screen(renewed, base, candidates))
+    again.resume(search.found)
+    return again, first.fit
 
 
 def _chosen(search: Search) -> Hypothesis:

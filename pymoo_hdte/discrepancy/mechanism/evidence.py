@@ -98,6 +98,10 @@ class MeasuredData(WhitenedBalances):
         """Return None: held-out records of a mechanism are simulated, once the verdict stands."""
         return
 
+    def with_noise_of(self, fitted: Fit) -> None:
+        """Return None: the noise of measured motion and force is that of the sensors."""
+        return
+
     def with_rest(self, residuals: Vector) -> MeasuredData:
         """Return the data with whitened residuals (n,) beyond the sensors' noise as further noise.
 

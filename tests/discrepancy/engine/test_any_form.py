@@ -225,8 +225,8 @@ def test_beside_two_effects_a_third_is_not_fitted_to_errors_of_their_forms(monke
     base = fit(data)
 
     def sizes():
-        search = Search(data, base, laws)
-        search.singles(screen(data, base, laws))
+        search = Search(data, base, laws, screen(data, base, laws))
+        search.singles()
         search.grow()
         assert {one.label for one in search.found[0].candidates} == {SPRING, line}
         assert not search.enough(search.found[0])

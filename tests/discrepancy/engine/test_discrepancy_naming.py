@@ -209,6 +209,21 @@ def test_what_came_nowhere_near_is_only_evaluated_when_the_noise_is_renewed(ripp
     assert np.array_equal(found[far.label].values, far.fit.values)
 
 
+@pytest.mark.parametrize(("ratio", "sizes"), [(RULES.changed_noise_ratio, {1}), (1e9, {1, 2})])
+def test_nothing_is_sought_beside_an_effect_that_leaves_its_noise(ratio, sizes):
+    """A reaction, which carries more of each turn's own error to the torque, took a minute."""
+    (effect,) = of_labels([REACTION])[0].build((1.0,))
+    noisy = replace(EMPTY, reference_effects=(effect,))
+    data, _ = measured((effect,), np.random.default_rng(4), noisy)
+    data = replace(data, reference_effects=(), rules=replace(RULES, changed_noise_ratio=ratio))
+    verdict = verdict_on(data, FEW)
+    assert labels_of(verdict) == {REACTION}
+    assert {len(one.members) for one in (verdict.chosen, *verdict.alternatives)} == sizes
+    renewed = verdict.noise_of is not None
+    assert renewed == (sizes == {1})
+    assert renewed == (verdict.chosen.fit.chi_square < chi2.isf(1e-3, verdict.degrees_of_freedom))
+
+
 def test_two_effects_are_both_named():
     data = planted({RIPPLE: (0.003, 0.0), LINE: (1.0 * ARCSEC, 0.0)})
     verdict = verdict_on(data, FEW)
