@@ -110,7 +110,7 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
         data = data.loaded
     _check_steady(data)
     data, listed, verdict = judged(data, _candidates)
-    data, verdict = _with_noise_of(verdict, data, listed)
+    data, verdict = _judged_again(verdict, data, listed)
     return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
 
 
@@ -141,7 +141,7 @@ def _check_steady(data: Data) -> None:
         raise InvalidInput("believed.effects", names, allowed)
 
 
-def _with_noise_of(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
+def _judged_again(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
     """Judge again if the named effect changes the noise."""
     chosen = verdict.chosen
     if chosen is None or chosen.explained < data.rules.explained_share:

@@ -158,7 +158,7 @@ class Data(Observations):
         return replace(self, features=features, torsion=()) if features.records else None
 
     def with_noise_of(self, fitted: Fit) -> Data | None:
-        """Return the data with the noise of another model; None where theirs is about the same.
+        """Return the data with the noise of another model; None where it adds little to theirs.
 
         The non-repeatable error is a motion, which reaches all channels through the response of
         the drive, its effects included.

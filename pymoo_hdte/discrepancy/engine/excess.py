@@ -38,8 +38,15 @@ class Excess:
 
     def significant(self, rules: Rules) -> NDArray[np.bool_]:
         """Return for which parts, shape (parts,), the excess is significant."""
+        return np.asarray(self.of_parts > self._most_noise(rules))
+
+    def is_noise(self, rules: Rules) -> bool:
+        """Tell whether each part has as much as noise gives, neither more nor less."""
+        return bool(np.all(np.abs(self.of_parts) <= self._most_noise(rules)))
+
+    def _most_noise(self, rules: Rules) -> NDArray[np.float64]:
         noise = np.sqrt(2.0 * self.degrees_of_freedom.sum(axis=0))
-        return np.asarray(self.of_parts > rules.false_alarm_deviations * noise)
+        return np.asarray(rules.false_alarm_deviations * noise)
 
     @property
     def worst(self) -> NDArray[np.int_]:

@@ -159,10 +159,11 @@ class FittedSets:
             self._finished.add(label)
         return self._by_label[label]
 
-    def resume(self, known: Sequence[Hypothesis]) -> None:
+    def resume(self, known: Sequence[Hypothesis], go_on: bool = False) -> None:
         """Fit sets from the values that another search has found on nearly the same data.
 
         The chosen one first. Those that came nowhere near it or the best one are only evaluated.
+        Where the search is to ``go_on``, what it fits afterwards is fitted as in any search.
         """
         self._resumed = True
         chosen, best = known[0], min(known, key=lambda one: one.bic)
@@ -174,6 +175,7 @@ class FittedSets:
             self.finished(self._by_label[label_of(one.candidates)])
         for size in {len(one.members) for one in known}:
             self.finish_near(size)
+        self._resumed = not go_on
 
     def leave_out(self, one: Hypothesis) -> None:
         """Leave a set out of all that are compared: it is known under another name."""

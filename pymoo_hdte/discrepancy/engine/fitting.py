@@ -238,7 +238,7 @@ class Evidence(Protocol):
         ...
 
     def with_noise_of(self, fitted: Fit) -> Evidence | None:
-        """Return the data with the noise of another model; None where theirs is about the same."""
+        """Return the data with the noise of another model; None where it adds little to theirs."""
         ...
 
 

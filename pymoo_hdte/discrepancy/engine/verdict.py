@@ -146,7 +146,7 @@ def judge(
         search.resume(known)
     else:
         search.singles()
-        search, noise_of = _with_noise_of_first(search)
+        search, noise_of = _renewed_search(search)
         data, base = search.data, search.base
         search.grow()
     chosen = _chosen(search)
@@ -209,23 +209,24 @@ def judge(
     )
 
 
-def _with_noise_of_first(search: Search) -> tuple[Search, Fit | None]:
-    """Return the search with the noise of the first single effect, if that is then all there is.
+def _renewed_search(search: Search) -> tuple[Search, Fit | None]:
+    """Return the search with the noise of the best single effect, if that is then all there is.
 
-    With less noise than there is, further effects would be sought for what is none.
+    With less noise than there is, further effects would be sought for what is none. A wrong effect
+    that lets much noise through may hide others in it, but hardly as much as noise in each part.
     """
     data, first = search.data, search.found[0]
-    if search.enough(first) or first.explained < data.rules.explained_share:
-        return search, None
-    renewed = data.with_noise_of(first.fit)
+    explained = first.listed and first.explained >= data.rules.explained_share
+    renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
     if renewed is None:
-        return search, None
-    fitted = fit(renewed, first.candidates, first.fit.values)
-    if not down_to_noise(fitted, search.degrees_of_freedom, data.rules):
         return search, None
     base, candidates = fit(renewed, start=search.base.values), search.candidates
     again = Search(renewed, base, candidates, screen(renewed, base, candidates))
-    again.resume(search.found)
+    again.resume(search.found, go_on=True)
+    found, quiet = again.found[0], down_to_noise(base, search.degrees_of_freedom, data.rules)
+    alone = again.enough(found) and renewed.excess(found.fit).is_noise(data.rules)
+    if quiet or found.label != first.label or not alone or again.held_by_sensors(found):
+        return search, None
     return again, first.fit
 
 

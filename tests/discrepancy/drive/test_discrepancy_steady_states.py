@@ -10,6 +10,7 @@ from planted_features import known_data, library, listed, measured, with_sweep
 from pymoo_hdte.discrepancy.drive import rattling
 from pymoo_hdte.discrepancy.drive.steady_states import merged
 from pymoo_hdte.discrepancy.engine.candidate import Layout
+from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.drive.effects import LawAtPort
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import SoftWindup
@@ -71,9 +72,13 @@ def named(*names):
     return SimpleNamespace(effects=[SimpleNamespace(name=name, listed=True) for name in names])
 
 
-def answer(*names, status="named", more=False, rivals=()):
+def answer(*names, status="named", more=False, rivals=(), noise_of=None):
     return SimpleNamespace(
-        status=status, chosen=named(*names), equivalent=rivals, leaves_more_than_noise=more
+        status=status,
+        chosen=named(*names),
+        equivalent=rivals,
+        leaves_more_than_noise=more,
+        noise_of=noise_of,
     )
 
 
@@ -109,6 +114,16 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
     found, _, verdict = rattling.judged(swept, lambda some, base: library(some))
     assert len(found.features.records) == kept
     assert verdict is (of_all if kept == len(LOADED_OR_NOT) else of_loaded)
+
+
+def test_data_have_the_noise_that_they_were_judged_with(monkeypatch, swept):
+    (law,) = (one for one in library(swept) if one.label == "kinematic_reaction:input")
+    reaction = fit(swept, [law], steps=0)
+    monkeypatch.setattr(
+        rattling, "judge", lambda *_: answer("kinematic_reaction", noise_of=reaction)
+    )
+    found, _, _ = rattling.judged(swept, lambda some, base: library(some))
+    assert found.reference_effects == reaction.effects
 
 
 @pytest.mark.parametrize(("name", "kept"), [("backlash", 6), (None, 8)])

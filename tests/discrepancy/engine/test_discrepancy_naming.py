@@ -224,6 +224,16 @@ def test_nothing_is_sought_beside_an_effect_that_leaves_its_noise(ratio, sizes):
     assert renewed == (verdict.chosen.fit.chi_square < chi2.isf(1e-3, verdict.degrees_of_freedom))
 
 
+@pytest.mark.parametrize(
+    ("of_records", "noise"),
+    [((20.0, -30.0), True), ((60.0, 60.0), False), ((-60.0, -60.0), False)],
+)
+def test_a_part_is_noise_if_it_has_neither_more_nor_less(of_records, noise):
+    """Four standard deviations of two records with 200 degrees of freedom each are 113."""
+    excess = Excess(np.array([of_records, (0.0, 0.0)]).T, np.full((2, 2), 200.0))
+    assert excess.is_noise(RULES) == noise
+
+
 def test_two_effects_are_both_named():
     data = planted({RIPPLE: (0.003, 0.0), LINE: (1.0 * ARCSEC, 0.0)})
     verdict = verdict_on(data, FEW)
