@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -33,16 +34,14 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     left_by,
     other_forms,
 )
+from pymoo_hdte.discrepancy.engine.equivalents import distinct, rivals
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
-    contains,
     down_to_noise,
-    is_bounded,
 )
-from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.engine.screening import screen
+from pymoo_hdte.discrepancy.engine.screening import Screened, screen
 from pymoo_hdte.discrepancy.engine.search import Search
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted", "partial")
@@ -141,72 +140,21 @@ def judge(
         return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
-    search, noise_of = Search(data, base, searched, screened), None
+    search = Search(data, base, searched, screened)
     if known:
         search.resume(known)
-    else:
-        search.singles()
-        search, noise_of = _renewed_search(search)
-        data, base = search.data, search.base
-        search.grow()
+        return _verdict(search, _answer(search, _chosen(search), ()))
+    search.singles()
+    search, noise_of = _renewed_search(search)
+    search.grow()
     chosen = _chosen(search)
-    if not known and len(chosen.members) > 1:
+    if len(chosen.members) > 1:
         search.complete(chosen)
         chosen = _chosen(search)
-    others = [one for one in candidates if one.instead_of]
-    if not known and replaced(search, chosen, others):
+    if replaced(search, chosen, [one for one in candidates if one.instead_of]):
         chosen = _chosen(search)
-    certain = explains_in_any_form(search, chosen)
-    if not certain:
-        chosen = simpler_law(search, chosen)
-    foreign: list[Hypothesis] = []
-    if not (certain and chosen.listed):
-        foreign = in_another_form(search, chosen, () if known else search.screened)
-        if not certain and explains_in_any_form(search, best_set(search)):
-            # One of the effects that were fitted only now does so as it is listed.
-            chosen, certain, foreign = _chosen(search), True, []
-    if foreign:
-        equivalent = [*foreign[1:], *([chosen] if certain else [])]
-        chosen, certain = foreign[0], True
-    else:
-        equivalent = _rivals(search, chosen)
-    together = [] if certain else twins(search, chosen)
-    in_part = not certain and stands_out(search, chosen, together)
-    equivalent += together if in_part else []
-    if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
-        equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
-        chosen = listed[0]
-    vote = data.held_out_vote(base, chosen.fit)
-    shown = vote is None or vote.counts(rules)
-    doubts = doubts_of(search, chosen, vote if shown else None) + other_forms(search, chosen)
-    if in_part:
-        certain, left = True, left_by(chosen.fit.chi_square / degrees_of_freedom)
-        doubts += [left] if left not in doubts else []
-    if certain and not foreign:
-        # The rules of earning may pass over a set for which the evidence speaks: both are told.
-        equivalent += in_one_law(search, chosen)
-        equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
-    equivalent = _distinct(chosen, equivalent)
-    status = _status(chosen, certain, equivalent, doubts)
-    rivals = tuple(equivalent) if status == "class" else ()
-    compared = (chosen, *rivals) if foreign else search.found
-    # A class that is not all is no more certain than a name in part.
-    like = "partial" if in_part and status == "class" else status
-    sure = probability.of_names(like, chosen, rivals, compared, degrees_of_freedom, rules)
-    return Verdict(
-        status,
-        base,
-        chosen,
-        tuple(one for one in search.found if one is not chosen),
-        rivals,
-        degrees_of_freedom,
-        rules,
-        tuple(doubts),
-        shown,
-        sure,
-        search.forms.share_in_another(chosen) if foreign else None,
-        noise_of,
-    )
+    answer = _answer(search, chosen, search.screened)
+    return replace(_verdict(search, answer), noise_of=noise_of)
 
 
 def _renewed_search(search: Search) -> tuple[Search, Fit | None]:
@@ -235,44 +183,79 @@ def _chosen(search: Search) -> Hypothesis:
     return confirmed(search, special_case(search, best_set(search)))
 
 
-def _rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the sets that explain the data as well as the chosen one by something else.
+class _Answer(NamedTuple):
+    """A chosen set, sets that may be told with it, and what is certain of them.
 
-    What contains one of them is a further one only where it comes near that, too.
+    ``certain`` is that it explains the data, ``foreign`` that another form of its law does, and
+    ``in_part`` that it stands out although more is left.
     """
-    found = [
-        one
-        for one in search.found
-        if one is not chosen
-        and _comes_near(search, one, chosen)
-        and explains_in_any_form(search, one)
-        and search.earned(one)
-    ]
-    return [
-        one
-        for one in found
-        if all(
-            _comes_near(search, one, special)
-            for special in found
-            if special.names != one.names and contains(one, special)
-        )
-    ]
+
+    chosen: Hypothesis
+    equivalent: list[Hypothesis]
+    certain: bool
+    foreign: bool
+    in_part: bool
 
 
-def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether a set says something else than another that the data do not tell from it.
+def _answer(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) -> _Answer:
+    """Return what a search tells of its chosen set: itself, or what stands for it."""
+    certain = explains_in_any_form(search, chosen)
+    if not certain:
+        chosen = simpler_law(search, chosen)
+    foreign: list[Hypothesis] = []
+    if not (certain and chosen.listed):
+        foreign = in_another_form(search, chosen, screened)
+        if not certain and explains_in_any_form(search, best_set(search)):
+            # One of the effects that were fitted only now does so as it is listed.
+            chosen, certain, foreign = _chosen(search), True, []
+    if foreign:
+        equivalent = [*foreign[1:], *([chosen] if certain else [])]
+        chosen, certain = foreign[0], True
+    else:
+        equivalent = rivals(search, chosen)
+    together = [] if certain else twins(search, chosen)
+    in_part = not certain and stands_out(search, chosen, together)
+    equivalent += together if in_part else []
+    if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
+        equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
+        chosen = listed[0]
+    return _Answer(chosen, equivalent, certain, bool(foreign), in_part)
 
-    A law that contains the other one and ends at its bound is the other one. Where its further
-    unknowns are determined, the evidence has told; where they are not, it is a rival.
-    """
-    near = search.alike(one, other) or undecided(one, other, search.data.rules)
-    return near and not (contains(one, other) and is_bounded(one.fit))
 
-
-def _distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Return the sets that name other effects, each once: one order or another is one effect."""
-    of_names = {one.names: one for one in reversed(equivalent) if one.names != chosen.names}
-    return list(reversed(of_names.values()))
+def _verdict(search: Search, answer: _Answer) -> Verdict:
+    """Return the verdict: an answer with its doubts, status and probability."""
+    data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
+    chosen, equivalent, certain, foreign, in_part = answer
+    vote = data.held_out_vote(search.base, chosen.fit)
+    shown = vote is None or vote.counts(rules)
+    doubts = doubts_of(search, chosen, vote if shown else None) + other_forms(search, chosen)
+    if in_part:
+        left = left_by(chosen.fit.chi_square / degrees_of_freedom)
+        doubts += [left] if left not in doubts else []
+    if (certain and not foreign) or in_part:
+        # The rules of earning may pass over a set for which the evidence speaks: both are told.
+        equivalent += in_one_law(search, chosen)
+        equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
+    equivalent = distinct(chosen, equivalent)
+    status = _status(chosen, certain or in_part, equivalent, doubts)
+    others = tuple(equivalent) if status == "class" else ()
+    compared = (chosen, *others) if foreign else search.found
+    # A class that is not all is no more certain than a name in part.
+    like = "partial" if in_part and status == "class" else status
+    sure = probability.of_names(like, chosen, others, compared, degrees_of_freedom, rules)
+    return Verdict(
+        status,
+        search.base,
+        chosen,
+        tuple(one for one in search.found if one is not chosen),
+        others,
+        degrees_of_freedom,
+        rules,
+        tuple(doubts),
+        shown,
+        sure,
+        search.forms.share_in_another(chosen) if foreign else None,
+    )
 
 
 def _status(

@@ -14,13 +14,13 @@ from pymoo_hdte.discrepancy.drive.forms.corrections import (
     Correction,
     LoadRate,
 )
-from pymoo_hdte.discrepancy.engine import any_form, choice, verdict
+from pymoo_hdte.discrepancy.engine import any_form, choice, equivalents
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.equivalents import undecided
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import alike, hypothesis_of
 from pymoo_hdte.discrepancy.engine.membership import is_earned
-from pymoo_hdte.discrepancy.engine.nesting import undecided
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
@@ -265,7 +265,7 @@ def test_one_effect_at_one_order_or_another_is_one_member_of_a_class():
     """A play that varies once or twice in a turn made four of a class of three effects."""
     soft, once, twice = a_set(a_law("soft")), *(a_set(a_law("varying", order=k)) for k in (1, 2))
     same = a_set(a_law("soft", order=1.0))
-    assert verdict._distinct(soft, [once, twice, same]) == [once]
+    assert equivalents.distinct(soft, [once, twice, same]) == [once]
 
 
 @pytest.mark.parametrize(("evidence", "members"), [(1122.0, 1), (1105.0, 2)])
@@ -273,7 +273,7 @@ def test_what_contains_a_member_of_a_class_has_to_be_a_rival_of_that(
     evidence, members, monkeypatch
 ):
     """Two frictions beside three springs made a class of five, of which two had needless terms."""
-    monkeypatch.setattr(verdict, "explains_in_any_form", lambda search, one: True)
+    monkeypatch.setattr(equivalents, "explains_in_any_form", lambda search, one: True)
     level, fading = unknown("level", 0.0, 1.0, 0.1), unknown("excess", 0.0, 1.0, 0.1)
     dry = a_law("dry", "output", [level])
     falling = a_law("falling", "output", [level, fading], holds=("dry",))
@@ -288,10 +288,10 @@ def test_what_contains_a_member_of_a_class_has_to_be_a_rival_of_that(
         alike=lambda one, other: alike(one, other, 1000, RULES, overlap=True),
         earned=lambda one: True,
     )
-    assert verdict._rivals(search, chosen) == [rival, further][:members]
+    assert equivalents.rivals(search, chosen) == [rival, further][:members]
     # One effect at two orders is no special case of itself.
     search.found = [chosen, rival, a_set(dry, a_law("backlash", order=2.0), chi_square=1105.0)]
-    assert verdict._rivals(search, chosen) == search.found[1:]
+    assert equivalents.rivals(search, chosen) == search.found[1:]
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,60 @@
-"""Whether data tell a law from its special case: a play that varies from one that does not."""
+"""Sets that explain the data as well as a chosen one by something else.
+
+Or that are a special case of it, as a play that does not vary, where data do not tell the two.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.doubts import explains_in_any_form
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains, differing
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains, differing, is_bounded
 from pymoo_hdte.discrepancy.engine.rules import Rules
+from pymoo_hdte.discrepancy.engine.search import Search
+
+
+def rivals(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return the sets that explain the data as well as the chosen one by something else.
+
+    What contains one of them is a further one only where it comes near that, too.
+    """
+    found = [
+        one
+        for one in search.found
+        if one is not chosen
+        and _comes_near(search, one, chosen)
+        and explains_in_any_form(search, one)
+        and search.earned(one)
+    ]
+    return [
+        one
+        for one in found
+        if all(
+            _comes_near(search, one, special)
+            for special in found
+            if special.names != one.names and contains(one, special)
+        )
+    ]
+
+
+def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
+    """Tell whether a set says something else than another that the data do not tell from it.
+
+    A law that contains the other one and ends at its bound is the other one. Where its further
+    unknowns are determined, the evidence has told; where they are not, it is a rival.
+    """
+    near = search.alike(one, other) or undecided(one, other, search.data.rules)
+    return near and not (contains(one, other) and is_bounded(one.fit))
+
+
+def distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Return the sets that name other effects, each once: one order or another is one effect."""
+    of_names = {one.names: one for one in reversed(equivalent) if one.names != chosen.names}
+    return list(reversed(of_names.values()))
 
 
 def undecided(one: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
