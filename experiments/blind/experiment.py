@@ -14,6 +14,7 @@ from experiments.blind.figures import confusion_matrix, reliability_diagram
 from experiments.blind.outcome import Outcome
 from experiments.blind.reliability import reliability_table
 from experiments.blind.rig.visible import LEAST
+from experiments.blind.runs import RUNS, read_runs, runs_table
 from experiments.blind.scoring import BlindJob
 from experiments.blind.sentences import in_one_sentence, of_the_first_page
 from experiments.blind.tables import (
@@ -66,6 +67,7 @@ def run(context: Context) -> Result:
 
 def _tables(outcomes: list[Outcome]) -> tuple[Table, ...]:
     return (
+        runs_table(read_runs(DATA / RUNS)),
         wrong_table(outcomes),
         *times_tables(outcomes),
         reliability_table(outcomes),

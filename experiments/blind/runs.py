@@ -1,0 +1,125 @@
+"""All blind runs: what came of each with the code of its time, and of all together.
+
+Only the outcome of the last run is kept case by case. A run starts where the one before it ended,
+at cases that nobody has seen, so that a row is added for each and none is ever changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+from experiments.blind.cases import all_cases
+from experiments.blind.outcome import Outcome
+from experiments.runner.committed import read_rows
+from experiments.runner.result import Cell, Column, Table
+from pymoo_hdte.io.text_table import csv_text
+
+RUNS = "blind_runs.csv"
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Counts of cases and of what came out, for each what it is a share of and its number."""
+
+    plain: int
+    plain_wrong: int
+    single: int
+    single_right: int
+    pair: int
+    pair_both: int
+    triple: int
+    triple_two: int
+    clean: int
+    clean_alarms: int
+    interval: int
+    interval_holds: int
+
+    def __add__(self, other: Counts) -> Counts:
+        pairs = zip(astuple(self), astuple(other), strict=True)
+        return Counts(*(one + two for one, two in pairs))
+
+
+@dataclass(frozen=True)
+class BlindRun:
+    """The cases from the first to the last of the list, counted from 1, and the code they met."""
+
+    first: int
+    last: int
+    code: str
+    counts: Counts
+
+
+def run_of(outcomes: Sequence[Outcome], code: str) -> BlindRun:
+    """Return the run of some outcomes, which stand together in the list."""
+    by_kind = {
+        kind: [one for one in outcomes if one.case.kind == kind]
+        for kind in ("single", "pair", "triple", "none")
+    }
+    plain = [one for one in outcomes if one.confident]
+    first = all_cases().index(outcomes[0].case) + 1
+    counts = Counts(
+        len(plain),
+        sum(one.wrong_confident for one in plain),
+        len(by_kind["single"]),
+        sum(one.right for one in by_kind["single"]),
+        len(by_kind["pair"]),
+        sum(one.all_named for one in by_kind["pair"]),
+        len(by_kind["triple"]),
+        sum(one.two_named for one in by_kind["triple"]),
+        len(by_kind["none"]),
+        sum(one.status != "adequate" for one in by_kind["none"]),
+        sum(int(one.numbers.get("quantities", 0)) for one in outcomes),
+        sum(int(one.numbers.get("quantities_covered", 0)) for one in outcomes),
+    )
+    return BlindRun(first, first + len(outcomes) - 1, code, counts)
+
+
+def read_runs(path: Path) -> list[BlindRun]:
+    """Read what `format_runs` wrote."""
+    return [
+        BlindRun(
+            int(row["first"]),
+            int(row["last"]),
+            row["code"],
+            Counts(*(int(row[one.name]) for one in fields(Counts))),
+        )
+        for row in read_rows(path)
+    ]
+
+
+def format_runs(runs: Sequence[BlindRun]) -> str:
+    """Return the CSV text of runs."""
+    columns = ["first", "last", "code", *(one.name for one in fields(Counts))]
+    rows = [(one.first, one.last, one.code, *astuple(one.counts)) for one in runs]
+    return csv_text(columns, rows)
+
+
+def total(runs: Sequence[BlindRun]) -> Counts:
+    """Return the counts of several runs together."""
+    return sum((one.counts for one in runs[1:]), runs[0].counts)
+
+
+def runs_table(runs: Sequence[BlindRun]) -> Table:
+    """Return a row a run, all of them together last."""
+    rows: list[tuple[Cell, ...]] = [
+        (f"{one.first} to {one.last}", one.code, *astuple(one.counts)) for one in runs
+    ]
+    rows.append((f"{runs[0].first} to {runs[-1].last}", "all", *astuple(total(runs))))
+    groups = {
+        "plain answers": "wrong",
+        "one effect": "right",
+        "two effects": "both",
+        "three effects": "two",
+        "nothing hidden": "alarms",
+        "95 % intervals": "hold",
+    }
+    columns = [Column("cases"), Column("code")]
+    for group, outcome in groups.items():
+        columns += [Column("of", group=group), Column(outcome, group=group)]
+    note = (
+        "Each run met cases that nobody had seen, with the code of its time, which the runs "
+        "before it had led to. Answers are counted as above, by the rules of now."
+    )
+    return Table("runs", "All runs so far", tuple(columns), tuple(rows), note=note)

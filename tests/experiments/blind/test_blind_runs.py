@@ -1,0 +1,43 @@
+"""The list of all blind runs, which the pooled figures of the pages come from."""
+
+from itertools import pairwise
+
+import pytest
+
+from experiments.blind.data import read_outcomes
+from experiments.blind.experiment import OUTCOMES, SECONDS
+from experiments.blind.runs import RUNS, Counts, format_runs, read_runs, run_of, total
+from experiments.runner.committed import DATA
+
+ALL = read_runs(DATA / RUNS)
+
+
+def test_the_last_run_is_that_of_the_stored_outcome():
+    outcomes = read_outcomes(DATA / OUTCOMES, DATA / SECONDS)
+    assert ALL[-1] == run_of(outcomes, ALL[-1].code)
+
+
+def test_each_run_starts_where_the_one_before_it_ended():
+    assert ALL[0].first == 1
+    assert all(later.first == earlier.last + 1 for earlier, later in pairwise(ALL))
+
+
+@pytest.mark.parametrize("run", ALL, ids=lambda run: str(run.first))
+def test_no_more_came_out_than_was_run(run):
+    counts = vars(run.counts)
+    names = list(counts)
+    assert all(counts[part] <= counts[of] for of, part in zip(names[::2], names[1::2], strict=True))
+    hidden = sum(counts[name] for name in ("single", "pair", "triple", "clean"))
+    assert hidden <= run.last - run.first + 1
+
+
+def test_runs_are_read_as_they_are_written(tmp_path):
+    (tmp_path / RUNS).write_text(format_runs(ALL))
+    assert read_runs(tmp_path / RUNS) == ALL
+
+
+def test_counts_of_runs_add_up():
+    assert total(ALL[:1]) == ALL[0].counts
+    assert total(ALL) == Counts(
+        *(sum(each) for each in zip(*(vars(one.counts).values() for one in ALL), strict=True))
+    )
