@@ -3,10 +3,12 @@
 import re
 
 from places import README, WORDS
+from scipy.stats import binomtest
 
 from experiments.blind.cases import all_cases
 from experiments.blind.data import read_outcomes
 from experiments.blind.experiment import OUTCOMES, SECONDS
+from experiments.blind.runs import RUNS, read_runs, total
 from experiments.runner.committed import DATA
 
 
@@ -45,3 +47,27 @@ def test_the_readme_says_what_came_of_the_blind_campaigns():
     assert f"of {len(singles)} single effects it found {sum(one.right for one in singles)}" in said
     both = sum(one.all_named for one in pairs)
     assert f"it named both in {both} of {len(pairs)}" in said
+
+
+def test_pooled_figures_are_those_of_the_runs():
+    runs = read_runs(DATA / RUNS)
+    (first,) = set(re.findall(r"since case (\d+)", WORDS))
+    since = total([one for one in runs if one.first >= int(first)])
+
+    def share(value):
+        return f"{value:.2f}".removeprefix("0")
+
+    def pooled(good, of):
+        found = binomtest(good, of)
+        low, high = found.proportion_ci(method="exact")
+        return share(found.statistic), f"({share(low)} to {share(high)})"
+
+    both, interval = pooled(since.pair_both, since.pair)
+    assert f"{both} {interval} of the {since.pair} since case {first}" in WORDS
+    holds, interval = pooled(since.interval_holds, since.interval)
+    assert f"{holds} {interval} of {since.interval} since case {first}" in WORDS
+    low, high = binomtest(since.plain_wrong, since.plain).proportion_ci(method="exact")
+    wrong = f"({f'{100 * low:.1f}'.removeprefix('0')} to {100 * high:.1f} %)"
+    assert f"{since.plain_wrong} of {since.plain} {wrong} since case {first}" in WORDS
+    before = total(runs[:-1])
+    assert f"{before.plain_wrong} of their {before.plain} plain answers were wrong" in WORDS
