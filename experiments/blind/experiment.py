@@ -2,8 +2,8 @@
 
 Without ``--full`` the report is made from ``experiments/data/blind.csv``, the committed outcome of
 the cases that have been run, which stand together in the list; with it the list is run (of it
-``--cases 97-192``), goes on where it was interrupted, and leaves the same file, and that of the
-seconds, in the results folder.
+``--cases 97-192``), goes on where it was interrupted, and leaves the same file, that of the
+seconds and the row of the run in the results folder.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from experiments.blind.figures import confusion_matrix, reliability_diagram
 from experiments.blind.outcome import Outcome
 from experiments.blind.reliability import reliability_table
 from experiments.blind.rig.visible import LEAST
-from experiments.blind.runs import RUNS, read_runs, runs_table
+from experiments.blind.runs import RUNS, format_runs, read_runs, run_of, runs_table
 from experiments.blind.scoring import BlindJob
 from experiments.blind.sentences import in_one_sentence, of_the_first_page
 from experiments.blind.tables import (
@@ -54,12 +54,14 @@ def run(context: Context) -> Result:
     """Run the cases or read their outcomes, and hold the scores against what must be reached."""
     outcomes = _campaign(context) if context.full else _committed()
     stored = stored_outcome(context, "blind") if outcomes else ()
+    # What has just been run stands in no row yet.
+    runs = (runs_table(read_runs(DATA / RUNS)),) if outcomes and not context.full else ()
     return Result(
         title="Blind campaigns: what the discrepancy workflow finds",
         command=context.command("blind"),
         answer=in_one_sentence(outcomes),
         paragraphs=(*stored, SETTING, _extent(outcomes)),
-        tables=(must_reach_table(outcomes), *(_tables(outcomes) if outcomes else ())),
+        tables=(must_reach_table(outcomes), *runs, *(_tables(outcomes) if outcomes else ())),
         pictures=_pictures(outcomes) if outcomes else (),
         first_page={NEW: of_the_first_page(outcomes)} if outcomes else {},
     )
@@ -67,7 +69,6 @@ def run(context: Context) -> Result:
 
 def _tables(outcomes: list[Outcome]) -> tuple[Table, ...]:
     return (
-        runs_table(read_runs(DATA / RUNS)),
         wrong_table(outcomes),
         *times_tables(outcomes),
         reliability_table(outcomes),
@@ -128,6 +129,7 @@ def _campaign(context: Context) -> list[Outcome]:
     target, seconds = context.out / "blind", context.out / TIMES / "blind"
     write_atomically(target / OUTCOMES, format_outcomes(outcomes).encode())
     write_atomically(seconds / SECONDS, format_seconds(outcomes).encode())
+    write_atomically(target / RUNS, format_runs([run_of(outcomes)]).encode())
     return outcomes
 
 

@@ -1,7 +1,8 @@
 """All blind runs: what came of each with the code of its time, and of all together.
 
 Only the outcome of the last run is kept case by case. A run starts where the one before it ended,
-at cases that nobody has seen, so that a row is added for each and none is ever changed.
+at cases that nobody has seen. ``python -m experiments blind --full`` leaves the row of what it ran
+in the results; who stores it gives the commit that ran, which was stated before.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ RUNS = "blind_runs.csv"
 
 @dataclass(frozen=True)
 class Counts:
-    """Counts of cases and of what came out, for each what it is a share of and its number."""
+    """Numbers of answers or cases, each followed by how many of them came out as its name says."""
 
     plain: int
     plain_wrong: int
@@ -51,27 +52,28 @@ class BlindRun:
     counts: Counts
 
 
-def run_of(outcomes: Sequence[Outcome], code: str) -> BlindRun:
-    """Return the run of some outcomes, which stand together in the list."""
+def run_of(outcomes: Sequence[Outcome], code: str = "") -> BlindRun:
+    """Return the run of some outcomes, which stand together in the list, and of a commit."""
     by_kind = {
         kind: [one for one in outcomes if one.case.kind == kind]
         for kind in ("single", "pair", "triple", "none")
     }
     plain = [one for one in outcomes if one.confident]
     first = all_cases().index(outcomes[0].case) + 1
+    covered = [held for one in outcomes for held in one.covered]
     counts = Counts(
-        len(plain),
-        sum(one.wrong_confident for one in plain),
-        len(by_kind["single"]),
-        sum(one.right for one in by_kind["single"]),
-        len(by_kind["pair"]),
-        sum(one.all_named for one in by_kind["pair"]),
-        len(by_kind["triple"]),
-        sum(one.two_named for one in by_kind["triple"]),
-        len(by_kind["none"]),
-        sum(one.status != "adequate" for one in by_kind["none"]),
-        sum(int(one.numbers.get("quantities", 0)) for one in outcomes),
-        sum(int(one.numbers.get("quantities_covered", 0)) for one in outcomes),
+        plain=len(plain),
+        plain_wrong=sum(one.wrong_confident for one in plain),
+        single=len(by_kind["single"]),
+        single_right=sum(one.right for one in by_kind["single"]),
+        pair=len(by_kind["pair"]),
+        pair_both=sum(one.all_named for one in by_kind["pair"]),
+        triple=len(by_kind["triple"]),
+        triple_two=sum(one.two_named for one in by_kind["triple"]),
+        clean=len(by_kind["none"]),
+        clean_alarms=sum(one.status != "adequate" for one in by_kind["none"]),
+        interval=len(covered),
+        interval_holds=sum(covered),
     )
     return BlindRun(first, first + len(outcomes) - 1, code, counts)
 

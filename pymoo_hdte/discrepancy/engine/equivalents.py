@@ -1,6 +1,6 @@
 """Sets that explain the data as well as a chosen one by something else.
 
-Or that are a special case of it, as a play that does not vary, where data do not tell the two.
+And whether data tell a law from its special case: a play that varies from one that does not.
 """
 
 from __future__ import annotations

@@ -41,7 +41,10 @@ class Excess:
         return np.asarray(self.of_parts > self._most_noise(rules))
 
     def is_noise(self, rules: Rules) -> bool:
-        """Tell whether each part has as much as noise gives, neither more nor less."""
+        """Tell whether each part has as much as noise gives, neither more nor less.
+
+        Less does not show in a part with fewer than some thirty degrees of freedom.
+        """
         return bool(np.all(np.abs(self.of_parts) <= self._most_noise(rules)))
 
     def _most_noise(self, rules: Rules) -> NDArray[np.float64]:

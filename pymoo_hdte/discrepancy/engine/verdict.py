@@ -161,21 +161,30 @@ def _renewed_search(search: Search) -> tuple[Search, Fit | None]:
     """Return the search with the noise of the best single effect, if that is then all there is.
 
     With less noise than there is, further effects would be sought for what is none. A wrong effect
-    that lets much noise through may hide others in it, but hardly as much as noise in each part.
+    that lets much noise through may hide others in it, but hardly as much as noise in each part. An
+    effect beside which sensors are far from what is stated is not all, and a base that needs no
+    effect with that noise says nothing of this one.
     """
     data, first = search.data, search.found[0]
     explained = first.listed and first.explained >= data.rules.explained_share
     renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
-    if renewed is None:
+    if renewed is None or not _is_all(renewed, fit(renewed, first.candidates, first.fit.values)):
         return search, None
     base, candidates = fit(renewed, start=search.base.values), search.candidates
+    if down_to_noise(base, search.degrees_of_freedom, data.rules):
+        return search, None
     again = Search(renewed, base, candidates, screen(renewed, base, candidates))
     again.resume(search.found, go_on=True)
-    found, quiet = again.found[0], down_to_noise(base, search.degrees_of_freedom, data.rules)
-    alone = again.enough(found) and renewed.excess(found.fit).is_noise(data.rules)
-    if quiet or found.label != first.label or not alone or again.held_by_sensors(found):
-        return search, None
-    return again, first.fit
+    found = again.found[0]
+    same = found.label == first.label and _is_all(renewed, found.fit)
+    return (again, first.fit) if same and not again.held_by_sensors(found) else (search, None)
+
+
+def _is_all(data: Evidence, fitted: Fit) -> bool:
+    """Tell whether a fit leaves noise, as much as there is in each part of the data."""
+    degrees_of_freedom = len(fitted.residuals) - fitted.n_base
+    noise = down_to_noise(fitted, degrees_of_freedom, data.rules)
+    return noise and data.excess(fitted).is_noise(data.rules)
 
 
 def _chosen(search: Search) -> Hypothesis:
@@ -225,7 +234,8 @@ def _answer(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) ->
 def _verdict(search: Search, answer: _Answer) -> Verdict:
     """Return the verdict: an answer with its doubts, status and probability."""
     data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
-    chosen, equivalent, certain, foreign, in_part = answer
+    chosen, told, certain, foreign, in_part = answer
+    equivalent = list(told)
     vote = data.held_out_vote(search.base, chosen.fit)
     shown = vote is None or vote.counts(rules)
     doubts = doubts_of(search, chosen, vote if shown else None) + other_forms(search, chosen)

@@ -9,7 +9,7 @@ from planted_features import CONDITIONS, known_data, library, measured, with_swe
 from scipy.stats import chi2
 
 from pymoo_hdte.discrepancy.drive.objective import Objective
-from pymoo_hdte.discrepancy.engine import hypothesis, membership, search
+from pymoo_hdte.discrepancy.engine import fitted_sets, hypothesis, membership, search
 from pymoo_hdte.discrepancy.engine import verdict as naming
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Layout
@@ -209,9 +209,28 @@ def test_what_came_nowhere_near_is_only_evaluated_when_the_noise_is_renewed(ripp
     assert np.array_equal(found[far.label].values, far.fit.values)
 
 
-@pytest.mark.parametrize(("ratio", "sizes"), [(RULES.changed_noise_ratio, {1}), (1e9, {1, 2})])
-def test_nothing_is_sought_beside_an_effect_that_leaves_its_noise(ratio, sizes):
+@pytest.mark.parametrize("go_on", [True, False])
+def test_a_search_that_goes_on_fits_further_sets_from_all_starts(monkeypatch, ripple, go_on):
+    data, verdict = ripple
+    again = search.Search(data, verdict.base, ())
+    again.resume([verdict.chosen], go_on=go_on)
+    asked = []
+    monkeypatch.setattr(fitted_sets, "best_fit", lambda data, one, *_: asked.append(one) or one.fit)
+    (line,) = of_labels([LINE])
+    start = np.append(verdict.base.values, line.starts[0])
+    again.finished(again.fitted((line,), start, steps=0))
+    assert bool(asked) == go_on
+
+
+@pytest.mark.parametrize(
+    ("ratio", "noise", "sizes"),
+    [(RULES.changed_noise_ratio, True, {1}), (RULES.changed_noise_ratio, False, {1, 2}),
+     (1e9, True, {1, 2})],
+)  # fmt: skip
+def test_nothing_is_sought_beside_an_effect_that_leaves_its_noise(monkeypatch, ratio, noise, sizes):
     """A reaction, which carries more of each turn's own error to the torque, took a minute."""
+    if not noise:
+        monkeypatch.setattr(Excess, "is_noise", lambda *_: False)
     (effect,) = of_labels([REACTION])[0].build((1.0,))
     noisy = replace(EMPTY, reference_effects=(effect,))
     data, _ = measured((effect,), np.random.default_rng(4), noisy)

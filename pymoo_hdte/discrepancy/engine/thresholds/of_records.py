@@ -180,7 +180,7 @@ class RecordRules(RuleSet):
         1.5,
         "ratio of variances",
         "The verdict is repeated with the noise that the named effect carries to the channels, if "
-        "a variance grows by more than this; before other effects are sought beside a single one.",
+        "a variance grows by more than this; for a single effect already before others are sought.",
         f"{BY_HAND}: chi-square of the feature that it moves most is then off by half.",
         at_least=1.0,
     )
