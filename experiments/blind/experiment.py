@@ -14,7 +14,7 @@ from experiments.blind.figures import confusion_matrix, reliability_diagram
 from experiments.blind.outcome import Outcome
 from experiments.blind.reliability import reliability_table
 from experiments.blind.rig.visible import LEAST
-from experiments.blind.runs import RUNS, format_runs, read_runs, run_of, runs_table
+from experiments.blind.runs import RUNS, BlindRun, format_runs, read_runs, run_of, runs_table
 from experiments.blind.scoring import BlindJob
 from experiments.blind.sentences import in_one_sentence, of_the_first_page
 from experiments.blind.tables import (
@@ -54,14 +54,16 @@ def run(context: Context) -> Result:
     """Run the cases or read their outcomes, and hold the scores against what must be reached."""
     outcomes = _campaign(context) if context.full else _committed()
     stored = stored_outcome(context, "blind") if outcomes else ()
-    # What has just been run stands in no row yet.
-    runs = (runs_table(read_runs(DATA / RUNS)),) if outcomes and not context.full else ()
     return Result(
         title="Blind campaigns: what the discrepancy workflow finds",
         command=context.command("blind"),
         answer=in_one_sentence(outcomes),
         paragraphs=(*stored, SETTING, _extent(outcomes)),
-        tables=(must_reach_table(outcomes), *runs, *(_tables(outcomes) if outcomes else ())),
+        tables=(
+            must_reach_table(outcomes),
+            *((runs_table(_runs(outcomes, context.full)),) if outcomes else ()),
+            *(_tables(outcomes) if outcomes else ()),
+        ),
         pictures=_pictures(outcomes) if outcomes else (),
         first_page={NEW: of_the_first_page(outcomes)} if outcomes else {},
     )
@@ -97,6 +99,20 @@ def _pictures(outcomes: list[Outcome]) -> tuple[Picture, ...]:
     )
 
 
+def _runs(outcomes: list[Outcome], full: bool) -> list[BlindRun]:
+    """Return all runs that are stored, the one just made in place of those that it repeats."""
+    stored = read_runs(DATA / RUNS)
+    if not full:
+        return stored
+    now = run_of(outcomes, _first(outcomes))
+    return [*(one for one in stored if one.last < now.first), now]
+
+
+def _first(outcomes: list[Outcome]) -> int:
+    """Return where the first of the outcomes stands in the list, counted from 1."""
+    return all_cases().index(outcomes[0].case) + 1
+
+
 def _extent(outcomes: list[Outcome]) -> str:
     """Return in words how many cases of the list have been run."""
     total = len(all_cases())
@@ -104,7 +120,7 @@ def _extent(outcomes: list[Outcome]) -> str:
         return f"None of the {total} cases of the list is stored yet: all figures are missing."
     if len(outcomes) == total:
         return f"All {total} cases of the list have been run."
-    first = all_cases().index(outcomes[0].case) + 1
+    first = _first(outcomes)
     what = (
         f"Cases {first} to {first + len(outcomes) - 1} of the {total} of the list are shown, in "
         "which kinds, effects, forms and stresses are mixed evenly."
@@ -129,7 +145,7 @@ def _campaign(context: Context) -> list[Outcome]:
     target, seconds = context.out / "blind", context.out / TIMES / "blind"
     write_atomically(target / OUTCOMES, format_outcomes(outcomes).encode())
     write_atomically(seconds / SECONDS, format_seconds(outcomes).encode())
-    write_atomically(target / RUNS, format_runs([run_of(outcomes)]).encode())
+    write_atomically(target / RUNS, format_runs([run_of(outcomes, _first(outcomes))]).encode())
     return outcomes
 
 

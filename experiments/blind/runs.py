@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
-from experiments.blind.cases import all_cases
 from experiments.blind.outcome import Outcome
 from experiments.runner.committed import read_rows
 from experiments.runner.result import Cell, Column, Table
@@ -52,14 +51,13 @@ class BlindRun:
     counts: Counts
 
 
-def run_of(outcomes: Sequence[Outcome], code: str = "") -> BlindRun:
-    """Return the run of some outcomes, which stand together in the list, and of a commit."""
+def run_of(outcomes: Sequence[Outcome], first: int, code: str = "") -> BlindRun:
+    """Return the run of outcomes, which stand together in the list, from its first number on."""
     by_kind = {
         kind: [one for one in outcomes if one.case.kind == kind]
         for kind in ("single", "pair", "triple", "none")
     }
     plain = [one for one in outcomes if one.confident]
-    first = all_cases().index(outcomes[0].case) + 1
     covered = [held for one in outcomes for held in one.covered]
     counts = Counts(
         plain=len(plain),

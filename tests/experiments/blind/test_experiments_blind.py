@@ -26,6 +26,7 @@ from experiments.blind.reliability import reliability
 from experiments.blind.rig.forms import FORMS, LISTED, UNLISTED
 from experiments.blind.rig.runs import Condition
 from experiments.blind.rig.session import ARCSEC, SHEET, draw_circumstances
+from experiments.blind.runs import RUNS
 from experiments.blind.scoring import (
     COLUMNS,
     BlindJob,
@@ -496,7 +497,7 @@ def test_a_campaign_outlives_a_defect_resumes_and_leaves_what_the_report_reads(
     assert {one.status for one in found if one.case.kind != "unlisted"} == {"named"}
     assert {one.status for one in found if one.case.kind == "unlisted"} == {"error"}
     assert found[1].seconds == (1.0, 2.0, 3.0, 4.0)
-    for file in files:
+    for file in (*files, tmp_path / "blind" / RUNS):
         shutil.copy(file, tmp_path)
     monkeypatch.setattr(committed, "DATA", tmp_path)
     monkeypatch.setattr(blind, "DATA", tmp_path)
