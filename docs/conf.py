@@ -74,7 +74,7 @@ sphinx_gallery_conf = {
     # What a guide shows it prints: the value of a last line may hold an address in memory.
     "capture_repr": (),
     "download_all_examples": False,
-    # Guides at a time; they share nothing.
+    # So many guides run at a time; they share nothing.
     "parallel": 2,
     "show_memory": False,
     "show_signature": False,
