@@ -59,18 +59,15 @@ def run(context: Context) -> Result:
         command=context.command("blind"),
         answer=in_one_sentence(outcomes),
         paragraphs=(*stored, SETTING, _extent(outcomes)),
-        tables=(
-            must_reach_table(outcomes),
-            *((runs_table(_runs(outcomes, context.full)),) if outcomes else ()),
-            *(_tables(outcomes) if outcomes else ()),
-        ),
+        tables=(must_reach_table(outcomes), *(_tables(outcomes, context.full) if outcomes else ())),
         pictures=_pictures(outcomes) if outcomes else (),
         first_page={NEW: of_the_first_page(outcomes)} if outcomes else {},
     )
 
 
-def _tables(outcomes: list[Outcome]) -> tuple[Table, ...]:
+def _tables(outcomes: list[Outcome], full: bool) -> tuple[Table, ...]:
     return (
+        runs_table(_runs(outcomes, full)),
         wrong_table(outcomes),
         *times_tables(outcomes),
         reliability_table(outcomes),

@@ -12,6 +12,7 @@ from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 from experiments.blind.outcome import Outcome
+from experiments.blind.targets import select
 from experiments.runner.committed import read_rows
 from experiments.runner.result import Cell, Column, Table
 from pymoo_hdte.io.text_table import csv_text
@@ -53,23 +54,22 @@ class BlindRun:
 
 def run_of(outcomes: Sequence[Outcome], first: int, code: str = "") -> BlindRun:
     """Return the run of outcomes, which stand together in the list, from its first number on."""
-    by_kind = {
-        kind: [one for one in outcomes if one.case.kind == kind]
-        for kind in ("single", "pair", "triple", "none")
-    }
+    single, pair, triple, clean = (
+        select(outcomes, kind) for kind in ("single", "pair", "triple", "none")
+    )
     plain = [one for one in outcomes if one.confident]
     covered = [held for one in outcomes for held in one.covered]
     counts = Counts(
         plain=len(plain),
         plain_wrong=sum(one.wrong_confident for one in plain),
-        single=len(by_kind["single"]),
-        single_right=sum(one.right for one in by_kind["single"]),
-        pair=len(by_kind["pair"]),
-        pair_both=sum(one.all_named for one in by_kind["pair"]),
-        triple=len(by_kind["triple"]),
-        triple_two=sum(one.two_named for one in by_kind["triple"]),
-        clean=len(by_kind["none"]),
-        clean_alarms=sum(one.status != "adequate" for one in by_kind["none"]),
+        single=len(single),
+        single_right=sum(one.right for one in single),
+        pair=len(pair),
+        pair_both=sum(one.all_named for one in pair),
+        triple=len(triple),
+        triple_two=sum(one.two_named for one in triple),
+        clean=len(clean),
+        clean_alarms=sum(one.status != "adequate" for one in clean),
         interval=len(covered),
         interval_holds=sum(covered),
     )

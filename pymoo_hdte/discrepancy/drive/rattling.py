@@ -63,8 +63,8 @@ def _judged_from(
 ) -> tuple[Data, list[Candidate], Verdict]:
     """Return data, with the noise that they were judged with, candidates and the verdict."""
     verdict = judge(data, base, candidates)
-    renewed = None if verdict.noise_of is None else data.with_noise_of(verdict.noise_of)
-    return data if renewed is None else renewed, candidates, verdict
+    renewed = verdict.renewed
+    return renewed if isinstance(renewed, Data) else data, candidates, verdict
 
 
 def _explains_by_a_clearance(verdict: Verdict) -> bool:

@@ -77,8 +77,8 @@ class Verdict:
     in_another_form : float or None
         Share of the misfit that another form of the named law removes, where only such a form
         explains it.
-    noise_of : Fit or None
-        Model with whose noise the data were judged, where it is not the one that they came with.
+    renewed : Evidence or None
+        The data as they were judged, where their noise is not the one that they came with.
     """
 
     status: str
@@ -92,7 +92,7 @@ class Verdict:
     shown_in_held_out: bool = True
     probability: float | None = None
     in_another_form: float | None = None
-    noise_of: Fit | None = None
+    renewed: Evidence | None = None
 
     @property
     def accepted(self) -> Fit:
@@ -145,7 +145,7 @@ def judge(
         search.resume(known)
         return _verdict(search, _answer(search, _chosen(search), ()))
     search.singles()
-    search, noise_of = _renewed_search(search)
+    search = _renewed_search(search)
     search.grow()
     chosen = _chosen(search)
     if len(chosen.members) > 1:
@@ -153,11 +153,11 @@ def judge(
         chosen = _chosen(search)
     if replaced(search, chosen, [one for one in candidates if one.instead_of]):
         chosen = _chosen(search)
-    answer = _answer(search, chosen, search.screened)
-    return replace(_verdict(search, answer), noise_of=noise_of)
+    verdict = _verdict(search, _answer(search, chosen, search.screened))
+    return verdict if search.data is data else replace(verdict, renewed=search.data)
 
 
-def _renewed_search(search: Search) -> tuple[Search, Fit | None]:
+def _renewed_search(search: Search) -> Search:
     """Return the search with the noise of the best single effect, if that is then all there is.
 
     With less noise than there is, further effects would be sought for what is none. A wrong effect
@@ -169,15 +169,15 @@ def _renewed_search(search: Search) -> tuple[Search, Fit | None]:
     explained = first.listed and first.explained >= data.rules.explained_share
     renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
     if renewed is None or not _is_all(renewed, fit(renewed, first.candidates, first.fit.values)):
-        return search, None
+        return search
     base, candidates = fit(renewed, start=search.base.values), search.candidates
     if down_to_noise(base, search.degrees_of_freedom, data.rules):
-        return search, None
+        return search
     again = Search(renewed, base, candidates, screen(renewed, base, candidates))
     again.resume(search.found, go_on=True)
     found = again.found[0]
     same = found.label == first.label and _is_all(renewed, found.fit)
-    return (again, first.fit) if same and not again.held_by_sensors(found) else (search, None)
+    return again if same and not again.held_by_sensors(found) else search
 
 
 def _is_all(data: Evidence, fitted: Fit) -> bool:

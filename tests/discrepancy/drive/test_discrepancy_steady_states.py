@@ -72,13 +72,13 @@ def named(*names):
     return SimpleNamespace(effects=[SimpleNamespace(name=name, listed=True) for name in names])
 
 
-def answer(*names, status="named", more=False, rivals=(), noise_of=None):
+def answer(*names, status="named", more=False, rivals=(), renewed=None):
     return SimpleNamespace(
         status=status,
         chosen=named(*names),
         equivalent=rivals,
         leaves_more_than_noise=more,
-        noise_of=noise_of,
+        renewed=renewed,
     )
 
 
@@ -119,9 +119,8 @@ def test_records_that_rattle_count_unless_a_clearance_explains_all_others(
 def test_data_have_the_noise_that_they_were_judged_with(monkeypatch, swept):
     (law,) = (one for one in library(swept) if one.label == "kinematic_reaction:input")
     reaction = fit(swept, [law], steps=0)
-    monkeypatch.setattr(
-        rattling, "judge", lambda *_: answer("kinematic_reaction", noise_of=reaction)
-    )
+    renewed = replace(swept, reference_effects=reaction.effects)
+    monkeypatch.setattr(rattling, "judge", lambda *_: answer("kinematic_reaction", renewed=renewed))
     found, _, _ = rattling.judged(swept, lambda some, base: library(some))
     assert found.reference_effects == reaction.effects
 

@@ -238,7 +238,7 @@ def test_nothing_is_sought_beside_an_effect_that_leaves_its_noise(monkeypatch, r
     verdict = verdict_on(data, FEW)
     assert labels_of(verdict) == {REACTION}
     assert {len(one.members) for one in (verdict.chosen, *verdict.alternatives)} == sizes
-    renewed = verdict.noise_of is not None
+    renewed = verdict.renewed is not None
     assert renewed == (sizes == {1})
     assert renewed == (verdict.chosen.fit.chi_square < chi2.isf(1e-3, verdict.degrees_of_freedom))
 
