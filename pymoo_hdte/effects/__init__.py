@@ -6,6 +6,7 @@ from pymoo_hdte.effects import (
     hysteresis,
     linear,
     load_friction,
+    shear_thinning,
     stiffness,
     temperature_friction,
 )
@@ -31,6 +32,7 @@ __all__ = [
     "load_friction",
     "register",
     "registered",
+    "shear_thinning",
     "stiffness",
     "temperature_friction",
     "unknown",

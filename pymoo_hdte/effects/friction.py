@@ -12,6 +12,7 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
+from pymoo_hdte.effects.shear_thinning import shear_thinning
 from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 
 FRICTION_PORTS = ("input", "output")
@@ -186,6 +187,7 @@ def _drag(sizes: Sizes) -> list[Guess]:
     return [
         Guess((level, faster), [(level.start, power) for power in (2.0, 3.0, 1.5)], build),
         Guess((level, slower), starts, build, form="sublinear", sentence=sentence),
+        shear_thinning(level, speed),
     ]
 
 
@@ -199,7 +201,7 @@ register(
         _drag,
         # At the output it would have to be N times as large, as Stribeck friction.
         sought=("input",),
-        of_fit={"level": "torque"},
+        of_fit={"level": "torque", "thinning": "speed"},
     )
 )
 

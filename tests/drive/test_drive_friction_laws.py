@@ -1,4 +1,4 @@
-"""Friction that grows with a power of the speed, or with the load, in closed form."""
+"""Friction that grows with the speed, or with the load, in closed form."""
 
 from dataclasses import replace
 
@@ -20,6 +20,7 @@ from pymoo_hdte.effects.friction import SMOOTHING_SPEED, NonlinearDrag
 from pymoo_hdte.effects.guess import Sizes
 from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.effects.load_friction import LoadFriction
+from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.drive import drive_mechanism
 from pymoo_hdte.mechanism.simulation import simulate_mechanism
@@ -103,6 +104,30 @@ def test_a_planted_power_comes_back_with_its_exponent(exponent, torque, word):
     judge_power(judge(data, fit(data), drags), exponent, torque, word)
 
 
+FORMS = [
+    ("load_dependent_friction", "power", (0.12, 0.8)),
+    ("nonlinear_drag", "shear_thinning", (0.03, 8.0)),
+]
+"""Effects whose further forms are sought in the place of others only, with values of these."""
+
+
+@pytest.mark.parametrize(("name", "form", "values"), FORMS)
+def test_a_form_that_stands_for_another_alone_is_named_with_its_values(name, form, values):
+    speeds = (30.0, 100.0, 300.0, 600.0, 1000.0, 1400.0, 2000.0)
+    data = known_data([(speed, load) for speed in speeds for load in (0.0, 10.0, 20.0, 40.0)])
+    laws = [one for one in library(data) if (one.name, one.port) == (name, "input")]
+    (planted,) = (one for one in laws if one.form == form)
+    assert planted.only_as_form
+    data, _ = measured(planted.build(values), np.random.default_rng(5), data)
+    verdict = judge(data, fit(data), laws)
+    assert verdict.status == "named"
+    assert [one.label for one in verdict.chosen.candidates] == [planted.label]
+    fitted = verdict.chosen.fit
+    found, spread = fitted.values[-2:], np.sqrt(np.diag(fitted.covariance))[-2:]
+    assert np.all(np.abs(found - values) < 3.0 * spread)
+    assert np.all(spread < 0.1 * np.array(values))
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize(("exponent", "torque", "word"), POWERS)
 def test_a_planted_power_is_named_with_its_exponent(exponent, torque, word):
@@ -132,6 +157,48 @@ def test_the_share_is_that_of_the_direction_of_power(speed, load, share, driven)
     # Both turned round are the same drive in a mirror.
     mirrored = torque_of(law, -speed, -load).torque
     assert mirrored == pytest.approx(-torque_of(law, speed, load).torque)
+
+
+@given(st.floats(0.5, 2.0), st.floats(0.01, 50.0), st.floats(0.1, 40.0))
+def test_friction_by_load_grows_with_its_power_beyond_what_the_direction_says(power, load, at):
+    law = LoadFriction(0.2, 0.1, power, at)
+    grown = at * (load / at) ** power
+    assert torque_of(law, 3.0, load).torque == pytest.approx(0.2 * grown)
+    assert torque_of(law, 3.0, -load).torque == pytest.approx(0.1 * grown)
+    assert torque_of(law, 3.0, 0.0).torque == 0.0
+    # At the reference all powers are the friction in proportion.
+    proportional = torque_of(LoadFriction(0.2, 0.1), 3.0, at).torque
+    assert torque_of(law, 3.0, at).torque == pytest.approx(proportional)
+
+
+@pytest.mark.parametrize("bad", [{"exponent": 0.0}, {"reference": -1.0}, {"exponent": np.nan}])
+def test_powers_of_the_load_are_checked(bad):
+    (number,) = bad
+    with pytest.raises(InvalidInput, match=f"load_dependent_friction.{number}"):
+        LoadFriction(0.1, 0.1, **bad)
+
+
+@given(st.floats(1e-3, 1e3), st.floats(0.5, 50.0))
+def test_a_fluid_that_thins_is_viscous_when_slow_and_logarithmic_when_fast(share, thinning):
+    """By the series of asinh, to the first term that is left out of each."""
+    law, speed = ShearThinningDrag(0.02, thinning, 200.0), share * thinning
+    found = torque_of(law, speed)
+    size = 0.02 / np.log(200.0 / thinning + np.hypot(1.0, 200.0 / thinning))
+    if share < 1.0:
+        assert found.torque / (size * share) == pytest.approx(1.0, abs=share**2 / 6.0 + 1e-9)
+    else:
+        assert found.torque / size == pytest.approx(np.log(2.0 * share), abs=0.25 / share**2)
+    assert torque_of(law, 200.0).torque == pytest.approx(0.02)
+    assert torque_of(law, -speed).torque == pytest.approx(-found.torque)
+    step = 1e-5 * speed
+    rise = torque_of(law, speed + step).torque - torque_of(law, speed - step).torque
+    assert found.damping == pytest.approx(rise / (2.0 * step), rel=1e-6)
+
+
+@pytest.mark.parametrize("bad", [(np.nan, 1.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, -2.0)])
+def test_numbers_of_a_fluid_that_thins_are_checked(bad):
+    with pytest.raises(InvalidInput, match="shear_thinning_drag"):
+        ShearThinningDrag(*bad)
 
 
 @pytest.mark.parametrize("load", [-3.0, 0.0, 5.0])
@@ -171,11 +238,15 @@ def test_the_motor_pays_the_share_of_the_load_and_a_driving_load_keeps_the_other
 def test_one_share_is_guessed_where_loads_only_oppose_and_none_where_no_load_is_known():
     sizes = Sizes(force=0.1, residual=0.01, largest=0.5, speed=200.0, travel=1e-3, load=0.4)
     known = effect_named("load_dependent_friction")
-    (guess,) = known.guesses(sizes)
+    guess, power = known.guesses(sizes)
     ((_, law),) = known.parts(guess, (0.3,))
     assert law == LoadFriction(0.3, 0.3)
-    (guess,) = known.guesses(replace(sizes, driven=True))
+    ((_, law),) = known.parts(power, (0.3, 0.8))
+    assert law == LoadFriction(0.3, 0.3, 0.8, 0.4)
+    guess, power = known.guesses(replace(sizes, driven=True))
     assert [one.name for one in guess.unknowns] == ["share", "driven_share"]
+    ((_, law),) = known.parts(power, (0.3, 0.1, 0.8))
+    assert law == LoadFriction(0.3, 0.1, 0.8, 0.4)
     assert known.guesses(replace(sizes, load=0.0)) == []
 
 

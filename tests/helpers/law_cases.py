@@ -16,6 +16,7 @@ from pymoo_hdte.effects.friction import (
 )
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.load_friction import LoadFriction
+from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.effects.temperature_friction import TemperatureFriction
 from pymoo_hdte.units import ARCSEC
@@ -37,6 +38,8 @@ EFFECTS = [
     LawAtPort("torque_ripple", "input", PeriodicTorque(6.0, 1.0, 0.015)),
     LawAtPort("nonlinear_drag", "input", NonlinearDrag(2e-6, 0.5, 100.0)),
     LawAtPort("load_dependent_friction", "input", LoadFriction(0.2, 0.1)),
+    LawAtPort("load_dependent_friction", "input", LoadFriction(0.2, 0.1, 0.7, 40.0)),
+    LawAtPort("shear_thinning_drag", "input", ShearThinningDrag(0.02, 10.0, 200.0)),
     LawAtPort("temperature_dependent_friction", "input", TemperatureFriction(1e-4, 0.03, 300.0)),
     KinematicErrorLine(3.0, 2 * ARCSEC, 0.7),
     KinematicReaction(),

@@ -103,6 +103,11 @@ class Candidate:
         """Tell whether it is tried in the place of an effect: at its port, or with a memory."""
         return member.name in self.instead_of and (member.port == self.port or member.remembers)
 
+    @property
+    def only_as_form(self) -> bool:
+        """Whether it is tried only in the place of another form of the same effect."""
+        return self.name in self.instead_of
+
     def holds(self, other: Candidate) -> bool:
         """Tell whether another effect is a special case of this one, or of this form of it."""
         return is_contained(other.name, self.name) or (

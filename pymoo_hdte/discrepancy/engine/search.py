@@ -38,6 +38,8 @@ class Search(FittedSets):
         Effects that may be missing, and base parameters that may be out of tolerance.
     screened : sequence of Screened
         The same beside the base, where they were screened.
+    forms_only : sequence of Candidate
+        Further forms of theirs, tried only in the place of another.
     """
 
     def __init__(
@@ -46,9 +48,10 @@ class Search(FittedSets):
         base: Fit,
         candidates: Sequence[Candidate],
         screened: Sequence[Screened] = (),
+        forms_only: Sequence[Candidate] = (),
     ) -> None:
         super().__init__(data, base)
-        self.candidates, self.screened = candidates, screened
+        self.candidates, self.screened, self.forms_only = candidates, screened, forms_only
         self._extended: set[frozenset[str]] = set()
 
     def singles(self) -> None:
@@ -290,9 +293,8 @@ class Search(FittedSets):
         for member in one.candidates:
             others = tuple(each for each in one.candidates if each is not member)
             kept = one.effects if member.covered_by else others
-            for other in self.candidates:
+            for other in (*self.candidates, *self.forms_only):
                 curve = open_to_curves and member.is_curve and other.is_curve
                 special = other.port == member.port and (curve or member.holds(other))
                 if (other.is_form_of(member) or special) and may_be_together((*kept, other)):
-                    start = np.append(one.values_of(kept), other.starts[0])
-                    self.fitted((*kept, other), start)
+                    self.fitted((*kept, other), np.append(one.values_of(kept), other.starts[0]))

@@ -140,7 +140,8 @@ def judge(
         return Verdict("adequate", base, None, (), (), degrees_of_freedom, rules, probability=clean)
     if not screened and not known:
         return Verdict("unlisted", base, None, (), (), degrees_of_freedom, rules)
-    search = Search(data, base, searched, screened)
+    forms = [one for one in candidates if one.only_as_form]
+    search = Search(data, base, searched, screened, forms)
     if known:
         search.resume(known)
         return _verdict(search, _answer(search, _chosen(search), ()))
@@ -151,7 +152,8 @@ def judge(
     if len(chosen.members) > 1:
         search.complete(chosen)
         chosen = _chosen(search)
-    if replaced(search, chosen, [one for one in candidates if one.instead_of]):
+    others = [one for one in candidates if one.instead_of and not one.only_as_form]
+    if replaced(search, chosen, others):
         chosen = _chosen(search)
     verdict = _verdict(search, _answer(search, chosen, search.screened))
     return verdict if search.data is data else replace(verdict, renewed=search.data)
@@ -173,7 +175,7 @@ def _renewed_search(search: Search) -> Search:
     base, candidates = fit(renewed, start=search.base.values), search.candidates
     if down_to_noise(base, search.degrees_of_freedom, data.rules):
         return search
-    again = Search(renewed, base, candidates, screen(renewed, base, candidates))
+    again = Search(renewed, base, candidates, screen(renewed, base, candidates), search.forms_only)
     again.resume(search.found, go_on=True)
     found = again.found[0]
     same = found.label == first.label and _is_all(renewed, found.fit)

@@ -45,7 +45,7 @@ def judged(
         Effects beyond whose residual others are judged, so that they are judged themselves.
     """
     base, rules = fit(data), data.rules
-    searched = [one for one in candidates if not one.instead_of]
+    searched = [one for one in candidates if one.only_as_form or not one.instead_of]
     verdict, added = _compared(data, base, searched, best)
     verdict = _mostly_explained(sensors, data, verdict)
     verdict = _simplest(data, verdict)
@@ -243,7 +243,8 @@ def _with_substitutes(
     for member in chosen.candidates:
         kept = tuple(one for one in chosen.candidates if one is not member)
         for other in candidates:
-            if other.replaces(member) and all(other.goes_with(one) for one in kept):
+            another = other.replaces(member) and not other.only_as_form
+            if another and all(other.goes_with(one) for one in kept):
                 start = np.append(chosen.values_of(kept), other.starts[0])
                 fitted = fit(data, (*kept, other), start)
                 if _does_as_well(data, fitted, chosen.fit):

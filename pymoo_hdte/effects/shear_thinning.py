@@ -1,0 +1,89 @@
+"""Drag of a fluid that thins as it is sheared: it grows with the logarithm of the speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pymoo_hdte.checks import real_number
+from pymoo_hdte.effects.effect import Effect, register
+from pymoo_hdte.effects.guess import Guess
+from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
+from pymoo_hdte.effects.unknowns import Parameter, unknown
+
+
+@dataclass(frozen=True)
+class ShearThinningDrag(Aperiodic):
+    """T = level asinh(speed / thinning) / asinh(reference / thinning): a fluid of Eyring.
+
+    Viscous damping up to the speed of ``thinning``, and hardly more torque beyond it. Eyring,
+    J. Chemical Physics 4 (1936); of oil films Johnson and Tevaarwerk, Proceedings of the Royal
+    Society A 356 (1977).
+
+    Attributes
+    ----------
+    level : float
+        Torque at the reference speed, N.m.
+    thinning, reference : float
+        rad/s.
+
+    Raises
+    ------
+    InvalidInput
+        For a number that is not finite, or a speed that is not above 0.
+    """
+
+    level: float
+    thinning: float
+    reference: float
+
+    def __post_init__(self) -> None:
+        real_number("shear_thinning_drag.level", self.level)
+        real_number("shear_thinning_drag.thinning", self.thinning, above=0.0)
+        real_number("shear_thinning_drag.reference", self.reference, above=0.0)
+
+    def respond(self, state: PortState) -> Response:
+        """Return torque and tangents."""
+        share = state.speed / self.thinning
+        size = self.level / np.arcsinh(self.reference / self.thinning)
+        slope = size / self.thinning / np.hypot(1.0, share)
+        return Response(size * np.arcsinh(share), damping=slope)
+
+
+register(
+    Effect(
+        "shear_thinning_drag",
+        ShearThinningDrag,
+        ("input", "output"),
+        {"level": "torque", "thinning": "speed", "reference": "speed"},
+        "A drag at the {port} of a fluid that thins: it grows with the logarithm of the speed.",
+    )
+)
+
+
+def shear_thinning(level: Parameter, speed: float) -> Guess:
+    """Guess a fluid that thins, in place of a drag by a power of the speed.
+
+    Parameters
+    ----------
+    level : Parameter
+        Of the drag at the largest speed.
+    speed : float
+        That speed, rad/s. Thinning beyond half of it would be the damping of the port, to a
+        quarter, and within a five-hundredth dry friction.
+    """
+
+    def build(values: Sequence[float]) -> tuple[Law, ...]:
+        return (ShearThinningDrag(values[0], values[1], speed),)
+
+    thinning = unknown("thinning", 0.002 * speed, 0.5 * speed, 0.05 * speed)
+    sentence = "A friction at the {port} that grows with the logarithm of the speed."
+    return Guess(
+        (level, thinning),
+        build=build,
+        form="shear_thinning",
+        sentence=sentence,
+        instead_of=("nonlinear_drag",),
+    )
