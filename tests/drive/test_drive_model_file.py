@@ -141,6 +141,7 @@ def test_a_file_of_version_1_still_holds_its_model():
         "new_zero",
         "presliding_friction",
         "coupled_inertia",
+        "shear_thinning_drag",
     }
     known = {one.name for one in drive_effects()}
     assert {effect.name for effect in loaded.effects} == known - later
