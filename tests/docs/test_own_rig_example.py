@@ -204,8 +204,10 @@ def test_python_block_runs_and_prints_what_the_page_says(at_the_rig):
 def test_page_lists_the_library():
     rows = re.findall(r"^\| (`\w+`.*?) \|", PAGE.split("| effect |")[1], flags=re.MULTILINE)
     listed = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
-    # A clearance that varies belongs to the mesh of a drive, and is looked for there only.
-    assert sorted(listed) == sorted({one.name for one in law_effects()} - {"clearance_variation"})
+    # A clearance that varies belongs to the mesh of a drive, and is looked for there only; and what
+    # is a form of another alone is tried in drives only.
+    of_drives = {"clearance_variation", "shear_thinning_drag"}
+    assert sorted(listed) == sorted({one.name for one in law_effects()} - of_drives)
 
 
 def test_every_block_is_checked_here():

@@ -45,7 +45,7 @@ def judged(
         Effects beyond whose residual others are judged, so that they are judged themselves.
     """
     base, rules = fit(data), data.rules
-    searched = [one for one in candidates if one.only_as_form or not one.instead_of]
+    searched = [one for one in candidates if not one.instead_of]
     verdict, added = _compared(data, base, searched, best)
     verdict = _mostly_explained(sensors, data, verdict)
     verdict = _simplest(data, verdict)
