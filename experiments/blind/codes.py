@@ -14,7 +14,7 @@ ERROR = "error"
 """Status of a case in which the workflow raised an exception."""
 STATUSES = (*VERDICTS, ERROR)
 _NEVER_HIDDEN = tuple(sorted({one.name for one in drive_effects()} - set(LISTED)))
-"""Effects that the workflow may name and no case hides."""
+"""Effects of the library that no case hides under their names."""
 NAMES = (
     *LISTED,
     *_NEVER_HIDDEN,

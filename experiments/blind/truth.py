@@ -13,7 +13,11 @@ from experiments.blind.cases import OUT_OF_TOLERANCE, Case
 
 SAME = {"damping": "damping_reference", "load_inertia": "load_inertia"}
 """Base parameters that an effect covers under its own name."""
-FORM_OF = {"presliding_friction": "coulomb_friction", "coupled_inertia": "load_inertia"}
+FORM_OF = {
+    "presliding_friction": "coulomb_friction",
+    "coupled_inertia": "load_inertia",
+    "shear_thinning_drag": "nonlinear_drag",
+}
 """Effects of the library that are a form of one that is hidden."""
 PARAMETER = "parameter"
 

@@ -37,7 +37,7 @@ class LoadFriction(Aperiodic):
     exponent : float
         Power of the load with which the friction grows.
     reference : float
-        Load at which the shares hold, N.m.
+        Load at which the shares hold, N.m; in a verdict the largest of the records.
     """
 
     loaded: ClassVar[bool] = True
@@ -112,7 +112,7 @@ register(
         LoadFriction,
         ("input",),
         {"share": "", "driven_share": "", "exponent": "", "reference": "torque"},
-        "Friction at the {port} that grows in proportion to the load.",
+        "Friction at the {port} that grows with the load.",
         _shares,
     )
 )

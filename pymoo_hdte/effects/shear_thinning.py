@@ -18,9 +18,9 @@ from pymoo_hdte.effects.unknowns import Parameter, unknown
 class ShearThinningDrag(Aperiodic):
     """T = level asinh(speed / thinning) / asinh(reference / thinning): a fluid of Eyring.
 
-    Viscous damping up to the speed of ``thinning``, and hardly more torque beyond it. Eyring,
-    J. Chemical Physics 4 (1936); of oil films Johnson and Tevaarwerk, Proceedings of the Royal
-    Society A 356 (1977).
+    Viscous damping up to the speed of ``thinning``, beyond which the torque grows by its logarithm.
+    Eyring, J. Chemical Physics 4 (1936); of oil films Johnson and Tevaarwerk, Proceedings of the
+    Royal Society A 356 (1977).
 
     Attributes
     ----------
@@ -59,6 +59,8 @@ register(
         ("input", "output"),
         {"level": "torque", "thinning": "speed", "reference": "speed"},
         "A drag at the {port} of a fluid that thins: it grows with the logarithm of the speed.",
+        # A verdict tells it as a form of that.
+        special_case_of=("nonlinear_drag",),
     )
 )
 
@@ -71,8 +73,9 @@ def shear_thinning(level: Parameter, speed: float) -> Guess:
     level : Parameter
         Of the drag at the largest speed.
     speed : float
-        That speed, rad/s. Thinning beyond half of it would be the damping of the port, to a
-        quarter, and within a five-hundredth dry friction.
+        That speed, rad/s. Thinning beyond half of it would be the damping of the port, to three
+        tenths of the torque; within a five-hundredth, the torque at a tenth of the speed is two
+        thirds of the whole, as of dry friction beside a drag.
     """
 
     def build(values: Sequence[float]) -> tuple[Law, ...]:

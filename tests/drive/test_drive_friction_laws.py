@@ -202,8 +202,9 @@ def test_numbers_of_a_fluid_that_thins_are_checked(bad):
 
 
 @pytest.mark.parametrize("load", [-3.0, 0.0, 5.0])
-def test_damping_of_friction_by_load_is_its_derivative(load):
-    law = LoadFriction(0.2, 0.05)
+@pytest.mark.parametrize("exponent", [1.0, 0.6, 1.7])
+def test_damping_of_friction_by_load_is_its_derivative(load, exponent):
+    law = LoadFriction(0.2, 0.05, exponent, 4.0)
     speed, step = np.array([-0.3, -2e-4, -5e-5, 0.0, 3e-5, 1e-4, 0.2]), 1e-9
     rise = torque_of(law, speed + step, load).torque - torque_of(law, speed - step, load).torque
     found = torque_of(law, speed, load).damping

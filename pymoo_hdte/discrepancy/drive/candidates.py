@@ -19,8 +19,11 @@ _ACTING_AT = {"input_damping": "input", "output_damping": "output"}
 """Ports at which base parameters are friction, as a law there is."""
 _COVERED = {"load_inertia": "load_inertia", "damping": "damping_reference"}
 """Base parameters that an effect in the library covers, and the effect."""
-_DRY = ("coulomb_friction", "presliding_friction")
-"""Names of dry friction, of which a port has one."""
+_ONCE = (
+    {"coulomb_friction", "presliding_friction"},
+    {"nonlinear_drag", "shear_thinning_drag"},
+)
+"""Names of one thing in several forms, which a port has once: dry friction, and drag."""
 
 
 def drive_candidates(
@@ -28,10 +31,17 @@ def drive_candidates(
 ) -> list[Candidate]:
     """Return all candidates for a drive, for the sizes of each of its ports.
 
-    None of them is at the place of a believed effect; dry friction is there once, bending or not.
+    None of them is at the place of a believed effect; dry friction is there once, bending or not,
+    and drag once, of a fluid that thins or not.
     """
     known = {place_of(effect) for effect in believed}
-    known |= {(name, port, order) for one, port, order in known if one in _DRY for name in _DRY}
+    known |= {
+        (name, port, order)
+        for one, port, order in known
+        for names in _ONCE
+        if one in names
+        for name in names
+    }
     found = [
         candidate_of(effect, guess, port, "torque", _standing, sizes[port].slower)
         for effect in drive_effects()

@@ -125,6 +125,15 @@ class Candidate:
             return self.name == member.covered_by
         return (self.name, self.port) == (member.name, member.port)
 
+    def stands_for(self, member: Candidate, any_curve: bool) -> bool:
+        """Tell whether it may be what an effect is: another form of it, or its special case there.
+
+        With ``any_curve`` a curve may be any other at its port that is not tried as a form only.
+        """
+        curve = any_curve and member.is_curve and self.is_curve and not self.only_as_form
+        special = self.port == member.port and (curve or member.holds(self))
+        return special or self.is_form_of(member)
+
     @property
     def linear(self) -> bool:
         """Whether a prediction is close to linear in all its unknowns: parts of lines, and levels.

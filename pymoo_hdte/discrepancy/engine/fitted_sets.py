@@ -76,6 +76,12 @@ class FittedSets:
             return is_bounded(one.fit)
         return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
 
+    def leaves_forms(self, one: Hypothesis) -> bool:
+        """Tell whether most of what a set leaves is what other forms of its laws do, at first."""
+        rest, left = self.forms.rest(one.fit), one.fit.chi_square - self.degrees_of_freedom
+        most = 1.0 - self.data.rules.explained_part_share
+        return rest is not None and rest.excess <= most * left
+
     def alike(self, one: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
         overlap = self.forms.known((*one.candidates, *chosen.candidates))

@@ -18,8 +18,9 @@ from pymoo_hdte.discrepancy.drive.sizes import port_sizes
 from pymoo_hdte.drive import LawAtPort, preset
 from pymoo_hdte.drive.effects import PreslidingFriction, effect_from_fields
 from pymoo_hdte.drive.toml_text import model_toml
-from pymoo_hdte.effects.friction import CoulombFriction
+from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
 from pymoo_hdte.effects.guess import Sizes
+from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.effects.unknowns import line_with_variance, lines_of, polar, starts_along_each, wave
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.units import ARCSEC
@@ -82,8 +83,13 @@ def test_starts_are_within_the_bounds(candidate):
     assert all(parameter.scale > 0.0 for parameter in candidate.parameters)
 
 
-IN_FILES = {"load_inertia/coupled": "coupled_inertia"}
-"""Effects of a model under a name of their own: it takes the believed inertia beside this form."""
+IN_FILES = {
+    # A model takes the believed inertia beside it.
+    "load_inertia/coupled": "coupled_inertia",
+    # Another law, with other numbers.
+    "nonlinear_drag/shear_thinning": "shear_thinning_drag",
+}
+"""Forms of effects that stand in a model under a name of their own."""
 
 
 @settings(max_examples=15)
@@ -222,6 +228,38 @@ def test_a_believed_dry_friction_leaves_none_to_be_found_at_its_port(law):
     labels = {one.label for one in found}
     assert not labels & {"coulomb_friction:output", "presliding_friction:output"}
     assert "coulomb_friction:input" in labels
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("nonlinear_drag", NonlinearDrag(1e-6)),
+        ("shear_thinning_drag", ShearThinningDrag(0.02, 10.0, 200.0)),
+    ],
+)
+def test_a_believed_drag_leaves_none_in_any_form(name, law):
+    sizes = port_sizes(BELIEVED, ORDERS.tolist(), [1.0], SCALES)
+    assert {one.form for one in drive_candidates(sizes) if one.name == "nonlinear_drag"} == {
+        "",
+        "sublinear",
+        "shear_thinning",
+    }
+    found = drive_candidates(sizes, [LawAtPort(name, "input", law)])
+    assert not [one for one in found if one.name == "nonlinear_drag"]
+
+
+def test_a_form_alone_stands_for_its_own_effect_and_for_no_other_curve():
+    sizes = port_sizes(BELIEVED, ORDERS.tolist(), [1.0], SCALES)
+    known = {one.label: one for one in drive_candidates(sizes)}
+    thinning, drag = known["nonlinear_drag/shear_thinning:input"], known["nonlinear_drag:input"]
+    assert thinning.only_as_form
+    assert not drag.only_as_form
+    assert thinning.stands_for(drag, any_curve=False)
+    # Drag is another curve where dry friction was; what is sought as a form of drag is not.
+    dry = known["coulomb_friction:input"]
+    assert drag.stands_for(dry, any_curve=True)
+    assert not drag.stands_for(dry, any_curve=False)
+    assert not thinning.stands_for(dry, any_curve=True)
 
 
 def test_a_believed_order_of_the_error_is_no_further_line_of_it():
