@@ -98,8 +98,9 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         0.5,
         "share of the excess chi-square",
         "Least share of the excess of each single part of the data that effects remove, and of "
-        "what is left that a second effect removes before its fit is finished, or that base "
-        "parameters at bounds would remove, to first order, to be freed beside effects.",
+        "what is left that a second effect removes before its fit is finished, or that, to first "
+        "order, base parameters at bounds would remove to be freed beside effects, or other forms "
+        "of the laws of a set for those to be tried that stand for listed ones only.",
         f"{BY_HAND}: half is the least that may be called most of it. A curve that removes 96 % of "
         "the whole and nothing of the input torque is not the cause of both.",
         at_least=0.0,
