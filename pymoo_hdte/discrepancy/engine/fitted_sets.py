@@ -77,7 +77,12 @@ class FittedSets:
         return one.exact or bool(self.data.excess(one.fit).significant(self.data.rules).any())
 
     def leaves_forms(self, one: Hypothesis) -> bool:
-        """Tell whether most of what a set leaves is what other forms of its laws do, at first."""
+        """Tell whether most of what a set leaves is what other forms of its laws do, at first.
+
+        Not where it leaves no more than noise with each of its laws within its listed form.
+        """
+        if self.enough(one) and not is_bounded(one.fit):
+            return False
         rest, left = self.forms.rest(one.fit), one.fit.chi_square - self.degrees_of_freedom
         most = 1.0 - self.data.rules.explained_part_share
         return rest is not None and rest.excess <= most * left
