@@ -86,7 +86,7 @@ def _shares(sizes: Sizes) -> list[Guess]:
     shares = tuple(unknown(name, 0.0, 1.0, 0.1) for name in names)
 
     def build(values: Sequence[float]) -> tuple[Law, ...]:
-        return (LoadFriction(values[0], values[len(names) - 1]),)
+        return (LoadFriction(values[0], values[-1]),)
 
     def power(values: Sequence[float]) -> tuple[Law, ...]:
         *of_load, exponent = values

@@ -290,11 +290,11 @@ class Search(FittedSets):
         that to first order take most of the rest were tried before.
         """
         open_to_curves = not (self.enough(one) or one.freed)
-        forms_only = self.forms_only if self.leaves_forms(one) else ()
         for member in one.candidates:
             others = tuple(each for each in one.candidates if each is not member)
             kept = one.effects if member.covered_by else others
-            for other in (*self.candidates, *forms_only):
-                fits = other.stands_for(member, open_to_curves)
-                if fits and may_be_together((*kept, other)):
+            for other in (*self.candidates, *self.forms_only):
+                fits = other.stands_for(member, open_to_curves) and may_be_together((*kept, other))
+                # What only stands for listed forms is tried where these leave some.
+                if fits and (not other.only_as_form or self.leaves_forms(one)):
                     self.fitted((*kept, other), np.append(one.values_of(kept), other.starts[0]))

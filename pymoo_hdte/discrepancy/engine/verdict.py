@@ -152,8 +152,7 @@ def judge(
     if len(chosen.members) > 1:
         search.complete(chosen)
         chosen = _chosen(search)
-    others = [one for one in candidates if one.instead_of and not one.only_as_form]
-    if replaced(search, chosen, others):
+    if replaced(search, chosen, [one for one in candidates if one.instead_of]):
         chosen = _chosen(search)
     verdict = _verdict(search, _answer(search, chosen, search.screened))
     return verdict if search.data is data else replace(verdict, renewed=search.data)

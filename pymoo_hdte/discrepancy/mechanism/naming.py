@@ -243,8 +243,7 @@ def _with_substitutes(
     for member in chosen.candidates:
         kept = tuple(one for one in chosen.candidates if one is not member)
         for other in candidates:
-            another = other.replaces(member) and not other.only_as_form
-            if another and all(other.goes_with(one) for one in kept):
+            if other.replaces(member) and all(other.goes_with(one) for one in kept):
                 start = np.append(chosen.values_of(kept), other.starts[0])
                 fitted = fit(data, (*kept, other), start)
                 if _does_as_well(data, fitted, chosen.fit):
