@@ -100,7 +100,7 @@ class Candidate:
         return (self.acts_at or self.port) == (other.acts_at or other.port)
 
     def replaces(self, member: Candidate) -> bool:
-        """Tell whether it is tried in the place of another: at its port, or of one with a memory."""
+        """Tell whether it is tried in the place of another: at its port, or with a memory."""
         named = member.name != self.name and member.name in self.instead_of
         return named and (member.port == self.port or member.remembers)
 
