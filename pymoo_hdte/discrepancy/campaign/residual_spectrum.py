@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial, reduce
 
+import finufft
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -19,8 +20,8 @@ from pymoo_hdte.discrepancy.engine.rules import RULES
 LEAST_SEPARATION = 0.1
 """Least share of a line's power that is independent of the fitted lines."""
 
-BLOCK = 64
-"""Lines of the residual spectrum worked on at once, to bound the memory."""
+SUM_ERROR = 1e-12
+"""Relative error of the sums over rows."""
 
 
 def residual_spectrum(
@@ -73,18 +74,17 @@ def residual_spectrum(
     multiples = np.arange(1, int(np.ceil(highest * ratio - 1e-9)))
     whole = ratio * np.arange(1, int(np.ceil(highest - 1e-9)))
     whole = whole[np.abs(whole - whole.round()) > 1e-9]
+    lines = np.concatenate([multiples, whole]).astype(float)
     sigma = np.sqrt(np.diag(row_covariance(rig, ratio, record.samples_averaged)))
-    sums: list[_Sums] = []
+    sums = []
     for part in fit.parts:
         basis = fit.basis(part)
         rows = np.hstack([basis, fit.residual(part, basis) / sigma]).T
-        angle = record.input_angle[part, None] / ratio
-        found = [_Sums.of(rows, block, waves) for block, waves in _waves(angle, multiples, whole)]
-        sums = [one.plus(more) for one, more in zip(sums, found, strict=True)] if sums else found
-    searched, amplitudes = zip(*(one.amplitudes(len(record.time)) for one in sums), strict=True)
-    searched = np.concatenate(searched) / ratio
+        sums.append(_Sums.of(rows, record.input_angle[part] / ratio, lines))
+    separate, amplitudes = reduce(_Sums.plus, sums).amplitudes(len(record.time))
+    searched = lines[separate] / ratio
     rising = np.argsort(searched)
-    return searched[rising], np.concatenate(amplitudes, axis=1)[:, rising]
+    return searched[rising], amplitudes[:, rising]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,26 +94,27 @@ class _Sums:
     ``products`` has shape (p + 4, k): with the basis, then with the residuals.
     """
 
-    lines: NDArray[Any]
     products: NDArray[np.complex128]
     squares: NDArray[np.complex128]
 
     @classmethod
     def of(
-        cls, rows: NDArray[np.float64], lines: NDArray[Any], waves: NDArray[np.complex128]
+        cls, rows: NDArray[np.float64], angle: NDArray[np.float64], lines: NDArray[np.float64]
     ) -> _Sums:
-        # As real numbers: a product of real and complex matrices would copy the real one.
-        products = (rows @ waves.view(float)).view(complex)
-        return cls(lines, products, np.einsum("nk,nk->k", waves, waves))
+        """Sum over rows at angles (n,) with waves exp(i line angle)."""
+        # Type 3: neither the angles nor the lines need be evenly spaced.
+        transform = partial(finufft.nufft1d3, isign=1, eps=SUM_ERROR, nthreads=1)
+        products = transform(angle, np.ascontiguousarray(rows, dtype=complex), lines)
+        return cls(products, transform(angle, np.ones(len(angle), complex), 2.0 * lines))
 
     def plus(self, more: _Sums) -> _Sums:
         """Return the sums over the rows of both."""
-        return _Sums(self.lines, self.products + more.products, self.squares + more.squares)
+        return _Sums(self.products + more.products, self.squares + more.squares)
 
-    def amplitudes(self, n: int) -> tuple[NDArray[Any], NDArray[np.float64]]:
+    def amplitudes(self, n: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
         """Fit cosine and sine of each wave, orthogonal to the basis, to residuals of variance 1.
 
-        Returns the lines that are separate enough, and their amplitudes (4, k), for n rows.
+        Returns which lines are separate enough, and their amplitudes (4, k), for n rows.
         """
         shared, products = self.products[:-4], self.products[-4:]
         power = n - np.sum(np.abs(shared) ** 2, axis=0)
@@ -124,14 +125,4 @@ class _Sums:
         # square)/2, c's = Im square / 2; their chi-square of two degrees of freedom has mean 2.
         chi_square = 2.0 * (np.abs(products) ** 2 * power - np.real(products**2 * square.conj()))
         chi_square /= power**2 - np.abs(square) ** 2
-        return self.lines[separate], np.sqrt(chi_square / 2.0)
-
-
-def _waves(
-    angle: NDArray[np.float64], multiples: NDArray[np.int_], others: NDArray[np.floating[Any]]
-) -> Iterator[tuple[NDArray[Any], NDArray[np.complex128]]]:
-    """Yield consecutive multiples in blocks, then others, with their waves over angles (n, 1)."""
-    powers = np.exp(1j * angle * np.arange(BLOCK))
-    for block in np.split(multiples, range(BLOCK, len(multiples), BLOCK)):
-        yield block, powers[:, : len(block)] * np.exp(1j * angle * block[0])
-    yield others, np.exp(1j * angle * others)
+        return separate, np.sqrt(chi_square / 2.0)

@@ -188,6 +188,26 @@ def test_residual_spectrum_of_noise_is_exponential():
         assert kstest(channel**2, "expon").pvalue > 0.001
 
 
+@pytest.mark.parametrize("ratio", [RATIO, RATIO - 0.63])
+def test_residual_spectrum_is_what_a_line_removes_beside_those_of_the_fit(ratio):
+    spoiled = noisy(np.random.default_rng(14))
+    orders, amplitudes = residual_spectrum(spoiled, RIG, ratio, ORDERS)
+    angle = spoiled.input_angle
+    channels = [angle / ratio - spoiled.output_angle, spoiled.input_torque, spoiled.output_torque]
+    sigma = np.sqrt(np.diag(row_covariance(RIG, ratio, 1)))
+    known = np.outer(angle, ORDERS)
+    fitted = np.column_stack([np.ones(N_ROWS), TIME, np.cos(known), np.sin(known)])
+
+    def left(columns):
+        squares = [np.linalg.lstsq(columns, one, rcond=None)[1][0] for one in channels]
+        return np.array(squares) / sigma[:3] ** 2
+
+    for place in (0, len(orders) // 3, len(orders) - 1):
+        more = np.outer(angle, orders[place])
+        removed = left(fitted) - left(np.column_stack([fitted, np.cos(more), np.sin(more)]))
+        np.testing.assert_allclose(amplitudes[:3, place] ** 2, removed / 2.0, rtol=1e-6, atol=1e-6)
+
+
 def test_residual_spectrum_shows_the_unlisted_line_only():
     clean = noisy(np.random.default_rng(11))
     strong = waves(np.full(5, 30.0 * RIG.output_torque_noise), ORDERS, ANGLE)
