@@ -25,7 +25,7 @@ def freed_together(data: Evidence, fitted: Fit) -> tuple[tuple[Candidate, ...], 
         if not more:
             break
         freed = (*freed, *more)
-        found = fit(data, (*fitted.candidates, *freed), found.values)
+        found = fit(data, (*fitted.candidates, *freed), found.values, settled=data.rules.trial_gain)
     return freed, found
 
 

@@ -14,13 +14,21 @@ from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 
+FORETOLD = 1e-3
+"""Share of a change of the residuals, squared, up to which derivatives foretell it.
+
+Steps from there lead back: 50 starts of seen campaigns that were foretold this well ended where the
+derivatives were taken. That they are not is no evidence of another minimum.
+"""
+
 
 def best_fit(
     data: Evidence, one: Hypothesis, starts: Sequence[Vector], found: Iterable[Hypothesis]
 ) -> Fit:
     """Return the best fit of a set from its values, the believed base and other starts.
 
-    A fit ends where it arrives at an earlier one.
+    From a start that leads back only the residuals are computed. A fit ends where it arrives at an
+    earlier one.
 
     Parameters
     ----------
@@ -36,11 +44,37 @@ def best_fit(
 
     def fit_from(further: Iterable[Vector]) -> Fit:
         for start in further:
-            fits.append(fit(data, one.candidates, start, known=fits))
-        return min(fits, key=lambda each: each.chi_square)
+            if _may_lead_elsewhere(data, _least(fits), start):
+                fits.append(fit(data, one.candidates, start, known=fits))
+        return _least(fits)
 
     best = fit_from((_from_believed(data.base, one), *starts))
     return fit_from(_other_shapes(best, one, found, data.rules))
+
+
+def _least(fits: Sequence[Fit]) -> Fit:
+    return min(fits, key=lambda each: each.chi_square)
+
+
+def _may_lead_elsewhere(data: Evidence, best: Fit, start: Vector) -> bool:
+    """Tell whether a fit from a start may end lower than the best one so far.
+
+    Not where the derivatives of the best one foretell the residuals at the start. Nor where what
+    they do not foretell there, as a new shape of a law, with any strength removes less of what the
+    best one leaves than evidence would count, in units of that. Of 173 starts of seen campaigns
+    107 were left out by this; one of them would have gained, 2.8.
+    """
+    problem = data.objective(best.candidates)
+    moved = np.clip(start, problem.lower, problem.upper) - best.values
+    foretold = best.jacobian @ (moved / problem.scale)
+    beyond = problem.residuals(best.values + moved) - best.residuals - foretold
+    if beyond @ beyond <= FORETOLD * (foretold @ foretold):
+        return False
+    by_unknowns, _ = np.linalg.qr(best.jacobian[:, best.bound_sides == 0.0])
+    beyond -= by_unknowns @ (by_unknowns.T @ beyond)
+    removed, size = (beyond @ best.residuals) ** 2, beyond @ beyond
+    misfit = max(best.chi_square / max(len(best.residuals) - len(best.values), 1), 1.0)
+    return bool(removed >= data.rules.evidence_distance / 2.0 * misfit * size)
 
 
 def other_starts(one: Hypothesis, base: Vector) -> list[Vector]:

@@ -171,7 +171,8 @@ def _renewed_search(search: Search) -> Search:
     renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
     if renewed is None or not _is_all(renewed, fit(renewed, first.candidates, first.fit.values)):
         return search
-    base, candidates = fit(renewed, start=search.base.values), search.candidates
+    settled, candidates = data.rules.trial_gain, search.candidates
+    base = fit(renewed, start=search.base.values, settled=settled)
     if down_to_noise(base, search.degrees_of_freedom, data.rules):
         return search
     again = Search(renewed, base, candidates, screen(renewed, base, candidates), search.forms_only)

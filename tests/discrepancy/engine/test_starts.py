@@ -1,0 +1,77 @@
+"""Which further starts a fit follows: a wave of a frequency that is not found from afar."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.starts import best_fit
+from pymoo_hdte.effects.unknowns import Parameter
+
+TIME = np.linspace(0.0, 10.0, 400)
+STRENGTH, FREQUENCY, LEVEL = 3.0, 2.0, 5.0
+
+
+class Wave:
+    """Residuals of a level and a wave of unknown strength and frequency, measured with noise 1."""
+
+    candidates = ()
+    parameters = (
+        Parameter("level", 0.0, -10.0, 10.0, 1.0),
+        Parameter("strength", 1.0, 0.0, 10.0, 1.0),
+        Parameter("frequency", 6.0, 0.5, 12.0, 1.0),
+    )
+    scale = np.ones(3)
+    start, lower, upper = np.array([[one.start, one.lower, one.upper] for one in parameters]).T
+
+    def __init__(self):
+        noise = np.random.default_rng(3).normal(size=len(TIME))
+        self.measured = LEVEL + STRENGTH * np.sin(FREQUENCY * TIME) + noise
+        self.derived = 0
+
+    def residuals(self, values):
+        level, strength, frequency = values
+        return level + strength * np.sin(frequency * TIME) - self.measured
+
+    def jacobian(self, values):
+        self.derived += 1
+        _, strength, frequency = values
+        slopes = np.sin(frequency * TIME), strength * TIME * np.cos(frequency * TIME)
+        return np.column_stack([np.ones_like(TIME), *slopes])
+
+
+@pytest.fixture
+def far():
+    """The evidence, and a fit whose wave has vanished far from the true frequency."""
+    problem = Wave()
+    data = SimpleNamespace(objective=lambda _: problem, rules=RULES, base=())
+    vanished = fit(data, (), np.array([0.0, 1.0, 9.0]))
+    assert vanished.values[1] < 0.5
+    return data, problem, SimpleNamespace(candidates=(), names=frozenset(), fit=vanished)
+
+
+def found_from(far, start):
+    """Where the best fit ends with one more start, and how often derivatives were asked for."""
+    data, problem, one = far
+    problem.derived = 0
+    best = best_fit(data, one, [np.array(start)], ())
+    return best, problem.derived
+
+
+def test_a_start_is_followed_where_its_shape_removes_what_is_left(far):
+    _, without = found_from(far, far[2].fit.values)
+    best, derived = found_from(far, [0.0, 1.0, 2.2])
+    assert derived > without
+    assert best.values == pytest.approx([LEVEL, STRENGTH, FREQUENCY], abs=0.3)
+
+
+@pytest.mark.parametrize("start", [[0.0, 1.0, 5.0], [-3.0, 0.0, 9.0]])
+def test_no_start_is_followed_whose_shape_is_not_in_the_data_or_that_leads_back(far, start):
+    _, without = found_from(far, far[2].fit.values)
+    best, derived = found_from(far, start)
+    assert derived == without
+    assert best.chi_square == pytest.approx(far[2].fit.chi_square, abs=0.1)
+    # That it would lead nowhere else: followed, it ends no lower.
+    assert fit(far[0], (), np.array(start)).chi_square > best.chi_square - 0.1
