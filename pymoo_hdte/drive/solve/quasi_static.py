@@ -192,7 +192,8 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     held = _play(torque, sum(law.breakaway for law in at_output if law.before_slip is None))
     steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
     moving = np.flatnonzero(moves)
-    turning = moving[1:][moves[moving[1:]] * moves[moving[:-1]] < 0.0]
+    # Signs, since the product of two small moves may be zero.
+    turning = moving[1:][np.diff(np.sign(moves[moving])) != 0.0]
     before, turns = np.zeros((len(mesh.stiffness), 1)), _none(coefficients)
     for rows in np.split(np.arange(len(torque)), turning):
         direction = 1.0 if moves[rows].sum() >= 0.0 else -1.0
