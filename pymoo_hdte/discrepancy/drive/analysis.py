@@ -14,11 +14,16 @@ from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.campaign.rows.examination import examined_rows
 from pymoo_hdte.discrepancy.campaign.rows.findings import RowFindings
+from pymoo_hdte.discrepancy.drive import rattling
 from pymoo_hdte.discrepancy.drive.candidates import drive_candidates
-from pymoo_hdte.discrepancy.drive.evidence import Data, training_data
-from pymoo_hdte.discrepancy.drive.features import Features, measure, unexpected_orders
+from pymoo_hdte.discrepancy.drive.evidence import Data, flanks_held, training_data
+from pymoo_hdte.discrepancy.drive.features import (
+    Features,
+    measure,
+    unexpected_lines,
+    unexpected_orders,
+)
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
-from pymoo_hdte.discrepancy.drive.rattling import judged
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
 from pymoo_hdte.discrepancy.drive.steady_states import TOLERANCE
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
@@ -101,15 +106,22 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     expected = expected_orders(campaign, rules)
     campaign, rows = examined_rows(campaign, expected, rules)
     features = measure(campaign, campaign.train, expected)
-    unexpected = unexpected_orders(features, ratio, campaign.rig, rules)
+    lines = unexpected_lines(features, ratio, campaign.rig, rules)
+    held = flanks_held(features, campaign.torque_scale, rules)
+    rattles = rattling.is_heard(lines, held, rules)
+    # Lines of a motion that does not repeat are no orders.
+    kept = np.flatnonzero(held) if rattles else range(len(lines))
+    unexpected = unexpected_orders([lines[row] for row in kept], ratio, rules)
     if unexpected:
         orders = _apart(unexpected, campaign, expected, rules)
         features = measure(campaign, campaign.train, orders)
     data = training_data(campaign, features, rules)
     if any(effect_named(effect.name).rattles for effect in campaign.believed.effects):
         data = data.loaded
+    elif rattles:
+        data = rattling.with_clearance(data)
     _check_steady(data)
-    data, listed, verdict = judged(data, _candidates)
+    data, listed, verdict = rattling.judged(data, _candidates)
     data, verdict = _judged_again(verdict, data, listed)
     return DriveFinding(campaign, data, verdict, tuple(unexpected), rows)
 

@@ -42,6 +42,11 @@ def _unproven(finding: DriveFinding) -> list[str]:
             "Neither fitted nor predicted, because the load does not hold the tooth flanks "
             f"together: {', '.join(left_out)}."
         )
+    if finding.data.evident:
+        found.append(
+            "Without load the motion does not repeat with the input: tooth flanks part and meet "
+            "again, so that no explanation without a clearance is told."
+        )
     return found
 
 

@@ -51,9 +51,12 @@ class Data(Observations):
     ----------
     rules : Rules
         Thresholds of the verdict.
+    evident : frozenset of str
+        As of `Evidence`.
     """
 
     rules: Rules = RULES
+    evident: frozenset[str] = frozenset()
 
     @property
     def remainder(self) -> float:

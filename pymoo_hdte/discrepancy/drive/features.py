@@ -8,6 +8,7 @@ record to the next, which reaches all channels through the response of the drive
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -132,24 +133,37 @@ def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[
     return covariance
 
 
-def unexpected_orders(
+def unexpected_lines(
     features: Features, ratio: float, rig: Rig, rules: Rules = RULES
-) -> list[float]:
-    """Return orders beyond those of the features at which the residual exceeds the noise.
+) -> list[dict[float, float]]:
+    """Return where the residual of each record exceeds the noise, beyond the features' orders.
 
-    The strongest first, summed over channels and records; fixed frequencies, whose order differs
-    from record to record, do not add up and come last.
+    For each record the power, summed over channels, by order in cycles per input turn.
     """
-    total: dict[float, float] = {}
+    found = []
     for record in features.records:
         orders, amplitudes = residual_spectrum(
             record, rig, ratio, features.orders, rules.highest_order
         )
         power = amplitudes**2
         threshold = np.log(power.size * len(features.records) / rules.unexpected_line_chance)
-        for place in np.flatnonzero(power.max(axis=0) > threshold):
-            key = round(float(orders[place]), 9)
-            total[key] = total.get(key, 0.0) + float(power[:, place].sum())
+        beyond = np.flatnonzero(power.max(axis=0) > threshold)
+        sizes = power[:, beyond].sum(axis=0)
+        found.append(dict(zip(orders[beyond].round(9).tolist(), sizes.tolist(), strict=True)))
+    return found
+
+
+def unexpected_orders(
+    lines: Sequence[dict[float, float]], ratio: float, rules: Rules = RULES
+) -> list[float]:
+    """Return the orders of unexpected lines of several records, the strongest first.
+
+    In total; fixed frequencies, whose order differs from record to record, do not add up and come
+    last.
+    """
+    total: Counter[float] = Counter()
+    for one in lines:
+        total.update(one)
     strongest: list[float] = []
     for order in sorted(total, key=lambda one: -total[one]):
         if all(abs(order - other) > 2.5 / ratio for other in strongest):

@@ -2,20 +2,24 @@
 
 With a clearance a drive whose load does not hold the tooth flanks together has no steady state that
 could be fitted: such records are predicted without the clearance. Where they are fitted, they speak
-against every set that has one, and for a soft wind-up, which follows the motion within it.
+against every set that has one, and for a soft wind-up, which follows the motion within it. Where
+several plainly do not repeat with the input, they show a clearance by themselves.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.drive.evidence import Data
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
+from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED, Verdict, judge
-from pymoo_hdte.effects.effect import effect_named
+from pymoo_hdte.effects.effect import effect_named, known_effects
 
 
 def judged(
@@ -75,6 +79,36 @@ def _explains_by_a_clearance(verdict: Verdict) -> bool:
     several = (one.effects for one in named if len(one.effects) > 1)
     listed = {each.name for effects in several for each in effects if each.listed}
     return any(effect_named(name).rattles for name in listed)
+
+
+def is_heard(
+    lines: Sequence[dict[float, float]], held: NDArray[np.bool_], rules: Rules = RULES
+) -> bool:
+    """Tell whether records show by themselves that tooth flanks part.
+
+    Flanks that part and meet again do not repeat with the input: several records whose load does
+    not hold them together have many lines that are no orders of the drive, and no other record has.
+
+    Parameters
+    ----------
+    lines : sequence of dict
+        Of each record: see `features.unexpected_lines`.
+    held : ndarray, shape (r,)
+        Which records have a load that holds the flanks together: see `evidence.flanks_held`.
+    rules : Rules
+    """
+    rough = np.array([len(one) >= rules.rattling_lines for one in lines])
+    return bool(rough[~held].sum() >= rules.fewest_rattling and not rough[held].any())
+
+
+def with_clearance(data: Data) -> Data:
+    """Return the data without records that rattle, in which a clearance is evident.
+
+    The same data where too few records are left.
+    """
+    loaded = data.loaded
+    names = frozenset(one.name for one in known_effects() if one.rattles)
+    return data if loaded is data else replace(loaded, evident=names)
 
 
 def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> str | None:

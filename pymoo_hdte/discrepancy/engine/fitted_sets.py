@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 
+import numpy as np
+
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vector, fit
@@ -49,12 +51,14 @@ class FittedSets:
         self._left_out: set[frozenset[str]] = set()
         self._finished: set[frozenset[str]] = set()
         self._from_all_starts: set[frozenset[str]] = set()
-        self._resumed = False
+        self._resumed = self._whole_only = False
 
     @property
     def found(self) -> list[Hypothesis]:
         """All sets fitted so far that are no others under another name, by rising BIC."""
-        known = (one for label, one in self._by_label.items() if label not in self._left_out)
+        known = [one for label, one in self._by_label.items() if label not in self._left_out]
+        if self._whole_only:
+            known = [one for one in known if not self.lacks_evident(one)]
         return sorted(known, key=lambda one: one.bic)
 
     def of_size(self, size: int) -> list[Hypothesis]:
@@ -62,15 +66,30 @@ class FittedSets:
         return [one for one in self.found if len(one.members) == size]
 
     def enough(self, one: Hypothesis) -> bool:
-        """Tell whether a set explains the data down to the noise."""
-        return self.forms.leaves_noise(one)
+        """Tell whether a set explains the data down to the noise, and has what is evident."""
+        return self.forms.leaves_noise(one) and not self.lacks_evident(one)
+
+    def lacks_evident(self, one: Hypothesis) -> bool:
+        """Tell whether an effect is evident, and a set has none of those that it may be."""
+        evident = self.data.evident
+        return bool(evident) and not any(each.name in evident for each in one.candidates)
+
+    def add_evident(self, one: Hypothesis, others: Sequence[Candidate]) -> None:
+        """Fit a set that lacks what is evident with each of the others that it may be."""
+        for more in others if self.lacks_evident(one) else ():
+            for start in more.starts if more.name in self.data.evident else ():
+                self.fitted((*one.candidates, more), np.append(one.fit.values, start), again=True)
+
+    def leave_out_lacking(self) -> None:
+        """Leave out all sets that lack what is evident, if any has it."""
+        self._whole_only = not all(map(self.lacks_evident, self.found))
 
     def could_count(self, one: Hypothesis) -> bool:
         """Tell whether a further effect could be justified.
 
         One at a bound may stand for two, and so may a zero or gain far beyond what is stated.
         """
-        if self.held_by_sensors(one):
+        if self.held_by_sensors(one) or self.lacks_evident(one):
             return True
         if self.enough(one):
             return is_bounded(one.fit)
@@ -100,7 +119,12 @@ class FittedSets:
         return all(self._earns(one, member, self.without(one, member)) for member in members)
 
     def _earns(self, one: Hypothesis, member: Effects, rest: Hypothesis) -> bool:
-        """Tell whether a member is earned, as the listed laws go or in any form of the others."""
+        """Tell whether a member is earned, as the listed laws go or in any form of the others.
+
+        What is evident is.
+        """
+        if self.lacks_evident(rest) and not self.lacks_evident(one):
+            return True
         earned = is_earned(self.data, self.base, one, rest, member)
         return earned or self.forms.earns(one, rest) or self._brings_sensors_back(one, rest)
 

@@ -206,6 +206,11 @@ class Evidence(Protocol):
         """Share of the base's excess up to which a residual is attributed to no effect."""
         ...
 
+    @property
+    def evident(self) -> frozenset[str]:
+        """Names of effects of which one is there, whatever a fit says; empty if none is evident."""
+        ...
+
     def objective(self, candidates: Sequence[Candidate]) -> Residuals:
         """Return the residuals of a model with candidates; see `objective.Objective`."""
         ...

@@ -196,9 +196,9 @@ class Search(FittedSets):
             return
         self._extended.add(label)
         self._free_beside(one)
-        others = self._further(one)
-        if not others:
+        if not (others := self._further(one)):
             return
+        self.add_evident(one, others)
         if len(one.members) > 1 and self.forms.explains(one):
             # A third effect shows beside two only in what no form of theirs explains.
             self._extend_beyond_forms(one)

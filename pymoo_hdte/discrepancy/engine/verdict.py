@@ -130,7 +130,7 @@ def judge(
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
     candidates = [*candidates, *data.out_of_tolerance(base.at_bounds)]
-    quiet = down_to_noise(base, degrees_of_freedom, rules)
+    quiet = down_to_noise(base, degrees_of_freedom, rules) and not data.evident
     # Screening is slow, and known sets need none unless the base itself may be adequate.
     searched = [one for one in candidates if not one.instead_of]
     screened = screen(data, base, searched) if quiet or not known else []
@@ -148,6 +148,7 @@ def judge(
     search.singles()
     search = _renewed_search(search)
     search.grow()
+    search.leave_out_lacking()
     chosen = _chosen(search)
     if len(chosen.members) > 1:
         search.complete(chosen)

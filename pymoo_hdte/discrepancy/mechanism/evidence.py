@@ -48,6 +48,11 @@ class MeasuredData(WhitenedBalances):
         )
 
     @property
+    def evident(self) -> frozenset[str]:
+        """None: no effect shows by itself in records of a mechanism."""
+        return frozenset()
+
+    @property
     def remainder(self) -> float:
         """Share of the base's excess up to which a residual is attributed to no effect."""
         return self.rules.mechanism_remainder

@@ -27,10 +27,10 @@ def campaign():
     return replace(clean, running=(replace(turned, **angles), *clean.running[1:]))
 
 
-def said(campaign, fitted=None, orders=ORDERS, chosen=None, status="named"):
+def said(campaign, fitted=None, orders=ORDERS, chosen=None, status="named", **of_data):
     """Return all limits of a campaign of which some records, by default all, were fitted."""
     features = measure(campaign, fitted or campaign.train, orders)
-    data = Data(campaign, features, (), campaign.torsion)
+    data = Data(campaign, features, (), campaign.torsion, **of_data)
     return campaign_limits(
         DriveFinding(campaign, data, Verdict(status, None, chosen, (), (), FREEDOM), ())
     )
@@ -67,6 +67,7 @@ CASES = {
         lambda c: said(c, c.train[:-1]),
         r"Neither fitted nor predicted.*: run_2000rpm_40Nm[,.]",
     ),
+    "evident": (lambda c: said(c, evident=frozenset(["backlash"])), "flanks part"),
 }
 
 

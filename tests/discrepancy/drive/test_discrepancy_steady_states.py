@@ -1,4 +1,4 @@
-"""Steady states of records: those without one, where a clearance would rattle, and nearby ones."""
+"""Steady states of records: those without one, where a clearance rattles, and nearby ones."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -6,14 +6,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from planted_features import known_data, library, listed, measured, with_sweep
+from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.discrepancy.drive import rattling
+from pymoo_hdte.discrepancy.drive.evidence import flanks_held
+from pymoo_hdte.discrepancy.drive.features import measure, unexpected_lines
 from pymoo_hdte.discrepancy.drive.steady_states import merged
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.drive.effects import LawAtPort
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.stiffness import SoftWindup
+from pymoo_hdte.units import ARCSEC
+from pymoo_hdte.virtual.rig import run_campaign
+from pymoo_hdte.virtual.runs import Condition
 
 LOADED_OR_NOT = [(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0, 40.0)]
 
@@ -134,3 +142,70 @@ def test_records_that_rattle_do_not_count_where_sweeps_speak_for_a_clearance(
     monkeypatch.setattr(rattling, "judge", lambda *_: SOFT)
     found, _, _ = rattling.judged(data, lambda some, base: [])
     assert len(found.features.records) == kept
+
+
+CONDITIONS = tuple(
+    Condition(speed, load, 1000.0, 1, "train") for speed in (1000.0, 1500.0) for load in (0.0, 20.0)
+)
+ORDERS = [1.0 / 101.0, 2.0 / 101.0, 1.0, 2.0, 2.02, 3.0, 4.0, 6.0]
+CLEARANCES = {"backlash", "clearance_variation"}
+MANY, FEW = ({0.1 * k: 20.0 for k in range(1, n)} for n in (RULES.rattling_lines + 1, 5))
+
+
+@pytest.mark.parametrize(
+    ("hidden", "heard"),
+    [
+        ({"clearance": 5.0 * ARCSEC, "clearance_rounding": 0.75 * ARCSEC}, True),
+        ({"soft_share": 0.3, "soft_corner": 3e-4, "corner_rounding": 5e-5}, False),
+        ({}, False),
+    ],
+)
+def test_a_clearance_is_heard_without_load_and_a_soft_windup_is_not(hidden, heard):
+    rig = true_rig(*([effect("mesh", **hidden)] if hidden else []))
+    campaign = run_campaign(rig, BELIEVED, RIG, np.random.default_rng(4), CONDITIONS)
+    features = measure(campaign, campaign.train, ORDERS)
+    lines = unexpected_lines(features, BELIEVED.ratio, campaign.rig)
+    held = flanks_held(features, campaign.torque_scale, RULES)
+    assert held.tolist() == [False, True, False, True]
+    assert rattling.is_heard(lines, held) == heard
+
+
+@pytest.mark.parametrize(
+    ("lines", "heard"),
+    [
+        ([MANY, FEW, MANY, {}], True),
+        # One record may be disturbed, and what is rough with load as well is no rattling.
+        ([MANY, {}, FEW, {}], False),
+        ([MANY, MANY, MANY, {}], False),
+        ([{}, MANY, {}, MANY], False),
+    ],
+)
+def test_several_records_without_load_are_rough_and_none_with_load(lines, heard):
+    assert rattling.is_heard(lines, np.array([False, True, False, True])) == heard
+
+
+def test_a_clearance_is_evident_only_where_enough_records_are_left():
+    whole = known_data([(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 10.0, 20.0)])
+    found = rattling.with_clearance(replace(whole, rules=replace(RULES, fewest_records=4)))
+    assert found.evident == CLEARANCES
+    assert np.all(found.features.conditions.output_torque > 0.0)
+    few = rattling.with_clearance(replace(whole, rules=replace(RULES, fewest_records=5)))
+    assert not few.evident
+    assert len(few.features.records) == 6
+
+
+@pytest.mark.parametrize("evident", [True, False])
+def test_what_is_evident_is_told_beside_what_explains_the_rest(evident):
+    """A soft wind-up told of a clearance beside it as well, in records with load."""
+    rng = np.random.default_rng(2)
+    empty = known_data([(rpm, load) for rpm in (10.0, 2000.0) for load in (10.0, 20.0, 30.0, 40.0)])
+    effects = listed(empty, "soft_windup").build((0.3, 3e-4, 3.0))
+    data = with_sweep(measured(effects, rng, empty)[0], effects, rng)
+    data = replace(data, evident=frozenset(CLEARANCES if evident else ()))
+    names = ("soft_windup", "backlash")
+    verdict = judge(data, fit(data), [one for one in library(data) if one.name in names])
+    told = [verdict.chosen, *verdict.equivalent]
+    for one in told:
+        assert "soft_windup" in {each.name for each in one.effects}
+        assert bool(CLEARANCES & {each.name for each in one.effects}) == evident
+    assert verdict.status == ("partial" if evident else "named")

@@ -11,7 +11,7 @@ from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy.drive.features import Features, unexpected_orders
+from pymoo_hdte.discrepancy.drive.features import Features, unexpected_lines, unexpected_orders
 from pymoo_hdte.discrepancy.drive.prediction import Conditions
 from pymoo_hdte.discrepancy.drive.rattling import leading_sweep_effect
 from pymoo_hdte.discrepancy.engine import screening
@@ -213,7 +213,7 @@ def test_lines_that_no_one_expected_are_found_the_strongest_first(lines):
     orders = np.array([1.0, 2.0, 2.02])
     conditions = Conditions(*np.ones((3, 3)), np.zeros((3, 3, 4), dtype=complex))
     features = Features(records, conditions, orders, np.zeros((3, 26)), np.zeros((3, 26, 26)))
-    found = unexpected_orders(features, BELIEVED.ratio, RIG)
+    found = unexpected_orders(unexpected_lines(features, BELIEVED.ratio, RIG), BELIEVED.ratio)
     assert found == pytest.approx(lines, abs=0.5 / BELIEVED.ratio)
 
 
@@ -232,7 +232,7 @@ def test_a_line_of_the_input_is_found_at_its_order_where_the_ratio_is_no_whole_n
     orders = np.array([1.0, 2.0])
     features = Features(records, conditions, orders, np.zeros((3, 18)), np.zeros((3, 18, 18)))
     # What the lines of such a ratio leak to comes after it.
-    assert unexpected_orders(features, 50.5, RIG)[0] == 7.0
+    assert unexpected_orders(unexpected_lines(features, 50.5, RIG), 50.5)[0] == 7.0
 
 
 def test_a_record_in_which_the_drive_would_rattle_says_nothing_of_a_clearance():
