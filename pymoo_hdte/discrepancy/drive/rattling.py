@@ -8,7 +8,7 @@ several plainly do not repeat with the input, they show a clearance by themselve
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +20,13 @@ from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 from pymoo_hdte.discrepancy.engine.verdict import EXPLAINED, Verdict, judge
 from pymoo_hdte.effects.effect import effect_named, known_effects
+
+SUMMED = 8
+"""Most lines whose sums and differences a steady motion is taken to have."""
+LEAKED = 0.01
+"""Share of a record's strongest line, in power, up to which a line may be what that one leaks."""
+SAME_ORDER = 0.4
+"""Cycles of an output turn up to which two lines are of one order: not half their distance."""
 
 
 def judged(
@@ -82,12 +89,17 @@ def _explains_by_a_clearance(verdict: Verdict) -> bool:
 
 
 def is_heard(
-    lines: Sequence[dict[float, float]], held: NDArray[np.bool_], rules: Rules = RULES
+    lines: Sequence[dict[float, float]],
+    held: NDArray[np.bool_],
+    orders: Sequence[float],
+    ratio: float,
+    rules: Rules = RULES,
 ) -> bool:
     """Tell whether records show by themselves that tooth flanks part.
 
-    Flanks that part and meet again do not repeat with the input: several records whose load does
-    not hold them together have many lines that are no orders of the drive, and no other record has.
+    Flanks that part and meet again do not repeat with the input. Records whose load does not hold
+    them together then have many lines that no steady motion has: a curved law makes only sums and
+    differences of the lines that there are, however many of them.
 
     Parameters
     ----------
@@ -95,10 +107,37 @@ def is_heard(
         Of each record: see `features.unexpected_lines`.
     held : ndarray, shape (r,)
         Which records have a load that holds the flanks together: see `evidence.flanks_held`.
+    orders : sequence of float
+        Of the error, cycles per input turn. Lines of records with load count as well.
+    ratio : float
     rules : Rules
     """
-    rough = np.array([len(one) >= rules.rattling_lines for one in lines])
-    return bool(rough[~held].sum() >= rules.fewest_rattling and not rough[held].any())
+    with_load = [one for one, is_held in zip(lines, held, strict=True) if is_held]
+    without = [one for one, is_held in zip(lines, held, strict=True) if not is_held]
+    loaded = {order for one in with_load for order in one}
+    of_error, steady = (_sums_of(one, rules.highest_order) for one in (orders, {*orders, *loaded}))
+    free = np.array([_strong_beyond(one, steady, ratio) for one in without])
+    rough = [_strong_beyond(one, of_error, ratio) for one in with_load]
+    several = np.sum(free >= rules.rattling_trace) >= rules.fewest_rattling
+    return bool(several and max(rough, default=0) < rules.rattling_lines <= free.max())
+
+
+def _strong_beyond(lines: dict[float, float], steady: NDArray[np.float64], ratio: float) -> int:
+    """Return the number of lines at no steady order; those that a strong one leaks are left out."""
+    least = LEAKED * max(lines.values(), default=0.0)
+    strong = np.array([order for order, power in lines.items() if power >= least])
+    away = np.abs(np.subtract.outer(strong, steady)).min(axis=1)
+    return int(np.sum(away > SAME_ORDER / ratio))
+
+
+def _sums_of(orders: Collection[float], highest: float) -> NDArray[np.float64]:
+    """Return the sums and differences of up to `SUMMED` orders, up to the highest."""
+    one = np.array([0.0, *orders, *(-order for order in orders)])
+    found = np.zeros(1)
+    for _ in range(SUMMED):
+        found = np.abs(np.add.outer(found, one)).ravel().round(6)
+        found = np.unique(found[found <= highest])
+    return found
 
 
 def with_clearance(data: Data) -> Data:

@@ -145,17 +145,24 @@ def test_records_that_rattle_do_not_count_where_sweeps_speak_for_a_clearance(
 
 
 CONDITIONS = tuple(
-    Condition(speed, load, 1000.0, 1, "train") for speed in (1000.0, 1500.0) for load in (0.0, 20.0)
+    Condition(speed, load, 1000.0, 1, "train") for speed in (600.0, 1500.0) for load in (0.0, 20.0)
 )
 ORDERS = [1.0 / 101.0, 2.0 / 101.0, 1.0, 2.0, 2.02, 3.0, 4.0, 6.0]
 CLEARANCES = {"backlash", "clearance_variation"}
-MANY, FEW = ({0.1 * k: 20.0 for k in range(1, n)} for n in (RULES.rattling_lines + 1, 5))
+MANY, FEW = (
+    {1.0 / 3.0 + 0.05 * k: 20.0 for k in range(n)}
+    for n in (RULES.rattling_lines, RULES.rattling_trace)
+)
+BEATS = {2.0 + 0.02 * k: 20.0 for k in range(-6, 7)}
+BEATS_OF_HIDDEN = {0.31 * k: 20.0 for k in range(1, 5)} | {
+    1.0 + 0.31 * k: 20.0 for k in range(1, 6)
+}
 
 
 @pytest.mark.parametrize(
     ("hidden", "heard"),
     [
-        ({"clearance": 5.0 * ARCSEC, "clearance_rounding": 0.75 * ARCSEC}, True),
+        ({"clearance": 12.0 * ARCSEC, "clearance_rounding": 0.6 * ARCSEC}, True),
         ({"soft_share": 0.3, "soft_corner": 3e-4, "corner_rounding": 5e-5}, False),
         ({}, False),
     ],
@@ -167,21 +174,26 @@ def test_a_clearance_is_heard_without_load_and_a_soft_windup_is_not(hidden, hear
     lines = unexpected_lines(features, BELIEVED.ratio, campaign.rig)
     held = flanks_held(features, campaign.torque_scale, RULES)
     assert held.tolist() == [False, True, False, True]
-    assert rattling.is_heard(lines, held) == heard
+    assert rattling.is_heard(lines, held, BELIEVED.error_orders, BELIEVED.ratio) == heard
 
 
 @pytest.mark.parametrize(
     ("lines", "heard"),
     [
-        ([MANY, FEW, MANY, {}], True),
+        ([MANY, {}, FEW, {}], True),
         # One record may be disturbed, and what is rough with load as well is no rattling.
-        ([MANY, {}, FEW, {}], False),
+        ([MANY, {}, {}, {}], False),
         ([MANY, MANY, MANY, {}], False),
-        ([{}, MANY, {}, MANY], False),
+        ([FEW, {}, FEW, {}], False),
+        # Beats of the error and of a line of records with load, and what a strong line leaks.
+        ([BEATS, {}, BEATS, {}], False),
+        ([BEATS_OF_HIDDEN, {0.31: 50.0}, BEATS_OF_HIDDEN, {}], False),
+        ([MANY | {2.0: 1e5}, {}, MANY | {2.0: 1e5}, {}], False),
     ],
 )
-def test_several_records_without_load_are_rough_and_none_with_load(lines, heard):
-    assert rattling.is_heard(lines, np.array([False, True, False, True])) == heard
+def test_what_is_rough_without_load_only_and_at_no_steady_order_is_rattling(lines, heard):
+    held = np.array([False, True, False, True])
+    assert rattling.is_heard(lines, held, [1.0, 2.0, 2.02], 101.0) == heard
 
 
 def test_a_clearance_is_evident_only_where_enough_records_are_left():
