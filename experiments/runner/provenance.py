@@ -13,7 +13,7 @@ from pathlib import Path
 import experiments
 import pymoo_hdte
 
-PACKAGES = ("numpy", "scipy", "numba", "pymoo", "moocore", "chaospy", "matplotlib")
+PACKAGES = ("numpy", "scipy", "finufft", "numba", "pymoo", "moocore", "chaospy", "matplotlib")
 """Installed packages whose version can change a result."""
 EXTRAS = (
     *("jmetalpy", "pygmo", "coco-experiment", "comocma", "cma"),

@@ -108,7 +108,9 @@ def examine_drive(campaign: Campaign, rules: Rules = RULES) -> DriveFinding:
     features = measure(campaign, campaign.train, expected)
     lines = unexpected_lines(features, ratio, campaign.rig, rules)
     held = flanks_held(features, campaign.torque_scale, rules)
-    rattles = rattling.is_heard(lines, held, campaign.believed.error_orders, ratio, rules)
+    enough = held.sum() >= rules.fewest_records
+    known = campaign.believed.error_orders
+    rattles = enough and rattling.is_heard(lines, held, known, ratio, rules)
     # Lines of a motion that does not repeat are no orders.
     kept = np.flatnonzero(held) if rattles else range(len(lines))
     unexpected = unexpected_orders([lines[row] for row in kept], ratio, rules)

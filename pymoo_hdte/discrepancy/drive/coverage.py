@@ -44,8 +44,8 @@ def _unproven(finding: DriveFinding) -> list[str]:
         )
     if finding.data.evident:
         found.append(
-            "Without load the motion does not repeat with the input: tooth flanks part and meet "
-            "again, so that no explanation without a clearance is told."
+            "Without load the motion does not repeat with the input, as where tooth flanks part "
+            "and meet again: no explanation without a clearance is told."
         )
     return found
 

@@ -25,8 +25,11 @@ SUMMED = 8
 """Most lines whose sums and differences a steady motion is taken to have."""
 LEAKED = 0.01
 """Share of a record's strongest line, in power, up to which a line may be what that one leaks."""
-SAME_ORDER = 0.4
-"""Cycles of an output turn up to which two lines are of one order: not half their distance."""
+SAME_ORDER = 0.6
+"""Cycles of an output turn up to which a line is of a steady order, which may lie between lines.
+
+An order half-way between two lines shows in both.
+"""
 
 
 def judged(
@@ -115,7 +118,11 @@ def is_heard(
     with_load = [one for one, is_held in zip(lines, held, strict=True) if is_held]
     without = [one for one, is_held in zip(lines, held, strict=True) if not is_held]
     loaded = {order for one in with_load for order in one}
-    of_error, steady = (_sums_of(one, rules.highest_order) for one in (orders, {*orders, *loaded}))
+    if sum(len(one) >= rules.rattling_trace for one in without) < rules.fewest_rattling:
+        return False
+    of_error, steady = (
+        _sums_of(one, rules.highest_order, ratio) for one in (orders, {*orders, *loaded})
+    )
     free = np.array([_strong_beyond(one, steady, ratio) for one in without])
     rough = [_strong_beyond(one, of_error, ratio) for one in with_load]
     several = np.sum(free >= rules.rattling_trace) >= rules.fewest_rattling
@@ -130,13 +137,16 @@ def _strong_beyond(lines: dict[float, float], steady: NDArray[np.float64], ratio
     return int(np.sum(away > SAME_ORDER / ratio))
 
 
-def _sums_of(orders: Collection[float], highest: float) -> NDArray[np.float64]:
-    """Return the sums and differences of up to `SUMMED` orders, up to the highest."""
+def _sums_of(orders: Collection[float], highest: float, ratio: float) -> NDArray[np.float64]:
+    """Return the sums and differences of up to `SUMMED` orders, up to the highest.
+
+    To a hundredth of a cycle of an output turn, so that they are not too many.
+    """
     one = np.array([0.0, *orders, *(-order for order in orders)])
     found = np.zeros(1)
     for _ in range(SUMMED):
-        found = np.abs(np.add.outer(found, one)).ravel().round(6)
-        found = np.unique(found[found <= highest])
+        found = np.abs(np.add.outer(found, one)).ravel()
+        found = np.unique((100.0 * ratio * found[found <= highest]).round()) / (100.0 * ratio)
     return found
 
 

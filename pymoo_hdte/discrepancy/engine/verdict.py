@@ -144,6 +144,7 @@ def judge(
     search = Search(data, base, searched, screened, forms)
     if known:
         search.resume(known)
+        search.leave_out_lacking()
         return _verdict(search, _answer(search, _chosen(search), ()))
     search.singles()
     search = _renewed_search(search)
@@ -172,8 +173,7 @@ def _renewed_search(search: Search) -> Search:
     renewed = data.with_noise_of(first.fit) if explained and not search.enough(first) else None
     if renewed is None or not _is_all(renewed, fit(renewed, first.candidates, first.fit.values)):
         return search
-    settled, candidates = data.rules.trial_gain, search.candidates
-    base = fit(renewed, start=search.base.values, settled=settled)
+    base, candidates = fit(renewed, start=search.base.values), search.candidates
     if down_to_noise(base, search.degrees_of_freedom, data.rules):
         return search
     again = Search(renewed, base, candidates, screen(renewed, base, candidates), search.forms_only)
@@ -250,7 +250,8 @@ def _verdict(search: Search, answer: _Answer) -> Verdict:
         equivalent += in_one_law(search, chosen)
         equivalent += probability.likelier(chosen, equivalent, search.found, degrees_of_freedom)
     equivalent = distinct(chosen, equivalent)
-    status = _status(chosen, certain or in_part, equivalent, doubts)
+    known = (certain or in_part) and not search.lacks_evident(chosen)
+    status = _status(chosen, known, equivalent, doubts)
     others = tuple(equivalent) if status == "class" else ()
     compared = (chosen, *others) if foreign else search.found
     # A class that is not all is no more certain than a name in part.

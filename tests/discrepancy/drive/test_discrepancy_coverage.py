@@ -67,7 +67,7 @@ CASES = {
         lambda c: said(c, c.train[:-1]),
         r"Neither fitted nor predicted.*: run_2000rpm_40Nm[,.]",
     ),
-    "evident": (lambda c: said(c, evident=frozenset(["backlash"])), "flanks part"),
+    "evident": (lambda c: said(c, evident=frozenset(["backlash"])), "does not repeat"),
 }
 
 

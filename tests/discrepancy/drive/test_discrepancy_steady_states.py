@@ -221,3 +221,12 @@ def test_what_is_evident_is_told_beside_what_explains_the_rest(evident):
         assert "soft_windup" in {each.name for each in one.effects}
         assert bool(CLEARANCES & {each.name for each in one.effects}) == evident
     assert verdict.status == ("partial" if evident else "named")
+    again = judge(data, verdict.base, [], (verdict.chosen, *verdict.alternatives))
+    assert {each.name for each in again.chosen.effects} == {each.name for each in told[0].effects}
+
+
+def test_steady_orders_between_two_lines_are_no_rattling():
+    """With a ratio that is no whole number orders of the input lie between those of the output."""
+    between = {order + way / 50.5: 20.0 for order in (3.0, 5.0, 7.0, 9.0) for way in (-0.5, 0.5)}
+    held = np.array([False, False, True])
+    assert not rattling.is_heard([between, between, {}], held, [1.0, 2.0], 50.5)

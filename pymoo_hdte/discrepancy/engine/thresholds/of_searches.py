@@ -52,7 +52,8 @@ class SearchRules(RuleSet):
     trial_gain: float = rule(
         0.01,
         "share of chi-square",
-        "Least share that a step removes for a fit that only ranks an explanation to go on.",
+        "Least share that a step removes for a fit to go on that only ranks an explanation, or "
+        "tells which parameters want to leave their tolerances.",
         f"{BY_HAND}: explanations that are told apart by less are fitted to the end.",
         at_least=0.0,
         at_most=1.0,
