@@ -18,7 +18,7 @@ Vector = NDArray[np.float64]
 FORETOLD = 1e-3
 """Share of a change of the residuals, squared, up to which derivatives foretell it.
 
-Steps from there lead back: 50 starts of seen campaigns that were foretold this well ended where the
+Steps from there lead back: 27 starts of seen campaigns that were foretold this well ended where the
 derivatives were taken. That they are not is no evidence of another minimum.
 """
 
