@@ -145,7 +145,7 @@ def _of_speed(
 
 def _varying_friction(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     port, slower = candidate.port, ranges.slower(candidate.port)
-    found: list[DriveEffect] = [*_friction(candidate, ranges)]
+    found = _friction(candidate, ranges)
     for order in (slower * one for one in ranges.multiples(candidate.order or 1.0)):
         for phase in _PARTS:
             for power in range(2):
@@ -204,16 +204,16 @@ def _springs(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
 
 
 def _stiffness_wave(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    return [
-        Correction("mesh", PeriodicStiffness(order, phase, _SHARE))
-        for order in ranges.multiples(candidate.order or 2.0)
-        for phase in _PARTS
-    ]
+    orders = ranges.multiples(candidate.order or 2.0)
+    laws = [PeriodicStiffness(order, phase, _SHARE) for order in orders for phase in _PARTS]
+    return [Correction("mesh", law) for law in laws]
 
 
 def _ripple(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
-    size = _SHARE * ranges.torque / ranges.ratio
-    orders = ranges.multiples(candidate.order or 1.0)
+    size, order = _SHARE * ranges.torque / ranges.ratio, candidate.order or 1.0
+    orders = ranges.multiples(order)
+    # It moves its own angle, through which each harmonic shows at the next lower one, too.
+    orders += [orders[-1] + order] if 0 < len(orders) < ranges.terms else []
     return [
         Correction("input", PeriodicTorque(order, phase, size))
         for order in orders
