@@ -12,7 +12,13 @@ import numpy as np
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.doubts import explains_in_any_form
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains, differing, is_bounded
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    contains,
+    differing,
+    is_bounded,
+    label_of,
+)
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.search import Search
 
@@ -48,7 +54,27 @@ def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
     near = search.alike(one, other) or undecided(one, other, search.data.rules)
+    near = near or _needs_no_value(search, one, other)
     return near and not (contains(one, other) and is_bounded(one.fit))
+
+
+def _needs_no_value(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
+    """Tell whether a set explains in another form what another has a value out of tolerance for.
+
+    Of two laws at one port the values beside one may stand for the form of the other: a soft
+    wind-up with an error of the gears too large is nearly a play with a soft skin.
+    """
+    shared = label_of(one.effects) & label_of(other.effects)
+    mine, theirs = (
+        [each for each in those if each.label not in shared]
+        for those in (one.effects, other.effects)
+    )
+    if one.freed or not other.freed or not mine or len(mine) != len(theirs):
+        return False
+    same = all(any(each.beside(law) for law in theirs) for each in mine)
+    further = one.fit.chi_square - other.fit.chi_square
+    most = search.data.rules.form_share**2 * search.excess
+    return same and further < most and search.forms.rest_is_noise(one.fit)
 
 
 def distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:

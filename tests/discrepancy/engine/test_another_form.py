@@ -173,6 +173,8 @@ def a_set(*members, values=(), spread=1e-3, chi_square=1000.0, removed=1e5):
     )
     return SimpleNamespace(
         candidates=members,
+        effects=[one for one in members if one.frees is None],
+        freed=[one for one in members if one.frees is not None],
         fit=fitted,
         listed=True,
         exact=False,
@@ -292,6 +294,35 @@ def test_what_contains_a_member_of_a_class_has_to_be_a_rival_of_that(
     # One effect at two orders is no special case of itself.
     search.found = [chosen, rival, a_set(dry, a_law("backlash", order=2.0), chi_square=1105.0)]
     assert equivalents.rivals(search, chosen) == search.found[1:]
+
+
+@pytest.mark.parametrize(
+    ("share", "port", "noise", "told"),
+    [
+        (0.9, "mesh", True, True),
+        (1.1, "mesh", True, False),
+        (0.9, "output", True, False),
+        (0.9, "mesh", False, False),
+    ],
+)
+def test_a_value_out_of_tolerance_may_stand_for_the_form_of_another_law(
+    share, port, noise, told, monkeypatch
+):
+    """Blind case single 940: a play with a soft skin was named a soft wind-up and an amplitude."""
+    monkeypatch.setattr(equivalents, "explains_in_any_form", lambda search, one: True)
+    amplitude = replace(a_law("parameter", "error_amplitude_1"), frees="error_amplitude_1")
+    chosen = a_set(a_law("soft_windup"), amplitude)
+    further = share * RULES.form_share**2 * 1e5
+    play = a_set(a_law("backlash", port), chi_square=1000.0 + further)
+    search = SimpleNamespace(
+        found=[chosen, play],
+        data=SimpleNamespace(rules=RULES),
+        excess=1e5,
+        alike=lambda one, other: alike(one, other, 1000, RULES, overlap=True),
+        earned=lambda one: True,
+        forms=SimpleNamespace(rest_is_noise=lambda fitted: noise),
+    )
+    assert equivalents.rivals(search, chosen) == ([play] if told else [])
 
 
 @pytest.mark.parametrize(
