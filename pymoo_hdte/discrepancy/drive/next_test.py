@@ -22,6 +22,7 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.fitting import Fit
+from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive.effects import ENCODER_LINE
 
@@ -81,7 +82,8 @@ def next_experiment(finding: DriveFinding) -> Proposal:
     if twin is not None and verdict.status != "unlisted" and twin.expected_separation >= least:
         return twin
     model = grid.model(chosen)
-    hypotheses = [grid.model(fitted) for fitted in nearest_rivals(verdict)]
+    rivals = nearest_rivals(verdict)
+    hypotheses = [grid.model(fitted) for fitted in rivals]
     if not hypotheses:
         return _most_uncertain(grid, model)
     separations = np.array([separation(model, hypothesis) for hypothesis in hypotheses])
@@ -96,7 +98,9 @@ def next_experiment(finding: DriveFinding) -> Proposal:
     test = int(np.argmax(together))
     closest = int(told[np.argmin(separations[told, test])])
     labels = model.label, hypotheses[closest].label
-    proposed = _proposal(grid, test, labels, float(separations[closest, test]), verdict)
+    same = any(one.fit is rivals[closest] for one in verdict.equivalent)
+    said = _aim(verdict, *labels, same)
+    proposed = _proposal(grid, test, said, labels, float(separations[closest, test]))
     never = [k for k in range(len(hypotheses)) if separations[k].max() < least]
     if not never:
         return proposed
@@ -124,37 +128,45 @@ def nearest_rivals(verdict: Verdict) -> list[Fit]:
     """Return the fits of the nearest other hypotheses, nearest first."""
     if verdict.chosen is None:
         return []
-    names = {candidate.name for candidate in verdict.chosen.candidates}
+    names = _names(verdict.chosen)
     others = [
         *verdict.equivalent,
         *sorted(verdict.alternatives, key=lambda hypothesis: hypothesis.bic),
     ]
     found: dict[frozenset[str], Fit] = {}
     for hypothesis in others:
-        theirs = frozenset(candidate.name for candidate in hypothesis.candidates)
+        theirs = _names(hypothesis)
         # Of nested models the larger one can imitate the chosen one in every test.
         if not names <= theirs:
             found.setdefault(theirs, hypothesis.fit)
     return list(found.values())[:_RIVALS]
 
 
-def _proposal(
-    grid: Grid, test: int, labels: tuple[str, str], expected: float, verdict: Verdict
-) -> Proposal:
-    one, other = labels
-    what, speed, load, kind = grid.condition(test)
+def _names(hypothesis: Hypothesis) -> frozenset[str]:
+    """Return the names of its effects, and of each base parameter out of tolerance."""
+    return frozenset(candidate.frees or candidate.name for candidate in hypothesis.candidates)
+
+
+def _aim(verdict: Verdict, one: str, other: str, same: bool) -> str:
+    """Return what a test is for; ``same`` tells whether both models are of one class."""
     if verdict.status == "unlisted":
-        said = f"Neither {one} nor {other} explains the data; they differ most in"
-    elif verdict.equivalent:
-        said = f"The data cannot tell {one} from {other}; what can is"
-    else:
-        said = f"The data separate {one} from others; the best further test against {other} is"
+        return f"Neither {one} nor {other} explains the data; they differ most in"
+    if same:
+        return f"The data cannot tell {one} from {other}; what can is"
+    return f"The data separate {one} from others; the best further test against {other} is"
+
+
+def _proposal(
+    grid: Grid, test: int, said: str, labels: tuple[str, str], expected: float
+) -> Proposal:
+    what, speed, load, kind = grid.condition(test)
     return Proposal(f"{said} {what}.", kind, speed, load, labels, expected)
 
 
 def _most_uncertain(grid: Grid, model: Model) -> Proposal:
     """Return the running record with the most uncertain prediction of the fit."""
-    variance = np.sum(model.influence[: len(grid.speed_rpm)] ** 2, axis=(1, 2))
+    running = slice(len(grid.speed_rpm))
+    variance = np.sum(model.influence[running] ** 2, axis=(1, 2)) * model.steady[running]
     test = int(np.argmax(variance))
     what, speed, load, kind = grid.condition(test)
     text = f"The model is least certain of {what}: make it."

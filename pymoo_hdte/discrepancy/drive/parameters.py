@@ -6,6 +6,7 @@ and hide an effect. The errors of torque sensors are unknown constants with a pr
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -71,6 +72,21 @@ def words_of(name: str, error_orders: Sequence[float]) -> str:
         part = kind.removeprefix("error_")
         return f"{part} of order {error_orders[int(line)]:.4g} of the static error"
     return name.replace("_", " ")
+
+
+def by_order(text: str, error_orders: Sequence[float]) -> str:
+    """Return a text in which lines of the static error have their order, not their number.
+
+    Examples
+    --------
+    >>> by_order("error_amplitude_1", (1.0, 2.0)), by_order("error phase 0, damping", (1.0,))
+    ('error amplitude of order 2', 'error phase of order 1, damping')
+    """
+
+    def named(line: re.Match[str]) -> str:
+        return f"error {line[1]} of order {error_orders[int(line[2])]:.4g}"
+
+    return re.sub(r"error[ _](amplitude|phase)[ _](\d+)", named, text)
 
 
 def base_parameters(

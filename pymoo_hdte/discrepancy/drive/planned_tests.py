@@ -37,12 +37,14 @@ class Model:
     """A fitted model and its predictions for every test, in units of the noise.
 
     ``predicted`` has shape (n_tests, f); ``influence``, shape (n_tests, f, p), is that of the
-    parameters in units of their own uncertainty.
+    parameters in units of their own uncertainty. Where a test has no ``steady`` state (n_tests,) by
+    the model, it predicts nothing there.
     """
 
     label: str
     predicted: Values
     influence: Values
+    steady: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +103,23 @@ class Grid:
         root = vectors * np.sqrt(np.clip(size, 0.0, None))
         label = "+".join(candidate.label for candidate in fitted.candidates) or "base"
         influence = objective.jacobian(fitted.values) @ root
-        predicted = self.predict(fitted.values[: len(self.data.base)], fitted.effects)
-        return Model(label, predicted, self._by_test(influence))
+        predicted, steady = self._predicted(fitted.values[: len(self.data.base)], fitted.effects)
+        return Model(label, predicted, self._by_test(influence), steady)
 
     def predict(self, base: Values, effects: Sequence[DriveEffect]) -> Values:
         """Return predictions in units of the noise, (n_tests, f)."""
-        running = self.data.whiten(self.data.predict(base[None], effects))[0]
+        return self._predicted(base, effects)[0]
+
+    def _predicted(
+        self, base: Values, effects: Sequence[DriveEffect]
+    ) -> tuple[Values, NDArray[np.bool_]]:
+        """Return the same, and which tests have a steady state."""
+        prediction = self.data.prediction(base[None], effects)
+        running = self.data.whiten(self.data.features.of_prediction(prediction))[0]
         torsion = np.nan_to_num(self.data.torsion_residuals(base[None], effects)[0])
-        return self._by_test(np.concatenate([running, torsion])[:, None])[..., 0]
+        predicted = self._by_test(np.concatenate([running, torsion])[:, None])[..., 0]
+        sweeps = np.ones(len(self.data.torsion), dtype=bool)
+        return predicted, np.append(prediction.balance.converged, sweeps)
 
     def _by_test(self, rows: Values) -> Values:
         """Return rows (n, p) of running records, sweep and priors as (n_tests, f, p)."""
@@ -123,7 +134,7 @@ class Grid:
     def condition(self, test: int) -> tuple[str, float | None, float | None, str]:
         """Return a test in words, its speed (r/min), its load (N.m) and its kind."""
         if test >= len(self.speed_rpm):
-            reach = float(self.data.torsion[0].torque.max())
+            reach = float(self.data.torsion[0].path.max())
             what = f"a torsion sweep through zero between -{reach:.3g} and {reach:.3g} N.m"
             return what, None, None, "torsion_sweep"
         speed, load = float(self.speed_rpm[test]), float(self.load_torque[test])
@@ -133,12 +144,16 @@ class Grid:
 
 
 def separation(one: Model, other: Model) -> Values:
-    """Return the chi-square of the difference in every test, shape (n_tests,)."""
+    """Return the chi-square of the difference in every test, shape (n_tests,).
+
+    None where the drive would rattle by one of them: such a record is not fitted.
+    """
     difference = (other.predicted - one.predicted)[..., None]
     columns = np.concatenate([difference, one.influence, other.influence], axis=2)
     # The unknowns of both models are known to their own uncertainty, the unit of the influence.
     known = np.diag(np.r_[0.0, np.ones(columns.shape[2] - 1)])
-    return unimitated(np.swapaxes(columns, 1, 2) @ columns + known, 1)[:, 0, 0]
+    found = unimitated(np.swapaxes(columns, 1, 2) @ columns + known, 1)[:, 0, 0]
+    return np.where(one.steady & other.steady, found, 0.0)
 
 
 def _sweep(reach: float, noise: float) -> TorsionPoints:

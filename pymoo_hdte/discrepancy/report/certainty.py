@@ -80,15 +80,15 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
 
 
 def _next_best(best: Hypothesis, chosen: Hypothesis) -> str:
-    """Return what the next best explains; where the share is the same, the BIC tells them apart."""
+    """Return what the best other set explains; where that is the same, the BIC tells them apart."""
     share, gap = percent(best.explained), best.bic - chosen.bic
     if share == percent(chosen.explained):
         share = "as much to a tenth of a per cent"
     elif gap > 0.0 and best.explained < chosen.explained:
-        return f"The next best, {in_words(best.label)}, explains {share}."
+        return f"The best other explanation, {in_words(best.label)}, explains {share}."
     return (
-        f"The next best, {in_words(best.label)}, explains {share}; its BIC is "
-        f"{number(abs(gap), 2)} {'above' if gap > 0.0 else 'below'}."
+        f"The best other explanation, {in_words(best.label)}, explains {share}; its BIC is "
+        f"{number(abs(gap))} {'above' if gap > 0.0 else 'below'}."
     )
 
 
@@ -161,13 +161,9 @@ def _probably(verdict: Verdict) -> str:
 
 
 def _others(verdict: Verdict, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the sets of as many effects as the chosen one, with other names."""
-    return [
-        one
-        for one in verdict.alternatives
-        if _names(one) != _names(chosen) and len(one.candidates) == len(chosen.candidates)
-    ]
+    """Return the sets that say something else: not all that the chosen one says, and more."""
+    return [one for one in verdict.alternatives if not _names(chosen) <= _names(one)]
 
 
 def _names(hypothesis: Hypothesis) -> set[str]:
-    return {candidate.name for candidate in hypothesis.candidates}
+    return {candidate.frees or candidate.name for candidate in hypothesis.candidates}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.proof import Proof
-from pymoo_hdte.reports.html import percent
+from pymoo_hdte.reports.html import number, percent
 
 _SHOWN = 3
 """Most records that a sentence names."""
@@ -16,10 +16,10 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
         return "No record was held out, so nothing can be said about conditions not fitted."
     gap = proof.channels[proof.leading]
     where = f"{len(proof.records)} held-out records, {proof.leading.replace('_', ' ')}"
-    noise = f"noise alone {gap.noise_floor:.3g} {gap.unit}"
+    noise = f"noise alone {number(gap.noise_floor)} {gap.unit}"
     if not finding.verdict.accepted.candidates:
-        return f"Nothing was added. On {where}: off by {gap.before:.3g} {gap.unit}, {noise}."
-    words = f"On {where}: off by {gap.before:.3g} before, {gap.after:.3g} after, {noise}"
+        return f"Nothing was added. On {where}: off by {number(gap.before)} {gap.unit}, {noise}."
+    words = f"On {where}: off by {number(gap.before)} before, {number(gap.after)} after, {noise}"
     if gap.worse or proof.overall.worse:
         where = "there" if gap.worse else "in all channels together"
         return f"{words}. The revised model is worse {where}: do not use it.{_worse(proof)}"
@@ -27,8 +27,10 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
         words += f"; {percent(min(gap.shrinkage, 1.0))} of what the noise does not explain is gone"
     error = proof.channels["transmission_error"]
     if error is not gap:
-        words += f". Transmission error: {error.before:.3g} before, {error.after:.3g} after, "
-        words += f"noise alone {error.noise_floor:.3g} {error.unit}"
+        words += (
+            f". Transmission error: {number(error.before)} before, {number(error.after)} after, "
+        )
+        words += f"noise alone {number(error.noise_floor)} {error.unit}"
     return f"{words}.{_worse(proof)}"
 
 
@@ -37,7 +39,7 @@ def _worse(proof: Proof) -> str:
     gaps = {name.replace("_", " "): gap for name, gap in proof.channels.items()}
     gaps["all channels together"] = proof.overall
     parts = [
-        f"{name} {gap.before:.3g} before, {gap.after:.3g} after, in {gap.unit}"
+        f"{name} {number(gap.before)} before, {number(gap.after)} after, in {gap.unit}"
         for name, gap in gaps.items()
         if gap.worse
     ]

@@ -52,7 +52,7 @@ class Choice:
     @property
     def stays(self) -> bool:
         """Whether the old design is still as good as any by the new model."""
-        return bool(np.allclose(self.delivered, self.reached, rtol=_SAME_MOMENTS, atol=0.0))
+        return bool(np.all(self.delivered <= (1.0 + _SAME_MOMENTS) * self.reached))
 
 
 @dataclass(frozen=True, eq=False)

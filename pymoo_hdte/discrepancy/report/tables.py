@@ -11,14 +11,15 @@ import numpy as np
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.gap import Gap
-from pymoo_hdte.discrepancy.drive.parameters import base_unit, words_of
+from pymoo_hdte.discrepancy.drive.parameters import by_order, words_of
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.report.document import base_parameters
 from pymoo_hdte.effects.sentence_blanks import in_words
-from pymoo_hdte.effects.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import HARMONIC_NAMES, Parameter
 from pymoo_hdte.reports.html import percent
 from pymoo_hdte.units import ARCSEC, REVOLUTION_PER_MINUTE
 
@@ -41,18 +42,18 @@ STATUSES = {
 }
 """Words for the status of a verdict."""
 
-_NORMAL_95 = 1.96
+_HARMONICS = tuple(name.replace("_", " ") for name in HARMONIC_NAMES if name)
 
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """A fitted base parameter; ``None`` where there is no believed value or no bound."""
+    """A fitted base parameter; ``None`` where there is no believed value, interval or bound."""
 
     name: str
     unit: str
     believed: float | None
     value: float
-    half_width: float
+    interval95: tuple[float, float] | None
     lower: float | None
     upper: float | None
     at_bound: bool
@@ -69,6 +70,14 @@ class EffectRow:
     upper: float
     unit: str
 
+    @property
+    def is_headline(self) -> bool:
+        """Whether the first screen tells it: no phase, and no harmonic that may be nothing."""
+        if self.parameter.endswith("phase"):
+            return False
+        certain = self.lower > 0.0 or self.upper < 0.0
+        return certain or not self.parameter.startswith(_HARMONICS)
+
 
 @dataclass(frozen=True)
 class HypothesisRow:
@@ -82,7 +91,9 @@ class HypothesisRow:
     at_bounds: str
 
 
-def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
+def effect_rows(
+    effects: Sequence[Mapping[str, Any]], error_orders: Sequence[float] = ()
+) -> list[EffectRow]:
     """Return the parameters of the effects of a verdict document; angles in arcsec."""
     rows = []
     for effect in effects:
@@ -95,11 +106,12 @@ def effect_rows(effects: Sequence[Mapping[str, Any]]) -> list[EffectRow]:
             value, low, high = (
                 number / size for number in (quantity["value"], *quantity["interval95"])
             )
-            rows.append(EffectRow(label, name.replace("_", " "), value, low, high, unit))
+            words = by_order(name, error_orders).replace("_", " ")
+            rows.append(EffectRow(label, words, value, low, high, unit))
     return rows
 
 
-def hypothesis_rows(verdict: Verdict) -> list[HypothesisRow]:
+def hypothesis_rows(verdict: Verdict, error_orders: Sequence[float]) -> list[HypothesisRow]:
     """Return the evidence of all fitted hypotheses, the chosen one first."""
     hypotheses = [] if verdict.chosen is None else [verdict.chosen]
     hypotheses += [
@@ -110,12 +122,12 @@ def hypothesis_rows(verdict: Verdict) -> list[HypothesisRow]:
     best = min(hypothesis.bic for hypothesis in hypotheses)
     return [
         HypothesisRow(
-            in_words(hypothesis.label),
+            by_order(in_words(hypothesis.label), error_orders),
             _role(verdict, hypothesis),
             hypothesis.fit.chi_square,
             percent(hypothesis.explained),
             hypothesis.bic - best,
-            ", ".join(name.replace("_", " ") for name in hypothesis.fit.at_bounds) or "none",
+            by_order(", ".join(hypothesis.fit.at_bounds), error_orders).replace("_", " ") or "none",
         )
         for hypothesis in hypotheses
     ]
@@ -124,16 +136,13 @@ def hypothesis_rows(verdict: Verdict) -> list[HypothesisRow]:
 def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     """Return the base parameters of the accepted fit."""
     fitted = finding.verdict.accepted
-    # Without influence on a residual there is no interval; variances may be below zero by rounding.
+    # Without influence on a residual there is no interval.
     known = np.any(fitted.jacobian != 0.0, axis=0)
-    variances = np.where(known, np.maximum(np.diag(fitted.covariance), 0.0), np.nan)
-    half_widths = _NORMAL_95 * np.sqrt(variances)
+    entries = base_parameters(fitted, finding.verdict.rules)
     base = fitted.parameters[: len(finding.data.base)]
     return [
-        _parameter_row(finding.campaign, parameter, value, half_width, fitted.at_bounds)
-        for parameter, value, half_width in zip(
-            base, fitted.values.tolist(), half_widths.tolist(), strict=False
-        )
+        _parameter_row(finding.campaign, parameter, entries[parameter.name], bool(has_interval))
+        for parameter, has_interval in zip(base, known, strict=False)
     ]
 
 
@@ -168,32 +177,25 @@ def record_rows(
 
 
 def _parameter_row(
-    campaign: Campaign,
-    parameter: Parameter,
-    value: float,
-    half_width: float,
-    at_bounds: tuple[str, ...],
+    campaign: Campaign, parameter: Parameter, entry: Mapping[str, Any], has_interval: bool
 ) -> ParameterRow:
-    name, unit, size = parameter.name, _shown(base_unit(parameter.name)), 1.0
-    if name.startswith(("error_amplitude_", "error_phase_")):
-        kind, line = name.rsplit("_", 1)
-        unit, size = ("arcsec", ARCSEC) if kind == "error_amplitude" else ("rad", 1.0)
-        name = f"{kind} of order {campaign.believed.error_orders[int(line)]:g}"
-    elif "." in name:
-        name = words_of(name, ())
-    elif name == "offset":
+    """Return the row of a parameter from its entry in the verdict document."""
+    name, unit, size = parameter.name, _shown(entry["unit"]), 1.0
+    if name == "offset" or name.startswith("error_amplitude_"):
         unit, size = "arcsec", ARCSEC
+    words = words_of(name, ()) if "." in name else by_order(name, campaign.believed.error_orders)
+    low, high = (end / size for end in entry["interval95"])
     # Phases and the constant of the encoders have no believed value.
     free = parameter.name == "offset" or parameter.name.startswith("error_phase_")
     return ParameterRow(
-        name.replace("_", " "),
+        words.replace("_", " "),
         unit,
         None if free else parameter.start / size,
-        value / size,
-        half_width / size,
+        entry["value"] / size,
+        (low, high) if has_interval else None,
         None if free else parameter.lower / size,
         None if free else parameter.upper / size,
-        parameter.name in at_bounds,
+        entry["at_bound"],
     )
 
 
@@ -205,4 +207,17 @@ def _shown(unit: str) -> str:
 def _role(verdict: Verdict, hypothesis: Hypothesis) -> str:
     if hypothesis is verdict.chosen:
         return "best known, but not enough" if verdict.status == "unlisted" else "chosen"
-    return "cannot be told apart" if hypothesis in verdict.equivalent else "rejected"
+    if hypothesis in verdict.equivalent or _at_another_order(verdict, hypothesis):
+        return "cannot be told apart"
+    return "rejected"
+
+
+def _at_another_order(verdict: Verdict, hypothesis: Hypothesis) -> bool:
+    """Tell whether a set is one of a class at another order, which the evidence does not exclude.
+
+    A class has each set of names once.
+    """
+    return any(
+        hypothesis.names == one.names and hypothesis.bic - one.bic < verdict.rules.evidence_distance
+        for one in verdict.equivalent
+    )

@@ -11,6 +11,7 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.coverage import campaign_limits
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
+from pymoo_hdte.discrepancy.drive.parameters import by_order
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.drive.revision import (
     MODEL_FILE,
@@ -142,6 +143,7 @@ def _page(
     document: dict[str, Any],
     shift: OptimumShift,
 ) -> str:
+    orders = finding.campaign.believed.error_orders
     pictures = {
         "overview": data_uri(misfit_overview(location)),
         "map": data_uri(misfit_map(location)),
@@ -163,16 +165,17 @@ def _page(
         location=location,
         proof=proof,
         status=STATUSES[finding.verdict.status],
-        effects=effect_rows(document["effects"]),
+        effects=effect_rows(document["effects"], orders),
         certainty=how_sure(finding),
-        next_test=in_words(document["next_experiment"]["description"]),
+        next_test=by_order(in_words(document["next_experiment"]["description"]), orders),
         pictures=pictures,
-        hypotheses=hypothesis_rows(finding.verdict),
+        hypotheses=hypothesis_rows(finding.verdict, orders),
         parameters=parameter_rows(finding),
         metrics=metric_rows(proof),
         records=record_rows(finding.campaign, proof),
         rows_found=rows_sentence(finding.rows),
         faults=fault_rows(finding.rows),
+        all_faults=len(finding.rows.faults),
         noise=noise_rows(finding.rows),
         shift=shift,
         believed_effects=believed_in_words(document),

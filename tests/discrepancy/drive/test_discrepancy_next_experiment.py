@@ -1,6 +1,7 @@
 """The next experiment: closed forms of the separation, and the twins that no record separates."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,9 +32,12 @@ def hypothesis_of(data, candidate, start, bic=0.0):
 
 def test_separation_in_closed_form():
     # One feature, difference 3, noise 1, uncertainties 2 and 1 of the two predictions.
-    one = Model("one", np.array([[0.0]]), np.array([[[2.0]]]))
-    other = Model("other", np.array([[3.0]]), np.array([[[1.0]]]))
+    steady = np.array([True])
+    one = Model("one", np.array([[0.0]]), np.array([[[2.0]]]), steady)
+    other = Model("other", np.array([[3.0]]), np.array([[[1.0]]]), steady)
     assert separation(one, other) == pytest.approx([9.0 / (1.0 + 4.0 + 1.0)])
+    # Where the drive would rattle by one of the models nothing is predicted.
+    assert separation(one, replace(other, steady=~steady)) == [0.0]
 
 
 def test_an_eccentric_encoder_is_to_be_clocked_anew():
@@ -139,14 +143,31 @@ def test_a_record_that_the_campaign_has_is_called_a_repeat():
     assert not grid.repeats.any()
 
 
-def test_a_superset_of_the_named_effects_is_no_rival():
-    def fake(*names):
-        return SimpleNamespace(
-            candidates=tuple(SimpleNamespace(name=name) for name in names), bic=0.0, fit=names
-        )
+def fake(*names):
+    """A set of effects; capitals are base parameters out of tolerance."""
+    candidates = (
+        SimpleNamespace(name="parameter" if name.isupper() else name, frees=name * name.isupper())
+        for name in names
+    )
+    return SimpleNamespace(candidates=tuple(candidates), bic=0.0, fit=names)
 
+
+def test_a_superset_of_the_named_effects_is_no_rival():
     verdict = Verdict("named", None, fake("a"), (fake("a", "b"), fake("c"), fake("c", "a")), (), 1)
     assert nearest_rivals(verdict) == [("c",)]
+
+
+def test_the_same_effect_beside_other_values_is_a_rival():
+    """It was passed over, and a set that was rejected was said to be of the class."""
+    one, other, rejected = fake("a", "K", "J"), fake("a", "K", "B"), fake("a", "c")
+    verdict = Verdict("class", None, one, (other, rejected), (other,), 1)
+    assert nearest_rivals(verdict) == [("a", "K", "B"), ("a", "c")]
+
+
+def test_a_planned_sweep_is_told_by_the_torques_at_which_it_turns():
+    data, _ = measured(data=known_data([(10.0, 0.0), (200.0, 0.0), (2000.0, 40.0)]))
+    grid = Grid.of(analysed(data, "adequate"))
+    assert "between -10 and 10 N.m" in grid.condition(len(grid.speed_rpm))[0]
 
 
 def test_the_verdict_gives_amplitude_and_phase_with_their_intervals():

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from pymoo_hdte.discrepancy.drive.gap import Gap
 from pymoo_hdte.discrepancy.drive.misfit.relevance import Relevance, largest_change, relevance
 from pymoo_hdte.discrepancy.drive.proof import Proof
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
-from pymoo_hdte.discrepancy.report.tables import effect_rows
+from pymoo_hdte.discrepancy.report.optimum import Choice
+from pymoo_hdte.discrepancy.report.tables import EffectRow, effect_rows, hypothesis_rows
 from pymoo_hdte.units import ARCSEC
 
 NAMED = SimpleNamespace(
@@ -71,6 +73,27 @@ def test_what_gets_worse_is_said(changes, words, names):
     assert found.worse == names
     # One channel that is worse does not condemn a model that is better.
     assert ("do not use it" in gap_sentence(NAMED, found)) == ("do not use it" in words)
+
+
+def test_a_gap_of_thousands_has_no_exponent():
+    """It was off by 4.46e+03 mN.m."""
+    large = proof()
+    large.channels["transmission_error"] = Gap(4460.0, 1230.0, 0.42, "arcsec")
+    assert "off by 4460 before, 1230 after" in gap_sentence(NAMED, large)
+
+
+@pytest.mark.parametrize(
+    ("reached", "stays"),
+    [((46.8, 5.04), True), ((46.6, 5.04), True), ((46.2, 5.04), False), ((46.8, 4.9), False)],
+)
+def test_the_old_design_stays_where_the_new_optimum_is_better_in_nothing(reached, stays):
+    """A new optimum of 46.8 and 5.04 was praised beside an old design of 46.6 and 5.04."""
+    delivered, factors = np.array([46.6, 5.04]), np.ones(4)
+    none = np.zeros(4, dtype=bool)
+    choice = Choice(
+        "balanced", factors, factors, none, none, 0.0, delivered, delivered, np.array(reached)
+    )
+    assert choice.stays == stays
 
 
 def test_a_gap_within_the_noise_is_not_called_worse():
@@ -192,3 +215,43 @@ def test_a_believed_value_is_told_without_the_name_of_an_effect():
     )
     assert (believed.effect, believed.parameter) == ("", "input inertia")
     assert (effect.effect, effect.parameter) == ("coulomb friction (input)", "level")
+
+
+def test_a_line_of_the_error_is_told_by_its_order():
+    """Of orders 1, 2 and 2.02 the second was called amplitude 1."""
+    value = {"value": 1e-5, "interval95": [9e-6, 1.1e-5], "unit": "rad"}
+    numbers = {"error_amplitude_1": value}
+    effect = {"name": "parameter", "port": "mesh", "order": None, "parameters": numbers}
+    (row,) = effect_rows([effect], (1.0, 2.0, 2.02))
+    assert row.parameter == "error amplitude of order 2"
+
+
+@pytest.mark.parametrize(
+    ("parameter", "lower", "told"),
+    [
+        ("amplitude", -1.0, True),
+        ("second amplitude", -1.0, False),
+        ("second amplitude", 1.0, True),
+        ("third phase", 1.0, False),
+    ],
+)
+def test_a_harmonic_that_may_be_nothing_is_not_on_the_first_screen(parameter, lower, told):
+    assert EffectRow("ripple", parameter, 2.0, lower, 3.0, "N.m").is_headline == told
+
+
+@pytest.mark.parametrize(("bic", "role"), [(9.0, "cannot be told apart"), (11.0, "rejected")])
+def test_a_member_of_a_class_at_another_order_is_none_that_was_rejected(bic, role):
+    def fitted(order, bic):
+        names = frozenset({("clearance_variation", "mesh")})
+        fit = SimpleNamespace(chi_square=1.0, at_bounds=("error_amplitude_1",))
+        label = f"clearance_variation:mesh@{order}"
+        return SimpleNamespace(names=names, label=label, fit=fit, explained=1.0, bic=bic)
+
+    once, twice = fitted(1, bic), fitted(2, 0.0)
+    chosen = SimpleNamespace(**(vars(twice) | {"names": frozenset(), "label": "backlash:mesh"}))
+    verdict = SimpleNamespace(
+        chosen=chosen, alternatives=(twice, once), equivalent=(twice,), rules=RULES, status="class"
+    )
+    rows = hypothesis_rows(verdict, (1.0, 2.0))
+    assert [row.role for row in rows] == ["chosen", "cannot be told apart", role]
+    assert rows[0].at_bounds == "error amplitude of order 2"

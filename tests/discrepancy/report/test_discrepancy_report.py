@@ -185,8 +185,9 @@ def test_parameters_are_told_in_the_reader_s_units(ripple):
     place = [parameter.name for parameter in fitted.parameters].index("error_amplitude_1")
     assert amplitude.value == pytest.approx(fitted.values[place] / ARCSEC)
     assert (amplitude.believed, amplitude.unit) == (pytest.approx(9.0), "arcsec")
-    assert amplitude.half_width == pytest.approx(
-        1.96 * fitted.covariance[place, place] ** 0.5 / ARCSEC
+    low, high = amplitude.interval95
+    assert high - low == pytest.approx(
+        2.0 * 1.96 * fitted.covariance[place, place] ** 0.5 / ARCSEC, rel=1e-3
     )
     assert rows["error phase of order 1"].believed is None
 
