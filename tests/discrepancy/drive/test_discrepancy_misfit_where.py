@@ -257,8 +257,8 @@ def test_a_nature_is_said_where_the_torques_say_it_and_nowhere_else(words):
 
 
 OF_THE_ERROR = {
-    "It is kinematic": lambda load: 1.0 + 0.0 * load,
-    "It is a compliance": lambda load: load / 40.0,
+    "is kinematic: no torque": lambda load: 1.0 + 0.0 * load,
+    "is a compliance: the torsion": lambda load: load / 40.0,
     "the load makes it smaller": lambda load: 1.0 - 0.9 * load / 40.0,
     "which these records do not tell": lambda load: 1.0 + 0.8 * np.cos(9.0 * np.arange(len(load))),
 }
@@ -280,6 +280,12 @@ def test_what_shows_at_speed_only_is_not_there_at_rest():
     fast = np.where(SPEED > 1500.0, 1.0, 0.0)
     assert "shows at speed only" in said({(1, 4): fast})[0]
     assert "shows at speed only" not in said({(1, 4): fast + 0.3})[0]
+
+
+def test_what_is_judged_at_the_lower_speeds_is_said_of_these():
+    everywhere = said({(1, 4): np.full(12, 0.02)})[0]
+    assert "At the lower speeds it is torque-like" in everywhere
+    assert "It is torque-like" in said({(1, 4): np.full(12, 0.02)}, speed_rpm=np.full(12, 9.0))[0]
 
 
 def test_one_fast_record_that_is_off_is_no_inertia():

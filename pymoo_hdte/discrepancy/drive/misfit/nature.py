@@ -34,7 +34,7 @@ def sizes(location: Location) -> Values:
 
 
 def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
-    """Return in words what kind of misfit it is."""
+    """Return in words what kind of misfit it is, at the lower speeds where these show it."""
     rules, speed = location.rules, np.abs(location.speed_rpm)
     slow = speed <= np.median(speed)
     size = sizes(location)[:, :3].sum(axis=(1, 2))
@@ -43,6 +43,13 @@ def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
             return "It shows at speed only, as a torque of inertia or damping does"
         # No more than some records have it, which happen to be fast ones.
         slow = np.ones_like(slow)
+    said = _of_records(location, believed, slow)
+    return said if slow.all() else f"At the lower speeds {said[0].lower()}{said[1:]}"
+
+
+def _of_records(location: Location, believed: BelievedDrive, slow: Flags) -> str:
+    """Return what kind of misfit some records have, in which inertia is small."""
+    rules = location.rules
     misfit = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)[slow]
     # Torques divided by the stiffness, to compare them with the torsion.
     error = misfit[:, 0]

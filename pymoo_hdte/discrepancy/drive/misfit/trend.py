@@ -164,7 +164,7 @@ def in_words(found: dict[str, Trend | None]) -> str:
     if kinds == ["unknown", "unknown"]:
         if any(trend is not None and trend.scattered for trend in found.values()):
             return "differs from record to record, but not surely with speed or load"
-        return "shows no sure change with speed or load"
+        return "neither grows nor falls surely with speed or load"
     return " and ".join(_clause(name, trend) for name, trend in found.items())
 
 
@@ -179,7 +179,7 @@ def _clause(name: str, trend: Trend | None) -> str:
         "falls": f"falls with {name}{fold}",
         "turns": f"changes its sign with {name}",
         "steady": f"hardly changes with {name}",
-        "unknown": f"shows no sure change with {name}",
+        "unknown": f"neither grows nor falls surely with {name}",
     }
     return words[trend.kind]
 
