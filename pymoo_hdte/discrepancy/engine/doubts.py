@@ -31,7 +31,7 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
         if bounded:
             found.append(f"{', '.join(bounded)} of {candidate.label} ended at a bound")
         elif candidate in unsure:
-            found.append(f"the interval of {candidate.label} contains nothing")
+            found.append(f"the interval of {candidate.label} contains zero")
     if any(one.frees in fitted.at_bounds for one in chosen.candidates):
         found.append("a base parameter ended at ten times or a tenth of what is believed")
     for name in _contradicted_in_any_form(search, chosen):

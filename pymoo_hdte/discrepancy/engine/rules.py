@@ -240,7 +240,7 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
     certain_deviations: float = rule(
         1.959964,
         "standard deviations",
-        "Strength of an effect below which its interval contains nothing: no plain name, and no "
+        "Strength of an effect below which its interval contains zero: no plain name, and no "
         "name at all beside effects that leave no more than noise.",
         "Test level: half-width of the 95 % interval of a normal value, which reports print.",
     )

@@ -13,7 +13,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
 )
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
-from pymoo_hdte.effects.sentence_blanks import in_words
+from pymoo_hdte.effects.sentence_blanks import in_words, listed
 from pymoo_hdte.reports.html import number, percent
 
 
@@ -38,8 +38,9 @@ def how_sure(finding: DriveFinding) -> str:
         )
     if verdict.status == "unlisted":
         return (
-            "That something is missing is certain; what it is, is not. The nearest known effect "
-            f"explains {share} of the misfit, {_too_little(finding, verdict.chosen)}."
+            "That something is missing is certain; what it is, is not. The nearest known effect, "
+            f"{in_words(verdict.chosen.label)}, explains {share} of the misfit, "
+            f"{_too_little(finding, verdict.chosen)}."
             + "".join(f" Against it: {in_words(one)}." for one in verdict.doubts)
         )
     return " ".join(_evidence(finding, verdict.chosen, share))
@@ -72,7 +73,7 @@ def how_sure_of_records(finding: MechanismFinding) -> str:
         best = max(others, key=lambda one: one.explained)
         words.append(_next_best(best, chosen))
     else:
-        words.append("No other set of as many effects came near enough to be compared.")
+        words.append("No other set of effects came near enough to be compared.")
     if not verdict.shown_in_held_out:
         words.append("The records kept out of the fit do not show it.")
     words.append("Real records leave more than noise, so that no probability is given.")
@@ -99,7 +100,7 @@ def _too_little(finding: DriveFinding, nearest: Hypothesis) -> str:
         parts = [
             part.replace("_", " ") for part, missed in zip(PARTS, residual, strict=True) if missed
         ]
-        return f"but not what shows in {' and '.join(f'the {part}' for part in parts)}"
+        return f"but not what shows in the {listed(parts)}"
     rules = finding.verdict.rules
     if explains(finding.data, nearest, finding.verdict.base, finding.verdict.degrees_of_freedom):
         return "but a name needs more than that"

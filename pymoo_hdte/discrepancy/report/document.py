@@ -111,10 +111,10 @@ def sentence(verdict: Verdict) -> str:
     if not chosen.listed:
         return f"Something is missing that is none of the known effects. {what}"
     if verdict.status == "unlisted":
-        return (
-            "Something is missing that no known effect explains. The nearest is "
-            f"{in_words(chosen.label)}."
-        )
+        missing = "Something is missing that no known effect explains"
+        if chosen.explained < verdict.rules.explained_part_share:
+            return f"{missing}, not even half of it."
+        return f"{missing}. The nearest is {in_words(chosen.label)}."
     if verdict.status == "class":
         others = "; or ".join(in_words(hypothesis.label) for hypothesis in verdict.equivalent)
         what = f"{what} Or, which these data cannot tell from it: {others}."

@@ -139,10 +139,10 @@ def parameter_rows(finding: DriveFinding) -> list[ParameterRow]:
     # Without influence on a residual there is no interval.
     known = np.any(fitted.jacobian != 0.0, axis=0)
     entries = base_parameters(fitted, finding.verdict.rules)
-    base = fitted.parameters[: len(finding.data.base)]
+    # With the bounds of their tolerances, also where one was freed from them.
     return [
         _parameter_row(finding.campaign, parameter, entries[parameter.name], bool(has_interval))
-        for parameter, has_interval in zip(base, known, strict=False)
+        for parameter, has_interval in zip(finding.data.base, known, strict=False)
     ]
 
 

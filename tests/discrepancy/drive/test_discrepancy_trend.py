@@ -112,7 +112,9 @@ def test_few_or_noisy_records_say_nothing(rng):
     )
     rough = plane(1.0, 0.0, 0.3) + rng.normal(0.0, 0.5, COUNT)
     assert kinds(rough, np.full(COUNT, 0.5)) == {"speed": "unknown", "load": "unknown"}
-    assert "neither grows nor falls surely" in in_words(trends(rough + 0j, np.full(COUNT, 0.5), SPEED, LOAD, RULES))
+    assert "neither grows nor falls surely" in in_words(
+        trends(rough + 0j, np.full(COUNT, 0.5), SPEED, LOAD, RULES)
+    )
 
 
 def test_noise_is_said_to_grow_as_rarely_as_the_rule_says(rng):

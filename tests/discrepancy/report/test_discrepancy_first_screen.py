@@ -12,6 +12,7 @@ from pymoo_hdte.discrepancy.drive.gap import Gap
 from pymoo_hdte.discrepancy.drive.misfit.relevance import Relevance, largest_change, relevance
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.report.document import sentence
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
 from pymoo_hdte.discrepancy.report.optimum import Choice
 from pymoo_hdte.discrepancy.report.tables import EffectRow, effect_rows, hypothesis_rows
@@ -224,6 +225,19 @@ def test_a_line_of_the_error_is_told_by_its_order():
     effect = {"name": "parameter", "port": "mesh", "order": None, "parameters": numbers}
     (row,) = effect_rows([effect], (1.0, 2.0, 2.02))
     assert row.parameter == "error amplitude of order 2"
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.0, False), (0.6, True)])
+def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
+    """A frequency that is fixed was said to be nearest to a friction that explained 0 %."""
+    chosen = SimpleNamespace(
+        candidates=(SimpleNamespace(sentence="Dry friction."),),
+        listed=True,
+        explained=share,
+        label="coulomb_friction:input",
+    )
+    verdict = SimpleNamespace(status="unlisted", chosen=chosen, rules=RULES)
+    assert ("coulomb friction" in sentence(verdict)) == told
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,8 @@ def nature_of_misfit(location: Location, believed: BelievedDrive) -> str:
 def _of_records(location: Location, believed: BelievedDrive, slow: Flags) -> str:
     """Return what kind of misfit some records have, in which inertia is small."""
     rules = location.rules
-    misfit = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)[slow]
+    flagged = np.where(location.flagged, np.nan_to_num(location.misfit), 0.0)
+    misfit = np.asarray(flagged[slow], dtype=np.complex128)
     # Torques divided by the stiffness, to compare them with the torsion.
     error = misfit[:, 0]
     from_input = misfit[:, 1] * believed.ratio / believed.stiffness
