@@ -75,14 +75,13 @@ register(
 
 
 @dataclass(frozen=True)
-class StribeckFriction(Aperiodic):
+class StribeckFriction(CoulombFriction):
     """T = (level + excess exp(-(speed / fading)^2)) sign(speed).
 
     Level and excess in N.m; fading in rad/s. Armstrong-Helouvry, Dupont, Canudas de Wit,
     Automatica 30 (1994), with the Gaussian form of the curve.
     """
 
-    level: float
     excess: float
     fading: float
 

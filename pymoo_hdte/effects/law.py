@@ -201,7 +201,7 @@ class Behaviour:
 
     @property
     def constant(self) -> float:
-        """Size of the force if it is constant against the motion at any speed, else 0."""
+        """Size of the part of the force that is against the motion and the same at all speeds."""
         return 0.0
 
     @property

@@ -225,10 +225,11 @@ def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit) -> Proposal | Non
         test = int(np.argmax(expected))
         speed, load = float(grid.speed_rpm[test]), float(grid.load_torque[test])
         twin = "zero error of the input torque sensor"
+        what = "" if placed[1].breakaway == level else "The level of "
         text = (
-            f"{candidate.label} and a {twin} of {level:.2g} N.m predict the same as long as the "
-            f"input turns one way: repeat the record at {speed:.4g} r/min with {load:.3g} N.m in "
-            "reverse, or tare the sensor with the motor uncoupled."
+            f"{what}{candidate.label} and a {twin} of {level:.2g} N.m predict the same as long as "
+            f"the input turns one way: repeat the record at {speed:.4g} r/min with {load:.3g} N.m "
+            "in reverse, or tare the sensor with the motor uncoupled."
         )
         labels = (candidate.label, twin)
         return Proposal(text, "running", -speed, 0.0 - load, labels, float(expected[test]))

@@ -70,6 +70,17 @@ def test_dry_friction_at_the_input_asks_for_the_other_direction():
     assert 0.5 * clear < proposal.expected_separation < clear
 
 
+def test_the_level_of_a_friction_that_falls_asks_for_the_other_direction():
+    """It was known to 70 %, and a test was proposed against what was 3·10⁵ of BIC away."""
+    data = known_data()
+    candidate = listed(data, "stribeck_friction")
+    values = 0.01, 0.01, 20.0
+    data, _ = measured(candidate.build(values))
+    proposal = next_experiment(judged(data, hypothesis_of(data, candidate, values)))
+    assert proposal.speed_rpm < 0.0
+    assert proposal.description.startswith("The level of stribeck_friction:input and a zero error")
+
+
 def test_a_rival_is_told_apart_by_a_record_that_the_two_predict_apart():
     data = known_data()
     ripple, line = listed(data, "torque_ripple", [6.0]), listed(data, "kinematic_error", [6.0])
