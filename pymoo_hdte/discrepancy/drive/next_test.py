@@ -76,6 +76,9 @@ def next_experiment(finding: DriveFinding) -> Proposal:
     verdict, grid = finding.verdict, Grid.of(finding)
     if verdict.chosen is None:
         return _most_uncertain(grid, grid.model(verdict.base))
+    if verdict.status == "unlisted" and not verdict.comes_near:
+        said = "No known effect comes near, so that a test between two of them would tell nothing."
+        return Proposal(said, "none", None, None, None, 0.0)
     chosen = verdict.chosen.fit
     twin = _encoder_twin(grid, chosen) or _zero_twin(grid, finding, chosen)
     least = verdict.rules.separated_chi_square

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
-from pymoo_hdte.discrepancy.drive.evidence import Data
+from pymoo_hdte.discrepancy.drive.evidence import Data, flanks_held
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.drive.prediction import Conditions
@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive import DriveEffect
+from pymoo_hdte.effects.effect import known_effects
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 _SPEEDS = 4
@@ -104,6 +105,11 @@ class Grid:
         label = "+".join(candidate.label for candidate in fitted.candidates) or "base"
         influence = objective.jacobian(fitted.values) @ root
         predicted, steady = self._predicted(fitted.values[: len(self.data.base)], fitted.effects)
+        rattling = {one.name for one in known_effects() if one.rattles}
+        if any(one.name in rattling for one in fitted.candidates):
+            # Such records would not be fitted, whatever holds the flanks in the model.
+            data, running = self.data, slice(len(self.speed_rpm))
+            steady[running] &= flanks_held(data.features, data.campaign.torque_scale, data.rules)
         return Model(label, predicted, self._by_test(influence), steady)
 
     def predict(self, base: Values, effects: Sequence[DriveEffect]) -> Values:

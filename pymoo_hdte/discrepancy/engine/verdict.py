@@ -107,6 +107,12 @@ class Verdict:
         degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
         return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
 
+    @property
+    def comes_near(self) -> bool:
+        """Whether the chosen effects explain at least half of the misfit."""
+        chosen = self.chosen
+        return chosen is not None and chosen.explained >= self.rules.explained_part_share
+
     def after_vote(self, vote: Vote) -> Verdict:
         """Return it with the vote of held-out records: ``unlisted`` where they contradict it."""
         if not vote.counts(self.rules):

@@ -37,8 +37,12 @@ def how_sure(finding: DriveFinding) -> str:
             "the encoder takes no part in the motion of the drive."
         )
     if verdict.status == "unlisted":
+        certain = "That something is missing is certain; what it is, is not."
+        if not verdict.comes_near:
+            most = in_words(verdict.chosen.label)
+            return f"{certain} The most that was explained is {share}, by {most}."
         return (
-            "That something is missing is certain; what it is, is not. The nearest known effect, "
+            f"{certain} The nearest known effect, "
             f"{in_words(verdict.chosen.label)}, explains {share} of the misfit, "
             f"{_too_little(finding, verdict.chosen)}."
             + "".join(f" Against it: {in_words(one)}." for one in verdict.doubts)

@@ -112,7 +112,7 @@ def sentence(verdict: Verdict) -> str:
         return f"Something is missing that is none of the known effects. {what}"
     if verdict.status == "unlisted":
         missing = "Something is missing that no known effect explains"
-        if chosen.explained < verdict.rules.explained_part_share:
+        if not verdict.comes_near:
             return f"{missing}, not even half of it."
         return f"{missing}. The nearest is {in_words(chosen.label)}."
     if verdict.status == "class":

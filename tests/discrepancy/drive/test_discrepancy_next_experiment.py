@@ -175,6 +175,29 @@ def test_the_same_effect_beside_other_values_is_a_rival():
     assert nearest_rivals(verdict) == [("a", "K", "B"), ("a", "c")]
 
 
+def test_a_record_in_which_a_clearance_would_rattle_separates_nothing():
+    """A repeat of one was proposed that had been left out because no load held the flanks."""
+    data = known_data([(rpm, load) for rpm in (10.0, 2000.0) for load in (0.0, 40.0)])
+    play, soft = listed(data, "backlash"), listed(data, "soft_windup")
+    data, _ = measured(play.build((1e-5,)), np.random.default_rng(2), data)
+    grid = Grid.of(analysed(data, "adequate"))
+    models = [grid.model(hypothesis_of(data, one, one.starts[0]).fit) for one in (play, soft)]
+    running = slice(len(grid.speed_rpm))
+    assert models[1].steady.all()
+    assert models[0].steady[running].tolist() == (grid.load_torque > 0.0).tolist()
+    assert not separation(*models)[running][grid.load_torque == 0.0].any()
+
+
+def test_no_test_is_made_up_between_effects_that_explain_nothing():
+    verdict = Verdict("unlisted", None, fake("a"), (fake("c"),), (), 1)
+    verdict.chosen.explained = 0.3
+    data, _ = measured(data=known_data())
+    finding = DriveFinding(data.campaign, data, replace(verdict, base=fit(data)), ())
+    proposal = next_experiment(finding)
+    assert (proposal.test, proposal.separates) == ("none", None)
+    assert "No known effect comes near" in proposal.description
+
+
 def test_a_planned_sweep_is_told_by_the_torques_at_which_it_turns():
     data, _ = measured(data=known_data([(10.0, 0.0), (200.0, 0.0), (2000.0, 40.0)]))
     grid = Grid.of(analysed(data, "adequate"))

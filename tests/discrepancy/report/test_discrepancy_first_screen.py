@@ -12,6 +12,7 @@ from pymoo_hdte.discrepancy.drive.gap import Gap
 from pymoo_hdte.discrepancy.drive.misfit.relevance import Relevance, largest_change, relevance
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.engine.rules import RULES
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.report.document import sentence
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
 from pymoo_hdte.discrepancy.report.optimum import Choice
@@ -236,7 +237,7 @@ def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
         explained=share,
         label="coulomb_friction:input",
     )
-    verdict = SimpleNamespace(status="unlisted", chosen=chosen, rules=RULES)
+    verdict = Verdict("unlisted", None, chosen, (), (), 1)
     assert ("coulomb friction" in sentence(verdict)) == told
 
 
