@@ -117,8 +117,6 @@ def _believing(measured: Any, model: Path | None, sheet: Path | None) -> Any:
 
 
 def _summary(document: dict[str, Any], out: Path) -> str:
-    from pymoo_hdte.effects.sentence_blanks import in_words
-
     torsion: dict[str, Any] = document.get("torsion", {"effects": [], "limits": []})
     names = " + ".join(_name(one) for one in (*document["effects"], *torsion["effects"]))
     lines = [
@@ -130,7 +128,7 @@ def _summary(document: dict[str, Any], out: Path) -> str:
         *document["limits"],
         *_remarks(document.get("record_remarks", [])),
         *torsion["limits"],
-        f"Next: {in_words(document['next_experiment']['description'])}",
+        f"Next: {document['next_experiment']['description']}",
         *([f"For the torsion: {test}"] if (test := torsion.get("next_experiment")) else []),
         f"Report: {out / PAGE_FILE}",
     ]

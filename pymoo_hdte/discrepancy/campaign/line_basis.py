@@ -160,3 +160,12 @@ def mean_speed(record: RunningRecord) -> float:
 def nyquist_order(record: RunningRecord) -> float:
     """Return the order at half the rate of the rows, in cycles per input turn."""
     return float(np.pi * record.sample_rate / mean_speed(record))
+
+
+def spans_a_turn(record: RunningRecord, ratio: float) -> bool:
+    """Tell whether a record spans an output turn, without which its lines cannot be told apart.
+
+    Its last row lies one step before the end of the turn, and the speed is not exact.
+    """
+    travel = float(record.input_angle[-1] - record.input_angle[0])
+    return abs(travel) >= 0.99 * 2.0 * np.pi * ratio

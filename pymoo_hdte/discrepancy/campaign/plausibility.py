@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
+from pymoo_hdte.discrepancy.campaign.line_basis import spans_a_turn
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.drive.datasheet import LOST_POWER
@@ -203,10 +204,8 @@ def _check_travel(record: RunningRecord, ratio: float, rules: Rules) -> None:
         within = f"{100.0 * rules.speed_mismatch:g} %"
         allowed = f"{record.input_speed:g} rad/s within {within}, the input speed of the record"
         raise InvalidInput("mean speed of input_angle", speed, allowed)
-    turn = 2.0 * math.pi * ratio
-    # The last sample lies one step before the end of the turn, and the speed is not exact.
-    if not abs(travel) >= 0.99 * turn:
-        allowed = f"at least {turn:.6g} rad, one output turn"
+    if not spans_a_turn(record, ratio):
+        allowed = f"at least {2.0 * math.pi * ratio:.6g} rad, one output turn"
         raise InvalidInput("travel of input_angle", abs(travel), allowed)
 
 

@@ -15,7 +15,7 @@ from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.misfit.relevance import relevance
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
-from pymoo_hdte.discrepancy.drive.parameters import base_unit
+from pymoo_hdte.discrepancy.drive.parameters import base_unit, by_order
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, adequate, expected_values
@@ -49,15 +49,15 @@ def verdict_document(
     proposal : Proposal
     """
     verdict = finding.verdict
-    matters = relevance(finding, location)
+    matters, orders = relevance(finding, location), finding.campaign.believed.error_orders
     absent = {"reason": "no held-out record can be predicted, so that nothing can be proved"}
     return {
         "schema_version": SCHEMA_VERSION,
         "campaign": finding.campaign.title,
         "status": verdict.status,
-        "sentence": sentence(verdict),
+        "sentence": by_order(sentence(verdict), orders),
         "probability": verdict.probability,
-        "doubts": [in_words(one) for one in verdict.doubts],
+        "doubts": [by_order(in_words(one), orders) for one in verdict.doubts],
         "effects": effects_of(verdict),
         "relevance": None if matters is None else matters.as_dict(),
         "alternatives": _alternatives(verdict),
@@ -69,7 +69,8 @@ def verdict_document(
         "residual_over_noise": residual_of_parts(finding),
         **with_believed_effects([one.to_dict() for one in finding.campaign.believed.effects]),
         "held_out": absent if held_out is None else dict(held_out),
-        "next_experiment": proposal.as_dict(),
+        "next_experiment": proposal.as_dict()
+        | {"description": by_order(in_words(proposal.description), orders)},
         "location": location.summary(),
         **finding.rows.as_dict(),
         "versions": {

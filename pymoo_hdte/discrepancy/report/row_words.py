@@ -23,6 +23,7 @@ _NOUNS = {
     "settling": ("beginning that has not settled", "beginnings that have not settled"),
     "gap": ("gap", "gaps"),
     "repeated": ("run of repeated rows", "runs of repeated rows"),
+    "stuck": ("channel that stays the same", "channels that stay the same"),
 }
 
 

@@ -11,7 +11,6 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.coverage import campaign_limits
 from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
-from pymoo_hdte.discrepancy.drive.parameters import by_order
 from pymoo_hdte.discrepancy.drive.proof import Proof
 from pymoo_hdte.discrepancy.drive.revision import (
     MODEL_FILE,
@@ -43,7 +42,6 @@ from pymoo_hdte.discrepancy.report.tables import (
 )
 from pymoo_hdte.drive import DriveModel
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
-from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.reports.figures import data_uri
 from pymoo_hdte.reports.html import page
 
@@ -167,7 +165,7 @@ def _page(
         status=STATUSES[finding.verdict.status],
         effects=effect_rows(document["effects"], orders),
         certainty=how_sure(finding),
-        next_test=by_order(in_words(document["next_experiment"]["description"]), orders),
+        next_test=document["next_experiment"]["description"],
         pictures=pictures,
         hypotheses=hypothesis_rows(finding.verdict, orders),
         parameters=parameter_rows(finding),

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import Rig, RunningRecord, TorsionRecord, order_lines
 from pymoo_hdte.discrepancy.campaign.records import Jump
+from pymoo_hdte.discrepancy.campaign.rows.examination import _check_failed
 from pymoo_hdte.discrepancy.campaign.rows.repair import RUNNING, repaired_run, repaired_sweep
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.units import ARCSEC
@@ -177,6 +179,35 @@ def test_repeated_rows_are_left_out(rng):
     broken = replace(record, **{one: getattr(record, one)[frozen] for one in RUNNING})
     (fault,) = repaired(broken).faults
     assert (fault.kind, fault.row, fault.rows, fault.treatment) == ("repeated", 500, 5, "left out")
+
+
+@pytest.mark.parametrize("channel", RUNNING)
+def test_rows_in_which_a_channel_has_failed_are_left_out(rng, channel):
+    """A motor torque that stayed the same for half a record was called a jump, and fitted."""
+    record = run(rng)
+    held = np.arange(N_ROWS)
+    held[500:800] = 499
+    result = repaired(replace(record, **{channel: getattr(record, channel)[held]}))
+    (fault,) = result.faults
+    assert (fault.kind, fault.channel, fault.row, fault.rows) == ("stuck", channel, 499, 301)
+    assert fault.size == getattr(record, channel)[499]
+    assert_lines_as_of(result.record, without(record, np.r_[:499, 800:N_ROWS]), 1e-6)
+
+
+def test_a_coarse_reading_has_not_failed(rng):
+    record = replace(run(rng), output_torque=np.round(TIME * 3.0))
+    assert "stuck" not in {fault.kind for fault in repaired(record).faults}
+
+
+def test_a_record_without_enough_rows_that_are_sound_is_not_usable(rng):
+    record = run(rng)
+    held = np.minimum(np.arange(N_ROWS), 200)
+    result = repaired(replace(record, input_torque=record.input_torque[held]))
+    assert not result.usable
+    assert [fault.kind for fault in result.faults] == ["stuck"]
+    # Where the campaign cannot do without it.
+    with pytest.raises(InvalidInput, match=r"run: input_torque in rows 201 to \d+ is"):
+        _check_failed([result])
 
 
 def test_a_record_of_two_loads_is_not_usable(rng):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.line_basis import mean_speed
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord, TorsionRecord
@@ -48,6 +49,11 @@ def examined_rows(
     campaign : Campaign
         The same object if nothing was found.
     findings : RowFindings
+
+    Raises
+    ------
+    InvalidInput
+        For a record in which a channel fails, if too few were left without it.
     """
     n_rows = sum(len(one.time) for one in campaign.running)
     n_rows += sum(len(one.time) for one in campaign.torsion)
@@ -59,6 +65,7 @@ def examined_rows(
     sweeps = [repaired_sweep(one, deviations, rules) for one in campaign.torsion]
     left_out = _left_out(runs, rules)
     kept = [one for one in runs if one.record.name not in left_out]
+    _check_failed(kept)
     noise = _noise(campaign, kept, [record for record, _ in sweeps], rules)
     rig = with_noise(campaign.rig, noise)
     records = _unsettled([one.record for one in kept], rules)
@@ -136,6 +143,17 @@ def _left_out(runs: Sequence[RepairedRun], rules: Rules) -> tuple[str, ...]:
     if len(train) - sum(one.role == "train" for one in lost) < rules.fewest_records:
         lost = [one for one in lost if one.role != "train"]
     return tuple(one.name for one in lost)
+
+
+def _check_failed(kept: Sequence[RepairedRun]) -> None:
+    """Refuse a record that has to be kept, but whose rows hardly have a sensor that works."""
+    for one in kept:
+        failed = [fault for fault in one.faults if fault.kind == "stuck"]
+        if failed and not one.usable:
+            rows = f"rows {failed[0].row + 1} to {failed[0].row + failed[0].rows}"
+            field = f"{one.record.name}: {failed[0].channel} in {rows}"
+            allowed = "a reading that changes; without this record too few are left"
+            raise InvalidInput(field, f"always {failed[0].size:g}", allowed)
 
 
 def _final(fault: RowFault, left_out: Sequence[str]) -> RowFault:

@@ -24,9 +24,10 @@ class RowFault:
     ----------
     record : str
         Name of the record.
-    kind : {"spike", "jump", "gap", "repeated", "new zero", "settling"}
+    kind : {"spike", "jump", "gap", "repeated", "stuck", "new zero", "settling"}
         One to a few rows that depart from both sides; a constant offset from a row on; rows that
-        are missing; rows that repeat the one before; a constant offset from this record on; a decay
+        are missing; rows that repeat the one before; rows in which one channel does not change,
+        though it does elsewhere; a constant offset from this record on; a decay
         at the first rows.
     channel : str
         ``"input_angle"``, ``"output_angle"``, ``"input_torque"``, ``"output_torque"``; ``"time"``
@@ -38,8 +39,8 @@ class RowFault:
         How many; of a gap, how many are missing; of a jump, all rows to the end of the record, of a
         new zero, to the end of the session; of a decay, three time constants.
     size : float
-        Largest departure, the offset, or the length of a gap or of a hidden decay, in `UNITS` of
-        the channel.
+        Largest departure, the offset, the reading that does not change, or the length of a gap or
+        of a hidden decay, in `UNITS` of the channel.
     treatment : {"left out", "modelled", "none needed"}
         What became of the rows; where a record is left out, that of its faults is ``"left out"``.
     """

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from pymoo_hdte.checks import InvalidInput
-from pymoo_hdte.discrepancy.campaign.line_basis import LineFit
+from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, spans_a_turn
 from pymoo_hdte.discrepancy.campaign.records import Jump, RunningRecord, TorsionRecord
 from pymoo_hdte.discrepancy.campaign.rows.faults import (
     WINDOWS,
@@ -68,7 +68,7 @@ class RepairedRun:
 def repaired_run(
     record: RunningRecord, ratio: float, orders: Sequence[float], deviations: float, rules: Rules
 ) -> RepairedRun:
-    """Return a running record without spikes, jumps, repeated rows and settling.
+    """Return a running record without spikes, jumps, failed or repeated rows, and settling.
 
     Parameters
     ----------
@@ -83,6 +83,10 @@ def repaired_run(
     """
     search = _RunSearch(record, ratio, deviations, rules)
     search.take_repeated()
+    search.take_stuck()
+    stuck = tuple(fault for fault in search.faults if fault.kind == "stuck")
+    if stuck and not spans_a_turn(search.record, ratio):
+        return RepairedRun(record, stuck, None, False)
     search.note_gaps()
     try:
         residual = search.run(orders)

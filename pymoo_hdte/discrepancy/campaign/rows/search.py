@@ -55,6 +55,29 @@ class RowSearch(Generic[Record]):
                 self.note("repeated", "rows", first, last - first + 1, length, "left out")
             self._keep(~again)
 
+    def take_stuck(self) -> None:
+        """Leave out rows in which a channel does not change though it does in most others."""
+        every = np.zeros(len(self.rows), dtype=bool)
+        for channel in self.channels:
+            stuck = self._stuck(getattr(self.record, channel))
+            for first, last in _runs(stuck):
+                value = float(getattr(self.record, channel)[first])
+                self.note("stuck", channel, first, last - first + 1, value, "left out")
+            every |= stuck
+        if every.any() and np.count_nonzero(~every) >= FEWEST_SAMPLES:
+            self._keep(~every)
+
+    def _stuck(self, values: Rows) -> NDArray[np.bool_]:
+        """Return in which rows a channel stays the same for too long."""
+        same = np.r_[False, values[1:] == values[:-1]]
+        found = np.zeros_like(same)
+        for first, last in _runs(same):
+            if last - first + 2 >= self.rules.stuck_rows:
+                found[first - 1 : last + 1] = True
+        # Coarse readings stay the same for many rows anywhere.
+        coarse = found.all() or np.mean(same[~found]) > 0.5
+        return np.zeros_like(found) if coarse else found
+
     def note_gaps(self) -> None:
         """Note where the time runs on without rows."""
         steps = np.diff(self.record.time) * self.record.sample_rate

@@ -53,6 +53,15 @@ class RowRules(RuleSet):
         "Most jumps of a sensor in one record; more are a motion.",
         f"{BY_HAND}: a sensor that jumps more often has to be repaired first.",
     )
+    stuck_rows: int = rule(
+        30,
+        "rows",
+        "A channel that does not change for so many rows of a running record, though it does in at "
+        "least half of the others, has failed there.",
+        "Test level: a reading that changes in every other row stays the same that long with a "
+        "chance of 2^-30, which is 1e-3 in a million rows. Coarse readings change in fewer and do "
+        "not come into question.",
+    )
     longest_settling: float = rule(
         0.1,
         "share of the record",
