@@ -22,7 +22,8 @@ def campaign_limits(finding: DriveFinding) -> list[str]:
     finding : DriveFinding
         Of `analysis.examine_drive`.
     """
-    return [*_unproven(finding), *_unvaried(finding), *_unseen(finding), *_too_high(finding)]
+    of_records = _unproven(finding) + _unvaried(finding) + _unseen(finding)
+    return of_records + _like_a_gain(finding) + _too_high(finding)
 
 
 def _unproven(finding: DriveFinding) -> list[str]:
@@ -79,6 +80,21 @@ def _unvaried(finding: DriveFinding) -> list[str]:
             "hysteresis from damping, where the running records do not pass through zero torque."
         )
     return found
+
+
+def _like_a_gain(finding: DriveFinding) -> list[str]:
+    """Return what tells a friction in proportion to the load from a gain of the torque sensor."""
+    chosen = finding.verdict.chosen
+    if chosen is None or all(one.name != "load_dependent_friction" for one in chosen.candidates):
+        return []
+    power = [one.input_speed * one.load_torque for one in finding.data.features.records]
+    if min(power) < 0.0 < max(power):
+        return []
+    gain = 100.0 * finding.campaign.rig.input_torque_gain
+    return [
+        "Power flows one way through the drive in all fitted records: only the stated gain error "
+        f"of the input torque sensor, {gain:g} %, tells friction that grows with the load from it."
+    ]
 
 
 def _unseen(finding: DriveFinding) -> list[str]:
