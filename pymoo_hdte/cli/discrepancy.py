@@ -10,7 +10,7 @@ from typing import Any
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command import Command, Outcome, Say
-from pymoo_hdte.cli.own_effects import OPTION, own_effects
+from pymoo_hdte.cli.own_effects import OPTION, own_effects, told_by_line
 from pymoo_hdte.reports.folder import PAGE_FILE
 
 ModelFiles = tuple[Path | None, Path | None]
@@ -61,7 +61,8 @@ def _run(options: argparse.Namespace, say: Say) -> Outcome:
     with FOLDER.held(options.out), registered():
         for effect in () if options.effects is None else own_effects(options.effects):
             register(effect)
-        document = _analysed(options, believed, say)
+        with told_by_line(options.effects):
+            document = _analysed(options, believed, say)
     return Outcome(document, _summary(document, options.out))
 
 

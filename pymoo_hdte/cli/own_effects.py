@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -40,6 +42,21 @@ def own_effects(path: Path) -> tuple[Effect, ...]:
     if not found:
         raise InvalidInput(OPTION, str(path), "a Python file in which an Effect stands by a name")
     return tuple(found)
+
+
+@contextmanager
+def told_by_line(path: Path | None) -> Iterator[None]:
+    """Tell errors that an effect of the file makes later, in a fit, by the line of the file."""
+    try:
+        yield
+    except InvalidInput:
+        raise
+    except Exception as error:
+        if path is None or not (line := _line(error, path)):
+            raise
+        message = " ".join(f"{type(error).__name__}: {error}".split())
+        allowed = f"a Python file whose effects make no errors; {line}{message}"
+        raise InvalidInput(OPTION, str(path), allowed) from error
 
 
 def _names_of(path: Path) -> dict[str, Any]:

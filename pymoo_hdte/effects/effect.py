@@ -16,7 +16,7 @@ from dataclasses import MISSING, dataclass, field, fields
 from typing import Any, Protocol
 
 from pymoo_hdte.checks import InvalidInput, one_of, real_number
-from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.guess import Guess, Sizes, check_response
 from pymoo_hdte.effects.law import PORTS
 from pymoo_hdte.effects.quantities import si_unit, with_unit
 from pymoo_hdte.effects.sentence_blanks import check_sentence
@@ -152,8 +152,10 @@ class Effect:
         return bool(getattr(self.law, "drives", False))
 
     def guesses(self, sizes: Sizes) -> Sequence[Guess]:
-        """Return the forms that it may have, for the sizes of a port."""
-        return [] if self.guess is None else self.guess(sizes)
+        """Return the forms that it may have, for the sizes of a port; each has to give numbers."""
+        for one in (found := [] if self.guess is None else self.guess(sizes)):
+            check_response(self.name, [part for _, part in self.parts(one, one.begins[0])])
+        return found
 
     def parts(self, guess: Guess, values: Sequence[float]) -> tuple[tuple[str, Any], ...]:
         """Return laws (or other changes) for the values of a guess, each with its name."""

@@ -10,6 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.effects.law import PortState
 from pymoo_hdte.effects.unknowns import (
     HARMONIC_NAMES,
     Family,
@@ -166,3 +170,33 @@ class Guess:
         """Values from which fits start."""
         given = tuple(tuple(start) for start in self.starts)
         return given or (tuple(one.start for one in self.unknowns),)
+
+
+def check_response(name: str, parts: Sequence[Any]) -> None:
+    """Refuse laws that answer a small motion with anything but numbers, one a point or for all.
+
+    A fit would count them as lost everywhere, and the effect as one that was tried.
+
+    Parameters
+    ----------
+    name : str
+        Of the effect.
+    parts : sequence
+        Laws; other changes of a drive are passed over.
+    """
+    at = np.linspace(-1.0, 1.0, 6)[None]
+    state = PortState(
+        1e-4 * at,
+        10.0 * at,
+        lambda order: order * at,
+        np.array([[1e4]]),
+        load=at,
+        temperature=300.0,
+    )
+    for law in (one for one in parts if hasattr(one, "respond")):
+        response = law.respond(state)
+        for what in ("torque", "slope", "damping"):
+            value = np.asarray(getattr(response, what), dtype=float)
+            if value.size not in (1, at.size) or not np.all(np.isfinite(value)):
+                allowed = "finite numbers, one for each point of the motion"
+                raise InvalidInput(f"{what} of {name}", value, allowed)

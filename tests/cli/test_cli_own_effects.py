@@ -109,3 +109,26 @@ def test_a_file_that_gives_no_effect_is_one_line(text, words, folder, tmp_path, 
     assert printed.count("\n") == 1
     assert not (tmp_path / "out").exists()
     assert known_effects() == before
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("self.level * np.arcsinh(share)", "np.nan * share", "torque of eyring_drag"),
+        ("self.level * np.arcsinh(share)", "np.ones(3)", "torque of eyring_drag"),
+        ("self.level * np.arcsinh(share)", "share / no_such", "line {}: NameError: name 'no_such'"),
+        ("force, speed = sizes.force", "force, speed = sizes.no_such", "line {}: AttributeError"),
+    ],
+)
+def test_an_effect_that_gives_no_numbers_is_refused_by_name_or_line(
+    folder, tmp_path, capsys, old, new, told
+):
+    """It was listed among what was tried, or ended the command with a traceback."""
+    text = EXAMPLE.read_text()
+    assert text.count(old) == 1
+    file = tmp_path / "own.py"
+    file.write_text(text.replace(old, new))
+    line = text[: text.index(old)].count("\n") + 1
+    assert run(folder, tmp_path / "out", "--effects", file) == 2
+    assert told.format(line) in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
