@@ -154,7 +154,7 @@ class Effect:
     def guesses(self, sizes: Sizes) -> Sequence[Guess]:
         """Return the forms that it may have, for the sizes of a port; each has to give numbers."""
         for one in (found := [] if self.guess is None else self.guess(sizes)):
-            check_response(self.name, [part for _, part in self.parts(one, one.begins[0])])
+            check_response(self.name, [part for _, part in self.parts(one, one.begins[0])], sizes)
         return found
 
     def parts(self, guess: Guess, values: Sequence[float]) -> tuple[tuple[str, Any], ...]:

@@ -84,7 +84,8 @@ def _unvaried(finding: DriveFinding) -> list[str]:
 
 def _like_a_gain(finding: DriveFinding) -> list[str]:
     """Return what tells a friction in proportion to the load from a gain of the torque sensor."""
-    chosen = finding.verdict.chosen
+    verdict = finding.verdict
+    chosen = verdict.chosen if verdict.status in EXPLAINED else None
     if chosen is None or all(one.name != "load_dependent_friction" for one in chosen.candidates):
         return []
     power = [one.input_speed * one.load_torque for one in finding.data.features.records]
@@ -92,8 +93,9 @@ def _like_a_gain(finding: DriveFinding) -> list[str]:
         return []
     gain = 100.0 * finding.campaign.rig.input_torque_gain
     return [
-        "Power flows one way through the drive in all fitted records: only the stated gain error "
-        f"of the input torque sensor, {gain:g} %, tells friction that grows with the load from it."
+        "Power flows one way through the drive in all fitted records, so that friction that grows "
+        "with the load looks like a wrong gain of the input torque sensor: only its stated gain "
+        f"error, {gain:g} %, tells them apart."
     ]
 
 

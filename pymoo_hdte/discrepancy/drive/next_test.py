@@ -22,7 +22,6 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive.effects import ENCODER_LINE
 
@@ -43,11 +42,13 @@ class Proposal:
     description : str
         For the report.
     test : str
-        One of `TESTS`; "none" where no test within the limits separates the two models.
+        One of `TESTS`; "none" where no test within the limits separates the two models, or where
+        no known effect comes near the misfit.
     speed_rpm, load_torque : float or None
         r/min of the input, negative in reverse, and N.m; None for a sweep or no test.
     separates : tuple of str, or None
-        Labels of the two models; None where the aim is a less uncertain prediction.
+        Labels of the two models; None where the aim is a less uncertain prediction, or there is no
+        model worth a test.
     expected_separation : float
         Expected chi-square between the two models, or of the uncertain prediction; without a test
         the largest of all.
@@ -131,23 +132,17 @@ def nearest_rivals(verdict: Verdict) -> list[Fit]:
     """Return the fits of the nearest other hypotheses, nearest first."""
     if verdict.chosen is None:
         return []
-    names = _names(verdict.chosen)
+    names = verdict.chosen.names
     others = [
         *verdict.equivalent,
         *sorted(verdict.alternatives, key=lambda hypothesis: hypothesis.bic),
     ]
-    found: dict[frozenset[str], Fit] = {}
+    found: dict[frozenset[tuple[str, str]], Fit] = {}
     for hypothesis in others:
-        theirs = _names(hypothesis)
         # Of nested models the larger one can imitate the chosen one in every test.
-        if not names <= theirs:
-            found.setdefault(theirs, hypothesis.fit)
+        if hypothesis in verdict.equivalent or not names <= hypothesis.names:
+            found.setdefault(hypothesis.names, hypothesis.fit)
     return list(found.values())[:_RIVALS]
-
-
-def _names(hypothesis: Hypothesis) -> frozenset[str]:
-    """Return the names of its effects, and of each base parameter out of tolerance."""
-    return frozenset(candidate.frees or candidate.name for candidate in hypothesis.candidates)
 
 
 def _aim(verdict: Verdict, one: str, other: str, same: bool) -> str:
@@ -170,6 +165,9 @@ def _most_uncertain(grid: Grid, model: Model) -> Proposal:
     """Return the running record with the most uncertain prediction of the fit."""
     running = slice(len(grid.speed_rpm))
     variance = np.sum(model.influence[running] ** 2, axis=(1, 2)) * model.steady[running]
+    if not variance.any():
+        said = "In none of the tests within the limits does the drive have a steady state."
+        return Proposal(said, "none", None, None, None, 0.0)
     test = int(np.argmax(variance))
     what, speed, load, kind = grid.condition(test)
     text = f"The model is least certain of {what}: make it."
@@ -194,7 +192,7 @@ def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
         without = grid.predict(base, others)
         # Half a period reverses the encoder's line and leaves that of the drive unchanged.
         change = 2.0 * (grid.predict(base, chosen.effects) - without)[: len(grid.speed_rpm)]
-        expected = np.sum(change**2, axis=1)
+        expected = np.sum(change**2, axis=1) * grid.model(chosen).steady[: len(change)]
         test = int(np.argmax(expected))
         _, speed, load, _ = grid.condition(test)
         text = (
@@ -222,9 +220,11 @@ def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit) -> Proposal | Non
         level = placed[1].constant
         triangles = grid.data.whiteners
         row = triangles[:, MEANS.index(CHANNELS.index("input_torque"))]
-        influence = grid.model(chosen).influence[: len(row)]
+        model = grid.model(chosen)
+        influence = model.influence[: len(row)]
         known = np.sum(np.einsum("rf,rfp->rp", row, influence) ** 2, axis=1)
         expected = (2.0 * level) ** 2 / (np.sum(row**2, axis=1) + known)
+        expected *= model.steady[: len(row)]
         test = int(np.argmax(expected))
         speed, load = float(grid.speed_rpm[test]), float(grid.load_torque[test])
         twin = "zero error of the input torque sensor"

@@ -106,7 +106,9 @@ class Grid:
         influence = objective.jacobian(fitted.values) @ root
         predicted, steady = self._predicted(fitted.values[: len(self.data.base)], fitted.effects)
         rattling = {one.name for one in known_effects() if one.rattles}
-        if any(one.name in rattling for one in fitted.candidates):
+        names = {one.name for one in fitted.candidates}
+        names |= {one.name for one in self.data.campaign.believed.effects}
+        if names & rattling:
             # Such records would not be fitted, whatever holds the flanks in the model.
             data, running = self.data, slice(len(self.speed_rpm))
             steady[running] &= flanks_held(data.features, data.campaign.torque_scale, data.rules)

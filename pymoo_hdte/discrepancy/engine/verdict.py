@@ -107,6 +107,14 @@ class Verdict:
         degrees_of_freedom, rules = self.degrees_of_freedom, self.rules
         return chosen is not None and not down_to_noise(chosen.fit, degrees_of_freedom, rules)
 
+    def is_equivalent(self, one: Hypothesis) -> bool:
+        """Tell whether a set is of the class, or an order or form away from one and as likely."""
+        named = () if self.chosen is None else (self.chosen, *self.equivalent)
+        near = self.rules.evidence_distance
+        return one in self.equivalent or any(
+            one.names == other.names and one.bic - other.bic < near for other in named
+        )
+
     @property
     def comes_near(self) -> bool:
         """Whether the chosen effects explain at least half of the misfit."""

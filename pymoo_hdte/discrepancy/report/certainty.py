@@ -166,9 +166,9 @@ def _probably(verdict: Verdict) -> str:
 
 
 def _others(verdict: Verdict, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return the sets that say something else: not all that the chosen one says, and more."""
-    return [one for one in verdict.alternatives if not _names(chosen) <= _names(one)]
-
-
-def _names(hypothesis: Hypothesis) -> set[str]:
-    return {candidate.frees or candidate.name for candidate in hypothesis.candidates}
+    """Return the alternatives that neither contain the chosen set nor are a part of it."""
+    return [
+        one
+        for one in verdict.alternatives
+        if not (chosen.names <= one.names or one.names <= chosen.names)
+    ]

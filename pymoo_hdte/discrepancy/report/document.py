@@ -274,7 +274,7 @@ def _alternatives(verdict: Verdict) -> list[dict[str, Any]]:
             "chi_square": hypothesis.fit.chi_square,
             "explained": hypothesis.explained,
             "at_bound": list(hypothesis.fit.at_bounds),
-            "equivalent": hypothesis in verdict.equivalent,
+            "equivalent": verdict.is_equivalent(hypothesis),
         }
 
     return [

@@ -23,7 +23,10 @@ _NOUNS = {
     "settling": ("beginning that has not settled", "beginnings that have not settled"),
     "gap": ("gap", "gaps"),
     "repeated": ("run of repeated rows", "runs of repeated rows"),
-    "stuck": ("channel that stays the same", "channels that stay the same"),
+    "stuck": (
+        "run of rows in which a channel has failed",
+        "runs of rows in which a channel has failed",
+    ),
 }
 
 
@@ -104,7 +107,9 @@ def fault_rows(findings: RowFindings) -> list[FaultRow]:
 
 
 def _fault_row(fault: RowFault) -> FaultRow:
-    unit, size = _shown(UNITS[fault.channel], fault.size)
+    unit, size = UNITS[fault.channel], fault.size
+    if fault.kind != "stuck":  # whose size is a reading, and no small angle
+        unit, size = _shown(unit, size)
     channel = "all" if fault.channel == "rows" else fault.channel.replace("_", " ")
     kind = "repeated rows" if fault.kind == "repeated" else fault.kind
     return FaultRow(

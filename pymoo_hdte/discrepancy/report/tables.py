@@ -207,17 +207,4 @@ def _shown(unit: str) -> str:
 def _role(verdict: Verdict, hypothesis: Hypothesis) -> str:
     if hypothesis is verdict.chosen:
         return "best known, but not enough" if verdict.status == "unlisted" else "chosen"
-    if hypothesis in verdict.equivalent or _at_another_order(verdict, hypothesis):
-        return "cannot be told apart"
-    return "rejected"
-
-
-def _at_another_order(verdict: Verdict, hypothesis: Hypothesis) -> bool:
-    """Tell whether a set is one of a class at another order, which the evidence does not exclude.
-
-    A class has each set of names once.
-    """
-    return any(
-        hypothesis.names == one.names and hypothesis.bic - one.bic < verdict.rules.evidence_distance
-        for one in verdict.equivalent
-    )
+    return "cannot be told apart" if verdict.is_equivalent(hypothesis) else "rejected"

@@ -197,16 +197,22 @@ def test_rows_in_which_a_channel_has_failed_are_left_out(rng, channel):
 def test_a_coarse_reading_has_not_failed(rng):
     record = replace(run(rng), output_torque=np.round(TIME * 3.0))
     assert "stuck" not in {fault.kind for fault in repaired(record).faults}
+    # A sine in counts, which rests long at its crests.
+    sine = 20.0 + np.round(400.0 * np.sin(np.pi * TIME) + rng.normal(0.0, 0.1, N_ROWS)) / 100.0
+    record = replace(record, output_torque=sine)
+    assert "stuck" not in {fault.kind for fault in repaired(record).faults}
 
 
-def test_a_record_without_enough_rows_that_are_sound_is_not_usable(rng):
+@pytest.mark.parametrize(("first", "last"), [(200, N_ROWS), (3, N_ROWS), (50, N_ROWS - 50)])
+def test_a_record_without_enough_rows_that_are_sound_is_not_usable(rng, first, last):
     record = run(rng)
-    held = np.minimum(np.arange(N_ROWS), 200)
+    held = np.arange(N_ROWS)
+    held[first:last] = first
     result = repaired(replace(record, input_torque=record.input_torque[held]))
     assert not result.usable
     assert [fault.kind for fault in result.faults] == ["stuck"]
     # Where the campaign cannot do without it.
-    with pytest.raises(InvalidInput, match=r"run: input_torque in rows 201 to \d+ is"):
+    with pytest.raises(InvalidInput, match=rf"input_torque in \d+ rows from row {first + 1} on"):
         _check_failed([result])
 
 

@@ -155,12 +155,7 @@ def test_a_record_that_the_campaign_has_is_called_a_repeat():
 
 
 def fake(*names):
-    """A set of effects; capitals are base parameters out of tolerance."""
-    candidates = (
-        SimpleNamespace(name="parameter" if name.isupper() else name, frees=name * name.isupper())
-        for name in names
-    )
-    return SimpleNamespace(candidates=tuple(candidates), bic=0.0, fit=names)
+    return SimpleNamespace(names=frozenset(names), candidates=(), bic=0.0, fit=names)
 
 
 def test_a_superset_of_the_named_effects_is_no_rival():
@@ -170,9 +165,16 @@ def test_a_superset_of_the_named_effects_is_no_rival():
 
 def test_the_same_effect_beside_other_values_is_a_rival():
     """It was passed over, and a set that was rejected was said to be of the class."""
-    one, other, rejected = fake("a", "K", "J"), fake("a", "K", "B"), fake("a", "c")
+    a, values = ("a", "mesh"), [("parameter", one) for one in ("K", "J", "B")]
+    one, other = fake(a, *values[:2]), fake(a, *values[1:])
+    rejected = fake(a, ("c", "mesh"))
     verdict = Verdict("class", None, one, (other, rejected), (other,), 1)
-    assert nearest_rivals(verdict) == [("a", "K", "B"), ("a", "c")]
+    assert nearest_rivals(verdict) == [other.fit, rejected.fit]
+
+
+def test_what_contains_the_chosen_effects_is_a_rival_in_their_class():
+    one, more = fake(("a", "mesh")), fake(("a", "mesh"), ("b", "mesh"))
+    assert nearest_rivals(Verdict("class", None, one, (more,), (more,), 1)) == [more.fit]
 
 
 def test_a_record_in_which_a_clearance_would_rattle_separates_nothing():

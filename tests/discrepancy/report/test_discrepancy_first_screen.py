@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from pymoo_hdte.discrepancy.drive.gap import Gap
 from pymoo_hdte.discrepancy.drive.misfit.relevance import Relevance, largest_change, relevance
 from pymoo_hdte.discrepancy.drive.proof import Proof
-from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.report.document import sentence
 from pymoo_hdte.discrepancy.report.gap_words import gap_sentence
@@ -255,18 +254,19 @@ def test_a_harmonic_that_may_be_nothing_is_not_on_the_first_screen(parameter, lo
 
 
 @pytest.mark.parametrize(("bic", "role"), [(9.0, "cannot be told apart"), (11.0, "rejected")])
-def test_a_member_of_a_class_at_another_order_is_none_that_was_rejected(bic, role):
-    def fitted(order, bic):
-        names = frozenset({("clearance_variation", "mesh")})
+@pytest.mark.parametrize("of_class", [True, False])
+def test_what_is_as_likely_at_another_order_was_not_rejected(bic, role, of_class):
+    """Of the chosen effect, or of a member of its class, which has each set of names once."""
+
+    def fitted(name, order, bic=0.0):
+        names = frozenset({(name, "mesh")})
         fit = SimpleNamespace(chi_square=1.0, at_bounds=("error_amplitude_1",))
-        label = f"clearance_variation:mesh@{order}"
+        label = f"{name}:mesh@{order}"
         return SimpleNamespace(names=names, label=label, fit=fit, explained=1.0, bic=bic)
 
-    once, twice = fitted(1, bic), fitted(2, 0.0)
-    chosen = SimpleNamespace(**(vars(twice) | {"names": frozenset(), "label": "backlash:mesh"}))
-    verdict = SimpleNamespace(
-        chosen=chosen, alternatives=(twice, once), equivalent=(twice,), rules=RULES, status="class"
-    )
+    chosen, member = fitted("mesh_stiffness_variation", 1), fitted("clearance_variation", 2)
+    twin = fitted("clearance_variation" if of_class else "mesh_stiffness_variation", 3, bic)
+    verdict = Verdict("class", None, chosen, (member, twin), (member,), 1)
     rows = hypothesis_rows(verdict, (1.0, 2.0))
     assert [row.role for row in rows] == ["chosen", "cannot be told apart", role]
     assert rows[0].at_bounds == "error amplitude of order 2"

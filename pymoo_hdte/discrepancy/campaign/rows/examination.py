@@ -146,11 +146,11 @@ def _left_out(runs: Sequence[RepairedRun], rules: Rules) -> tuple[str, ...]:
 
 
 def _check_failed(kept: Sequence[RepairedRun]) -> None:
-    """Refuse a record that has to be kept, but whose rows hardly have a sensor that works."""
+    """Refuse a record that cannot be left out and in which a channel has failed for too long."""
     for one in kept:
         failed = [fault for fault in one.faults if fault.kind == "stuck"]
         if failed and not one.usable:
-            rows = f"rows {failed[0].row + 1} to {failed[0].row + failed[0].rows}"
+            rows = f"{failed[0].rows} rows from row {failed[0].row + 1} on"
             field = f"{one.record.name}: {failed[0].channel} in {rows}"
             allowed = "a reading that changes; without this record too few are left"
             raise InvalidInput(field, f"always {failed[0].size:g}", allowed)

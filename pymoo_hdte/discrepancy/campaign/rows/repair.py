@@ -56,7 +56,8 @@ class RepairedRun:
     residual : ndarray, shape (n, 4), or None
         Of the order lines, by channel as in `LineFit`; None where they cannot be fitted.
     usable : bool
-        False if several channels jump at once: not a sensor has changed then, but the test.
+        False if several channels jump at once: not a sensor has changed then, but the test. And if
+        too few rows are left in which no channel has failed.
     """
 
     record: RunningRecord
@@ -85,14 +86,15 @@ def repaired_run(
     search.take_repeated()
     search.take_stuck()
     stuck = tuple(fault for fault in search.faults if fault.kind == "stuck")
-    if stuck and not spans_a_turn(search.record, ratio):
-        return RepairedRun(record, stuck, None, False)
+    if stuck and not (search.is_cut and spans_a_turn(search.record, ratio)):
+        return RepairedRun(record, tuple(search.faults), None, False)
     search.note_gaps()
     try:
         residual = search.run(orders)
     except InvalidInput:
-        # A record that cannot tell these lines apart is judged, and refused, where it is measured.
-        return RepairedRun(record, (), None, True)
+        # A record that cannot tell these lines apart is judged, and refused, where it is measured,
+        # unless that is so only without the rows in which a channel has failed.
+        return RepairedRun(record, stuck, None, not stuck)
     return RepairedRun(search.record, tuple(search.faults), residual, search.usable)
 
 

@@ -55,8 +55,15 @@ class RowSearch(Generic[Record]):
                 self.note("repeated", "rows", first, last - first + 1, length, "left out")
             self._keep(~again)
 
+    @property
+    def is_cut(self) -> bool:
+        """Whether the rows of all faults that are to be left out are left out."""
+        return not any(
+            fault.treatment == "left out" and fault.row in self.rows for fault in self.faults
+        )
+
     def take_stuck(self) -> None:
-        """Leave out rows in which a channel does not change though it does in most others."""
+        """Leave out rows in which a channel stays the same for far longer than elsewhere."""
         every = np.zeros(len(self.rows), dtype=bool)
         for channel in self.channels:
             stuck = self._stuck(getattr(self.record, channel))
@@ -68,15 +75,13 @@ class RowSearch(Generic[Record]):
             self._keep(~every)
 
     def _stuck(self, values: Rows) -> NDArray[np.bool_]:
-        """Return in which rows a channel stays the same for too long."""
-        same = np.r_[False, values[1:] == values[:-1]]
-        found = np.zeros_like(same)
-        for first, last in _runs(same):
-            if last - first + 2 >= self.rules.stuck_rows:
-                found[first - 1 : last + 1] = True
-        # Coarse readings stay the same for many rows anywhere.
-        coarse = found.all() or np.mean(same[~found]) > 0.5
-        return np.zeros_like(found) if coarse else found
+        """Return in which rows a channel has one reading for too long."""
+        starts = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+        lengths = np.diff(np.r_[starts, len(values)])
+        ranked = np.sort(lengths)[::-1]
+        far = ranked[:-1] >= self.rules.stuck_ratio * ranked[1:]
+        stuck = ranked[:-1][far & (ranked[:-1] >= self.rules.stuck_rows)]
+        return np.repeat(lengths >= min(stuck, default=np.inf), lengths)
 
     def note_gaps(self) -> None:
         """Note where the time runs on without rows."""

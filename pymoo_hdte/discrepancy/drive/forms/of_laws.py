@@ -213,7 +213,8 @@ def _ripple(candidate: Candidate, ranges: Ranges) -> list[DriveEffect]:
     size, order = _SHARE * ranges.torque / ranges.ratio, candidate.order or 1.0
     orders = ranges.multiples(order)
     # It moves its own angle, through which each harmonic shows at the next lower one, too.
-    orders += [orders[-1] + order] if 0 < len(orders) < ranges.terms else []
+    shown = {round(one / order) for one in orders}
+    orders += [(k + 1) * order for k in shown if k < ranges.terms and k + 1 not in shown]
     return [
         Correction("input", PeriodicTorque(order, phase, size))
         for order in orders

@@ -56,11 +56,18 @@ class RowRules(RuleSet):
     stuck_rows: int = rule(
         30,
         "rows",
-        "A channel that does not change for so many rows of a running record, though it does in at "
-        "least half of the others, has failed there.",
-        "Test level: a reading that changes in every other row stays the same that long with a "
-        "chance of 2^-30, which is 1e-3 in a million rows. Coarse readings change in fewer and do "
-        "not come into question.",
+        "A channel of a running record has failed where it stays the same for at least so many "
+        "rows.",
+        "Test level: a reading that changes in every other row by chance stays the same that long "
+        "with a chance of 2^-30, which is 1e-3 in a million rows.",
+    )
+    stuck_ratio: float = rule(
+        10.0,
+        "ratio",
+        "And for this multiple of the longest that it stays the same elsewhere in the record.",
+        "Geometry: a sine in counts rests at its crest 2.7 times as long as in the count below, "
+        "with a tenth of a count of noise some 6 times. A slow encoder rests equally long in all.",
+        at_least=1.0,
     )
     longest_settling: float = rule(
         0.1,
