@@ -63,6 +63,8 @@ def read_drive_model(path: str | Path, sheet: str | Path | None = None) -> Drive
     """
     path = Path(path)
     sheet = path.with_name(f"{path.stem}{SHEET_SUFFIX}{path.suffix}") if sheet is None else sheet
+    # Where neither file is there, the model is the one that was asked for.
+    path.stat()
     try:
         return load_model(path, load_datasheet(sheet))
     except InvalidInput as error:

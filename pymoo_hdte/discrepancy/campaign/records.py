@@ -17,6 +17,9 @@ ROLES = ("train", "held_out")
 FEWEST_SAMPLES = 8
 """Least number of rows of a record."""
 
+_COLDEST, _HOTTEST = 200.0, 473.0
+"""K. No grease of a gear serves beyond -73 and 200 degrees Celsius: the unit is then another."""
+
 
 @dataclass(frozen=True)
 class Jump:
@@ -118,7 +121,10 @@ class RunningRecord:
         whole_number("samples_averaged", self.samples_averaged, 1)
         real_number("elapsed", self.elapsed, at_least=0.0)
         if self.temperature is not None:
-            real_number("temperature", self.temperature, above=0.0)
+            temperature = real_number("temperature", self.temperature)
+            if not _COLDEST <= temperature <= _HOTTEST:
+                allowed = f"{_COLDEST:g} to {_HOTTEST:g} K, that of a drive with its lubricant"
+                raise InvalidInput("temperature", f"{temperature:g} K", allowed)
         if self.settling is not None:
             real_number("settling", self.settling, above=0.0)
         _check_record(self, ("input_angle", "output_angle", "input_torque", "output_torque"))

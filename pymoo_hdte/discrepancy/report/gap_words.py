@@ -15,7 +15,8 @@ def gap_sentence(finding: DriveFinding, proof: Proof | None) -> str:
     if proof is None:
         return "No record was held out, so nothing can be said about conditions not fitted."
     gap = proof.channels[proof.leading]
-    where = f"{len(proof.records)} held-out records, {proof.leading.replace('_', ' ')}"
+    records = f"{len(proof.records)} held-out record{'s' if len(proof.records) > 1 else ''}"
+    where = f"{records}, {proof.leading.replace('_', ' ')}"
     noise = f"noise alone {number(gap.noise_floor)} {gap.unit}"
     if not finding.verdict.accepted.candidates:
         return f"Nothing was added. On {where}: off by {number(gap.before)} {gap.unit}, {noise}."

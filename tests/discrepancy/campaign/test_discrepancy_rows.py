@@ -194,6 +194,12 @@ def test_rows_in_which_a_channel_has_failed_are_left_out(rng, channel):
     assert_lines_as_of(result.record, without(record, np.r_[:499, 800:N_ROWS]), 1e-6)
 
 
+@pytest.mark.parametrize("temperature", [25.0, 2773.15, 573.15])
+def test_a_temperature_in_another_unit_is_refused(rng, temperature):
+    with pytest.raises(InvalidInput, match="200 to 473 K"):
+        replace(run(rng), temperature=temperature)
+
+
 def test_a_coarse_reading_has_not_failed(rng):
     record = replace(run(rng), output_torque=np.round(TIME * 3.0))
     assert "stuck" not in {fault.kind for fault in repaired(record).faults}

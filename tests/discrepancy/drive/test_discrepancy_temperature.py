@@ -143,14 +143,16 @@ channels.temperature = {{ column = "output_torque_Nm", unit = "{unit}" }}
 [rig]"""
 
 
-@pytest.mark.parametrize(("unit", "zero"), [("C", 273.15), ("K", 0.0)])
-def test_a_column_counts_by_its_mean(unit, zero, folder):
-    """The load of 20 N.m stands in for a temperature here."""
+def test_a_column_counts_by_its_mean(folder):
+    """The load of 20 N.m stands in for a temperature here, which in kelvin would be no drive's."""
     file = folder / "campaign.toml"
     text = file.read_text().replace("temperature_C = 22.5\n", "")
-    file.write_text(text.replace("[rig]", COLUMN.format(unit=unit)))
+    file.write_text(text.replace("[rig]", COLUMN.format(unit="C")))
     for record in read_campaign(folder).running:
-        assert record.temperature == pytest.approx(zero + np.mean(record.output_torque))
+        assert record.temperature == pytest.approx(273.15 + np.mean(record.output_torque))
+    file.write_text(text.replace("[rig]", COLUMN.format(unit="K")))
+    with pytest.raises(InvalidInput, match=r"temperature is '\d+\.?\d* K'"):
+        read_campaign(folder)
 
 
 @pytest.mark.parametrize(
