@@ -22,8 +22,21 @@ def campaign_limits(finding: DriveFinding) -> list[str]:
     finding : DriveFinding
         Of `analysis.examine_drive`.
     """
-    of_records = _unproven(finding) + _unvaried(finding) + _unseen(finding)
+    of_records = _zeroed(finding) + _unproven(finding) + _unvaried(finding) + _unseen(finding)
     return of_records + _like_a_gain(finding) + _too_high(finding)
+
+
+def _zeroed(finding: DriveFinding) -> list[str]:
+    """Return what records say that all begin at one reading of both angles, noise included."""
+    running = finding.campaign.running
+    begins = {(float(one.input_angle[0]), float(one.output_angle[0])) for one in running}
+    if len(begins) > 1 or len(running) < 2:
+        return []
+    return [
+        "Both angles begin at the same reading in every record. If their counters were zeroed "
+        "there, zeros differ from record to record, and with them the phases of all lines: state "
+        "the zero of each record."
+    ]
 
 
 def _unproven(finding: DriveFinding) -> list[str]:

@@ -58,6 +58,19 @@ def test_friction_of_the_load_is_told_from_a_gain_where_the_load_drives(campaign
     assert not [one for one in said(campaign, driven, chosen=chosen) if "gain error" in one]
 
 
+def test_counters_that_were_zeroed_at_each_record_are_told(campaign):
+    """The drive was said to lack something for certain, and the zeros were not mentioned."""
+
+    def zeroed(record):
+        angles = {one: getattr(record, one) for one in ("input_angle", "output_angle")}
+        return replace(record, **{one: values - values[0] for one, values in angles.items()})
+
+    running = tuple(map(zeroed, campaign.running))
+    assert any("state the zero" in one for one in said(replace(campaign, running=running)))
+    running = (campaign.running[0], *running[1:])
+    assert not any("state the zero" in one for one in said(replace(campaign, running=running)))
+
+
 def test_a_full_campaign_has_no_limits(campaign):
     assert said(campaign) == []
 
