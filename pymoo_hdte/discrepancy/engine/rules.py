@@ -110,7 +110,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
     contradicting_chi_square: float = rule(
         9.0,
         "chi-square per degree of freedom",
-        "From here on a part of the data plainly contradicts a model.",
+        "From here on a part of the data plainly contradicts a model, and the square of a sensor's "
+        "zero or gain, in units of its stated limit, what is stated of it.",
         f"{BY_HAND}: three times the noise. In a part of ten degrees of freedom noise reaches it "
         "with a chance of 5e-15, so that the size of a misfit decides here, not its significance.",
         at_least=1.0,

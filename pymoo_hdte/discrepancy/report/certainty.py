@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.evidence import PARTS
 from pymoo_hdte.discrepancy.drive.parameters import words_of
+from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
     adequate,
     explains,
     unexplained,
 )
+from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
 from pymoo_hdte.effects.sentence_blanks import in_words, listed
@@ -145,7 +149,24 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
         orders = finding.campaign.believed.error_orders
         names = ", ".join(words_of(name, orders) for name in bounded)
         words.append(f"At the bound of its range, and therefore uncertain: {names}.")
+    if far := _far_from_stated(chosen.fit, verdict.rules):
+        words.append(f"A sensor is far from what is stated of it, and values with it: {far}.")
     return [_probably(verdict), *words]
+
+
+def _far_from_stated(fitted: Fit, rules: Rules) -> str:
+    """Return the errors of sensors that contradict their stated limits, with both; SI."""
+    least = rules.contradicting_chi_square**0.5
+    return listed(
+        [
+            f"{words_of(one.name, ())} {number(value, 2)} ({number(one.prior, 2)} stated)"
+            for one, value in zip(fitted.parameters, fitted.values.tolist(), strict=True)
+            if np.isfinite(one.prior)
+            and abs(value - one.start) >= least * one.prior
+            # That of the sweep is no sensor's.
+            and one.name != "locked_stiffness"
+        ]
+    )
 
 
 def _probably(verdict: Verdict) -> str:

@@ -178,6 +178,18 @@ def test_a_next_best_that_explains_the_same_share_is_told_apart_by_its_bic(rippl
     assert "BIC" not in said
 
 
+@pytest.mark.parametrize(("deviations", "told"), [(2.9, False), (3.1, True)])
+def test_a_sensor_far_from_what_is_stated_of_it_is_told(ripple, deviations, told):
+    """Both gains ended four limits away, all values were 2 % off, and the page did not say it."""
+    fitted = ripple.verdict.chosen.fit
+    place = [one.name for one in fitted.parameters].index("input_torque_gain")
+    values = fitted.values.copy()
+    values[place] = deviations * fitted.parameters[place].prior
+    chosen = replace(ripple.verdict.chosen, fit=replace(fitted, values=values))
+    said = how_sure(replace(ripple, verdict=replace(ripple.verdict, chosen=chosen)))
+    assert ("input torque gain" in said) == told
+
+
 def test_parameters_are_told_in_the_reader_s_units(ripple):
     rows = {row.name: row for row in parameter_rows(ripple)}
     fitted = ripple.verdict.accepted

@@ -76,12 +76,18 @@ class RowSearch(Generic[Record]):
 
     def _stuck(self, values: Rows) -> NDArray[np.bool_]:
         """Return in which rows a channel has one reading for too long."""
-        starts = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
-        lengths = np.diff(np.r_[starts, len(values)])
-        ranked = np.sort(lengths)[::-1]
-        far = ranked[:-1] >= self.rules.stuck_ratio * ranked[1:]
-        stuck = ranked[:-1][far & (ranked[:-1] >= self.rules.stuck_rows)]
-        return np.repeat(lengths >= min(stuck, default=np.inf), lengths)
+        rules, changes = self.rules, np.r_[True, values[1:] != values[:-1]]
+        lengths = np.diff(np.r_[np.flatnonzero(changes), len(values)])
+        # A rest that the record cuts off tells how long rests are only where it is long.
+        whole = np.ones(len(lengths), dtype=bool)
+        whole[[0, -1]] = lengths[[0, -1]] >= rules.stuck_rows
+        ranked = np.sort(lengths[whole])[::-1][: rules.most_jumps + 1]
+        longest, others = ranked[:-1], ranked[1:]
+        far = longest[(longest >= rules.stuck_ratio * others) & (longest >= rules.stuck_rows)]
+        stuck = np.repeat(lengths >= min(far, default=np.inf), lengths)
+        left = changes[~stuck]
+        fine = len(left) >= rules.stuck_rows and left.mean() >= rules.changing_share
+        return stuck if fine else np.zeros_like(stuck)
 
     def note_gaps(self) -> None:
         """Note where the time runs on without rows."""
