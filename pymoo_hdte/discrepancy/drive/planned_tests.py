@@ -109,7 +109,8 @@ class Grid:
         names = {one.name for one in fitted.candidates}
         names |= {one.name for one in self.data.campaign.believed.effects}
         if names & rattling:
-            # Such records would not be fitted, whatever holds the flanks in the model.
+            # Such records would not be fitted, whatever holds the flanks in the model: without
+            # lines of their own, by their load alone.
             data, running = self.data, slice(len(self.speed_rpm))
             steady[running] &= flanks_held(data.features, data.campaign.torque_scale, data.rules)
         return Model(label, predicted, self._by_test(influence), steady)
@@ -154,7 +155,7 @@ class Grid:
 def separation(one: Model, other: Model) -> Values:
     """Return the chi-square of the difference in every test, shape (n_tests,).
 
-    None where the drive would rattle by one of them: such a record is not fitted.
+    Zero where the drive would rattle by one of them: such a record is not fitted.
     """
     difference = (other.predicted - one.predicted)[..., None]
     columns = np.concatenate([difference, one.influence, other.influence], axis=2)
