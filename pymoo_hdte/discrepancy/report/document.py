@@ -69,8 +69,7 @@ def verdict_document(
         "residual_over_noise": residual_of_parts(finding),
         **with_believed_effects([one.to_dict() for one in finding.campaign.believed.effects]),
         "held_out": absent if held_out is None else dict(held_out),
-        "next_experiment": proposal.as_dict()
-        | {"description": by_order(in_words(proposal.description), orders)},
+        "next_experiment": proposal.as_dict(),
         "location": location.summary(),
         **finding.rows.as_dict(),
         "versions": {
