@@ -52,10 +52,9 @@ def told_by_line(path: Path | None) -> Iterator[None]:
     except InvalidInput:
         raise
     except Exception as error:
-        if path is None or not (line := _line(error, path)):
+        if path is None or not _line(error, path):
             raise
-        message = " ".join(f"{type(error).__name__}: {error}".split())
-        allowed = f"a Python file whose effects make no errors; {line}{message}"
+        allowed = f"a Python file whose effects make no errors; {_told(error, path)}"
         raise InvalidInput(OPTION, str(path), allowed) from error
 
 
@@ -74,10 +73,15 @@ def _names_of(path: Path) -> dict[str, Any]:
         loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
-        message = " ".join(f"{type(error).__name__}: {error}".split())
-        allowed = f"a Python file that runs without errors; {_line(error, path)}{message}"
+        allowed = f"a Python file that runs without errors; {_told(error, path)}"
         raise InvalidInput(OPTION, str(path), allowed) from error
     return vars(module)
+
+
+def _told(error: BaseException, path: Path) -> str:
+    """Return an error with its line of the file, on one line."""
+    message = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"{_line(error, path)}{message}"
 
 
 def _line(error: BaseException, path: Path) -> str:

@@ -89,11 +89,11 @@ def _proposed(finding: DriveFinding) -> Proposal:
         said = "No known effect comes near, so that a test between two of them would tell nothing."
         return Proposal(said, "none", None, None, None, 0.0)
     chosen = verdict.chosen.fit
-    twin = _encoder_twin(grid, chosen) or _zero_twin(grid, finding, chosen)
+    model = grid.model(chosen)
+    twin = _encoder_twin(grid, chosen, model) or _zero_twin(grid, finding, chosen, model)
     least = verdict.rules.separated_chi_square
     if twin is not None and verdict.status != "unlisted" and twin.expected_separation >= least:
         return twin
-    model = grid.model(chosen)
     rivals = nearest_rivals(verdict)
     hypotheses = [grid.model(fitted) for fitted in rivals]
     if not hypotheses:
@@ -182,7 +182,7 @@ def _most_uncertain(grid: Grid, model: Model) -> Proposal:
     return Proposal(text, kind, speed, load, None, float(variance[test]))
 
 
-def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
+def _encoder_twin(grid: Grid, chosen: Fit, model: Model) -> Proposal | None:
     """Return the test that separates a line of whole cycles per output turn from the encoder's."""
     ratio = grid.data.campaign.believed.ratio
     for place, candidate in enumerate(chosen.candidates):
@@ -199,8 +199,8 @@ def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
         others = [effect for k, part in enumerate(parts) if k != place for effect in part]
         without = grid.predict(base, others)
         # Half a period reverses the encoder's line and leaves that of the drive unchanged.
-        change = 2.0 * (grid.predict(base, chosen.effects) - without)[: len(grid.speed_rpm)]
-        expected = np.sum(change**2, axis=1) * grid.model(chosen).steady[: len(change)]
+        change = 2.0 * (model.predicted - without)[: len(grid.speed_rpm)]
+        expected = np.sum(change**2, axis=1) * model.steady[: len(change)]
         test = int(np.argmax(expected))
         _, speed, load, _ = grid.condition(test)
         text = (
@@ -214,7 +214,7 @@ def _encoder_twin(grid: Grid, chosen: Fit) -> Proposal | None:
     return None
 
 
-def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit) -> Proposal | None:
+def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit, model: Model) -> Proposal | None:
     """Return the test that separates dry friction at the input from a zero error of the sensor.
 
     In reverse friction changes its sign and a zero error does not. Everything else is mirrored, so
@@ -228,7 +228,6 @@ def _zero_twin(grid: Grid, finding: DriveFinding, chosen: Fit) -> Proposal | Non
         level = placed[1].constant
         triangles = grid.data.whiteners
         row = triangles[:, MEANS.index(CHANNELS.index("input_torque"))]
-        model = grid.model(chosen)
         influence = model.influence[: len(row)]
         known = np.sum(np.einsum("rf,rfp->rp", row, influence) ** 2, axis=1)
         expected = (2.0 * level) ** 2 / (np.sum(row**2, axis=1) + known)

@@ -13,12 +13,12 @@ from pymoo_hdte.discrepancy.drive.evidence import Data, flanks_held
 from pymoo_hdte.discrepancy.drive.features import Features
 from pymoo_hdte.discrepancy.drive.objective import Objective
 from pymoo_hdte.discrepancy.drive.prediction import Conditions
+from pymoo_hdte.discrepancy.drive.rattling import clearances
 from pymoo_hdte.discrepancy.drive.separation import unimitated
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.drive import DriveEffect
-from pymoo_hdte.effects.effect import known_effects
 from pymoo_hdte.units import REVOLUTION_PER_MINUTE
 
 _SPEEDS = 4
@@ -105,10 +105,9 @@ class Grid:
         label = "+".join(candidate.label for candidate in fitted.candidates) or "base"
         influence = objective.jacobian(fitted.values) @ root
         predicted, steady = self._predicted(fitted.values[: len(self.data.base)], fitted.effects)
-        rattling = {one.name for one in known_effects() if one.rattles}
         names = {one.name for one in fitted.candidates}
         names |= {one.name for one in self.data.campaign.believed.effects}
-        if names & rattling:
+        if names & clearances():
             # Such records would not be fitted, whatever holds the flanks in the model: without
             # lines of their own, by their load alone.
             data, running = self.data, slice(len(self.speed_rpm))

@@ -156,8 +156,12 @@ def with_clearance(data: Data) -> Data:
     The same data where too few records are left.
     """
     loaded = data.loaded
-    names = frozenset(one.name for one in known_effects() if one.rattles)
-    return data if loaded is data else replace(loaded, evident=names)
+    return data if loaded is data else replace(loaded, evident=clearances())
+
+
+def clearances() -> frozenset[str]:
+    """Return the names of the effects with which parts may lose contact."""
+    return frozenset(one.name for one in known_effects() if one.rattles)
 
 
 def leading_sweep_effect(data: Data, fitted: Fit, candidates: Sequence[Candidate]) -> str | None:

@@ -72,6 +72,14 @@ def beyond_stated(fitted: Fit, rules: Rules) -> NDArray[np.float64]:
 
     Of each parameter, shape (n_parameters,); zero where it is near or nothing is stated.
     """
-    stated = Layout(fitted.parameters)
-    away = (fitted.values - stated.array("start")) / stated.array("prior")
+    away = from_stated(fitted)
     return np.where(np.abs(away) > rules.false_alarm_deviations, away**2, 0.0)
+
+
+def from_stated(fitted: Fit) -> NDArray[np.float64]:
+    """Return how far parameters are from what is stated of them, in units of its deviation.
+
+    Shape (n_parameters,); zero where nothing is stated.
+    """
+    stated = Layout(fitted.parameters)
+    return np.asarray((fitted.values - stated.array("start")) / stated.array("prior"))

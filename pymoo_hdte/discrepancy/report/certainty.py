@@ -14,6 +14,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     explains,
     unexplained,
 )
+from pymoo_hdte.discrepancy.engine.membership import from_stated
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.discrepancy.mechanism.analysis import MechanismFinding
@@ -156,15 +157,14 @@ def _evidence(finding: DriveFinding, chosen: Hypothesis, share: str) -> list[str
 
 def _far_from_stated(fitted: Fit, rules: Rules) -> str:
     """Return the errors of sensors that contradict their stated limits, with both; SI."""
-    least = rules.contradicting_chi_square**0.5
+    far = np.flatnonzero(from_stated(fitted) ** 2 >= rules.contradicting_chi_square)
+    known = [(fitted.parameters[place], float(fitted.values[place])) for place in far]
     return listed(
         [
             f"{words_of(one.name, ())} {number(value, 2)} ({number(one.prior, 2)} stated)"
-            for one, value in zip(fitted.parameters, fitted.values.tolist(), strict=True)
-            if np.isfinite(one.prior)
-            and abs(value - one.start) >= least * one.prior
+            for one, value in known
             # That of the sweep is no sensor's.
-            and one.name != "locked_stiffness"
+            if one.name != "locked_stiffness"
         ]
     )
 

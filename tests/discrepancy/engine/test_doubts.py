@@ -16,6 +16,7 @@ from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 FREEDOM = 1000
+JUDGED = SimpleNamespace(rules=RULES, evident=frozenset())
 
 
 def one(label, *, exact, frees=None):
@@ -290,10 +291,7 @@ def test_sets_far_behind_are_not_finished(size, behind, enough, resumed, finishe
         one.fit = SimpleNamespace(chi_square=float(FREEDOM))
     done = []
     known = FittedSets.__new__(FittedSets)
-    known.data, known.degrees_of_freedom = (
-        SimpleNamespace(rules=RULES, evident=frozenset()),
-        FREEDOM,
-    )
+    known.data, known.degrees_of_freedom = JUDGED, FREEDOM
     known._resumed = resumed
     known.of_size, known.enough = lambda wanted: sets, lambda one: enough
     known.finished = lambda one: done.append(one.place)
@@ -329,10 +327,7 @@ def test_what_brings_a_sensor_s_gain_back_is_earned_also_beside_noise(
         )
     }
     known = FittedSets.__new__(FittedSets)
-    known.data, known.degrees_of_freedom = (
-        SimpleNamespace(rules=RULES, evident=frozenset()),
-        FREEDOM,
-    )
+    known.data, known.degrees_of_freedom = JUDGED, FREEDOM
     known.base = SimpleNamespace(residuals=np.zeros(FREEDOM), values=())
     known.forms = SimpleNamespace(
         earns=lambda one, rest: False, in_free_form=lambda fitted: fits["free"]
@@ -350,10 +345,7 @@ def test_all_sets_of_a_size_may_be_known_under_another_name():
     """An inertia in a viscous clutch ended in an error, as none was left of two sets."""
     known = Search.__new__(Search)
     known.degrees_of_freedom = FREEDOM
-    known.data, known.candidates = (
-        SimpleNamespace(rules=RULES, evident=frozenset()),
-        [a_law("load_inertia")],
-    )
+    known.data, known.candidates = JUDGED, [a_law("load_inertia")]
     # The effect in its place is no better.
     known._by_its_effect = lambda one: None
     ripple, covered = a_law("ripple"), freed("load_inertia")

@@ -84,9 +84,9 @@ def repaired_run(
     """
     search = _RunSearch(record, ratio, deviations, rules)
     search.take_repeated()
-    search.take_stuck()
+    enough = search.take_stuck()
     stuck = tuple(fault for fault in search.faults if fault.kind == "stuck")
-    if stuck and not (search.is_cut and spans_a_turn(search.record, ratio)):
+    if stuck and not (enough and spans_a_turn(search.record, ratio)):
         return RepairedRun(record, tuple(search.faults), None, False)
     search.note_gaps()
     try:

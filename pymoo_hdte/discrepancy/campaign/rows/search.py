@@ -55,24 +55,23 @@ class RowSearch(Generic[Record]):
                 self.note("repeated", "rows", first, last - first + 1, length, "left out")
             self._keep(~again)
 
-    @property
-    def is_cut(self) -> bool:
-        """Whether the rows of all faults that are to be left out are left out."""
-        return not any(
-            fault.treatment == "left out" and fault.row in self.rows for fault in self.faults
-        )
+    def take_stuck(self) -> bool:
+        """Leave out rows in which a channel stays the same for far longer than elsewhere.
 
-    def take_stuck(self) -> None:
-        """Leave out rows in which a channel stays the same for far longer than elsewhere."""
+        Not if too few rows would be left, of which it tells.
+        """
         every = np.zeros(len(self.rows), dtype=bool)
         for channel in self.channels:
-            stuck = self._stuck(getattr(self.record, channel))
+            values = getattr(self.record, channel)
+            stuck = self._stuck(values)
             for first, last in _runs(stuck):
-                value = float(getattr(self.record, channel)[first])
+                value = float(values[first])
                 self.note("stuck", channel, first, last - first + 1, value, "left out")
             every |= stuck
-        if every.any() and np.count_nonzero(~every) >= FEWEST_SAMPLES:
+        enough = bool(np.count_nonzero(~every) >= FEWEST_SAMPLES)
+        if every.any() and enough:
             self._keep(~every)
+        return enough
 
     def _stuck(self, values: Rows) -> NDArray[np.bool_]:
         """Return in which rows a channel has one reading for too long."""
