@@ -91,12 +91,12 @@ def undecided(one: Hypothesis, chosen: Hypothesis, rules: Rules) -> bool:
     law is not shown by a part of it so small that its special case in another form has it too.
     """
     if contains(one, chosen):
-        pairs = differing(one, chosen)
+        pairs = differing(one.effects, chosen.effects)
         return any(
             _may_vary_as_much(one.fit, wide, chosen.fit, case, rules) for wide, case in pairs
         )
     if contains(chosen, one):
-        pairs = differing(chosen, one)
+        pairs = differing(chosen.effects, one.effects)
         return any(_is_its_form(chosen.fit, wide, one.fit, case, rules) for wide, case in pairs)
     return False
 

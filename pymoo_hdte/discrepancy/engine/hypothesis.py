@@ -216,7 +216,8 @@ def alike(
         return near and _stands_for_parameters(one, chosen)
     residual = chosen.fit.chi_square - degrees_of_freedom
     if not (near or one.exact or chosen.exact or contains(one, chosen) or contains(chosen, one)):
-        further, pairs = one.fit.chi_square - chosen.fit.chi_square, differing(one, chosen)
+        further = one.fit.chi_square - chosen.fit.chi_square
+        pairs = differing(one.candidates, chosen.candidates)
         same = all(mine.beside(other) for mine, other in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
         exact = all(mine.exact and other.exact for mine, other in pairs)
@@ -252,38 +253,40 @@ def leave_the_same(one: Hypothesis, other: Hypothesis, rules: Rules) -> bool:
 def contains(one: Hypothesis, other: Hypothesis) -> bool:
     """Tell whether a set is nested: it differs from another only by laws that contain the other's.
 
-    Stribeck's friction without its excess is Coulomb's: it always explains as much.
+    Stribeck's friction without its excess is Coulomb's: it always explains as much. Values out of
+    tolerance that only the wider set has beside its law make it wider still.
     """
-    if len(one.candidates) != len(other.candidates):
+    freed, fewer = (label_of(each.freed) for each in (one, other))
+    if len(one.effects) != len(other.effects) or not fewer <= freed:
         return False
-    pairs = differing(one, other)
-    return all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
+    pairs = differing(one.effects, other.effects)
+    wider = all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
+    return wider and (bool(pairs) or fewer == freed)
 
 
-def differing(one: Hypothesis, other: Hypothesis) -> list[tuple[Candidate, Candidate]]:
-    """Return in pairs the effects by which two sets of one size differ, by their ports."""
-    shared = Counter(_places(one)) & Counter(_places(other))
-    mine, theirs = (sorted(_beyond(each, shared), key=_port) for each in (one, other))
-    return list(zip(mine, theirs, strict=True))
+def differing(
+    mine: Sequence[Candidate], theirs: Sequence[Candidate]
+) -> list[tuple[Candidate, Candidate]]:
+    """Return in pairs the members by which two sets of one size differ, by their ports."""
+    shared = Counter(_places(mine)) & Counter(_places(theirs))
+    beyond = (_beyond(each, shared) for each in (mine, theirs))
+    own, other = (sorted(members, key=lambda each: each.port) for members in beyond)
+    return list(zip(own, other, strict=True))
 
 
-def _places(one: Hypothesis) -> list[tuple[str, str]]:
-    return [(each.name, each.port) for each in one.candidates]
+def _places(members: Sequence[Candidate]) -> list[tuple[str, str]]:
+    return [(each.name, each.port) for each in members]
 
 
-def _beyond(one: Hypothesis, shared: Counter[tuple[str, str]]) -> list[Candidate]:
-    """Return the effects of a set beyond those that are shared; a set may have one name twice."""
+def _beyond(members: Sequence[Candidate], shared: Counter[tuple[str, str]]) -> list[Candidate]:
+    """Return the members of a set beyond those that are shared; a set may have one name twice."""
     left, rest = Counter(shared), []
-    for place, each in zip(_places(one), one.candidates, strict=True):
+    for place, each in zip(_places(members), members, strict=True):
         if left[place]:
             left[place] -= 1
         else:
             rest.append(each)
     return rest
-
-
-def _port(candidate: Candidate) -> str:
-    return candidate.port
 
 
 def fit_all(

@@ -157,11 +157,12 @@ def law(name, *, bounded=False, chi_square=1000.0):
     level = unknown("level", 0.0, 1.0, 0.1)
     only = Candidate(name, "input", (level,), ((0.0,),), lambda values: (), "")
     fitted = SimpleNamespace(
+        candidates=(only,),
         chi_square=chi_square,
         bound_sides=np.array([1.0 if bounded else 0.0]),
         places=[(only, slice(0, 1))],
     )
-    return SimpleNamespace(fit=fitted, candidates=(only,), names=frozenset({(name, "input")}))
+    return Hypothesis(fitted, bic=chi_square, explained=1.0)
 
 
 @pytest.mark.parametrize(
@@ -195,6 +196,28 @@ def test_the_special_case_that_does_as_well_stands_for_its_law(
     )
     ((chosen, _),) = choice.special_case(search, best).names
     assert chosen == name
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "nested"),
+    [
+        (("play", "a", "b"), ("richer", "a", "b", "c"), True),
+        (("play",), ("richer", "a"), True),
+        (("play", "a"), ("richer", "b"), False),
+        (("play", "a", "b"), ("richer", "a"), False),
+        # The same law with fewer values is no other law: whether each is needed is asked elsewhere.
+        (("play", "a"), ("play", "a", "b"), False),
+    ],
+)
+def test_a_special_case_may_need_fewer_values_than_the_law(first, second, nested, monkeypatch):
+    """A play with a soft skin was named a clearance that varies, with a fourth value for it."""
+    monkeypatch.setattr(Candidate, "holds", lambda one, other: one.name == "richer")
+
+    def of(names):
+        return set_of(a_law(names[0]), *freed(*names[1:]), left=1.0)
+
+    assert contains(of(second), of(first)) == nested
+    assert not contains(of(first), of(second))
 
 
 def test_a_set_that_is_fitted_further_while_others_are_judged_is_judged_itself(monkeypatch):
@@ -234,10 +257,7 @@ def test_two_lines_of_one_name_are_no_special_case_of_one_of_them_and_another():
     """An eccentricity with its harmonic beside one with another line ended in an error."""
 
     def lines(*names):
-        members = tuple(
-            SimpleNamespace(name=name, port="sensor", holds=lambda other: False) for name in names
-        )
-        return SimpleNamespace(candidates=members, names=frozenset((n, "sensor") for n in names))
+        return set_of(*(Candidate(name, "sensor", (), ((),), None, "") for name in names), left=5.0)
 
     twice, mixed = lines("eccentricity", "eccentricity"), lines("eccentricity", "encoder_line")
     assert not contains(twice, mixed)
