@@ -59,7 +59,7 @@ def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
 
 
 def _needs_no_value(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether a set explains in another form what another has a value out of tolerance for.
+    """Tell whether a set explains in another form what another has a further value free for.
 
     Of two laws at one port the values beside one may stand for the form of the other: a soft
     wind-up with an error of the gears too large is nearly a play with a soft skin.
@@ -69,7 +69,8 @@ def _needs_no_value(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
         [each for each in those if each.label not in shared]
         for those in (one.effects, other.effects)
     )
-    if one.freed or not other.freed or not mine or len(mine) != len(theirs):
+    fewer = label_of(one.freed) < label_of(other.freed)
+    if not fewer or not mine or len(mine) != len(theirs):
         return False
     same = all(any(each.beside(law) for law in theirs) for each in mine)
     further = one.fit.chi_square - other.fit.chi_square

@@ -108,7 +108,7 @@ class FittedSets:
 
     def alike(self, one: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
-        overlap = self.forms.known((*one.candidates, *chosen.candidates))
+        overlap = self.forms.known((*one.effects, *chosen.effects))
         return alike(one, chosen, self.degrees_of_freedom, self.data.rules, overlap)
 
     def earned(self, one: Hypothesis) -> bool:

@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.engine import any_form, choice, equivalents
 from pymoo_hdte.discrepancy.engine.any_form import AnyForm
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.equivalents import undecided
+from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.hypothesis import alike, hypothesis_of
 from pymoo_hdte.discrepancy.engine.membership import is_earned
@@ -248,6 +249,25 @@ def test_forms_of_two_laws_at_one_port_overlap(port, overlap, near):
     assert alike(play, soft, 1000, RULES, overlap) == near
 
 
+@pytest.mark.parametrize(("own", "near"), [(False, True), (True, False)])
+def test_values_out_of_tolerance_beside_two_laws_do_not_tell_their_forms_apart(own, near):
+    """Blind case stressed 16: a play with a soft skin was named a soft wind-up, values beside it.
+
+    Of an effect of one's own other forms are not known.
+    """
+    freed = replace(a_law("parameter", "stiffness"), frees="stiffness")
+    further = 2.0 * RULES.form_accuracy**2 * 1e5
+    soft = a_set(a_law("soft_windup"), freed)
+    play = a_set(a_law("own" if own else "backlash"), freed, chi_square=1000.0 + further)
+    sets = FittedSets.__new__(FittedSets)
+    sets.data = SimpleNamespace(
+        rules=RULES, corrections=lambda one: [] if one.name in ("own", "parameter") else ["form"]
+    )
+    sets.degrees_of_freedom, sets.forms = 1000, AnyForm.__new__(AnyForm)
+    sets.forms.data = sets.data
+    assert sets.alike(play, soft) == near
+
+
 @pytest.mark.parametrize(("exact", "near"), [(True, False), (False, True)])
 def test_lines_beside_a_law_are_told_apart_by_what_they_do_themselves(exact, near):
     """A line of the drive was in a class with one of the encoder that left 650 more of the noise.
@@ -305,15 +325,18 @@ def test_what_contains_a_member_of_a_class_has_to_be_a_rival_of_that(
         (0.9, "mesh", False, False),
     ],
 )
+@pytest.mark.parametrize("shared", [(), ("stiffness",)])
 def test_a_value_out_of_tolerance_may_stand_for_the_form_of_another_law(
-    share, port, noise, told, monkeypatch
+    shared, share, port, noise, told, monkeypatch
 ):
     """Blind case single 940: a play with a soft skin was named a soft wind-up and an amplitude."""
     monkeypatch.setattr(equivalents, "explains_in_any_form", lambda search, one: True)
-    amplitude = replace(a_law("parameter", "error_amplitude_1"), frees="error_amplitude_1")
-    chosen = a_set(a_law("soft_windup"), amplitude)
+    *both, amplitude = (
+        replace(a_law("parameter", name), frees=name) for name in (*shared, "error_amplitude_1")
+    )
+    chosen = a_set(a_law("soft_windup"), *both, amplitude)
     further = share * RULES.form_share**2 * 1e5
-    play = a_set(a_law("backlash", port), chi_square=1000.0 + further)
+    play = a_set(a_law("backlash", port), *both, chi_square=1000.0 + further)
     search = SimpleNamespace(
         found=[chosen, play],
         data=SimpleNamespace(rules=RULES),
