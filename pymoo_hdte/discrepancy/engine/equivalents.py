@@ -54,12 +54,12 @@ def _comes_near(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
     unknowns are determined, the evidence has told; where they are not, it is a rival.
     """
     near = search.alike(one, other) or undecided(one, other, search.data.rules)
-    near = near or _needs_no_value(search, one, other)
+    near = near or _needs_fewer_values(search, one, other)
     return near and not (contains(one, other) and is_bounded(one.fit))
 
 
-def _needs_no_value(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
-    """Tell whether a set explains in another form what another has a further value free for.
+def _needs_fewer_values(search: Search, one: Hypothesis, other: Hypothesis) -> bool:
+    """Tell whether a set explains, in another form and with fewer values free, what another does.
 
     Of two laws at one port the values beside one may stand for the form of the other: a soft
     wind-up with an error of the gears too large is nearly a play with a soft skin.

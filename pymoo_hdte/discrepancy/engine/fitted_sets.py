@@ -108,7 +108,8 @@ class FittedSets:
 
     def alike(self, one: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
-        overlap = self.forms.known((*one.effects, *chosen.effects))
+        same_values = label_of(one.freed) == label_of(chosen.freed)
+        overlap = same_values and self.forms.known((*one.effects, *chosen.effects))
         return alike(one, chosen, self.degrees_of_freedom, self.data.rules, overlap)
 
     def earned(self, one: Hypothesis) -> bool:

@@ -253,35 +253,35 @@ def leave_the_same(one: Hypothesis, other: Hypothesis, rules: Rules) -> bool:
 def contains(one: Hypothesis, other: Hypothesis) -> bool:
     """Tell whether a set is nested: it differs from another only by laws that contain the other's.
 
-    Stribeck's friction without its excess is Coulomb's: it always explains as much. Values out of
-    tolerance that only the wider set has beside its law make it wider still.
+    Stribeck's friction without its excess is Coulomb's: it always explains as much. Beside its law
+    a set may have further values out of tolerance; beside the same laws they are no other law.
     """
-    freed, fewer = (label_of(each.freed) for each in (one, other))
-    if len(one.effects) != len(other.effects) or not fewer <= freed:
+    own, others = label_of(one.freed), label_of(other.freed)
+    if len(one.effects) != len(other.effects) or not (own == others or own > others > set()):
         return False
     pairs = differing(one.effects, other.effects)
     wider = all(wide.port == special.port and wide.holds(special) for wide, special in pairs)
-    return wider and (bool(pairs) or fewer == freed)
+    return wider and (bool(pairs) or others == own)
 
 
 def differing(
     mine: Sequence[Candidate], theirs: Sequence[Candidate]
 ) -> list[tuple[Candidate, Candidate]]:
-    """Return in pairs the members by which two sets of one size differ, by their ports."""
+    """Return in pairs the candidates by which two sets of one size differ, by their ports."""
     shared = Counter(_places(mine)) & Counter(_places(theirs))
     beyond = (_beyond(each, shared) for each in (mine, theirs))
-    own, other = (sorted(members, key=lambda each: each.port) for members in beyond)
+    own, other = (sorted(left, key=lambda each: each.port) for left in beyond)
     return list(zip(own, other, strict=True))
 
 
-def _places(members: Sequence[Candidate]) -> list[tuple[str, str]]:
-    return [(each.name, each.port) for each in members]
+def _places(candidates: Sequence[Candidate]) -> list[tuple[str, str]]:
+    return [(each.name, each.port) for each in candidates]
 
 
-def _beyond(members: Sequence[Candidate], shared: Counter[tuple[str, str]]) -> list[Candidate]:
-    """Return the members of a set beyond those that are shared; a set may have one name twice."""
+def _beyond(candidates: Sequence[Candidate], shared: Counter[tuple[str, str]]) -> list[Candidate]:
+    """Return the candidates beyond those that are shared; a set may have one name twice."""
     left, rest = Counter(shared), []
-    for place, each in zip(_places(members), members, strict=True):
+    for place, each in zip(_places(candidates), candidates, strict=True):
         if left[place]:
             left[place] -= 1
         else:

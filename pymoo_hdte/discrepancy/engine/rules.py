@@ -173,8 +173,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
     form_share: float = rule(
         0.05,
         "relative amplitude",
-        "The same of two laws at one port of a drive, whose forms overlap, values out of tolerance "
-        "beside one of them or not. And up to this share of "
+        "The same of two laws at one port of a drive, whose forms overlap, the same values "
+        "out of tolerance beside both, or more beside one. And up to this share of "
         "its special case's strength what a law has beyond that, as friction that falls with speed "
         "beyond dry friction, may be the form of the special case, and both are a class.",
         "Set by hand on 2026-11-26, after foreign forms on that bench: a play with a soft skin on "

@@ -210,7 +210,7 @@ def _choosing(data: MeasuredData, verdict: Verdict, one: Hypothesis, *doubts: st
     rivals = (
         each
         for each in verdict.equivalent
-        if each is not one and len(each.candidates) == len(one.candidates)
+        if each is not one and len(each.members) == len(one.members)
     )
     found = (*_doubts(data, verdict.base, one), *doubts)
     return _with_rivals(replace(verdict, chosen=one, alternatives=others, doubts=found), rivals)

@@ -199,6 +199,11 @@ def test_a_form_of_an_inertia_that_is_not_there_names_none(inertia, status):
     assert judged(LOAD, data).status == status
 
 
+def freed_value(name):
+    """A base parameter out of tolerance."""
+    return replace(a_law("parameter", name), frees=name, exact=True)
+
+
 WIDTH = unknown("half_width", 0.0, 1.0, 0.1)
 PLAY = a_law("play", parameters=[WIDTH])
 VARYING = a_law(
@@ -249,16 +254,18 @@ def test_forms_of_two_laws_at_one_port_overlap(port, overlap, near):
     assert alike(play, soft, 1000, RULES, overlap) == near
 
 
-@pytest.mark.parametrize(("own", "near"), [(False, True), (True, False)])
-def test_values_out_of_tolerance_beside_two_laws_do_not_tell_their_forms_apart(own, near):
+@pytest.mark.parametrize(
+    ("law", "value", "near"),
+    [("backlash", "stiffness", True), ("backlash", "damping", False), ("own", "stiffness", False)],
+)
+def test_values_out_of_tolerance_beside_two_laws_do_not_tell_their_forms_apart(law, value, near):
     """Blind case stressed 16: a play with a soft skin was named a soft wind-up, values beside it.
 
-    Of an effect of one's own other forms are not known.
+    Of an effect of one's own other forms are not known, and another value is another answer.
     """
-    freed = replace(a_law("parameter", "stiffness"), frees="stiffness")
     further = 2.0 * RULES.form_accuracy**2 * 1e5
-    soft = a_set(a_law("soft_windup"), freed)
-    play = a_set(a_law("own" if own else "backlash"), freed, chi_square=1000.0 + further)
+    soft = a_set(a_law("soft_windup"), freed_value("stiffness"))
+    play = a_set(a_law(law), freed_value(value), chi_square=1000.0 + further)
     sets = FittedSets.__new__(FittedSets)
     sets.data = SimpleNamespace(
         rules=RULES, corrections=lambda one: [] if one.name in ("own", "parameter") else ["form"]
@@ -331,9 +338,7 @@ def test_a_value_out_of_tolerance_may_stand_for_the_form_of_another_law(
 ):
     """Blind case single 940: a play with a soft skin was named a soft wind-up and an amplitude."""
     monkeypatch.setattr(equivalents, "explains_in_any_form", lambda search, one: True)
-    *both, amplitude = (
-        replace(a_law("parameter", name), frees=name) for name in (*shared, "error_amplitude_1")
-    )
+    *both, amplitude = map(freed_value, (*shared, "error_amplitude_1"))
     chosen = a_set(a_law("soft_windup"), *both, amplitude)
     further = share * RULES.form_share**2 * 1e5
     play = a_set(a_law("backlash", port), *both, chi_square=1000.0 + further)
