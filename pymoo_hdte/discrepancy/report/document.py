@@ -116,12 +116,22 @@ def sentence(verdict: Verdict) -> str:
             return f"{missing}, not even half of it."
         return f"{missing}. The nearest is {in_words(chosen.label)}."
     if verdict.status == "class":
-        others = "; or ".join(in_words(hypothesis.label) for hypothesis in verdict.equivalent)
-        what = f"{what} Or, which these data cannot tell from it: {others}."
+        what = f"{what} {_or_else([chosen, *verdict.equivalent])}"
     if verdict.doubts:
         doubts = in_words("; ".join(verdict.doubts))
         return f"{what} That is not all, or not quite right: {doubts}."
     return what
+
+
+def _or_else(sets: Sequence[Hypothesis]) -> str:
+    """Return in words what the sets of a class say beside the first; what all share is left out."""
+    labels = [[candidate.label for candidate in one.candidates] for one in sets]
+    shared = frozenset.intersection(*map(frozenset, labels))
+    own = [[label for label in each if label not in shared] for each in labels]
+    told = bool(shared) and all(own)
+    first, *others = (in_words("+".join(one)) for one in (own if told else labels))
+    place = f", in place of {first}" if told else ""
+    return f"Or, which these data cannot tell from it{place}: {'; or '.join(others)}."
 
 
 def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:

@@ -241,6 +241,32 @@ def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
 
 
 @pytest.mark.parametrize(
+    ("sets", "times"),
+    [
+        ((("soft_windup", "stiffness"), ("backlash", "stiffness"), ("play", "stiffness")), 0),
+        # Where nothing is shared, or where a set is a part of the first, all is said.
+        ((("soft_windup",), ("backlash", "stiffness")), 1),
+        ((("soft_windup", "stiffness"), ("stiffness",)), 1),
+    ],
+)
+def test_what_all_members_of_a_class_share_is_said_once(sets, times):
+    """Three values out of tolerance beside three laws were told three times on the first screen."""
+
+    def one(name):
+        label = f"parameter:{name}" if name == "stiffness" else f"{name}:mesh"
+        return SimpleNamespace(label=label, sentence=f"The {name} is off.")
+
+    first, *others = (
+        SimpleNamespace(candidates=[one(name) for name in each], listed=True) for each in sets
+    )
+    verdict = SimpleNamespace(status="class", chosen=first, equivalent=others, doubts=())
+    said = sentence(verdict)
+    assert said.count("stiffness (out of tolerance)") == times
+    for each in sets[1:]:
+        assert each[0].replace("_", " ") in said
+
+
+@pytest.mark.parametrize(
     ("parameter", "lower", "told"),
     [
         ("amplitude", -1.0, True),
