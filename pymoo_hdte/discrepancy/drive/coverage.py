@@ -12,6 +12,8 @@ from pymoo_hdte.effects.unknowns import harmonics_among
 
 _SAME_ORDER = 1e-6
 """Largest difference of order at which two lines count as the same."""
+_FEWEST_TO_COMPARE = 4
+"""Records of which one can stand out; of four that are alike each has a quarter."""
 
 
 def campaign_limits(finding: DriveFinding) -> list[str]:
@@ -22,8 +24,9 @@ def campaign_limits(finding: DriveFinding) -> list[str]:
     finding : DriveFinding
         Of `analysis.examine_drive`.
     """
-    of_records = _zeroed(finding) + _unproven(finding) + _unvaried(finding) + _unseen(finding)
-    return of_records + _like_a_gain(finding) + _too_high(finding)
+    of_records = _zeroed(finding) + _standing_out(finding) + _unproven(finding)
+    of_conditions = _unvaried(finding) + _unseen(finding)
+    return of_records + of_conditions + _like_a_gain(finding) + _too_high(finding)
 
 
 def _zeroed(finding: DriveFinding) -> list[str]:
@@ -36,6 +39,21 @@ def _zeroed(finding: DriveFinding) -> list[str]:
         "Both angles begin at the same reading in every record. If their counters were zeroed "
         "there, zeros differ from record to record, and with them the phases of all lines: state "
         "the zero of each record."
+    ]
+
+
+def _standing_out(finding: DriveFinding) -> list[str]:
+    """Return which record has more of what nothing explains than all the others together."""
+    records, verdict = finding.data.features.records, finding.verdict
+    if verdict.status != "unlisted" or len(records) < _FEWEST_TO_COMPARE:
+        return []
+    excess = finding.data.excess(verdict.base).chi_square[: len(records)].sum(axis=1)
+    share, worst = np.max(excess) / max(np.sum(excess), 1e-300), int(np.argmax(excess))
+    if share <= 0.5:
+        return []
+    return [
+        f"Record {records[worst].name} alone has {100.0 * share:.0f} % of what the believed drive "
+        "does not explain. Were its sensors and its drive as in the others? If not, leave it out."
     ]
 
 

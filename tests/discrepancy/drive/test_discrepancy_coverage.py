@@ -118,7 +118,41 @@ def nyquist_order(record):
     return np.pi * record.sample_rate / abs(record.input_speed)
 
 
-def test_a_harmonic_that_is_not_looked_at_is_told_where_misfit_is_left(campaign):
+def alike(data):
+    """As much that is not explained in each record."""
+    return SimpleNamespace(chi_square=np.ones((len(data.features.records) + 1, 5)))
+
+
+@pytest.mark.parametrize(
+    ("others", "n_records", "status", "told"),
+    [
+        (0.9, 5, "unlisted", True),
+        (1.1, 5, "unlisted", False),
+        (0.9, 3, "unlisted", False),
+        (0.9, 5, "named", False),
+    ],
+)
+def test_a_record_that_has_most_of_what_nothing_explains_is_told(
+    others, n_records, status, told, campaign, monkeypatch
+):
+    """One record with another zero of the encoder made a campaign unlisted, without its name."""
+
+    def uneven(data, fitted):
+        found = alike(data)
+        found.chi_square *= others / (n_records - 1)
+        found.chi_square[1] = 1.0
+        return found
+
+    monkeypatch.setattr(Data, "excess", uneven)
+    fitted = campaign.train[:n_records]
+    assert len(fitted) == n_records
+    sentences = said(campaign, fitted, chosen=periodic(1.0), status=status)
+    found = [one for one in sentences if one.startswith(f"Record {fitted[1].name} alone")]
+    assert bool(found) == told
+    assert not told or "53 %" in found[0]
+
+
+def test_a_harmonic_that_is_not_looked_at_is_told_where_misfit_is_left(campaign, monkeypatch):
     highest = 0.9 * min(map(nyquist_order, campaign.running))
     assert highest < 14.0
     above, below = 0.501 * highest, 0.499 * highest
@@ -126,6 +160,7 @@ def test_a_harmonic_that_is_not_looked_at_is_told_where_misfit_is_left(campaign)
     assert f"Order {2.0 * above:.4g}, the second harmonic of order {above:.4g}, is not" in sentence
     assert f"below order {highest:.3g}." in sentence
     assert "the values of the effect" in sentence
+    monkeypatch.setattr(Data, "excess", lambda data, fitted: alike(data))
     (sentence,) = said(campaign, chosen=periodic(1.2, above), status="unlisted")
     assert "the values of the effect" not in sentence
     # Four standard deviations of chi-square: 1.126 times the noise.
