@@ -1,7 +1,9 @@
 """Campaigns as people have them: other columns, units, signs, marks and zeros give the same."""
 
 import math
+import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -298,3 +300,29 @@ def test_a_record_outside_its_ranges_is_refused(folder, campaign, speed, load, m
     changed(folder, lambda whole: ranged(whole["record"][0], campaign.running[0], speed, load))
     with pytest.raises(InvalidInput, match=message):
         read_campaign(folder)
+
+
+@pytest.mark.parametrize(
+    ("channel", "message"),
+    [
+        ("input_angle", "mean speed of input_angle"),
+        ("output_angle", "largest transmission error"),
+    ],
+)
+@pytest.mark.parametrize("leap", [2.0 * np.pi, 0.0])
+def test_an_angle_that_begins_anew_is_told_where_its_record_is_refused(
+    campaign, channel, message, leap
+):
+    """An encoder that was zeroed within a record was told as a wrong speed of the whole record."""
+    first, row = campaign.running[0], 30
+    angle = getattr(first, channel).copy()
+    # Without a leap the whole angle is wrong.
+    angle *= 1.0 if leap else 2.0
+    for place in range(row, len(angle), row):
+        angle[place:] -= leap
+    record = replace(first, **{channel: angle})
+    with pytest.raises(InvalidInput, match=message) as refused:
+        replace(campaign, running=(record, *campaign.running[1:]))
+    # The motion of a row, at most 1.05 rad, stands against the leap.
+    assert bool(re.search(rf"{channel} leaps by -[56]\.", str(refused.value))) == bool(leap)
+    assert ("`unwrap` or `wraps`" in str(refused.value)) == bool(leap)
