@@ -20,9 +20,9 @@ from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.drive.datasheet import LOST_POWER
 from pymoo_hdte.units import ARCSEC
 
-_LEAP = 4.0
-"""A step of an angle this many times those of nine rows in ten is told as a leap where its record
-is refused; of a million normal values the largest is three times as large."""
+_LEAP = 2.0
+"""Usual steps of an angle that a leap is off by at least, where its record is refused: a turn is
+as many at the fastest motion at which a wrapped angle can be continued."""
 
 
 def check_believed(believed: BelievedDrive, rules: Rules) -> None:
@@ -162,7 +162,7 @@ def check_running(
         if not largest <= most:
             allowed = (
                 f"at most {most:g} rad at a ratio of {believed.ratio:g}, "
-                f"both angles in rad with one common zero{_leaps(record)}"
+                f"both angles in rad with one common zero{_leaps(record, rules)}"
             )
             raise InvalidInput("largest transmission error", largest, allowed)
         _check_torques(record, believed.ratio, rig, largest_load, rules)
@@ -202,26 +202,38 @@ def _check_travel(record: RunningRecord, ratio: float, rules: Rules) -> None:
     if record.speed_range:
         lowest, highest = record.speed_range
         if not lowest <= speed <= highest:
-            allowed = f"{lowest:g} to {highest:g} rad/s, the range of the record{_leaps(record)}"
+            allowed = f"{lowest:g} to {highest:g} rad/s, the range of the record"
+            allowed += _leaps(record, rules)
             raise InvalidInput("mean speed of input_angle", speed, allowed)
     elif not abs(speed - record.input_speed) <= rules.speed_mismatch * abs(record.input_speed):
         within = f"{100.0 * rules.speed_mismatch:g} %"
         allowed = f"{record.input_speed:g} rad/s within {within}, the input speed of the record"
-        allowed += _leaps(record)
+        allowed += _leaps(record, rules)
         raise InvalidInput("mean speed of input_angle", speed, allowed)
     if not spans_a_turn(record, ratio):
-        allowed = f"at least {2.0 * math.pi * ratio:.6g} rad, one output turn"
+        turn = 2.0 * math.pi * ratio
+        allowed = f"at least {turn:.6g} rad, one output turn{_leaps(record, rules)}"
         raise InvalidInput("travel of input_angle", abs(travel), allowed)
 
 
-def _leaps(record: RunningRecord) -> str:
-    """Return in words where an angle leaps, as a counter that begins anew does, for errors."""
-    found = []
+def _leaps(record: RunningRecord, rules: Rules) -> str:
+    """Return in words where an angle leaps, as a counter that begins anew does, for errors.
+
+    Rows that are missing are no leap, nor is a row that was misread, which the next step undoes.
+    """
+    found, steps = [], np.diff(record.time)
     for name in ("input_angle", "output_angle"):
-        steps = np.diff(getattr(record, name))
-        row = int(np.argmax(np.abs(steps)))
-        if abs(steps[row]) > _LEAP * np.quantile(np.abs(steps), 0.9):
-            found.append(f"; {name} leaps by {steps[row]:.4g} rad after row {row + 1}")
+        moved = np.diff(getattr(record, name))
+        usual = float(np.median(moved / steps))
+        off = moved - usual * steps
+        least = max(_LEAP * abs(float(np.median(moved))), rules.largest_transmission_error)
+        far = np.abs(off) > least
+        undone = far[:-1] & (np.abs(off[:-1] + off[1:]) < least)
+        far[:-1] &= ~undone
+        far[1:] &= ~undone
+        if far.any():
+            row = int(np.argmax(far))
+            found.append(f"; {name} leaps by {off[row]:.4g} rad after row {row + 1}")
     which = "an angle that begins anew is continued by `unwrap` or `wraps`"
     return f"{''.join(found)}: {which}" if found else ""
 

@@ -205,8 +205,8 @@ def alike(
     one leaves beyond the other is no more than such forms leave, unless they differ by effects of
     exact form only, or one is a special case of the other. Where even the chosen form leaves more
     than noise, differences of chi-square are compared with this residual. Two laws at one port
-    ``overlap`` where other forms of both are known. Where an effect of one stands for several base
-    parameters of the other, the evidence alone tells.
+    ``overlap`` where other forms of both are known, beside the same values out of tolerance. Where
+    an effect of one stands for several base parameters of the other, the evidence alone tells.
     """
     if one.names == chosen.names:
         return False

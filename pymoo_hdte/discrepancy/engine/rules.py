@@ -174,9 +174,10 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         0.05,
         "relative amplitude",
         "The same of two laws at one port of a drive, whose forms overlap, the same values "
-        "out of tolerance beside both, or more beside one. And up to this share of "
-        "its special case's strength what a law has beyond that, as friction that falls with speed "
-        "beyond dry friction, may be the form of the special case, and both are a class.",
+        "out of tolerance beside both, or fewer beside what leaves noise in another form. And up "
+        "to this share of its special case's strength what a law has beyond that, as friction that "
+        "falls with speed beyond dry friction, may be the form of the special case, and both are a "
+        "class.",
         "Set by hand on 2026-11-26, after foreign forms on that bench: a play with a soft skin on "
         "one flank was fitted better by a soft wind-up by 3.1e-2, and dry friction whose sign is a "
         "root was named friction that falls by 2.4e-2 and 3.3e-2 of it.",

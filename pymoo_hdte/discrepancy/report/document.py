@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import platform
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from importlib.metadata import version
 from typing import Any
 
@@ -115,7 +117,7 @@ def sentence(verdict: Verdict) -> str:
         if not verdict.comes_near:
             return f"{missing}, not even half of it."
         return f"{missing}. The nearest is {in_words(chosen.label)}."
-    if verdict.status == "class":
+    if verdict.status == "class" and verdict.equivalent:
         what = f"{what} {_or_else([chosen, *verdict.equivalent])}"
     if verdict.doubts:
         doubts = in_words("; ".join(verdict.doubts))
@@ -126,8 +128,8 @@ def sentence(verdict: Verdict) -> str:
 def _or_else(sets: Sequence[Hypothesis]) -> str:
     """Return in words what the sets of a class say beside the first; what all share is left out."""
     labels = [[candidate.label for candidate in one.candidates] for one in sets]
-    shared = frozenset.intersection(*map(frozenset, labels))
-    own = [[label for label in each if label not in shared] for each in labels]
+    shared = reduce(Counter.__and__, map(Counter, labels))
+    own = [list((Counter(each) - shared).elements()) for each in labels]
     told = bool(shared) and all(own)
     first, *others = (in_words("+".join(one)) for one in (own if told else labels))
     place = f", in place of {first}" if told else ""

@@ -302,6 +302,19 @@ def test_a_record_outside_its_ranges_is_refused(folder, campaign, speed, load, m
         read_campaign(folder)
 
 
+def anew(angle, row):
+    angle[row:] -= angle[row]
+
+
+def every_turn(angle, row):
+    for place in range(row, len(angle), 6):
+        angle[place:] -= 2.0 * np.pi
+
+
+def misread(angle, row):
+    angle[row] -= 2.0 * np.pi
+
+
 @pytest.mark.parametrize(
     ("channel", "message"),
     [
@@ -309,20 +322,31 @@ def test_a_record_outside_its_ranges_is_refused(folder, campaign, speed, load, m
         ("output_angle", "largest transmission error"),
     ],
 )
-@pytest.mark.parametrize("leap", [2.0 * np.pi, 0.0])
+@pytest.mark.parametrize(
+    ("fault", "told"), [(anew, True), (every_turn, True), (misread, False), (None, False)]
+)
 def test_an_angle_that_begins_anew_is_told_where_its_record_is_refused(
-    campaign, channel, message, leap
+    campaign, channel, message, fault, told
 ):
     """An encoder that was zeroed within a record was told as a wrong speed of the whole record."""
     first, row = campaign.running[0], 30
-    angle = getattr(first, channel).copy()
-    # Without a leap the whole angle is wrong.
-    angle *= 1.0 if leap else 2.0
-    for place in range(row, len(angle), row):
-        angle[place:] -= leap
+    # Without a leap, and beside a row that was misread, the whole angle is wrong.
+    angle = getattr(first, channel) * (1.0 if told else 2.0)
+    if fault:
+        fault(angle, row)
     record = replace(first, **{channel: angle})
     with pytest.raises(InvalidInput, match=message) as refused:
         replace(campaign, running=(record, *campaign.running[1:]))
-    # The motion of a row, at most 1.05 rad, stands against the leap.
-    assert bool(re.search(rf"{channel} leaps by -[56]\.", str(refused.value))) == bool(leap)
-    assert ("`unwrap` or `wraps`" in str(refused.value)) == bool(leap)
+    leap = rf"; {channel} leaps by -\S+ rad after row {row}: an angle"
+    assert bool(re.search(leap, str(refused.value))) == told
+
+
+def test_rows_that_are_missing_are_no_leap(campaign):
+    first = campaign.running[0]
+    kept = np.r_[0:100, 150 : len(first.time)]
+    columns = ("time", "input_angle", "output_angle", "input_torque", "output_torque")
+    record = replace(first, **{one: getattr(first, one)[kept] for one in columns})
+    record = replace(record, output_angle=2.0 * record.output_angle)
+    with pytest.raises(InvalidInput, match="largest transmission error") as refused:
+        replace(campaign, running=(record, *campaign.running[1:]))
+    assert "leaps" not in str(refused.value)

@@ -13,6 +13,8 @@ from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, alike, contains, label_of
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
+from pymoo_hdte.discrepancy.engine.verdict import Verdict
+from pymoo_hdte.discrepancy.mechanism import naming as measured
 from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 FREEDOM = 1000
@@ -218,6 +220,7 @@ def test_a_special_case_may_need_fewer_values_than_the_law(first, second, nested
         return set_of(a_law(names[0]), *freed(*names[1:]), left=1.0)
 
     assert contains(of(second), of(first)) == nested
+    assert not contains(of(first), of(second))
 
 
 def test_a_set_that_is_fitted_further_while_others_are_judged_is_judged_itself(monkeypatch):
@@ -439,3 +442,15 @@ def test_a_richer_law_that_leaves_a_misfit_is_no_more_certain_than_its_special_c
     special = set_of(a_law("hysteresis"), left=special_left)
     ((chosen, _),) = choice.simpler_law(search_among(rich, special), rich).names
     assert chosen == name
+
+
+def test_another_choice_keeps_the_rivals_that_name_as_much(monkeypatch):
+    """A set with fewer values out of tolerance lost its rivals with more, and its class."""
+    monkeypatch.setattr(measured, "_doubts", lambda data, base, one: [])
+    chosen = set_of(a_law("richer"), *freed("a", "b"), left=1.0)
+    simpler = set_of(a_law("play"), *freed("a"), left=1.0)
+    rival = set_of(a_law("soft"), *freed("a", "b"), left=1.0)
+    larger = set_of(a_law("soft"), a_law("play"), *freed("a"), left=1.0)
+    verdict = Verdict("class", None, chosen, (simpler, rival, larger), (rival, larger), FREEDOM)
+    found = measured._choosing(None, verdict, simpler)
+    assert (found.status, found.chosen, found.equivalent) == ("class", simpler, (rival,))
