@@ -205,9 +205,9 @@ print(f"a law may be the form of its special case  {RULES.form_share:g} of its s
 # Two of these rules make a set simpler before it is judged. A law gives way to its special case if
 # it ended at a bound, or if the special case leaves no more than noise and no more beyond the law
 # than a model is off by: friction that falls by a hundredth may be dry friction, and both are in
-# one class. Where values are out of tolerance, too, fewer of them may stand beside the special case.
-# And beside effects that leave no more than noise, a further one is dropped if its strength may be
-# nothing, or if the records kept out of the fit deny it.
+# one class. Fewer values out of tolerance may stand beside the special case, if any do. And beside
+# effects that leave no more than noise, a further one is dropped if its strength may be nothing, or
+# if the records kept out of the fit deny it.
 
 print(f"a model is off by                          {RULES.model_accuracy:g} of an amplitude")
 
