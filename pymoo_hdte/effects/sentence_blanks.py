@@ -15,7 +15,9 @@ BLANKS = ("port", "order", "force")
 """What a sentence may leave open: the port, the orders, and the word for what acts there."""
 _OUT = " lies outside its tolerance."
 _PORT = r"([A-Za-z]\w*(?:\.\w+)*(?: of \w+)?)"
-_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:/([a-z\d.+]+))?:" + _PORT + r"(?:@([\d.e+-]*\d))?")
+_FORM = r"(?:/([a-z\d.+]+(?: s)?))?"
+"""A form of an effect; that of a new zero is its time."""
+_LABEL = re.compile(r"([a-z]+(?:_[a-z]+)*)" + _FORM + ":" + _PORT + r"(?:@([\d.e+-]*\d))?")
 
 
 def check_sentence(field: str, sentence: str) -> None:

@@ -135,6 +135,12 @@ def test_vectors_with_numbers_of_their_own_predict_as_each_alone(holding):
     assert not np.allclose(together[0], together[1], rtol=1e-3)
 
 
+def test_a_new_zero_is_told_with_its_time():
+    """It was called new_zero/1446 s (sensor) on the first screen."""
+    said = in_words("new_zero/1446 s:sensor+load_inertia:output")
+    assert said == "new zero (sensor, 1446 s) and load inertia (output)"
+
+
 def test_numbers_have_names_words_and_units():
     effects = (
         LawAtPort("torque_ripple", "input", PeriodicTorque(2.04, 0.4, 0.01)),
