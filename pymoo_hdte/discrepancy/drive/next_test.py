@@ -22,6 +22,7 @@ from pymoo_hdte.discrepancy.drive.analysis import DriveFinding
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.parameters import by_order
 from pymoo_hdte.discrepancy.drive.planned_tests import Grid, Model, separation
+from pymoo_hdte.discrepancy.engine.candidate import labels_apart
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.drive.effects import ENCODER_LINE
@@ -111,7 +112,10 @@ def _proposed(finding: DriveFinding) -> Proposal:
     closest = int(told[np.argmin(separations[told, test])])
     labels = model.label, hypotheses[closest].label
     same = any(one.fit is rivals[closest] for one in verdict.equivalent)
-    said = _aim(verdict, *labels, same)
+    # What two models of a class share is not what a test is to tell apart.
+    sets = [chosen.candidates, rivals[closest].candidates]
+    one, other = labels_apart(sets) if same else labels
+    said = _aim(verdict, one, other, same)
     proposed = _proposal(grid, test, said, labels, float(separations[closest, test]))
     never = [k for k in range(len(hypotheses)) if separations[k].max() < least]
     if not never:

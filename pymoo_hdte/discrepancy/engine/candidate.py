@@ -6,8 +6,10 @@ of its effect: see `pymoo_hdte.effects.guess`.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -222,6 +224,17 @@ def out_of_tolerance(name: str, words: str, acts_at: str = "", covered_by: str =
         acts_at=acts_at,
         covered_by=covered_by,
     )
+
+
+def labels_apart(sets: Sequence[Sequence[Candidate]]) -> list[str]:
+    """Return the label of each set without what all of them share.
+
+    The whole labels if nothing of one would be left. A set may have one effect twice.
+    """
+    labels = [[candidate.label for candidate in one] for one in sets]
+    shared = reduce(Counter.__and__, map(Counter, labels))
+    own = [list((Counter(each) - shared).elements()) for each in labels]
+    return ["+".join(one) for one in (own if all(own) else labels)]
 
 
 def _no_effect(values: Sequence[float]) -> tuple[Any, ...]:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from functools import reduce
 from importlib.metadata import version
 from typing import Any
 
@@ -18,7 +16,7 @@ from pymoo_hdte.discrepancy.drive.misfit.map import Location
 from pymoo_hdte.discrepancy.drive.misfit.relevance import relevance
 from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.parameters import base_unit, by_order
-from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, adequate, expected_values
 from pymoo_hdte.discrepancy.engine.rules import Rules
@@ -127,12 +125,8 @@ def sentence(verdict: Verdict) -> str:
 
 def _or_else(sets: Sequence[Hypothesis]) -> str:
     """Return in words what the sets of a class say beside the first; what all share is left out."""
-    labels = [[candidate.label for candidate in one.candidates] for one in sets]
-    shared = reduce(Counter.__and__, map(Counter, labels))
-    own = [list((Counter(each) - shared).elements()) for each in labels]
-    told = bool(shared) and all(own)
-    first, *others = (in_words("+".join(one)) for one in (own if told else labels))
-    place = f", in place of {first}" if told else ""
+    first, *others = map(in_words, labels_apart([one.candidates for one in sets]))
+    place = "" if first == in_words(sets[0].label) else f", in place of {first}"
     return f"Or, which these data cannot tell from it{place}: {'; or '.join(others)}."
 
 

@@ -95,6 +95,32 @@ def test_a_rival_is_told_apart_by_a_record_that_the_two_predict_apart():
     assert (proposal.test == "running") == (proposal.speed_rpm is not None)
 
 
+@pytest.mark.parametrize(
+    ("of_class", "said"),
+    [
+        (True, "cannot tell torque ripple (input, order 6) from kinematic error (mesh, order 6);"),
+        (False, "against kinematic error (mesh, order 6) and nonlinear drag (input) is"),
+    ],
+)
+def test_what_two_members_of_a_class_share_is_not_to_be_told_apart(of_class, said, monkeypatch):
+    """Three values out of tolerance beside both were told twice of the next test."""
+    data = known_data()
+    ripple, line = listed(data, "torque_ripple", [6.0]), listed(data, "kinematic_error", [6.0])
+    drag = listed(data, "nonlinear_drag")
+
+    def beside_drag(candidate):
+        alone = hypothesis_of(data, candidate, candidate.starts[0]).fit
+        both, values = (candidate, drag), np.append(alone.values, drag.starts[0])
+        return Hypothesis(fit(data, both, values), 0.0, 1.0)
+
+    chosen, other = beside_drag(ripple), beside_drag(line)
+    monkeypatch.setitem(
+        next_experiment.__globals__, "separation", lambda *_: np.array([10.0, 90.0, 40.0])
+    )
+    finding = judged(data, chosen, other, equivalent=(other,) if of_class else ())
+    assert said in next_experiment(finding).description
+
+
 def test_the_test_to_make_tells_the_chosen_effect_from_its_nearest_rival(monkeypatch):
     """Of the least separations 10, 5 and 30 the last is largest, though 90 stands elsewhere."""
     data = known_data()

@@ -267,9 +267,12 @@ def test_what_all_members_of_a_class_share_is_said_once(sets, words):
         label = f"parameter:{name}" if name == "stiffness" else f"{name}:mesh"
         return SimpleNamespace(label=label, sentence=f"The {name} is off.")
 
-    first, *others = (
-        SimpleNamespace(candidates=[one(name) for name in each], listed=True) for each in sets
-    )
+    def together(names):
+        candidates = [one(name) for name in names]
+        label = "+".join(each.label for each in candidates)
+        return SimpleNamespace(candidates=candidates, label=label, listed=True)
+
+    first, *others = map(together, sets)
     verdict = SimpleNamespace(status="class", chosen=first, equivalent=others, doubts=())
     assert sentence(verdict).endswith(words)
 
