@@ -154,17 +154,12 @@ def check_running(
         load requires.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        _check_travel(record, believed.ratio, rules)
-        # All but the outermost hundredth: rows that an encoder read wrongly are left out later.
-        errors = np.abs(record.transmission_error(believed.ratio))
-        largest = float(np.quantile(errors, 1.0 - rules.spike_share))
-        most = rules.largest_transmission_error
-        if not largest <= most:
-            allowed = (
-                f"at most {most:g} rad at a ratio of {believed.ratio:g}, "
-                f"both angles in rad with one common zero{_leaps(record, rules)}"
-            )
-            raise InvalidInput("largest transmission error", largest, allowed)
+        try:
+            _check_travel(record, believed.ratio, rules)
+            _check_error(record, believed.ratio, rules)
+        except InvalidInput as refused:
+            allowed = f"{refused.allowed}{_leaps(record, rules)}"
+            raise InvalidInput(refused.field, refused.value, allowed) from None
         _check_torques(record, believed.ratio, rig, largest_load, rules)
 
 
@@ -203,17 +198,26 @@ def _check_travel(record: RunningRecord, ratio: float, rules: Rules) -> None:
         lowest, highest = record.speed_range
         if not lowest <= speed <= highest:
             allowed = f"{lowest:g} to {highest:g} rad/s, the range of the record"
-            allowed += _leaps(record, rules)
             raise InvalidInput("mean speed of input_angle", speed, allowed)
     elif not abs(speed - record.input_speed) <= rules.speed_mismatch * abs(record.input_speed):
         within = f"{100.0 * rules.speed_mismatch:g} %"
         allowed = f"{record.input_speed:g} rad/s within {within}, the input speed of the record"
-        allowed += _leaps(record, rules)
         raise InvalidInput("mean speed of input_angle", speed, allowed)
     if not spans_a_turn(record, ratio):
-        turn = 2.0 * math.pi * ratio
-        allowed = f"at least {turn:.6g} rad, one output turn{_leaps(record, rules)}"
+        allowed = f"at least {2.0 * math.pi * ratio:.6g} rad, one output turn"
         raise InvalidInput("travel of input_angle", abs(travel), allowed)
+
+
+def _check_error(record: RunningRecord, ratio: float, rules: Rules) -> None:
+    # All but the outermost hundredth: rows that an encoder read wrongly are left out later.
+    errors = np.abs(record.transmission_error(ratio))
+    largest = float(np.quantile(errors, 1.0 - rules.spike_share))
+    most = rules.largest_transmission_error
+    if not largest <= most:
+        allowed = (
+            f"at most {most:g} rad at a ratio of {ratio:g}, both angles in rad with one common zero"
+        )
+        raise InvalidInput("largest transmission error", largest, allowed)
 
 
 def _leaps(record: RunningRecord, rules: Rules) -> str:

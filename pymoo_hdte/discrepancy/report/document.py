@@ -125,9 +125,10 @@ def sentence(verdict: Verdict) -> str:
 
 def _or_else(sets: Sequence[Hypothesis]) -> str:
     """Return in words what the sets of a class say beside the first; what all share is left out."""
-    first, *others = map(in_words, labels_apart([one.candidates for one in sets]))
-    place = "" if first == in_words(sets[0].label) else f", in place of {first}"
-    return f"Or, which these data cannot tell from it{place}: {'; or '.join(others)}."
+    first, *others = labels_apart([one.candidates for one in sets])
+    place = "" if first == sets[0].label else f", in place of {in_words(first)}"
+    listed = "; or ".join(map(in_words, others))
+    return f"Or, which these data cannot tell from it{place}: {listed}."
 
 
 def residual_of_parts(finding: DriveFinding) -> dict[str, dict[str, float]]:
