@@ -289,6 +289,16 @@ def decayed(constant, size):
     return size * np.exp(-TIME / constant)
 
 
+def least_deviations(constant, size):
+    """Return the Cramer-Rao bounds of the size of a decay, rad, and of the log of its constant."""
+    angle = np.outer(SPEED * TIME, ORDERS)
+    decay = decayed(constant, 1.0)
+    derivatives = [decay, size * decay * TIME / constant]
+    design = np.column_stack([TIME**0, TIME, np.cos(angle), np.sin(angle), *derivatives])
+    covariance = np.linalg.inv(design.T @ design)
+    return NOISE["input_angle"] * np.sqrt(np.diagonal(covariance)[-2:])
+
+
 @given(constant=st.floats(0.05, 0.4), size=st.floats(1.5e-3, 1.0), seed=st.integers(0, 9999))
 @settings(max_examples=25, deadline=None)
 def test_lines_of_a_record_that_begins_unsettled_scatter_as_their_covariance_says(
@@ -300,8 +310,9 @@ def test_lines_of_a_record_that_begins_unsettled_scatter_as_their_covariance_say
     result = repaired(late)
     (fault,) = result.faults
     assert (fault.kind, fault.channel, fault.row) == ("settling", "input_angle", 0)
-    assert abs(fault.size - size) < 0.3 * min(size, 5e-3)
-    assert 0.7 * constant < result.record.settling < 1.4 * constant
+    wrong = [fault.size - size, np.log(result.record.settling / constant)]
+    narrowed = [1e-4 * size, 1e-4]
+    assert np.all(np.abs(wrong) < 4.5 * least_deviations(constant, size) + narrowed)
     assert_lines_as_of(result.record, record)
 
 
