@@ -39,11 +39,11 @@ from pymoo_hdte.effects.friction import (
     CoulombFriction,
     NonlinearDrag,
     PeriodicFriction,
-    PeriodicTorque,
     StribeckFriction,
 )
 from pymoo_hdte.effects.hysteresis import MaxwellSlip, slip_along
 from pymoo_hdte.effects.law import PortState, periodic_phase
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.problems import RobustDTE

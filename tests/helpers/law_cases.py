@@ -11,11 +11,11 @@ from pymoo_hdte.effects.friction import (
     CoulombFriction,
     NonlinearDrag,
     PeriodicFriction,
-    PeriodicTorque,
     StribeckFriction,
 )
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.load_friction import LoadFriction
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.shear_thinning import ShearThinningDrag
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, PeriodicClearance, SoftWindup
 from pymoo_hdte.effects.temperature_friction import TemperatureFriction

@@ -15,7 +15,8 @@ from pymoo_hdte.drive import (
     MeshStiffnessVariation,
     ThermalDrift,
 )
-from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag, PeriodicTorque
+from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import HardeningStiffness
 from pymoo_hdte.units import ARCSEC
 

@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.fft import dct
 
-from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag, PeriodicTorque
+from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState, periodic_phase
 from pymoo_hdte.effects.linear import ConstantForce, DirectionalFriction, LinearDamper, LinearSpring
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import HardeningStiffness
 from pymoo_hdte.mechanism import BelievedValue, ErrorLine, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.balances import ForceBalance, balance_names, quantity_names

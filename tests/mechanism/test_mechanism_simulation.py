@@ -12,9 +12,10 @@ from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import LawAtPort, harmonic_balance, preset, simulate_drive
 from pymoo_hdte.drive.effects import KinematicReaction
 from pymoo_hdte.effects import Aperiodic, friction
-from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction, PeriodicTorque
+from pymoo_hdte.effects.friction import CoulombFriction, PeriodicFriction
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState, Response, periodic_phase
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, SoftWindup
 from pymoo_hdte.mechanism import (
     BelievedValue,

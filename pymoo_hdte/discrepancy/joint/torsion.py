@@ -28,7 +28,7 @@ from pymoo_hdte.discrepancy.mechanism.rest import (
 )
 from pymoo_hdte.drive.effects.static_error import KinematicErrorLine, KinematicTorsion
 from pymoo_hdte.effects.effect import Effect, place_of
-from pymoo_hdte.effects.friction import PeriodicTorque
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.mechanism import BelievedValue, Input, LawAt, Mechanism, Port, Record
 from pymoo_hdte.mechanism.effects import law_effects
 from pymoo_hdte.mechanism.port_motion import motion_at_port

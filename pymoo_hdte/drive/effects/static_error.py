@@ -13,9 +13,9 @@ from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.friction import PeriodicTorque
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import PortState, Response
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 
 

@@ -36,7 +36,8 @@ from pymoo_hdte.drive import (
 )
 from pymoo_hdte.drive.toml_text import model_toml, sheet_toml
 from pymoo_hdte.effects.effect import place_of
-from pymoo_hdte.effects.friction import CoulombFriction, PeriodicTorque
+from pymoo_hdte.effects.friction import CoulombFriction
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port
 from pymoo_hdte.units import ARCSEC
 

@@ -20,8 +20,9 @@ from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.report.document import base_parameters
 from pymoo_hdte.drive import KinematicErrorLine, LawAtPort
 from pymoo_hdte.drive.effects import MeshStiffnessVariation
-from pymoo_hdte.effects.friction import CoulombFriction, PeriodicTorque
+from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.sentence_blanks import in_words
 from pymoo_hdte.effects.unknowns import Parameter
 from pymoo_hdte.io.fields import Fields

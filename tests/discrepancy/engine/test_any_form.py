@@ -20,8 +20,9 @@ from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
-from pymoo_hdte.effects.friction import PeriodicTorque, smoothed_sign
+from pymoo_hdte.effects.friction import smoothed_sign
 from pymoo_hdte.effects.law import Response
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import PeriodicStiffness
 
 FRICTION, SPRING, DRIFT = (

@@ -31,9 +31,10 @@ from pymoo_hdte.drive.effects import (
     PreslidingFriction,
     ThermalDrift,
 )
-from pymoo_hdte.effects.friction import PeriodicTorque, smoothed_sign
+from pymoo_hdte.effects.friction import smoothed_sign
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState, Response, Values
+from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import HardeningStiffness, PeriodicStiffness, SoftWindup
 
 # Sizes are far below those that matter: only directions count.
