@@ -55,6 +55,16 @@ class CoulombFriction(Aperiodic):
         return abs(self.level)
 
 
+def _constant(sizes: Sizes) -> list[Guess]:
+    """Guess dry friction of three sizes: of its loop in a sweep the size is the shape.
+
+    After each turning point the friction holds the port until twice its level is overcome, and
+    there a sweep is exact: the loop of another level shows most of it only within a factor of two.
+    """
+    level = unknown("level", 0.0, sizes.largest, sizes.force)
+    return [Guess((level,), [(share * sizes.force,) for share in (1.0, 0.3, 0.1)])]
+
+
 register(
     Effect(
         "coulomb_friction",
@@ -62,7 +72,7 @@ register(
         FRICTION_PORTS,
         {"level": "torque"},
         "Dry friction at the {port}: a {force} that does not depend on speed.",
-        lambda sizes: [Guess((unknown("level", 0.0, sizes.largest, sizes.force),))],
+        _constant,
         special_case_of=(
             "stribeck_friction",
             "hysteresis",

@@ -14,7 +14,9 @@ from scipy.stats import chi2
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.discrepancy import Rig, TorsionRecord, read_campaign
 from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
+from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.drive import mean_torsion, preset, quasi_static_torsion
+from pymoo_hdte.effects import Sizes, effect_named
 from pymoo_hdte.effects.friction import CoulombFriction, StribeckFriction
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState
@@ -141,6 +143,24 @@ def test_at_rest_the_stribeck_excess_holds_too():
     stribeck = drive(("output", StribeckFriction(1.5, 0.5, 0.1)))
     coulomb = drive(("output", CoulombFriction(2.0)))
     assert np.array_equal(quasi_static_torsion(stribeck, LOOP), quasi_static_torsion(coulomb, LOOP))
+
+
+@pytest.mark.parametrize("level", 8.0 * np.geomspace(0.05, 1.5, 9))
+def test_some_start_of_dry_friction_shows_most_of_its_loop(level, rng):
+    sizes = Sizes(force=8.0, residual=1.0, largest=40.0, speed=1.0, travel=1.0)
+    points = torsion_points(swept((("output", CoulombFriction(level)),), rng), RIG)
+    linear = points.whitening @ predicted(points, ())
+
+    def beyond_stiffness(angle):
+        values = points.whitening @ angle
+        return values - linear * (linear @ values) / (linear @ linear)
+
+    left = beyond_stiffness(points.angle)
+    removed = []
+    for (start,) in effect_named("coulomb_friction").guesses(sizes)[0].begins:
+        loop = beyond_stiffness(predicted(points, (("output", CoulombFriction(start)),)))
+        removed.append((loop @ left) ** 2 / (loop @ loop) / (left @ left))
+    assert max(removed) > RULES.second_hope_share
 
 
 @pytest.mark.parametrize("level", [-1.0, 0.0])
