@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.doubts import explains_in_any_form
+from pymoo_hdte.discrepancy.engine.doubts import doubts_of, explains_in_any_form
 from pymoo_hdte.discrepancy.engine.fitting import Fit
 from pymoo_hdte.discrepancy.engine.hypothesis import (
     Hypothesis,
@@ -18,6 +18,7 @@ from pymoo_hdte.discrepancy.engine.hypothesis import (
     differing,
     is_bounded,
     label_of,
+    near_by_evidence,
 )
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.search import Search
@@ -76,6 +77,30 @@ def _needs_fewer_values(search: Search, one: Hypothesis, other: Hypothesis) -> b
     further = one.fit.chi_square - other.fit.chi_square
     most = search.data.rules.form_share**2 * search.excess
     return same and further < most and search.forms.rest_is_noise(one.fit)
+
+
+def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
+    """Return sets that explain with one more effect as listed what a doubted set does not so.
+
+    A drag whose form may be any holds a dry friction: that of a drag and a friction each as listed
+    fits down to noise is chance or the truth, and where the drag alone leaves doubts, as a sensor
+    far from what is stated, both are told. The best first, and what no evidence tells from it.
+    """
+    rules, freedom = search.data.rules, search.degrees_of_freedom
+    larger = [
+        search.finished(one)
+        for one in search.of_size(len(chosen.members) + 1)
+        if one.names > chosen.names
+        and one.listed
+        and label_of(one.freed) == label_of(chosen.freed)
+        and search.enough(one)
+        and chosen.bic - one.bic >= rules.bic_gain
+    ]
+    if not larger or not doubts_of(search, chosen, None):
+        return []
+    larger = [one for one in larger if not doubts_of(search, one, None)]
+    larger.sort(key=lambda one: one.bic)
+    return [one for one in larger if near_by_evidence(one, larger[0], freedom, rules)]
 
 
 def distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:
