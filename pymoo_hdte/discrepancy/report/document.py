@@ -124,10 +124,14 @@ def sentence(verdict: Verdict) -> str:
 
 
 def _or_else(sets: Sequence[Hypothesis]) -> str:
-    """Return in words what the sets of a class say beside the first; what all share is left out."""
+    """Return in words what the sets of a class say beside the first; what all share is left out.
+
+    What is a part of the first explains as much in another form only.
+    """
     first, *others = labels_apart([one.candidates for one in sets])
     place = "" if first == sets[0].label else f", in place of {in_words(first)}"
-    listed = "; or ".join(map(in_words, others))
+    alone = [" alone, in another form" * (one.names < sets[0].names) for one in sets[1:]]
+    listed = "; or ".join(in_words(one) + how for one, how in zip(others, alone, strict=True))
     return f"Or, which these data cannot tell from it{place}: {listed}."
 
 

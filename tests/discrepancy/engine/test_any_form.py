@@ -20,7 +20,8 @@ from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.search import Search
 from pymoo_hdte.discrepancy.engine.verdict import judge
-from pymoo_hdte.effects.friction import smoothed_sign
+from pymoo_hdte.drive import LawAtPort
+from pymoo_hdte.effects.friction import CoulombFriction, NonlinearDrag, smoothed_sign
 from pymoo_hdte.effects.law import Response
 from pymoo_hdte.effects.ripple import PeriodicTorque
 from pymoo_hdte.effects.stiffness import PeriodicStiffness
@@ -121,6 +122,27 @@ def test_a_gain_that_stands_for_the_form_of_a_law_is_no_doubt():
 def test_a_gain_beside_one_law_is_a_doubt():
     """In any form it follows too much."""
     assert GAIN in judged_with_a_gain().doubts
+
+
+DRAG, DRY = "nonlinear_drag:input", "coulomb_friction:input"
+
+
+@pytest.mark.parametrize(
+    ("dry", "status", "labels"),
+    [
+        (0.0, "named", [DRAG]),
+        (0.04, "class", [f"{DRAG}+{DRY}", DRAG]),
+        (0.08, "named", [f"{DRY}+{DRAG}"]),
+    ],
+)
+def test_a_drag_of_any_form_is_told_with_the_listed_one_and_a_dry_friction(dry, status, labels):
+    """With zeros of the sensors far from what is stated, a curve of the speed does as much."""
+    drag = LawAtPort("nonlinear_drag", "input", NonlinearDrag(0.03 / 209.0**2, 1.7, 209.0))
+    data = planted(drag, LawAtPort("coulomb_friction", "input", CoulombFriction(dry)), seed=3)
+    found = judge(data, fit(data), of_labels(DRAG, DRY))
+    told = [found.chosen, *found.equivalent]
+    assert (found.status, [one.label for one in told]) == (status, labels)
+    assert not found.doubts
 
 
 @pytest.mark.parametrize(("plain", "earned"), [(9.0, True), (1000.0, False)])
