@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -216,13 +216,24 @@ register(
 
 @dataclass(frozen=True)
 class PeriodicFriction(Periodic):
-    """T = level cos(order angle + phase) sign(speed); level in N.m."""
+    """T = level cos(order angle + phase) sign(speed).
+
+    Attributes
+    ----------
+    level : float
+        N.m.
+    locked : float
+        Level times the cosine at the angle at which the input was locked for a torsion sweep, N.m;
+        a property of a rig, not of a drive. By default nothing, as in the mean over all angles.
+    """
 
     level: float
+    locked: float = field(default=0.0, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         real_number("position_dependent_friction.level", self.level)
+        real_number("position_dependent_friction.locked", self.locked)
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
@@ -230,18 +241,33 @@ class PeriodicFriction(Periodic):
         level = self.level * self.cosine(state)
         return Response(level * sign, damping=level * slope)
 
+    @property
+    def breakaway(self) -> float:
+        """What it adds to that of the mean where the input was locked, N.m."""
+        return self.locked
+
 
 def _varying(sizes: Sizes) -> list[Guess]:
-    """Guess friction that varies about a mean, which is Coulomb's."""
+    """Guess friction that varies about a mean, which is Coulomb's.
+
+    A port that a swept load moves at one place shows the friction there: an unknown of its own,
+    since that place is not known.
+    """
     found = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
-        unknowns = (*family.waves("level", sizes.largest, sizes.residual), mean)
+        locked = [replace(mean, name="locked")] if sizes.swept else []
+        waves = family.waves("level", sizes.largest, sizes.residual)
+        unknowns = (*waves, mean, *locked)
 
-        def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
-            lines = family.lines(values[:-1])
-            varying = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
-            return (*varying, CoulombFriction(values[-1]))
+        def build(
+            values: Sequence[float], family: Family = family, n: int = len(waves)
+        ) -> tuple[Law, ...]:
+            mean, locked = values[n], values[-1]
+            (order, level, phase), *lines = family.lines(values[:n])
+            first = PeriodicFriction(order, phase, level, locked - mean)
+            others = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
+            return (first, *others, CoulombFriction(mean))
 
         found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
     return found
@@ -255,6 +281,6 @@ register(
         {"order": "", "phase": "angle", "level": "torque"},
         "Friction that varies with the position of the {port}, order {order}.",
         _varying,
-        of_fit={"mean": "torque"},
+        of_fit={"mean": "torque", "locked": "torque"},
     )
 )

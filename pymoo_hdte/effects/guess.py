@@ -51,6 +51,9 @@ class Sizes:
         Largest torque that the port passes on; 0 where solvers do not know it.
     driven : bool
         Whether the load opposes the motion in some records and drives it in others.
+    swept : bool
+        Whether a slow load moves it to and fro at one place, as the output of a drive whose input
+        is locked.
     temperature : float
         Mean of the records, K, where their temperatures spread enough to show what depends on them;
         0 elsewhere.
@@ -86,6 +89,7 @@ class Sizes:
     loaded: bool = False
     load: float = 0.0
     driven: bool = False
+    swept: bool = False
     temperature: float = 0.0
     turns: bool = False
     read: bool = False

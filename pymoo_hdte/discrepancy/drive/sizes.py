@@ -190,7 +190,6 @@ def port_sizes(
         duration=scales.duration,
         temperature=scales.temperature,
         changes=scales.changes,
-        swept=scales.swept,
     )
     slower = {"input": 1.0, "mesh": 1.0, "output": believed.ratio, "sensor": believed.ratio}
     return {
@@ -204,6 +203,7 @@ def port_sizes(
             speed=shared.speed / slower[port],
             damping=believed.input_damping if port == "input" else 0.0,
             load=scales.torque / believed.ratio if port == "input" else 0.0,
+            swept=scales.swept and port == "output",
             slower=slower[port],
             expected=_SHAFTS[port],
         )

@@ -44,8 +44,6 @@ class DriveSizes(Sizes):
         Of the session, s.
     changes : tuple of float
         Times of the session between records, at which a reading may have changed at once, s.
-    swept : bool
-        Whether the load was swept with the input locked.
     """
 
     error: float = 0.0
@@ -55,7 +53,6 @@ class DriveSizes(Sizes):
     inertia: float = 0.0
     duration: float = 0.0
     changes: tuple[float, ...] = ()
-    swept: bool = False
 
     def further(self) -> Self:
         """Return the sizes without the orders of believed lines of the error."""

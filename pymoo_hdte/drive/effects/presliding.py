@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pymoo_hdte.checks import real_number
-from pymoo_hdte.drive.effects.base import DriveSizes
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.effects.guess import Guess, Sizes
@@ -55,9 +54,8 @@ def _bending(sizes: Sizes) -> Sequence[Guess]:
 
     Not beside others: in the sweep alone they follow what the form of another law leaves there.
     """
-    if not (isinstance(sizes, DriveSizes) and sizes.swept):
-        return []
-    return [Guess(*springs("level", sizes), instead_of=("coulomb_friction", "hysteresis"))]
+    replaced = ("coulomb_friction", "hysteresis")
+    return [Guess(*springs("level", sizes), instead_of=replaced)] if sizes.swept else []
 
 
 register(

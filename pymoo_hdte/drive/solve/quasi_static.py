@@ -189,7 +189,8 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     locked += [law.before_slip for law in at_output]
     mesh_laws = tuple(law for law in locked if law is not None)
     mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
-    held = _play(torque, sum(law.breakaway for law in at_output if law.before_slip is None))
+    breakaway = sum(law.breakaway for law in at_output if law.before_slip is None)
+    held = _play(torque, max(breakaway, 0.0))
     steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
     moving = np.flatnonzero(moves)
     # Signs, since the product of two small moves may be zero.
