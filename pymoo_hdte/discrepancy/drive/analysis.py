@@ -156,7 +156,10 @@ def _check_steady(data: Data) -> None:
 
 
 def _judged_again(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
-    """Judge again if the named effect changes the noise."""
+    """Judge again if the named effect changes the noise.
+
+    What resonances hid beside it may show then.
+    """
     chosen = verdict.chosen
     if chosen is None or chosen.explained < data.rules.explained_share:
         return data, verdict
@@ -164,7 +167,8 @@ def _judged_again(verdict: Verdict, data: Data, listed: list[Candidate]) -> tupl
     if renewed is None:
         return data, verdict
     known = (chosen, *verdict.alternatives)
-    again = judge(renewed, fit(renewed, start=verdict.base.values), listed, known)
+    base = fit(renewed, start=verdict.base.values)
+    again = judge(renewed, base, listed, known, go_on=True)
     return (data, verdict) if again.chosen is None else (renewed, again)
 
 

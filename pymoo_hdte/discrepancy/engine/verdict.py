@@ -12,21 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from pymoo_hdte.discrepancy.engine import probability
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
-from pymoo_hdte.discrepancy.engine.choice import (
-    best_set,
-    confirmed,
-    in_another_form,
-    in_one_law,
-    replaced,
-    simpler_law,
-    special_case,
-    stands_out,
-    twins,
-)
+from pymoo_hdte.discrepancy.engine.choice import in_one_law, replaced
 from pymoo_hdte.discrepancy.engine.doubts import (
     NOT_PROVEN,
     doubts_of,
@@ -34,11 +23,11 @@ from pymoo_hdte.discrepancy.engine.doubts import (
     left_by,
     other_forms,
 )
-from pymoo_hdte.discrepancy.engine.equivalents import distinct, rivals, with_one_more
+from pymoo_hdte.discrepancy.engine.equivalents import Answer, answer_of, chosen_of, distinct
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, Vote, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, down_to_noise
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
-from pymoo_hdte.discrepancy.engine.screening import Screened, screen
+from pymoo_hdte.discrepancy.engine.screening import screen
 from pymoo_hdte.discrepancy.engine.search import Search
 
 STATUSES = ("adequate", "named", "class", "parameter", "unlisted", "partial")
@@ -133,10 +122,12 @@ def judge(
     base: Fit,
     candidates: Sequence[Candidate],
     known: Sequence[Hypothesis] = (),
+    go_on: bool = False,
 ) -> Verdict:
     """Return the verdict on a fitted base, by the rules of its data.
 
-    If sets are ``known`` from nearly the same data, only these are compared.
+    If sets are ``known`` from nearly the same data, only these are compared; where none of them
+    explains these data, the search may ``go_on`` from them.
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
@@ -156,18 +147,23 @@ def judge(
     if known:
         search.resume(known)
         search.leave_out_lacking()
-        return _verdict(search, _answer(search, _chosen(search), ()))
-    search.singles()
-    search = _renewed_search(search)
+        chosen = chosen_of(search)
+        if not go_on or explains_in_any_form(search, chosen):
+            return _verdict(search, answer_of(search, chosen, ()))
+        search = Search(data, base, searched, screen(data, base, searched), forms)
+        search.resume(known, go_on=True)
+    else:
+        search.singles()
+        search = _renewed_search(search)
     search.grow()
     search.leave_out_lacking()
-    chosen = _chosen(search)
+    chosen = chosen_of(search)
     if len(chosen.members) > 1:
         search.complete(chosen)
-        chosen = _chosen(search)
+        chosen = chosen_of(search)
     if replaced(search, chosen, [one for one in candidates if one.instead_of]):
-        chosen = _chosen(search)
-    verdict = _verdict(search, _answer(search, chosen, search.screened))
+        chosen = chosen_of(search)
+    verdict = _verdict(search, answer_of(search, chosen, search.screened))
     return verdict if search.data is data else replace(verdict, renewed=search.data)
 
 
@@ -201,53 +197,7 @@ def _is_all(data: Evidence, fitted: Fit) -> bool:
     return noise and data.excess(fitted).is_noise(data.rules)
 
 
-def _chosen(search: Search) -> Hypothesis:
-    """Return the best set, or its special case that does as well, without doubted members."""
-    return confirmed(search, special_case(search, best_set(search)))
-
-
-class _Answer(NamedTuple):
-    """A chosen set, sets that may be told with it, and what is certain of them.
-
-    ``certain`` is that it explains the data, ``foreign`` that another form of its law does, and
-    ``in_part`` that it stands out although more is left.
-    """
-
-    chosen: Hypothesis
-    equivalent: list[Hypothesis]
-    certain: bool
-    foreign: bool
-    in_part: bool
-
-
-def _answer(search: Search, chosen: Hypothesis, screened: Sequence[Screened]) -> _Answer:
-    """Return what a search tells of its chosen set: itself, or what stands for it."""
-    certain = explains_in_any_form(search, chosen)
-    if not certain:
-        chosen = simpler_law(search, chosen)
-    foreign: list[Hypothesis] = []
-    if not (certain and chosen.listed):
-        foreign = in_another_form(search, chosen, screened)
-        if not certain and explains_in_any_form(search, best_set(search)):
-            # One of the effects that were fitted only now does so as it is listed.
-            chosen, certain, foreign = _chosen(search), True, []
-    if foreign:
-        equivalent = [*foreign[1:], *([chosen] if certain else [])]
-        chosen, certain = foreign[0], True
-    else:
-        more = with_one_more(search, chosen) if certain else []
-        told = [*more, chosen, *rivals(search, chosen)]
-        chosen, equivalent = told[0], told[1:]
-    together = [] if certain else twins(search, chosen)
-    in_part = not certain and stands_out(search, chosen, together)
-    equivalent += together if in_part else []
-    if not chosen.listed and (listed := [one for one in equivalent if one.listed]):
-        equivalent = [chosen, *(one for one in equivalent if one is not listed[0])]
-        chosen = listed[0]
-    return _Answer(chosen, equivalent, certain, bool(foreign), in_part)
-
-
-def _verdict(search: Search, answer: _Answer) -> Verdict:
+def _verdict(search: Search, answer: Answer) -> Verdict:
     """Return the verdict: an answer with its doubts, status and probability."""
     data, rules, degrees_of_freedom = search.data, search.data.rules, search.degrees_of_freedom
     chosen, told, certain, foreign, in_part = answer
