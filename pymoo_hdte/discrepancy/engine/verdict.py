@@ -19,6 +19,7 @@ from pymoo_hdte.discrepancy.engine.choice import in_one_law, replaced
 from pymoo_hdte.discrepancy.engine.doubts import (
     NOT_PROVEN,
     doubts_of,
+    explains_in_any_form,
     left_by,
     other_forms,
 )
@@ -125,8 +126,8 @@ def judge(
 ) -> Verdict:
     """Return the verdict on a fitted base, by the rules of its data.
 
-    If sets are ``known`` from nearly the same data, only these are compared; where the best
-    leaves more than noise in any form of its laws, the search may ``go_on`` from them.
+    If sets are ``known`` from nearly the same data, only these are compared; where none of them
+    explains the data in any form, the search may ``go_on`` from them.
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
@@ -147,7 +148,7 @@ def judge(
         search.resume(known)
         search.leave_out_lacking()
         chosen = chosen_of(search)
-        if not go_on or search.enough(chosen) or search.forms.rest_is_noise(chosen.fit):
+        if not go_on or explains_in_any_form(search, chosen):
             return _verdict(search, answer_of(search, chosen, ()))
         search = Search(data, base, searched, screen(data, base, searched), forms)
         search.resume(known, go_on=True)

@@ -106,7 +106,8 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
 @pytest.mark.parametrize(("go_on", "labels"), [(False, {SPRING}), (True, {SPRING, DRIFT})])
 def test_a_search_goes_on_from_known_sets_only_where_that_is_asked_for(go_on, labels):
     """Resonances beside an inertia hid a friction: with their noise it alone was judged."""
-    data = planted(FOREIGN[SPRING], *small_drift())
+    (drift,) = of_labels(DRIFT)
+    data = planted(FOREIGN[SPRING], *drift.build((4e-7, 500.0)))
     base = fit(data)
     alone = judge(data, base, of_labels(SPRING))
     known = (alone.chosen, *alone.alternatives)
