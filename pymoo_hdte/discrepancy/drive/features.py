@@ -23,8 +23,6 @@ from pymoo_hdte.discrepancy.campaign.residual_spectrum import residual_spectrum
 from pymoo_hdte.discrepancy.drive.prediction import Conditions, Prediction
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
 
-ALIASED_HARMONICS = 5
-"""Highest harmonic of a line whose alias is allowed for, as the highest that effects have."""
 MEANS = (0, 1)
 """Channels whose mean is a feature; the others' means are conditions."""
 
@@ -102,8 +100,6 @@ def measure(
     values = np.array([stack(line.mean, line.phasors) for line in lines])
     stiffness = campaign.believed.stiffness
     covariance = np.array([_sensor_covariance(line, rig, stiffness) for line in lines])
-    for one, record, line in zip(covariance, records, lines, strict=True):
-        one[np.diag_indices_from(one)] += _aliased(record, line)
     return Features(tuple(records), conditions, np.array(orders), values, covariance)
 
 
@@ -135,31 +131,6 @@ def _sensor_covariance(line: OrderLines, rig: Rig, stiffness: float) -> NDArray[
     # The load is taken from the measured output torque, whose error changes the predicted torsion.
     covariance[0, 0] += line.covariance[2, 0, 0] / stiffness**2
     return covariance
-
-
-def _aliased(record: RunningRecord, line: OrderLines) -> NDArray[np.float64]:
-    """Return the variance of features on which harmonics of lines may be aliased, (n_features,).
-
-    A harmonic beyond half the rate of the rows shows at a lower order. How large it is nobody
-    knows; of a wave with jumps it is the line divided by its number, and of a smooth one less. What
-    a line adds to itself is small, and left out.
-    """
-    numbers = np.arange(2, ALIASED_HARMONICS + 1)[:, None]
-    per_row = 2.0 * np.pi * record.sample_rate / abs(line.slope[3])
-    resolved = 2.0 * np.pi / np.ptp(record.input_angle)
-    harmonics = numbers * line.orders
-    shown = np.abs(harmonics - per_row * np.round(harmonics / per_row))
-    # Share of the power of each line that each feature may have.
-    shares = (harmonics > per_row / 2.0) / numbers**2
-    of_lines = np.abs(np.subtract.outer(shown, line.orders)) < resolved
-    to_lines = np.einsum("kl,klm->lm", shares, of_lines)
-    np.fill_diagonal(to_lines, 0.0)
-    to_mean = np.sum(shares * (shown < resolved), axis=0)
-    power = np.abs(line.phasors) ** 2
-    # What may be an alias itself has no harmonics.
-    power = np.maximum(power - power @ to_lines, 0.0)
-    lines = power @ to_lines / 2.0
-    return stack(power @ to_mean, lines + 1j * lines)
 
 
 def unexpected_lines(

@@ -11,12 +11,7 @@ from virtual_rig_cases import BELIEVED, RIG
 
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 from pymoo_hdte.discrepancy.drive.candidates import out_of_tolerance
-from pymoo_hdte.discrepancy.drive.features import (
-    Features,
-    measure,
-    unexpected_lines,
-    unexpected_orders,
-)
+from pymoo_hdte.discrepancy.drive.features import Features, unexpected_lines, unexpected_orders
 from pymoo_hdte.discrepancy.drive.prediction import Conditions
 from pymoo_hdte.discrepancy.drive.rattling import leading_sweep_effect
 from pymoo_hdte.discrepancy.engine import screening
@@ -246,25 +241,6 @@ def test_lines_that_no_one_expected_are_found_the_strongest_first(lines):
     features = Features(records, conditions, orders, np.zeros((3, 26)), np.zeros((3, 26, 26)))
     found = unexpected_orders(unexpected_lines(features, BELIEVED.ratio, RIG), BELIEVED.ratio)
     assert found == pytest.approx(lines, abs=0.5 / BELIEVED.ratio)
-
-
-@pytest.mark.parametrize("share", [0.0, 1.0 / 16.0, 1.0 / 4.0])
-def test_a_line_counts_for_nothing_where_a_harmonic_of_another_is_aliased(share):
-    """Twenty rows a turn show order 12 as 8. So a trapezoid had another harmonic at each speed."""
-
-    def error(angle):
-        return 3.0 * ARCSEC * (np.sin(3.0 * angle) + share * np.sin(12.0 * angle + 1.0))
-
-    campaign = SimpleNamespace(believed=BELIEVED, rig=RIG)
-    orders = [1.0, 3.0, 8.0]
-    rng = np.random.default_rng(9)
-    found, plain = (measure(campaign, [record(rng, one)], orders) for one in (error, np.zeros_like))
-    variance, usual = (np.diagonal(one.covariance[0]) for one in (found, plain))
-    places = found.places(0)
-    value = found.values[0, places] - 3.0 * ARCSEC * np.array([[0.0, 0.0], [0.0, -1.0], [0.0, 0.0]])
-    assert np.all(value**2 < 4.5**2 * variance[places])
-    assert np.all(variance[places[2]] > (0.5 * ARCSEC) ** 2)
-    np.testing.assert_allclose(variance[places[:2]], usual[places[:2]], rtol=0.3)
 
 
 def test_a_line_of_the_input_is_found_at_its_order_where_the_ratio_is_no_whole_number():
