@@ -256,7 +256,7 @@ def _varying(sizes: Sizes) -> list[Guess]:
     found = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
-        locked = [replace(mean, name="locked")] if sizes.swept else []
+        locked = [replace(mean, name="level_with_input_locked")] if sizes.swept else []
         waves = family.waves("level", sizes.largest, sizes.residual)
         unknowns = (*waves, mean, *locked)
 
@@ -281,6 +281,6 @@ register(
         {"order": "", "phase": "angle", "level": "torque"},
         "Friction that varies with the position of the {port}, order {order}.",
         _varying,
-        of_fit={"mean": "torque", "locked": "torque"},
+        of_fit={"mean": "torque", "level_with_input_locked": "torque"},
     )
 )

@@ -192,7 +192,7 @@ def test_a_sweep_shows_a_varying_friction_where_it_was_made_and_not_its_mean(hel
     found = fit(data, (friction,), np.append(Layout(data.base).array("start"), friction.starts[0]))
     assert found.chi_square < 1.2 * len(found.residuals)
     deviation = np.sqrt(np.diagonal(found.covariance))
-    for name, true in (("mean", 1.8), ("locked", held)):
+    for name, true in (("mean", 1.8), ("level_with_input_locked", held)):
         place = [one.name for one in found.parameters].index(name)
         assert abs(found.values[place] - true) < 4.0 * deviation[place]
     assert deviation[place] < 0.01
