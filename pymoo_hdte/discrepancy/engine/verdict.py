@@ -126,8 +126,8 @@ def judge(
 ) -> Verdict:
     """Return the verdict on a fitted base, by the rules of its data.
 
-    If sets are ``known`` from nearly the same data, only these are compared; where none of them
-    explains the data in any form, the search may ``go_on`` from them.
+    If sets are ``known`` from nearly the same data, only these are compared; where the best
+    is a single effect that does not explain them in any form, the search may ``go_on``.
     """
     rules = data.rules
     degrees_of_freedom = len(base.residuals) - len(base.values)
@@ -148,7 +148,8 @@ def judge(
         search.resume(known)
         search.leave_out_lacking()
         chosen = chosen_of(search)
-        if not go_on or explains_in_any_form(search, chosen):
+        alone = len(chosen.members) == 1
+        if not (go_on and alone) or explains_in_any_form(search, chosen):
             return _verdict(search, answer_of(search, chosen, ()))
         search = Search(data, base, searched, screen(data, base, searched), forms)
         search.resume(known, go_on=True)
