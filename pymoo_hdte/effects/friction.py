@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
 from pymoo_hdte.effects.shear_thinning import shear_thinning
-from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
+from pymoo_hdte.effects.unknowns import Family, Parameter, starts_along_each, unknown
 
 FRICTION_PORTS = ("input", "output")
 
@@ -56,13 +56,14 @@ class CoulombFriction(Aperiodic):
 
 
 def _constant(sizes: Sizes) -> list[Guess]:
-    """Guess dry friction of three sizes: of its loop in a sweep the size is the shape.
+    """Guess dry friction, of three sizes where a sweep shows it.
 
-    After each turning point the friction holds the port until twice its level is overcome, and
-    there a sweep is exact: the loop of another level shows most of it only within a factor of two.
+    There the loop of a small friction has another shape than that of a large one: after each
+    turning point the port is held until twice the level is overcome.
     """
     level = unknown("level", 0.0, sizes.largest, sizes.force)
-    return [Guess((level,), [(share * sizes.force,) for share in (1.0, 0.3, 0.1)])]
+    shares = (1.0, 0.3, 0.1) if sizes.swept else (1.0,)
+    return [Guess((level,), [(share * sizes.force,) for share in shares])]
 
 
 register(
@@ -223,8 +224,8 @@ class PeriodicFriction(Periodic):
     level : float
         N.m.
     locked : float
-        Level times the cosine at the angle at which the input was locked for a torsion sweep, N.m;
-        a property of a rig, not of a drive. By default nothing, as in the mean over all angles.
+        Its torque at the angle at which the input was locked for a torsion sweep, N.m; a property
+        of a rig, not of a drive. By default nothing, as in the mean over all angles.
     """
 
     level: float
@@ -250,24 +251,28 @@ class PeriodicFriction(Periodic):
 def _varying(sizes: Sizes) -> list[Guess]:
     """Guess friction that varies about a mean, which is Coulomb's.
 
-    A port that a swept load moves at one place shows the friction there: an unknown of its own,
-    since that place is not known.
+    A port that a swept load moves at one place shows the friction there. That place is not known:
+    the sine of an unknown is the share of the waves that is added to the mean there.
     """
     found = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
-        locked = [replace(mean, name="level_with_input_locked")] if sizes.swept else []
-        waves = family.waves("level", sizes.largest, sizes.residual)
-        unknowns = (*waves, mean, *locked)
+        place = [Parameter("phase_with_input_locked", 0.0, -np.pi, np.pi, 1.0, linear=True)]
+        unknowns = (
+            *family.waves("level", sizes.largest, sizes.residual),
+            mean,
+            *(place if sizes.swept else []),
+        )
 
         def build(
-            values: Sequence[float], family: Family = family, n: int = len(waves)
+            values: Sequence[float], family: Family = family, swept: bool = sizes.swept
         ) -> tuple[Law, ...]:
-            mean, locked = values[n], values[-1]
-            (order, level, phase), *lines = family.lines(values[:n])
-            first = PeriodicFriction(order, phase, level, locked - mean)
-            others = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
-            return (first, *others, CoulombFriction(mean))
+            *waves, mean, at = values if swept else (*values, 0.0)
+            varying = [
+                PeriodicFriction(order, phase, level, float(np.sin(at)) * level)
+                for order, level, phase in family.lines(waves)
+            ]
+            return (*varying, CoulombFriction(mean))
 
         found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
     return found
@@ -281,6 +286,6 @@ register(
         {"order": "", "phase": "angle", "level": "torque"},
         "Friction that varies with the position of the {port}, order {order}.",
         _varying,
-        of_fit={"mean": "torque", "level_with_input_locked": "torque"},
+        of_fit={"mean": "torque", "phase_with_input_locked": "angle"},
     )
 )

@@ -158,7 +158,8 @@ def _check_steady(data: Data) -> None:
 def _judged_again(verdict: Verdict, data: Data, listed: list[Candidate]) -> tuple[Data, Verdict]:
     """Judge again if the named effect changes the noise.
 
-    What resonances hid beside it may show then.
+    From a single effect that then leaves more than noise the search goes on: what resonances hid
+    beside it may show.
     """
     chosen = verdict.chosen
     if chosen is None or chosen.explained < data.rules.explained_share:

@@ -137,27 +137,31 @@ def _needs_fewer_values(search: Search, one: Hypothesis, other: Hypothesis) -> b
 
 
 def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
-    """Return sets that explain with one more effect as listed what a doubted set does not so.
+    """Return what may be told before a set that leaves doubts: itself and one more effect.
 
-    A drag whose form may be any holds a dry friction: that of a drag and a friction each as listed
-    fits down to noise is chance or the truth, and where the drag alone leaves doubts, as a sensor
-    far from what is stated, both are told. The best first, and what no evidence tells from it.
+    Such a set leaves noise with all its laws in their listed forms, and no doubts. A drag of any
+    form holds a dry friction: where the drag alone needs sensors far from what is stated, either
+    may be true. The best first, and those that no evidence tells from it.
     """
     rules, freedom = search.data.rules, search.degrees_of_freedom
+    known, freed = label_of(chosen.candidates), label_of(chosen.freed)
     larger = [
-        search.finished(one)
+        one
         for one in search.of_size(len(chosen.members) + 1)
-        if one.names > chosen.names
+        if label_of(one.candidates) > known
+        and label_of(one.freed) == freed
         and one.listed
-        and label_of(one.freed) == label_of(chosen.freed)
-        and search.enough(one)
         and chosen.bic - one.bic >= rules.bic_gain
     ]
     if not larger or not doubts_of(search, chosen, None):
         return []
-    larger = [one for one in larger if not doubts_of(search, one, None)]
-    larger.sort(key=lambda one: one.bic)
-    return [one for one in larger if near_by_evidence(one, larger[0], freedom, rules)]
+    found = [
+        one
+        for one in map(search.finished, larger)
+        if search.enough(one) and confirmed(search, one) is one and not doubts_of(search, one, None)
+    ]
+    found.sort(key=lambda one: one.bic)
+    return [one for one in found if near_by_evidence(one, found[0], freedom, rules)]
 
 
 def distinct(chosen: Hypothesis, equivalent: Sequence[Hypothesis]) -> list[Hypothesis]:

@@ -18,7 +18,12 @@ from pymoo_hdte.discrepancy.drive.next_test import Proposal
 from pymoo_hdte.discrepancy.drive.parameters import base_unit, by_order
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, labels_apart
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, adequate, expected_values
+from pymoo_hdte.discrepancy.engine.hypothesis import (
+    Hypothesis,
+    adequate,
+    expected_values,
+    label_of,
+)
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.verdict import Verdict
 from pymoo_hdte.effects.sentence_blanks import in_words, joined_sentences
@@ -126,11 +131,12 @@ def sentence(verdict: Verdict) -> str:
 def _or_else(sets: Sequence[Hypothesis]) -> str:
     """Return in words what the sets of a class say beside the first; what all share is left out.
 
-    What is a part of the first explains as much in another form only.
+    A part of the first is told with it because it leaves doubts alone.
     """
     first, *others = labels_apart([one.candidates for one in sets])
     place = "" if first == sets[0].label else f", in place of {in_words(first)}"
-    alone = [" alone, in another form" * (one.names < sets[0].names) for one in sets[1:]]
+    whole = label_of(sets[0].candidates)
+    alone = [" alone, which leaves doubts" * (label_of(one.candidates) < whole) for one in sets[1:]]
     listed = "; or ".join(in_words(one) + how for one, how in zip(others, alone, strict=True))
     return f"Or, which these data cannot tell from it{place}: {listed}."
 

@@ -33,9 +33,9 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     contacts that bend (`PreslidingFriction`) start unbent, and act as springs across the mesh.
     Where a clearance leaves the torsion free, it moves no further than necessary.
 
-    The angle of the locked input is not known: a stiffness and clearances that vary with it are
-    taken at their means, which is wrong by up to the depth of the variation and by up to half the
-    clearance, and angle-periodic friction as none. The static error is a constant and is left out.
+    The angle of the locked input is not known: a stiffness that varies with it is taken at its
+    mean, and so are clearances and friction unless the law says what they are there (``locked``).
+    The static error is a constant and is left out.
     The test is that of Section 3.
 
     Parameters

@@ -147,7 +147,7 @@ def test_at_rest_the_stribeck_excess_holds_too():
 
 @pytest.mark.parametrize("level", 8.0 * np.geomspace(0.05, 1.5, 9))
 def test_some_start_of_dry_friction_shows_most_of_its_loop(level, rng):
-    sizes = Sizes(force=8.0, residual=1.0, largest=40.0, speed=1.0, travel=1.0)
+    sizes = Sizes(force=8.0, residual=1.0, largest=40.0, speed=1.0, travel=1.0, swept=True)
     points = torsion_points(swept((("output", CoulombFriction(level)),), rng), RIG)
     linear = points.whitening @ predicted(points, ())
 

@@ -257,8 +257,8 @@ def test_an_effect_that_explains_less_than_half_is_not_called_near(share, told):
             (("soft_windup",), ("backlash", "stiffness")),
             "from it: backlash (mesh) and stiffness (out of tolerance).",
         ),
-        # A part of the first says as much only where its law is another one.
-        ((("play", "windup"), ("windup",)), "from it: windup (mesh) alone, in another form."),
+        # What is a part of the first alone is in the class for its doubts.
+        ((("play", "windup"), ("windup",)), "from it: windup (mesh) alone, which leaves doubts."),
     ],
 )
 def test_what_all_members_of_a_class_share_is_said_once(sets, words):
@@ -271,9 +271,7 @@ def test_what_all_members_of_a_class_share_is_said_once(sets, words):
     def together(names):
         candidates = [one(name) for name in names]
         label = "+".join(each.label for each in candidates)
-        return SimpleNamespace(
-            candidates=candidates, label=label, listed=True, names=frozenset(names)
-        )
+        return SimpleNamespace(candidates=candidates, label=label, listed=True)
 
     first, *others = map(together, sets)
     verdict = SimpleNamespace(status="class", chosen=first, equivalent=others, doubts=())
