@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, Periodic, PortState, Response, Values
 from pymoo_hdte.effects.shear_thinning import shear_thinning
-from pymoo_hdte.effects.unknowns import Family, Parameter, starts_along_each, unknown
+from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
 
 FRICTION_PORTS = ("input", "output")
 
@@ -217,24 +217,13 @@ register(
 
 @dataclass(frozen=True)
 class PeriodicFriction(Periodic):
-    """T = level cos(order angle + phase) sign(speed).
-
-    Attributes
-    ----------
-    level : float
-        N.m.
-    locked : float
-        Its torque at the angle at which the input was locked for a torsion sweep, N.m; a property
-        of a rig, not of a drive. By default nothing, as in the mean over all angles.
-    """
+    """T = level cos(order angle + phase) sign(speed); level in N.m."""
 
     level: float
-    locked: float = field(default=0.0, compare=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         real_number("position_dependent_friction.level", self.level)
-        real_number("position_dependent_friction.locked", self.locked)
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents."""
@@ -242,37 +231,18 @@ class PeriodicFriction(Periodic):
         level = self.level * self.cosine(state)
         return Response(level * sign, damping=level * slope)
 
-    @property
-    def breakaway(self) -> float:
-        """What it adds to that of the mean where the input was locked, N.m."""
-        return self.locked
-
 
 def _varying(sizes: Sizes) -> list[Guess]:
-    """Guess friction that varies about a mean, which is Coulomb's.
-
-    A port that a swept load moves at one place shows the friction there. That place is not known:
-    the sine of an unknown is the share of the waves that is added to the mean there.
-    """
+    """Guess friction that varies about a mean, which is Coulomb's."""
     found = []
     for family in sizes.varying:
         mean = unknown("mean", 0.0, sizes.largest, sizes.force, linear=True)
-        place = [Parameter("phase_with_input_locked", 0.0, -np.pi, np.pi, 1.0, linear=True)]
-        unknowns = (
-            *family.waves("level", sizes.largest, sizes.residual),
-            mean,
-            *(place if sizes.swept else []),
-        )
+        unknowns = (*family.waves("level", sizes.largest, sizes.residual), mean)
 
-        def build(
-            values: Sequence[float], family: Family = family, swept: bool = sizes.swept
-        ) -> tuple[Law, ...]:
-            *waves, mean, at = values if swept else (*values, 0.0)
-            varying = [
-                PeriodicFriction(order, phase, level, float(np.sin(at)) * level)
-                for order, level, phase in family.lines(waves)
-            ]
-            return (*varying, CoulombFriction(mean))
+        def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
+            lines = family.lines(values[:-1])
+            varying = [PeriodicFriction(order, phase, level) for order, level, phase in lines]
+            return (*varying, CoulombFriction(values[-1]))
 
         found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
     return found
@@ -286,6 +256,6 @@ register(
         {"order": "", "phase": "angle", "level": "torque"},
         "Friction that varies with the position of the {port}, order {order}.",
         _varying,
-        of_fit={"mean": "torque", "phase_with_input_locked": "angle"},
+        of_fit={"mean": "torque"},
     )
 )

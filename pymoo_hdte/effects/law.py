@@ -196,7 +196,7 @@ class Behaviour:
 
     @property
     def breakaway(self) -> float:
-        """Force up to which the law holds a port at rest, or by which it changes that of others."""
+        """Force up to which the law holds a port at rest."""
         return 0.0
 
     @property

@@ -33,9 +33,9 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     contacts that bend (`PreslidingFriction`) start unbent, and act as springs across the mesh.
     Where a clearance leaves the torsion free, it moves no further than necessary.
 
-    The angle of the locked input is not known: a stiffness that varies with it is taken at its
-    mean, and so are clearances and friction unless the law says what they are there (``locked``).
-    The static error is a constant and is left out.
+    The angle of the locked input is not known: a stiffness and clearances that vary with it are
+    taken at their means, which is wrong by up to the depth of the variation and by up to half the
+    clearance, and angle-periodic friction as none. The static error is a constant and is left out.
     The test is that of Section 3.
 
     Parameters
@@ -189,8 +189,7 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     locked += [law.before_slip for law in at_output]
     mesh_laws = tuple(law for law in locked if law is not None)
     mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
-    breakaway = sum(law.breakaway for law in at_output if law.before_slip is None)
-    held = _play(torque, max(breakaway, 0.0))
+    held = _play(torque, sum(law.breakaway for law in at_output if law.before_slip is None))
     steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
     moving = np.flatnonzero(moves)
     # Signs, since the product of two small moves may be zero.
