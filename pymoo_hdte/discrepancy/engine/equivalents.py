@@ -153,7 +153,9 @@ def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
         and one.listed
         and chosen.bic - one.bic >= rules.bic_gain
     ]
-    if not larger or not doubts_of(search, chosen, None):
+    # Where forms are not known, only what is listed was compared.
+    any_form = search.forms.known(chosen.effects)
+    if not (larger and any_form) or not doubts_of(search, chosen, None):
         return []
     found = [
         one
