@@ -139,9 +139,9 @@ def _needs_fewer_values(search: Search, one: Hypothesis, other: Hypothesis) -> b
 def with_one_more(search: Search, chosen: Hypothesis) -> list[Hypothesis]:
     """Return what may be told before a set that leaves doubts: itself and one more effect.
 
-    Such a set leaves noise with all its laws in their listed forms, and no doubts. A drag of any
-    form holds a dry friction: where the drag alone needs sensors far from what is stated, either
-    may be true. The best first, and those that no evidence tells from it.
+    Such a set leaves no more than noise with all its laws as they are listed, and no doubts. A drag
+    of any form holds a dry friction: where the drag alone needs sensors far from what is stated,
+    either may be true. The best first, and those that no evidence tells from it.
     """
     rules, freedom = search.data.rules, search.degrees_of_freedom
     known, freed = label_of(chosen.candidates), label_of(chosen.freed)
