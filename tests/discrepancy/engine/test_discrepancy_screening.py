@@ -18,9 +18,6 @@ from pymoo_hdte.discrepancy.engine import screening
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.screening import Screened, most_hopeful, screen
-from pymoo_hdte.discrepancy.engine.verdict import judge
-from pymoo_hdte.drive import LawAtPort
-from pymoo_hdte.effects.friction import CoulombFriction
 from pymoo_hdte.units import ARCSEC
 
 SEEN = [3.0, 6.0]
@@ -173,19 +170,6 @@ def test_a_sweep_speaks_for_what_it_shows(name, values):
     effects = listed(data, name).build(values)
     data = with_sweep(data, effects, rng)
     assert leading_sweep_effect(data, fit(data), library(data)) == name
-
-
-def test_what_holds_the_output_at_rest_alone_is_no_friction_that_varies():
-    """A breakaway of 8 N.m in a sweep beside 3 N.m moving."""
-    rng = np.random.default_rng(1)
-
-    def dry(level):
-        return (LawAtPort("coulomb_friction", "output", CoulombFriction(level)),)
-
-    data = with_sweep(measured(dry(3.0), rng)[0], dry(8.0), rng)
-    verdict = judge(data, fit(data), [one for one in library(data) if one.port == "output"])
-    assert verdict.status in ("partial", "unlisted")
-    assert verdict.chosen.label == "coulomb_friction:output"
 
 
 def test_a_clean_sweep_and_none_speak_for_nothing():
