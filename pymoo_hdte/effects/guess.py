@@ -21,6 +21,7 @@ from pymoo_hdte.effects.unknowns import (
     Values,
     harmonics_among,
     is_among,
+    starts_along_each,
 )
 
 
@@ -174,6 +175,40 @@ class Guess:
         """Values from which fits start."""
         given = tuple(tuple(start) for start in self.starts)
         return given or (tuple(one.start for one in self.unknowns),)
+
+
+def guess_of_lines(
+    family: Family,
+    strength: str,
+    largest: float,
+    typical: float,
+    line: Callable[[float, float, float], Any],
+    *,
+    form: str = "",
+    sentence: str = "",
+    name: str = "",
+) -> Guess:
+    """Return a guess of what is no more than lines at the orders of a family.
+
+    Parameters
+    ----------
+    family : Family
+    strength : str
+        Name of the amplitude of a line.
+    largest, typical : float
+        Amplitudes.
+    line : callable
+        From order, amplitude and phase to a law (or another change of a drive).
+    form, sentence, name : str
+        As of `Guess`.
+    """
+    unknowns = family.waves(strength, largest, typical)
+
+    def build(values: Values) -> tuple[Any, ...]:
+        return tuple(line(*one) for one in family.lines(values))
+
+    starts = starts_along_each(unknowns)
+    return Guess(unknowns, starts, build, family, form, sentence, name=name)
 
 
 def check_response(name: str, parts: Sequence[Any], sizes: Sizes) -> None:

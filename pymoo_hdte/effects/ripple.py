@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,9 +9,8 @@ import numpy as np
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.guess import Guess, Sizes
-from pymoo_hdte.effects.law import Law, Periodic, PortState, Response
-from pymoo_hdte.effects.unknowns import Family, starts_along_each
+from pymoo_hdte.effects.guess import Guess, Sizes, guess_of_lines
+from pymoo_hdte.effects.law import Periodic, PortState, Response
 
 
 @dataclass(frozen=True)
@@ -36,17 +34,18 @@ class PeriodicTorque(Periodic):
         return complex(self.amplitude * np.exp(1j * self.phase))
 
 
+def torque_line(order: float, amplitude: float, phase: float) -> PeriodicTorque:
+    """Return one line of a ripple, as `guess_of_lines` asks for it."""
+    return PeriodicTorque(order, phase, amplitude)
+
+
 def _ripple(sizes: Sizes) -> list[Guess]:
-    found = []
-    for family in sizes.lines:
-        unknowns = family.waves("amplitude", sizes.largest, sizes.residual)
-
-        def build(values: Sequence[float], family: Family = family) -> tuple[Law, ...]:
-            lines = family.lines(values)
-            return tuple(PeriodicTorque(order, phase, size) for order, size, phase in lines)
-
-        found.append(Guess(unknowns, starts_along_each(unknowns), build, family, family.form))
-    return found
+    return [
+        guess_of_lines(
+            family, "amplitude", sizes.largest, sizes.residual, torque_line, form=family.form
+        )
+        for family in sizes.lines
+    ]
 
 
 register(

@@ -151,7 +151,8 @@ def judge(
         alone = len(chosen.members) == 1
         if not (go_on and alone) or explains_in_any_form(search, chosen):
             return _verdict(search, answer_of(search, chosen, ()))
-        search = Search(data, base, searched, screen(data, base, searched), forms)
+        screened = screened or screen(data, base, searched)
+        search = Search(data, base, searched, screened, forms)
         search.resume(known, go_on=True)
     else:
         search.singles()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -11,9 +10,8 @@ import numpy as np
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes, Lines, Session
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.guess import Guess
+from pymoo_hdte.effects.guess import Guess, guess_of_lines
 from pymoo_hdte.effects.law import Values
-from pymoo_hdte.effects.unknowns import starts_along_each
 
 ENCODER_LINE = "encoder_line"
 """Name of an error of the encoder's scale, which no verdict names: see `Guess.name`."""
@@ -105,18 +103,16 @@ def _off_centre(sizes: DriveSizes) -> list[Guess]:
 
 
 def _turning(sizes: DriveSizes, turns: float) -> Guess:
-    family = sizes.family(turns)
-    unknowns = family.waves("amplitude", sizes.largest_error, sizes.error)
+    def line(order: float, amplitude: float, phase: float) -> Eccentricity:
+        return Eccentricity(amplitude, phase, order)
 
-    def build(values: Sequence[float]) -> tuple[DriveEffect, ...]:
-        lines = family.lines(values)
-        return tuple(Eccentricity(amplitude, phase, order) for order, amplitude, phase in lines)
-
-    starts = starts_along_each(unknowns)
+    family, largest, typical = sizes.family(turns), sizes.largest_error, sizes.error
     if turns == 1.0:
-        return Guess(unknowns, starts, build, family)
+        return guess_of_lines(family, "amplitude", largest, typical, line)
     sentence = "The output encoder errs {order} times in its turn."
-    return Guess(unknowns, starts, build, family, sentence=sentence, name=ENCODER_LINE)
+    return guess_of_lines(
+        family, "amplitude", largest, typical, line, sentence=sentence, name=ENCODER_LINE
+    )
 
 
 register(

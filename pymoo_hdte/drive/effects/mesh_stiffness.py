@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -10,9 +9,8 @@ from pymoo_hdte.checks import real_number
 from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.guess import Guess
+from pymoo_hdte.effects.guess import Guess, guess_of_lines
 from pymoo_hdte.effects.stiffness import PeriodicStiffness
-from pymoo_hdte.effects.unknowns import starts_along_each
 
 WAVE_GENERATOR_ORDER = 2.0
 """Order of the effects of the wave generator's two lobes, in cycles per input turn."""
@@ -67,14 +65,11 @@ class MeshStiffnessVariation(DriveEffect):
 
 def _varying(sizes: DriveSizes) -> list[Guess]:
     """Guess the order of the two lobes with two harmonics, up to a quarter of the stiffness."""
-    family = sizes.family(WAVE_GENERATOR_ORDER, 3)
-    unknowns = family.waves("depth", 0.25, 0.02)
 
-    def build(values: Sequence[float]) -> tuple[DriveEffect, ...]:
-        lines = family.lines(values)
-        return tuple(MeshStiffnessVariation(depth, phase, order) for order, depth, phase in lines)
+    def line(order: float, depth: float, phase: float) -> MeshStiffnessVariation:
+        return MeshStiffnessVariation(depth, phase, order)
 
-    return [Guess(unknowns, starts_along_each(unknowns), build, family)]
+    return [guess_of_lines(sizes.family(WAVE_GENERATOR_ORDER, 3), "depth", 0.25, 0.02, line)]
 
 
 register(

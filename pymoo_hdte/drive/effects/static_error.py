@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -13,10 +12,10 @@ from pymoo_hdte.drive.effects.base import DriveEffect, DriveSizes
 from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.guess import Guess, Sizes
+from pymoo_hdte.effects.guess import Guess, Sizes, guess_of_lines
 from pymoo_hdte.effects.law import PortState, Response
-from pymoo_hdte.effects.ripple import PeriodicTorque
-from pymoo_hdte.effects.unknowns import Family, starts_along_each, unknown
+from pymoo_hdte.effects.ripple import PeriodicTorque, torque_line
+from pymoo_hdte.effects.unknowns import Family, unknown
 
 
 @dataclass(frozen=True)
@@ -97,53 +96,49 @@ def _lines(sizes: Any) -> list[Guess]:
 
 
 def _of_drive(sizes: DriveSizes) -> list[Guess]:
-    found = []
-    for family in sizes.further().lines:
-        unknowns = family.waves("amplitude", sizes.largest_error, sizes.error)
+    def line(order: float, amplitude: float, phase: float) -> KinematicErrorLine:
+        # Lines are cosines, the static error is a sum of sines.
+        return KinematicErrorLine(order, amplitude, phase + np.pi / 2.0)
 
-        def build(values: Sequence[float], family: Family = family) -> tuple[DriveEffect, ...]:
-            return tuple(
-                # Lines are cosines, the static error is a sum of sines.
-                KinematicErrorLine(order, amplitude, phase + np.pi / 2.0)
-                for order, amplitude, phase in family.lines(values)
-            )
-
-        found.append(Guess(unknowns, starts_along_each(unknowns), build, family))
-    return found
+    return [
+        guess_of_lines(family, "amplitude", sizes.largest_error, sizes.error, line)
+        for family in sizes.further().lines
+    ]
 
 
 def _of_reading(sizes: Sizes) -> list[Guess]:
-    found = []
-    for family in sizes.lines:
-        unknowns = family.waves("amplitude", sizes.largest, sizes.residual)
-
-        def build(values: Sequence[float], family: Family = family) -> tuple[PeriodicTorque, ...]:
-            lines = family.lines(values)
-            return tuple(PeriodicTorque(order, phase, size) for order, size, phase in lines)
-
-        sentence = (
-            "The reading of {port} varies with the position, orders {order}, and has one amplitude "
-            "at all speeds run: it is kinematic, and no {force} that moves inertias."
+    sentence = (
+        "The reading of {port} varies with the position, orders {order}, and has one amplitude "
+        "at all speeds run: it is kinematic, and no {force} that moves inertias."
+    )
+    return [
+        guess_of_lines(
+            family,
+            "amplitude",
+            sizes.largest,
+            sizes.residual,
+            torque_line,
+            form=family.form,
+            sentence=sentence,
         )
-        starts = starts_along_each(unknowns)
-        found.append(Guess(unknowns, starts, build, family, family.form, sentence))
-    return found
+        for family in sizes.lines
+    ]
 
 
 def _of_torsion(sizes: Sizes) -> list[Guess]:
     """Guess each expected order by itself, and all seen ones together."""
-    found, size = [], sizes.residual / sizes.stiffness
-    for family in (*(Family((order,)) for order in sizes.expected), *sizes.lines):
-        unknowns = family.waves("amplitude", sizes.largest / sizes.stiffness, size)
+    largest, typical = sizes.largest / sizes.stiffness, sizes.residual / sizes.stiffness
+    sentence = "The {port} errs with its angle, order {order} per turn, whatever the {force}."
 
-        def build(values: Sequence[float], family: Family = family) -> tuple[PeriodicTorque, ...]:
-            lines = family.lines(values)
-            return tuple(KinematicTorsion(order, phase, size) for order, size, phase in lines)
+    def line(order: float, amplitude: float, phase: float) -> KinematicTorsion:
+        return KinematicTorsion(order, phase, amplitude)
 
-        starts = starts_along_each(unknowns)
-        sentence = "The {port} errs with its angle, order {order} per turn, whatever the {force}."
-        found.append(Guess(unknowns, starts, build, family, family.form, sentence))
-    return found
+    return [
+        guess_of_lines(
+            family, "amplitude", largest, typical, line, form=family.form, sentence=sentence
+        )
+        for family in (*(Family((order,)) for order in sizes.expected), *sizes.lines)
+    ]
 
 
 register(
