@@ -41,7 +41,7 @@ def three_steps(patch):
     """Fits end after three steps, converged or not."""
     minimum = fitting.minimum
 
-    def unfinished(problem, start, steps, settled=0.0, known=()):
+    def unfinished(problem, start, steps, settled=0.0, known=(), rival=None):
         return minimum(problem, start, 3, settled)
 
     patch.setattr(fitting, "minimum", unfinished)

@@ -68,16 +68,17 @@ class Objective(Unknowns):
         Of the features, not whitened, (n, r, f); of sweeps and priors, whitened, (n, n_others).
         """
         n_base, steps = len(self.data.base), self.steps(values)
-        slopes = self.slopes_at(values) if self.slopes is None else self.slopes
         moved = values + np.diag(steps * self.scale)
         base, effects = self._parts(values)
+        # The steady states here are kept, as slopes leave out the records that have none here.
+        here = self._features(base, effects)[0]
+        slopes = self._slopes(values) if self.slopes is None else self.slopes
         in_sweeps = (*_IN_SWEEPS, *known_values(self.data.campaign.believed.effects))
         swept = [k for k, one in enumerate(self.data.base) if one.name in in_sweeps]
         torsion = self._torsion(np.vstack([base, moved[swept, :n_base]]), effects)
         by_base = np.zeros((n_base, torsion.shape[1]))
         by_base[swept] = (torsion[1:] - torsion[0]) / steps[swept, None]
         features, sweeps = list(slopes), list(by_base)
-        here = self._features(base, effects)[0]
         for place in range(n_base, len(values)):
             base, effects = self._parts(moved[place])
             there = self._features(base, effects, for_slopes=True)[0]
@@ -93,13 +94,16 @@ class Objective(Unknowns):
 
     def slopes_at(self, values: Vector) -> NDArray[np.float64]:
         """Return derivatives of the features by base parameters in units of their scale."""
+        self._features(*self._parts(values))
+        return self._slopes(values)
+
+    def _slopes(self, values: Vector) -> NDArray[np.float64]:
+        """Return the same at values of which the steady states are known."""
         base, effects = self._parts(values)
         n_base = base.shape[1]
         steps = self.steps(values)[:n_base]
         moving = [k for k, one in enumerate(self.data.base) if one.name not in _READ_ONLY]
         moved = base + np.diag(steps * self.scale[:n_base])
-        # The steady states here are kept, as slopes leave out the records that have none here.
-        self._features(base, effects)
         # Solved together, so that what Newton's method leaves cancels in the quotients.
         both = self._features(np.vstack([base, moved[moving]]), effects, for_slopes=True)
         here = both[0]

@@ -16,6 +16,9 @@ from pymoo_hdte.drive.solve.torus import Torus
 
 TOLERANCE = 1e-7
 """Tolerance of the harmonic balance: far below the noise, and twice as fast as full precision."""
+_OF_SLOPES = 3e-7
+"""The same for difference quotients, whose steps change the torsion by some 1e-4 of its size: the
+last step of Newton's method leaves less than a hundredth of that."""
 
 
 def steady_motions(
@@ -37,6 +40,8 @@ def steady_motions(
     """
     motor = SpeedLoop(rig.proportional, rig.integral)
 
+    tolerance = TOLERANCE
+
     def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> SteadyMotion:
         return harmonic_balance(
             coefficients.rows(rows),
@@ -44,7 +49,7 @@ def steady_motions(
             load_torque=load[rows],
             motor=motor,
             torus=torus,
-            tolerance=TOLERANCE,
+            tolerance=tolerance,
             start=None if start is None else start.rows(rows),
             steps=steps,
             tangents=True,
@@ -53,7 +58,7 @@ def steady_motions(
     bare, torus = replace(coefficients, laws=()), torus_of(coefficients)
     rattles, held = False, np.ones(len(speed), dtype=bool)
     if for_slopes and start is not None:
-        held = start.converged.copy()
+        held, tolerance = start.converged.copy(), _OF_SLOPES
     else:
         rattles = any(law.rattles for _, law in coefficients.laws)
     if rattles:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +53,7 @@ class TorsionPoints:
         """Standard deviation of each angle, rad, shape (b,)."""
         return np.sqrt(np.diag(self.covariance))
 
-    @property
+    @cached_property
     def whitening(self) -> Values:
         """Matrix (b - 1, b) that removes the angles' constant and gives them unit covariance."""
         white = np.linalg.inv(np.linalg.cholesky(self.covariance))

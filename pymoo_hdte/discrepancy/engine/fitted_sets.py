@@ -65,6 +65,12 @@ class FittedSets:
         """Return the sets of so many members, by rising BIC."""
         return [one for one in self.found if len(one.members) == size]
 
+    @property
+    def least_at_noise(self) -> float | None:
+        """Chi-square of the best set where that explains the data down to the noise."""
+        best = self.found[:1]
+        return best[0].fit.chi_square if best and self.enough(best[0]) else None
+
     def enough(self, one: Hypothesis) -> bool:
         """Tell whether a set explains the data down to the noise, and has what is evident."""
         return self.forms.leaves_noise(one) and not self.lacks_evident(one)
@@ -159,17 +165,26 @@ class FittedSets:
         return self.finished(self.fitted(kept, one.values_of(kept), again))
 
     def fitted(
-        self, effects: Effects, start: Vector, again: bool = False, steps: int | None = None
+        self,
+        effects: Effects,
+        start: Vector,
+        again: bool = False,
+        steps: int | None = None,
+        rival: float | None = None,
     ) -> Hypothesis:
         """Return a set fitted from a start so far as to rank it, in ``steps`` as of `fit`.
 
-        A set that is known already is fitted ``again`` only where that is asked for; the better
-        of both fits is kept.
+        A set that is known already is fitted ``again`` only where that is asked for, at most until
+        it arrives at the known fit; the better of both is kept. A fit beside a ``rival`` ends as
+        soon as it will not come near that chi-square.
         """
         label = label_of(effects)
-        if label not in self._by_label or again:
-            found = fit(self.data, effects, start, steps, self.data.rules.trial_gain)
-            trial, known = hypothesis_of(found, self.excess), self._by_label.get(label)
+        known = self._by_label.get(label)
+        if known is None or again:
+            ends = [known.fit] if known and known.candidates == effects else []
+            settled = self.data.rules.trial_gain
+            found = fit(self.data, effects, start, steps, settled, ends, rival)
+            trial = hypothesis_of(found, self.excess)
             if known is None or trial.bic < known.bic:
                 self._by_label[label] = trial
                 self._finished.discard(label)
@@ -188,7 +203,7 @@ class FittedSets:
         label = label_of(one.candidates)
         if label not in self._finished or starts:
             if self._resumed:
-                best = fit(self.data, one.candidates, one.fit.values)
+                best = fit(self.data, one.candidates, one.fit)
             else:
                 best = best_fit(self.data, one, starts, self._by_label.values())
             self._by_label[label] = hypothesis_of(best, self.excess)
@@ -220,13 +235,13 @@ class FittedSets:
     def finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near.
 
-        If the best set has several effects and leaves no more than noise, or the sets are known
-        from another search, only those that may come as near.
+        If the best set leaves no more than noise, or the sets are known from another search, only
+        those that may come as near.
         """
         for place in range(len(self.of_size(size))):
             same = self.of_size(size)
             best, one = same[0], same[place]
-            alone = self._resumed or (size > 1 and self.enough(best))
+            alone = self._resumed or self.enough(best)
             first = place < (1 if alone else self.data.rules.most_firsts)
             if first or self.may_come_as_near(one, best):
                 self.finished(one)

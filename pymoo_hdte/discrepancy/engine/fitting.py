@@ -54,6 +54,11 @@ class Fit:
         return float(self.residuals @ self.residuals)
 
     @property
+    def minimum(self) -> Minimum:
+        """Where the search ended."""
+        return Minimum(self.values, self.residuals, self.jacobian)
+
+    @property
     def effects(self) -> tuple[Any, ...]:
         """The fitted effects."""
         return tuple(effect for parts in self.effects_by_candidate for effect in parts)
@@ -128,22 +133,26 @@ class Fit:
 def fit(
     data: Evidence,
     candidates: Sequence[Candidate] = (),
-    start: Vector | None = None,
+    start: Vector | Fit | None = None,
     steps: int | None = None,
     settled: float = SETTLED_SHARE,
     known: Sequence[Fit] = (),
+    rival: float | None = None,
 ) -> Fit:
     """Fit base parameters and those of candidates from ``start`` (by default their own starts).
 
+    An earlier fit of the same candidates to the same data may be the start: the search goes on.
     It takes at most ``steps`` steps, by default as many as the rules allow, and ends earlier where
-    one removes less than the share ``settled`` of chi-square, or where it arrives at a ``known``
-    fit of the same candidates.
+    one removes less than the share ``settled`` of chi-square, where it arrives at a ``known`` fit
+    of the same candidates, or where it will not come near the chi-square of a ``rival``.
     """
     objective = data.objective(candidates)
-    begin = objective.start if start is None else start
     most = data.rules.fit_evaluations if steps is None else steps
-    ends = [Minimum(one.values, one.residuals, one.jacobian) for one in known]
-    found = minimum(objective, begin, most, settled, ends)
+    ends = [one.minimum for one in known]
+    if start is None:
+        start = objective.start
+    begin = start.minimum if isinstance(start, Fit) else start
+    found = minimum(objective, begin, most, settled, ends, rival)
     return Fit(objective.candidates, objective.parameters, *found)
 
 

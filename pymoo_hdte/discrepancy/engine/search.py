@@ -91,8 +91,9 @@ class Search(FittedSets):
             self.finish_near(size + 1)
 
     def alone(self, one: Screened) -> Hypothesis:
-        """Return a single effect, fitted so far as to rank it."""
-        return self.fitted((one.candidate,), np.append(self.base.values, one.start))
+        """Return a single effect, fitted so far as to rank it, beside one that leaves noise."""
+        start = np.append(self.base.values, one.start)
+        return self.fitted((one.candidate,), start, rival=self.least_at_noise)
 
     def _parameters(self) -> None:
         """Fit all base parameters that want to leave their tolerances together.

@@ -41,7 +41,7 @@ def best_fit(
     found : iterable of Hypothesis
         Sets that it may contain: where it does no better than one of them, other shapes are tried.
     """
-    fits = [fit(data, one.candidates, one.fit.values)]
+    fits = [fit(data, one.candidates, one.fit)]
 
     def fit_from(further: Iterable[Vector]) -> Fit:
         for start in further:

@@ -14,13 +14,14 @@ The mean of 1/w is that of the wanted speed, whose sign w has: a drive may turn 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.drive.solve.coefficients import Coefficients
-from pymoo_hdte.drive.solve.steady_motion import CONSTANT_TORQUE, Phasors, SpeedLoop
+from pymoo_hdte.drive.solve.steady_motion import Phasors, SpeedLoop
 from pymoo_hdte.drive.solve.torus import Matrices, Torus
 from pymoo_hdte.effects.law import Memory, PortState, Response
 
@@ -95,29 +96,31 @@ class AngleEquations:
 
     def at_wanted_speed(self, energy: Phasors) -> Phasors:
         """Return E scaled such that the mean of 1/w is that of the wanted speed."""
-        return energy * (self.speed * mean(1.0 / self._angular_speed(energy))) ** 2
+        angular_speed = self._angular_speed(self.torus.signal(energy))
+        return energy * (self.speed * mean(1.0 / angular_speed)) ** 2
 
-    def _angular_speed(self, energy: Phasors) -> Values:
-        size = np.sqrt(2.0 * np.maximum(self.torus.signal(energy), 1e-12))
+    def _angular_speed(self, energy: Values) -> Values:
+        size = np.sqrt(2.0 * np.maximum(energy, 1e-12))
         return np.copysign(size, self.speed)
 
     def motion(self, torsion: Phasors, energy: Phasors) -> TorsionMotion:
         """Evaluate torsion and E on the grid, with the resulting torques."""
         torus, coefficients = self.torus, self.coefficients
-        angular_speed = self._angular_speed(energy)
-        energy_slope = torus.signal(torus.derivative(energy))
-        error = self.static + torsion
-        slope = torus.signal(torus.derivative(torsion))
-        error_slope = self._static_slope + slope
-        error_curvature = torus.signal(torus.derivative(torus.derivative(error)))
+        slope, error = torus.derivative(torsion), self.static + torsion
+        curvature = torus.derivative(torus.derivative(error))
+        each = (energy, torus.derivative(energy), torsion, slope, curvature)
+        # In one call: most of the time of a small one goes by before it begins.
+        signals = torus.signal(np.concatenate(each)).reshape(len(each), -1, torus.size)
+        energy_there, energy_slope, position, slope_there, error_curvature = signals
+        angular_speed = self._angular_speed(energy_there)
+        error_slope = self._static_slope + slope_there
         output_acceleration = (
             energy_slope / coefficients.ratio
             - angular_speed**2 * error_curvature
             - energy_slope * error_slope
         )
         output_speed = angular_speed * (1.0 / coefficients.ratio - error_slope)
-        position = torus.signal(torsion)
-        rate = angular_speed * slope
+        rate = angular_speed * slope_there
         stiffness = coefficients.stiffness[:, None] * self._varying
         damping = coefficients.damping[:, None]
         mesh = self._laws("mesh", position, rate)
@@ -222,8 +225,11 @@ class AngleEquations:
         """Return the torque, N.m, that the output passes on to load, bearings and laws there."""
         return self.output_damping * motion.output_speed + motion.output_friction + self.load
 
-    def input_residual(self, motion: TorsionMotion, loop_torque: Values) -> Phasors:
-        """Return the residual of the first equation, N.m; its mean is the motor's constant."""
+    def input_residual(self, motion: TorsionMotion, lead: Phasors | float) -> Phasors:
+        """Return the residual of the first equation, N.m; its mean is the motor's constant.
+
+        ``lead`` is that of the motion.
+        """
         coefficients = self.coefficients
         reaction = coefficients.reaction * self._static_slope
         still = np.zeros_like(motion.angular_speed)
@@ -235,23 +241,26 @@ class AngleEquations:
             + friction.torque
             + motion.mesh_torque * (1.0 / coefficients.ratio - reaction)
         )
-        return self.torus.phasors(resisting - loop_torque)
+        driving = self.motor.proportional * (self.speed - motion.angular_speed)
+        return self.torus.phasors(resisting - driving) + self.motor.integral * lead
 
     def lead(self, motion: TorsionMotion) -> Phasors:
-        """Return alpha - Omega t."""
+        """Return alpha - Omega t, minus the integral of the speed that is missing."""
         return -self.torus.integral(self.torus.phasors(self.speed / motion.angular_speed))
 
-    def loop_torque(self, motion: TorsionMotion, lead: Phasors | None = None) -> Values:
+    def loop_torque(self, motion: TorsionMotion, lead: Phasors) -> Phasors:
         """Return the motor's torque without its constant; ``lead`` is that of the motion."""
-        motor = self.motor
-        if motor == CONSTANT_TORQUE:
-            return np.zeros_like(motion.angular_speed)
-        # The integral of w_set - w is Omega t - alpha.
-        late = -self.torus.signal(self.lead(motion) if lead is None else lead)
-        return motor.proportional * (self.speed - motion.angular_speed) + motor.integral * late
+        slower = self.torus.phasors(self.speed - motion.angular_speed)
+        return self.motor.proportional * slower - self.motor.integral * lead
 
+    @cached_property
+    def rate(self) -> Phasors:
+        """Angular frequency of each harmonic, times 1j, shape (n, n_harmonics)."""
+        return np.asarray(1j * self.torus.orders * self.speed)
+
+    @cached_property
     def input_operator(self) -> Phasors:
-        """Return A, motor torque per unit of E of the free input, linear in E; 1 for the mean."""
+        """N A: A, motor torque per unit of E of the free input, is linear in E; 1 at the mean."""
         coefficients, motor = self.coefficients, self.motor
         orders = np.where(self.torus.orders == 0.0, 1.0, self.torus.orders)
         damping = coefficients.input_damping[:, None] + motor.proportional
@@ -261,25 +270,30 @@ class AngleEquations:
             + motor.integral / (1j * orders * self.speed**2)
         )
         operator[:, 0] = 1.0
-        return operator
+        return coefficients.ratio * operator
 
-    def impedance(self, friction: Values, operator: Phasors) -> tuple[Phasors, Phasors, Phasors]:
+    def impedance(self, friction: Values) -> tuple[Phasors, Phasors, Phasors]:
         """Return mesh torque per transmission error P of the free inertias, C, and 1 + C / (N A).
 
-        C is the output's torque per unit of E, A the motor's (`input_operator`); ``friction`` is
-        the damping (n, 1) of the laws at the output, and ``operator`` is N A.
+        C is the output's torque per unit of E, N A that of the motor (`input_operator`);
+        ``friction`` is the damping (n, 1) of the laws at the output.
         """
-        frequency = self.torus.orders * self.speed
         damping = self.output_damping + friction
-        rates = self.coefficients.load_rates
-        inertia = self.output_inertia + self.coefficients.inertia_in_clutches(frequency)
-        inertia = inertia + sum(size * (1j * frequency) ** k for k, size in rates)
-        output = inertia * frequency**2 - 1j * frequency * damping
-        coupling = 1j * self.torus.orders * inertia + damping / self.speed
-        coupling = coupling / self.coefficients.ratio
-        share = 1.0 + coupling / operator
+        of_inertia, coupling = self._of_inertia
+        output = of_inertia - self.rate * damping
+        coupling = coupling + damping / (self.speed * self.coefficients.ratio)
+        share = 1.0 + coupling / self.input_operator
         share[:, 0] = 1.0
         return output / share, coupling, share
+
+    @cached_property
+    def _of_inertia(self) -> tuple[Phasors, Phasors]:
+        """What the inertia adds to P (before it is shared) and to C of `impedance`."""
+        frequency = self.torus.orders * self.speed
+        rates = self.coefficients.load_rates
+        inertia = self.output_inertia + self.coefficients.inertia_in_clutches(frequency)
+        inertia = inertia + sum(size * self.rate**k for k, size in rates)
+        return inertia * frequency**2, 1j * self.torus.orders * inertia / self.coefficients.ratio
 
 
 def mean(values: Values | float) -> Values:

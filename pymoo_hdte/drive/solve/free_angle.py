@@ -250,7 +250,7 @@ class _Solver:
                 left, before, factors = left[kept], before[kept], [factors[one] for one in kept]
                 least, waited, distance = least[kept], waited[kept], distance[kept]
                 equations = self.equations.rows(left)
-                at = Place(equations, self.torsion[left], self.energy[left])
+                at = at.rows(equations, kept)
 
     def factors(self, rows: NDArray[np.int_]) -> list[Factors | None]:
         """Return the factored matrices of Newton's method of some rows as they are now."""
@@ -264,13 +264,13 @@ class _Solver:
         torus, coefficients = equations.torus, equations.coefficients
         inertia = np.reshape(coefficients.load_inertia, (-1, 1))
         lead = equations.lead(motion)
-        loop_torque = equations.loop_torque(motion, lead)
-        constant = equations.input_residual(motion, loop_torque)[:, :1].real
+        motor_torque = equations.loop_torque(motion, lead)
+        motor_torque[:, :1] += equations.input_residual(motion, lead)[:, :1].real
         return SteadyMotion(
             torus=torus,
             transmission_error=equations.static + self.torsion,
             torsion=self.torsion,
-            motor_torque=torus.phasors(loop_torque + constant),
+            motor_torque=motor_torque,
             coupling_torque=torus.phasors(
                 equations.load
                 + inertia * motion.output_acceleration

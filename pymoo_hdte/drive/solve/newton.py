@@ -8,6 +8,7 @@ far as it reduces what the equations leave.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 import scipy
@@ -24,6 +25,12 @@ _LEAST_PART = 1.0 / 16.0
 """Smallest part of a step that is tried; of 756 cases of stiff springs it lost the fewest."""
 
 
+_BY_ROW = (
+    "torsion", "energy", "distance", "_mesh_slope", "_impedance", "_energy_change", "_left",
+    "_viscous", "_level",
+)  # fmt: skip
+
+
 class Place:
     """A torsion and E of all rows, with what the equations leave there.
 
@@ -38,22 +45,32 @@ class Place:
 
     def __init__(self, equations: AngleEquations, torsion: Phasors, energy: Phasors) -> None:
         self.equations, self.torsion, self.energy = equations, torsion, energy
-        self._motion = motion = equations.motion(torsion, energy)
+        motion = equations.motion(torsion, energy)
+        self._mesh_slope = motion.mesh_slope
         ratio = equations.coefficients.ratio
-        self._operator = ratio * equations.input_operator()
+        self._operator = equations.input_operator
         loss = mean(motion.output_loss)
-        self._impedance, coupling, share = equations.impedance(loss, self._operator)
-        missing = equations.input_residual(motion, equations.loop_torque(motion))
+        self._impedance, coupling, share = equations.impedance(loss)
+        # A motor of constant torque does not ask how far the input lags.
+        lead = equations.lead(motion) if equations.motor.integral else 0.0
+        missing = equations.input_residual(motion, lead)
         self._energy_change = -ratio * missing / self._operator
         self._energy_change[:, 0] = 0.0
         self._left = (equations.output_residual(motion) + coupling * self._energy_change) / share
-        rate = 1j * equations.torus.orders * equations.speed
-        self._viscous = rate * mean(motion.mesh_damping) - self._impedance
+        self._viscous = equations.rate * mean(motion.mesh_damping) - self._impedance
         self._level = mean(motion.mesh_slope)
         of_each = self._left / (np.abs(self._level) + np.abs(self._viscous))
         distance = np.linalg.norm(of_each, axis=1, keepdims=True)
         # A row that has diverged is farther away than any other place.
         self.distance = np.where(np.isnan(distance), np.inf, distance)
+
+    def rows(self, equations: AngleEquations, rows: NDArray[np.int_]) -> Place:
+        """Return the place of some of the rows, whose equations are given."""
+        some = copy(self)
+        some.equations, some._operator = equations, equations.input_operator
+        for name in _BY_ROW:
+            setattr(some, name, getattr(self, name)[rows])
+        return some
 
     def moved(self, change: Phasors, energy_change: Phasors) -> Place:
         """Return the place after a change, at the wanted speed."""
@@ -105,7 +122,7 @@ class Place:
         if equations.remembers:
             of_rows = equations if len(rows) == len(self.torsion) else equations.rows(rows)
             recall = of_rows.recall_matrix(self.torsion[rows])
-        slope, level = self._motion.mesh_slope[rows], self._level[rows]
+        slope, level = self._mesh_slope[rows], self._level[rows]
         varies = np.abs(slope - level) > _NEARLY_CONSTANT * np.abs(level)
         if not (equations.remembers or np.any(varies)):
             return None

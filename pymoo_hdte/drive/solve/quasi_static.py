@@ -113,10 +113,9 @@ class _Mesh:
 
     def respond(self, torsion: Values, turns: Values) -> Response:
         """Return the torque at torsions (n, m) that each follow the turning points (n, k)."""
-        earlier = np.repeat(turns, torsion.shape[1], axis=0)
 
         def path(values: Values) -> Values:
-            return np.column_stack([earlier, values.ravel()])
+            return np.column_stack([np.repeat(turns, torsion.shape[1], axis=0), values.ravel()])
 
         def back(values: Values) -> Values:
             return values[:, -1].reshape(torsion.shape)
@@ -205,6 +204,8 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
 
 def _play(torque: Values, breakaway: float) -> Values:
     """Return the torque that dry friction transmits to the mesh, from rest."""
+    if breakaway == 0.0:
+        return torque
     held = np.empty_like(torque)
     last = 0.0
     for sample, load in enumerate(torque):

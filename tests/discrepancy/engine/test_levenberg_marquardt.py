@@ -32,10 +32,11 @@ class TwoMinima:
         return np.array([[2.0 * WEIGHT * values[0], 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
-def found(start, known=()):
+def found(start, known=(), rival=None):
     """Where a search ends, and how often it asked for derivatives."""
     problem = TwoMinima()
-    values, residuals, jacobian = minimum(problem, np.array(start), 40, known=known)
+    begin = start.minimum if isinstance(start, Fit) else np.array(start)
+    values, residuals, jacobian = minimum(problem, begin, 40, known=known, rival=rival)
     return Fit((), (), values, residuals, jacobian), problem.asked["jacobian"]
 
 
@@ -65,3 +66,34 @@ def test_a_known_minimum_elsewhere_or_a_worse_one_ends_no_search():
     # A place beside the minimum that claims to be one.
     beside = Fit((), (), low.values + np.array([0.0, 0.3]), np.array([0.0, 0.3, 0.3]), low.jacobian)
     assert found([3.0, 2.0], [beside])[0].values == pytest.approx(low.values, abs=NEAR)
+
+
+def test_a_search_goes_on_with_the_derivatives_of_an_earlier_one():
+    """From its values alone, derivatives would be computed once more."""
+    far = Fit((), (), *minimum(TwoMinima(), np.array([3.0, 2.0]), 1))
+    assert far.chi_square > 2.0 * SETTLED
+    again, derived = found(far)
+    from_values, whole = found(far.values)
+    assert derived < whole
+    assert again.values == pytest.approx(from_values.values, abs=NEAR)
+
+
+def test_a_search_goes_on_past_derivatives_of_another_place():
+    """They promise no way down from here."""
+    problem, there = TwoMinima(), np.array([3.0, 2.0])
+    elsewhere = Fit((), (), there, problem.residuals(there), np.zeros((3, 2)))
+    assert found(elsewhere)[0].values == pytest.approx([1.0, 0.0], abs=NEAR)
+
+
+@pytest.mark.parametrize(("rival", "ends"), [(0.05, True), (0.5, False), (None, False)])
+def test_a_search_ends_that_will_not_come_near_a_rival(rival, ends):
+    """The minimum at (-1, 1) leaves 2, forty times the one and four times the other rival."""
+    high, whole = found([-3.0, 2.0])
+    beside, derived = found([-3.0, 2.0], rival=rival)
+    assert (derived < whole) == ends
+    if not ends:
+        assert beside.values == pytest.approx(high.values, abs=NEAR)
+
+
+def test_a_search_that_comes_near_a_rival_goes_on():
+    assert found([3.0, 2.0], rival=0.05)[0].values == pytest.approx([1.0, 0.0], abs=NEAR)

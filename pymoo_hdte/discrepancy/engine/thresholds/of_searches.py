@@ -84,7 +84,7 @@ class SearchRules(RuleSet):
         2,
         "1",
         "Single effects that are extended by a further one, and sets of one size that are fitted "
-        "to the end however far apart; one alone where several effects leave no more than noise. A "
+        "to the end however far apart; one alone where the best leaves no more than noise. A "
         "second single that leaves the same as the first is not extended anew.",
         f"{BY_HAND}: the better of two effects alone need not be one of both.",
     )
