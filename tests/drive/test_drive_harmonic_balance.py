@@ -27,8 +27,9 @@ from pymoo_hdte.drive.effects import (
     LawAtPort,
     effect_from_fields,
 )
+from pymoo_hdte.drive.solve.angle_equations import AngleEquations
 from pymoo_hdte.drive.solve.free_angle import harmonic_balance
-from pymoo_hdte.drive.solve.newton import factored, multiplication, stacked, unstacked
+from pymoo_hdte.drive.solve.newton import Place, factored, multiplication, stacked, unstacked
 from pymoo_hdte.drive.solve.steady_motion import SpeedLoop
 from pymoo_hdte.drive.solve.torus import (
     Torus,
@@ -505,3 +506,31 @@ def test_springs_together_pull_as_much_as_one_after_the_other(rng):
 def test_a_singular_matrix_leads_to_no_number():
     triangles, pivots = factored(np.array([[1.0, 2.0], [2.0, 4.0]]))
     assert not np.isfinite(scipy.linalg.lapack.dgetrs(triangles, pivots, np.ones(2))[0]).any()
+
+
+@pytest.mark.parametrize("motor", [SpeedLoop(), SpeedLoop(0.02, 0.5)])
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (),
+        (LawAtPort("coulomb_friction", "output", CoulombFriction(0.3)),),
+        (LawAtPort("soft_windup", "mesh", SoftWindup(0.2, 1e-4)),),
+        (LawAtPort("hysteresis", "mesh", MaxwellSlip(5.0, 1e-4)),),
+    ],
+)
+def test_the_place_of_some_rows_is_what_is_evaluated_there(effects, motor):
+    """A step of those rows alone goes where it would with places of their own."""
+    model = with_effects(preset("calibrated"), *effects)
+    coefficients = model.coefficients(np.tile(model.nominal, (4, 1)))
+    speed, load = np.array([20.0, -60.0, 90.0, 150.0]), np.array([5.0, 20.0, -20.0, 40.0])
+    motion = harmonic_balance(coefficients, input_speed=speed, load_torque=load, motor=motor)
+    equations = AngleEquations(coefficients, speed, load, motor, motion.torus)
+    torsion = 1.1 * motion.torsion
+    rows = np.array([1, 3])
+    some = equations.rows(rows)
+    kept = Place(equations, torsion, motion.energy).rows(some, rows)
+    fresh = Place(some, torsion[rows], motion.energy[rows])
+    np.testing.assert_allclose(kept.distance, fresh.distance, rtol=1e-12)
+    both = [one.newton_step(np.ones((2, 1)), one.factors(np.arange(2))) for one in (kept, fresh)]
+    for found, expected in zip(*both, strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())

@@ -41,7 +41,7 @@ def three_steps(patch):
     """Fits end after three steps, converged or not."""
     minimum = fitting.minimum
 
-    def unfinished(problem, start, steps, settled=0.0, known=(), rival=None):
+    def unfinished(problem, start, steps, settled=0.0, known=(), hopeless=0.0):
         return minimum(problem, start, 3, settled)
 
     patch.setattr(fitting, "minimum", unfinished)

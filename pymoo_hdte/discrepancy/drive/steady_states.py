@@ -17,8 +17,8 @@ from pymoo_hdte.drive.solve.torus import Torus
 TOLERANCE = 1e-7
 """Tolerance of the harmonic balance: far below the noise, and twice as fast as full precision."""
 _OF_SLOPES = 3e-7
-"""The same for difference quotients, whose steps change the torsion by some 1e-4 of its size: the
-last step of Newton's method leaves less than a hundredth of that."""
+"""The same for difference quotients: on a seen campaign it moves the worst derivative, which
+forward quotients give to .3 %, by .2 %."""
 
 
 def steady_motions(

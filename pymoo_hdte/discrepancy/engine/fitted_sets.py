@@ -66,10 +66,13 @@ class FittedSets:
         return [one for one in self.found if len(one.members) == size]
 
     @property
-    def least_at_noise(self) -> float | None:
-        """Chi-square of the best set where that explains the data down to the noise."""
-        best = self.found[:1]
-        return best[0].fit.chi_square if best and self.enough(best[0]) else None
+    def hopeless(self) -> float:
+        """Chi-square beyond which a fit will not come near a set that leaves no more than noise."""
+        best, rules = self.found[:1], self.data.rules
+        if not (best and self.enough(best[0])):
+            return np.inf
+        share = rules.outdone_share * self.base.chi_square
+        return max(rules.contradicting_chi_square * best[0].fit.chi_square, share)
 
     def enough(self, one: Hypothesis) -> bool:
         """Tell whether a set explains the data down to the noise, and has what is evident."""
@@ -170,20 +173,19 @@ class FittedSets:
         start: Vector,
         again: bool = False,
         steps: int | None = None,
-        rival: float | None = None,
+        hopeless: float = np.inf,
     ) -> Hypothesis:
         """Return a set fitted from a start so far as to rank it, in ``steps`` as of `fit`.
 
         A set that is known already is fitted ``again`` only where that is asked for, at most until
-        it arrives at the known fit; the better of both is kept. A fit beside a ``rival`` ends as
-        soon as it will not come near that chi-square.
+        it arrives at the known fit; the better of both is kept. ``hopeless`` is as of `fit`.
         """
         label = label_of(effects)
         known = self._by_label.get(label)
         if known is None or again:
             ends = [known.fit] if known and known.candidates == effects else []
             settled = self.data.rules.trial_gain
-            found = fit(self.data, effects, start, steps, settled, ends, rival)
+            found = fit(self.data, effects, start, steps, settled, ends, hopeless)
             trial = hypothesis_of(found, self.excess)
             if known is None or trial.bic < known.bic:
                 self._by_label[label] = trial
@@ -235,22 +237,26 @@ class FittedSets:
     def finish_near(self, size: int) -> None:
         """Fit the best sets of a size to the end, and those that may come as near.
 
-        If the best set leaves no more than noise, or the sets are known from another search, only
-        those that may come as near.
+        If the best set leaves no more than noise (a single one with sensors as they are stated), or
+        the sets are known from another search, only those that may come as near.
         """
         for place in range(len(self.of_size(size))):
             same = self.of_size(size)
             best, one = same[0], same[place]
-            alone = self._resumed or self.enough(best)
+            last = self.enough(best) and (size > 1 or not self.held_by_sensors(best))
+            alone = self._resumed or last
             first = place < (1 if alone else self.data.rules.most_firsts)
             if first or self.may_come_as_near(one, best):
                 self.finished(one)
 
     def may_come_as_near(self, one: Hypothesis, best: Hypothesis) -> bool:
         """Tell whether a set may come as near as the best once both are fitted to the end."""
-        near = self.data.rules.refit_margin * self.data.rules.evidence_distance
-        misfit = misfit_of(best, self.degrees_of_freedom)
-        return one.bic - best.bic < near * misfit
+        rules = self.data.rules
+        near = rules.evidence_distance * misfit_of(best, self.degrees_of_freedom)
+        if len(one.members) == 1:
+            # Forms that leave the same are alike however far apart by evidence.
+            near = max(near, rules.form_share**2 * best.removed)
+        return one.bic - best.bic < rules.refit_margin * near
 
 
 def may_be_together(effects: Effects) -> bool:

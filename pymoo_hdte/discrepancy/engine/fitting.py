@@ -137,14 +137,14 @@ def fit(
     steps: int | None = None,
     settled: float = SETTLED_SHARE,
     known: Sequence[Fit] = (),
-    rival: float | None = None,
+    hopeless: float = np.inf,
 ) -> Fit:
     """Fit base parameters and those of candidates from ``start`` (by default their own starts).
 
     An earlier fit of the same candidates to the same data may be the start: the search goes on.
     It takes at most ``steps`` steps, by default as many as the rules allow, and ends earlier where
     one removes less than the share ``settled`` of chi-square, where it arrives at a ``known`` fit
-    of the same candidates, or where it will not come near the chi-square of a ``rival``.
+    of the same candidates, or where it will leave more than a ``hopeless`` chi-square.
     """
     objective = data.objective(candidates)
     most = data.rules.fit_evaluations if steps is None else steps
@@ -152,7 +152,7 @@ def fit(
     if start is None:
         start = objective.start
     begin = start.minimum if isinstance(start, Fit) else start
-    found = minimum(objective, begin, most, settled, ends, rival)
+    found = minimum(objective, begin, most, settled, ends, hopeless)
     return Fit(objective.candidates, objective.parameters, *found)
 
 

@@ -93,7 +93,7 @@ class Search(FittedSets):
     def alone(self, one: Screened) -> Hypothesis:
         """Return a single effect, fitted so far as to rank it, beside one that leaves noise."""
         start = np.append(self.base.values, one.start)
-        return self.fitted((one.candidate,), start, rival=self.least_at_noise)
+        return self.fitted((one.candidate,), start, hopeless=self.hopeless)
 
     def _parameters(self) -> None:
         """Fit all base parameters that want to leave their tolerances together.

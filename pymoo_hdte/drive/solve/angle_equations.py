@@ -260,7 +260,7 @@ class AngleEquations:
 
     @cached_property
     def input_operator(self) -> Phasors:
-        """N A: A, motor torque per unit of E of the free input, is linear in E; 1 at the mean."""
+        """N A: A, motor torque per unit of E of the free input, linear in E; N at the mean."""
         coefficients, motor = self.coefficients, self.motor
         orders = np.where(self.torus.orders == 0.0, 1.0, self.torus.orders)
         damping = coefficients.input_damping[:, None] + motor.proportional

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pymoo_hdte.discrepancy.engine.fitting import Fit
-from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SETTLED, minimum
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SETTLED, is_hopeless, minimum
 
 WEIGHT = 100.0
 NEAR = np.sqrt(SETTLED)
@@ -32,11 +32,11 @@ class TwoMinima:
         return np.array([[2.0 * WEIGHT * values[0], 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
-def found(start, known=(), rival=None):
+def found(start, known=(), hopeless=np.inf):
     """Where a search ends, and how often it asked for derivatives."""
     problem = TwoMinima()
     begin = start.minimum if isinstance(start, Fit) else np.array(start)
-    values, residuals, jacobian = minimum(problem, begin, 40, known=known, rival=rival)
+    values, residuals, jacobian = minimum(problem, begin, 40, known=known, hopeless=hopeless)
     return Fit((), (), values, residuals, jacobian), problem.asked["jacobian"]
 
 
@@ -85,15 +85,31 @@ def test_a_search_goes_on_past_derivatives_of_another_place():
     assert found(elsewhere)[0].values == pytest.approx([1.0, 0.0], abs=NEAR)
 
 
-@pytest.mark.parametrize(("rival", "ends"), [(0.05, True), (0.5, False), (None, False)])
-def test_a_search_ends_that_will_not_come_near_a_rival(rival, ends):
-    """The minimum at (-1, 1) leaves 2, forty times the one and four times the other rival."""
+@pytest.mark.parametrize(("hopeless", "ends"), [(1.0, True), (3.0, False), (np.inf, False)])
+def test_a_search_ends_that_will_leave_too_much(hopeless, ends):
+    """At the minimum at (-1, 1) 2 is left."""
     high, whole = found([-3.0, 2.0])
-    beside, derived = found([-3.0, 2.0], rival=rival)
+    beside, derived = found([-3.0, 2.0], hopeless=hopeless)
     assert (derived < whole) == ends
     if not ends:
         assert beside.values == pytest.approx(high.values, abs=NEAR)
 
 
-def test_a_search_that_comes_near_a_rival_goes_on():
-    assert found([3.0, 2.0], rival=0.05)[0].values == pytest.approx([1.0, 0.0], abs=NEAR)
+def test_a_search_that_leaves_little_goes_on():
+    assert found([3.0, 2.0], hopeless=1.0)[0].values == pytest.approx([1.0, 0.0], abs=NEAR)
+
+
+@pytest.mark.parametrize(
+    ("promised", "ends"),
+    [
+        ([69.0], False),
+        ([69.0, 29.0], False),
+        ([69.0, 40.0], True),
+        ([9.0, 40.0], False),
+        ([69.0, 19.0], False),
+        ([900.0, 69.0, 40.0], True),
+    ],
+)
+def test_a_search_is_hopeless_once_two_promises_are_hardly_better(promised, ends):
+    """The first two are those of hysteresis, which was right."""
+    assert is_hopeless(promised, 20.0) == ends
