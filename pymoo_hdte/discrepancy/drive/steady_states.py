@@ -39,8 +39,8 @@ def steady_motions(
     on one side of a difference only would make a slope of the jump.
     """
     motor = SpeedLoop(rig.proportional, rig.integral)
-
-    tolerance = TOLERANCE
+    near = start if for_slopes else None
+    tolerance = TOLERANCE if near is None else _OF_SLOPES
 
     def solve(coefficients: Coefficients, rows: NDArray[np.int_], torus: Torus) -> SteadyMotion:
         return harmonic_balance(
@@ -57,8 +57,8 @@ def steady_motions(
 
     bare, torus = replace(coefficients, laws=()), torus_of(coefficients)
     rattles, held = False, np.ones(len(speed), dtype=bool)
-    if for_slopes and start is not None:
-        held, tolerance = start.converged.copy(), _OF_SLOPES
+    if near is not None:
+        held = near.converged.copy()
     else:
         rattles = any(law.rattles for _, law in coefficients.laws)
     if rattles:

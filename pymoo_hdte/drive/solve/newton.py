@@ -48,13 +48,13 @@ class Place:
         motion = equations.motion(torsion, energy)
         self._mesh_slope = motion.mesh_slope
         ratio = equations.coefficients.ratio
-        self._operator = equations.input_operator
+        operator = equations.input_operator
         loss = mean(motion.output_loss)
         self._impedance, coupling, share = equations.impedance(loss)
         # A motor of constant torque does not ask how far the input lags.
         lead = equations.lead(motion) if equations.motor.integral else 0.0
         missing = equations.input_residual(motion, lead)
-        self._energy_change = -ratio * missing / self._operator
+        self._energy_change = -ratio * missing / operator
         self._energy_change[:, 0] = 0.0
         self._left = (equations.output_residual(motion) + coupling * self._energy_change) / share
         self._viscous = equations.rate * mean(motion.mesh_damping) - self._impedance
@@ -67,7 +67,7 @@ class Place:
     def rows(self, equations: AngleEquations, rows: NDArray[np.int_]) -> Place:
         """Return the place of some of the rows, whose equations are given."""
         some = copy(self)
-        some.equations, some._operator = equations, equations.input_operator
+        some.equations = equations
         for name in _BY_ROW:
             setattr(some, name, getattr(self, name)[rows])
         return some
@@ -90,7 +90,8 @@ class Place:
         longest = np.abs(change).max(axis=1, keepdims=True)
         change *= np.minimum(1.0, size / np.maximum(longest, 1e-300))
         energy_change = self._energy_change.copy()
-        energy_change[:, 1:] -= ((self._left + self._impedance * change) / self._operator)[:, 1:]
+        operator = self.equations.input_operator
+        energy_change[:, 1:] -= ((self._left + self._impedance * change) / operator)[:, 1:]
         # Nor may the speed come near zero on the way.
         largest = np.abs(energy_change).sum(axis=1, keepdims=True)
         slowest = 0.5 * self.energy[:, :1].real
