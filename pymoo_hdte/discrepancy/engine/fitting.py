@@ -54,6 +54,11 @@ class Fit:
         return float(self.residuals @ self.residuals)
 
     @property
+    def misfit(self) -> float:
+        """Chi-square per degree of freedom, 1 at least: what a residual is beside its noise."""
+        return max(self.chi_square / max(len(self.residuals) - len(self.values), 1), 1.0)
+
+    @property
     def minimum(self) -> Minimum:
         """Where the search ended."""
         return Minimum(self.values, self.residuals, self.jacobian)
@@ -105,8 +110,7 @@ class Fit:
         variance of a uniform distribution between them, which is that of a value that no record
         determines.
         """
-        degrees_of_freedom = max(len(self.residuals) - len(self.values), 1)
-        curvature = self.jacobian.T @ self.jacobian / max(self.chi_square / degrees_of_freedom, 1.0)
+        curvature = self.jacobian.T @ self.jacobian / self.misfit
         scale = Layout(self.parameters).array("scale")
         within = np.diag(12.0 / self._widths**2)
         return np.linalg.inv(curvature + within) * np.outer(scale, scale)

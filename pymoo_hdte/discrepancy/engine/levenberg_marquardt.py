@@ -36,8 +36,11 @@ _TRUSTED = 0.5
 """Share of the promised reduction above which derivatives are updated by what the step showed."""
 _ATTEMPTS = 12
 """Most dampings tried for one step."""
-_SAME = 0.1
-"""Change of chi-square up to which a place is a known minimum; verdicts differ by 10 and more."""
+SAME = 0.1
+"""Chi-square, in units of what a residual is beside its noise, up to which minima are the same.
+
+Verdicts differ by 10 and more.
+"""
 
 _LITTLE = 0.5
 """Share of what derivatives promised to leave above which those after them promise little more.
@@ -155,7 +158,8 @@ def _arrived(
     way = (values - at.values) / problem.scale
     changes = (each @ way for each in (at.jacobian, jacobian))
     better = residuals @ residuals < at.residuals @ at.residuals
-    return not better and all(change @ change <= _SAME for change in changes)
+    most = SAME * max(residuals @ residuals / len(residuals), 1.0)
+    return not better and all(change @ change <= most for change in changes)
 
 
 def _least_to_first_order(residuals: Vector, jacobian: Matrix) -> float:

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
+from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SAME
 from pymoo_hdte.discrepancy.engine.rules import Rules
 from pymoo_hdte.discrepancy.engine.screening import basis_of
 from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
-
-FORETOLD = 1e-3
-"""Share of a change of the residuals, squared, up to which derivatives foretell it.
-
-Steps from there lead back: 27 starts of seen campaigns that were foretold this well ended where the
-derivatives were taken. That they are not is no evidence of another minimum.
-"""
 
 
 def best_fit(
@@ -28,8 +23,7 @@ def best_fit(
 ) -> Fit:
     """Return the best fit of a set from its values, the believed base and other starts.
 
-    From a start that leads back only the residuals are computed. A fit ends where it arrives at an
-    earlier one.
+    A fit ends where it arrives at an earlier one.
 
     Parameters
     ----------
@@ -45,8 +39,8 @@ def best_fit(
 
     def fit_from(further: Iterable[Vector]) -> Fit:
         for start in further:
-            if _may_lead_elsewhere(data, _least(fits), start):
-                fits.append(fit(data, one.candidates, start, known=fits))
+            if found := _fit_from(data, fits, start):
+                fits.append(found)
         return _least(fits)
 
     best = fit_from((_from_believed(data.base, one), *starts))
@@ -57,27 +51,32 @@ def _least(fits: Sequence[Fit]) -> Fit:
     return min(fits, key=lambda each: each.chi_square)
 
 
-def _may_lead_elsewhere(data: Evidence, best: Fit, start: Vector) -> bool:
-    """Tell whether a fit from a start may end lower than the best one so far.
+def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
+    """Return a fit from a start; None where it would end no lower than the best one so far.
 
-    Not where the derivatives of the best one foretell the residuals at the start. Nor where what
-    they do not foretell there, as a new shape of a law, with any strength removes less of what the
-    best one leaves than evidence would count, in units of that. A rule of thumb: of 173 starts of
-    seen campaigns 107 were left out by it, one of which would have gained 2.8 of chi-square.
+    Where the derivatives of the best one foretell most of the residuals at the start, they serve
+    for the first steps: a start that leads back costs a few evaluations, and one beyond a kink of a
+    law, as of a friction whose load changes sign, ends lower. At a new shape of a law that has
+    vanished they foretell nothing: a fit takes its own derivatives, unless what is not foretold
+    there removes, with any strength, less than `SAME` of what the best one leaves.
     """
+    best = _least(fits)
     problem = data.objective(best.candidates)
     moved = np.clip(start, problem.lower, problem.upper) - best.values
     foretold = best.jacobian @ (moved / problem.scale)
     beyond = problem.residuals(best.values + moved) - best.residuals - foretold
-    if not np.isfinite(beyond).all():
-        return True
-    if beyond @ beyond <= FORETOLD * (foretold @ foretold):
-        return False
-    by_unknowns = basis_of(best.jacobian[:, best.bound_sides == 0.0])
-    beyond -= by_unknowns @ (by_unknowns.T @ beyond)
-    removed, size = (beyond @ best.residuals) ** 2, beyond @ beyond
-    misfit = max(best.chi_square / max(len(best.residuals) - len(best.values), 1), 1.0)
-    return bool(removed >= data.rules.evidence_distance / 2.0 * misfit * size)
+    if beyond @ beyond <= foretold @ foretold:
+        if foretold @ foretold <= SAME * best.misfit:
+            return None
+        begin = replace(best, values=best.values + moved)
+        return fit(data, best.candidates, begin, known=fits)
+    if np.isfinite(beyond).all():
+        by_unknowns = basis_of(best.jacobian[:, best.bound_sides == 0.0])
+        beyond -= by_unknowns @ (by_unknowns.T @ beyond)
+        removed, size = (beyond @ best.residuals) ** 2, beyond @ beyond
+        if removed <= SAME * best.misfit * size:
+            return None
+    return fit(data, best.candidates, start, known=fits)
 
 
 def other_starts(one: Hypothesis, base: Vector) -> list[Vector]:

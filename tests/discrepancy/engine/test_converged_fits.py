@@ -10,7 +10,9 @@ from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 
 from pymoo_hdte.discrepancy import analyse
 from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.hypothesis import hypothesis_of
 from pymoo_hdte.discrepancy.engine.search import Search
+from pymoo_hdte.discrepancy.engine.starts import best_fit
 from pymoo_hdte.discrepancy.engine.verdict import judge
 from pymoo_hdte.drive import LoadInertia
 from pymoo_hdte.drive.effects import KinematicErrorLine
@@ -38,11 +40,15 @@ def random_start(parameters, rng):
     return rng.uniform(lower, upper)
 
 
-def differences(data, fitted):
-    """Return what ten fits from random starts leave beyond a fit: chi-square, shape (10,)."""
+def differences(data, fitted, others):
+    """Return what ten fits from random starts leave beyond a fit: chi-square, shape (10,).
+
+    Each is fitted as the sets that decide are: from other starts, too, beside the other sets.
+    """
     rng = np.random.default_rng(1)
     starts = [random_start(fitted.parameters, rng) for _ in range(STARTS)]
-    again = [fit(data, fitted.candidates, start) for start in starts]
+    fits = [hypothesis_of(fit(data, fitted.candidates, start), 0.0) for start in starts]
+    again = [best_fit(data, one, (), others) for one in fits]
     return np.array([one.chi_square for one in again]) - fitted.chi_square
 
 
@@ -111,8 +117,10 @@ def hold(data, found, share):
     The others stop at local minima: where Stribeck's excess has faded below all speeds it changes
     nothing, and nothing leads back; and a damping at one end of its tolerance hides some friction.
     """
+    others = [hypothesis_of(one, 0.0) for one in found]
     for one in found:
-        beyond, label = differences(data, one), [candidate.label for candidate in one.candidates]
+        label = [candidate.label for candidate in one.candidates]
+        beyond = differences(data, one, others)
         print(label, np.sort(beyond).round(2))
         assert beyond.min() > -SAME, label
         assert np.mean(beyond < SAME) >= share, label

@@ -1,4 +1,4 @@
-"""Which further starts a fit follows: a wave of a frequency that is not found from afar."""
+"""Which further starts a fit follows, and where it ends."""
 
 from types import SimpleNamespace
 
@@ -75,3 +75,32 @@ def test_no_start_is_followed_whose_shape_is_not_in_the_data_or_that_leads_back(
     assert best.chi_square == pytest.approx(far[2].fit.chi_square, abs=0.1)
     # That it would lead nowhere else: followed, it ends no lower.
     assert fit(far[0], (), np.array(start)).chi_square > best.chi_square - 0.1
+
+
+class Fold:
+    """Residuals of a zero and of its size: two minima, on either side of the kink at nothing.
+
+    As of a friction that acts against the load: a load near zero may have either sign.
+    """
+
+    candidates = ()
+    parameters = (Parameter("zero", 0.0, -10.0, 10.0, 1.0),)
+    scale, start, lower, upper = np.ones(1), np.zeros(1), np.array([-10.0]), np.array([10.0])
+    SIZE, BELIEVED = 3.0, -1.0
+
+    def residuals(self, values):
+        return np.array([abs(values[0]) - self.SIZE, 0.5 * (values[0] - self.BELIEVED)])
+
+    def jacobian(self, values):
+        return np.array([[np.sign(values[0])], [0.5]])
+
+
+def test_a_start_beyond_a_kink_is_followed_although_derivatives_foretell_most_of_the_way():
+    data = SimpleNamespace(objective=lambda _: Fold(), rules=RULES, base=())
+    (above,) = fit(data, (), np.array([5.0])).values
+    # Both minima in closed form: where the slope of the sum of squares is nothing on either side.
+    assert above == pytest.approx((Fold.SIZE + 0.25 * Fold.BELIEVED) / 1.25, abs=0.01)
+    one = SimpleNamespace(candidates=(), names=frozenset(), fit=fit(data, (), np.array([5.0])))
+    best = best_fit(data, one, [np.array([-4.0])], ())
+    assert best.values == pytest.approx([(-Fold.SIZE + 0.25 * Fold.BELIEVED) / 1.25], abs=0.01)
+    assert best.chi_square < one.fit.chi_square
