@@ -171,7 +171,8 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #      - The base passes the limit, and no candidate would gain enough.
 #    * - ``unlisted``
 #      - It does not, and no set explains the misfit either, in the listed form of its laws or in
-#        another, or the error on records kept out of the fit does not shrink with it.
+#        another, or the error on records kept out of the fit does not shrink with it as it should:
+#        by half of what a true effect would remove, if it shows there and chance explains no less.
 #    * - ``class``
 #      - A set explains it, and another set of as many effects that explains it too lies within the
 #        distances above. Where even the chosen form leaves more than noise, that of the evidence is

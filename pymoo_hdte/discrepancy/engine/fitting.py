@@ -181,6 +181,15 @@ class Vote:
         """Tell whether the change is large enough in these records to be seen."""
         return self.change >= rules.vote_change
 
+    def denies(self, rules: Rules) -> bool:
+        """Tell whether the records lose less by the change than any that is true would remove.
+
+        By chance a true one removes two standard deviations less, and in another form of its law
+        not all of it: what stands for something else may remove next to nothing.
+        """
+        by_chance = self.change - (rules.vote_change * self.change) ** 0.5
+        return self.before - self.after <= min(by_chance, rules.vote_share * self.change)
+
 
 class Residuals(Protocol):
     """Whitened residuals of a model with candidates, and their derivatives."""

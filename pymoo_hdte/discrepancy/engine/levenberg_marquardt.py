@@ -158,7 +158,7 @@ def _arrived(
     way = (values - at.values) / problem.scale
     changes = (each @ way for each in (at.jacobian, jacobian))
     better = residuals @ residuals < at.residuals @ at.residuals
-    most = SAME * max(residuals @ residuals / len(residuals), 1.0)
+    most = SAME * max(float(residuals @ residuals) / len(residuals), 1.0)
     return not better and all(change @ change <= most for change in changes)
 
 

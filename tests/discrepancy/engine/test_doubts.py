@@ -10,6 +10,7 @@ from pymoo_hdte.discrepancy.engine import choice
 from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.doubts import doubts_of
 from pymoo_hdte.discrepancy.engine.fitted_sets import FittedSets
+from pymoo_hdte.discrepancy.engine.fitting import Vote
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, alike, contains, label_of
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.search import Search
@@ -460,3 +461,32 @@ def test_another_choice_keeps_the_rivals_that_name_as_much(monkeypatch):
     verdict = Verdict("class", None, chosen, (simpler, rival, larger), (rival, larger), FREEDOM)
     found = measured._choosing(None, verdict, simpler)
     assert (found.status, found.chosen, found.equivalent) == ("class", simpler, (rival,))
+
+
+def denials(change, share):
+    """How often records kept out of the fit deny a change of which a share is true, in 4000."""
+    rng = np.random.default_rng(5)
+    predicted = np.zeros(40)
+    predicted[0] = np.sqrt(change)
+    measured = share * predicted + rng.normal(size=(4000, 40))
+    before, after = (np.sum((measured - one) ** 2, axis=1) for one in (0.0 * predicted, predicted))
+    votes = [Vote(*pair, change) for pair in zip(before, after, strict=True)]
+    return np.mean([one.denies(RULES) for one in votes])
+
+
+@pytest.mark.parametrize("change", [16.0, 54.0, 1e3, 1e6])
+def test_records_deny_a_true_change_as_rarely_as_is_stated(change):
+    # At most 2.3 %, two standard deviations of a normal value, and 0.5 % for 4000 draws.
+    assert denials(change, 1.0) < 0.028
+
+
+@pytest.mark.parametrize(("share", "denied"), [(0.0, 1.0), (0.5, 1.0), (0.9, 0.0)])
+def test_records_deny_a_change_of_which_half_is_true_and_none_of_which_a_tenth_is_not(
+    share, denied
+):
+    assert denials(1e3, share) == pytest.approx(denied, abs=0.01)
+
+
+def test_a_play_that_stood_for_an_error_that_grows_with_load_is_denied():
+    """As it was fitted from one start to a published case: its error shrinks by 0.02 of 54."""
+    assert Vote(803.54, 803.52, 54.2).denies(RULES)
