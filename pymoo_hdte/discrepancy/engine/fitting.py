@@ -185,10 +185,14 @@ class Vote:
         """Tell whether the records lose less by the change than any that is true would remove.
 
         By chance a true one removes two standard deviations less, and in another form of its law
-        not all of it: what stands for something else may remove next to nothing.
+        not all of it: what stands for something else may remove next to nothing. A prediction that
+        diverges, so that its change has no size, is denied where it diverges with the change.
         """
-        by_chance = self.change - (rules.vote_change * self.change) ** 0.5
-        return self.before - self.after <= min(by_chance, rules.vote_share * self.change)
+        least = 0.0
+        if np.isfinite(self.change):
+            by_chance = self.change - (rules.vote_change * self.change) ** 0.5
+            least = min(by_chance, rules.vote_share * self.change)
+        return self.before - self.after <= least
 
 
 class Residuals(Protocol):

@@ -490,3 +490,8 @@ def test_records_deny_a_change_of_which_half_is_true_and_none_of_which_a_tenth_i
 def test_a_play_that_stood_for_an_error_that_grows_with_load_is_denied():
     """As it was fitted from one start to a published case: its error shrinks by 0.02 of 54."""
     assert Vote(803.54, 803.52, 54.2).denies(RULES)
+
+
+def test_records_deny_a_change_with_which_their_prediction_diverges_and_none_that_prevents_it():
+    assert Vote(1.0, np.inf, np.inf).denies(RULES)
+    assert not Vote(1.0, 0.0, np.inf).denies(RULES)
