@@ -172,7 +172,7 @@ print(f"  or, of forms not exact, if they leave    {RULES.form_ratio:g} times as
 #    * - ``unlisted``
 #      - It does not, and no set explains the misfit either, in the listed form of its laws or in
 #        another, or the error on records kept out of the fit does not shrink with it as it should:
-#        by half of what a true effect would remove, if it shows there and chance explains no less.
+#        less than half of what a true effect would remove is gone, and that is no chance.
 #    * - ``class``
 #      - A set explains it, and another set of as many effects that explains it too lies within the
 #        distances above. Where even the chosen form leaves more than noise, that of the evidence is

@@ -41,7 +41,7 @@ def doubts_of(search: Search, chosen: Hypothesis, vote: Vote | None) -> list[str
         if curves and chosen.freed:
             found.append(f"values out of tolerance may stand for what {curves[0]} leaves")
         found += _harmonics_of_another(chosen.candidates)
-    if vote is not None and vote.denies(search.data.rules):
+    if vote is not None and vote.denies(search.data.rules, fitted.misfit):
         found.append(NOT_PROVEN)
     per_degree = fitted.chi_square / search.degrees_of_freedom
     if per_degree > search.data.rules.contradicting_chi_square:

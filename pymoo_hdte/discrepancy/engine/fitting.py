@@ -145,10 +145,11 @@ def fit(
 ) -> Fit:
     """Fit base parameters and those of candidates from ``start`` (by default their own starts).
 
-    An earlier fit of the same candidates to the same data may be the start: the search goes on.
-    It takes at most ``steps`` steps, by default as many as the rules allow, and ends earlier where
-    one removes less than the share ``settled`` of chi-square, where it arrives at a ``known`` fit
-    of the same candidates, or where it will leave more than a ``hopeless`` chi-square.
+    An earlier fit of the same candidates to the same data may be the start, with its values or with
+    others: its derivatives serve for the first step. The search takes at most ``steps`` steps, by
+    default as many as the rules allow, and ends earlier where one removes less than the share
+    ``settled`` of chi-square, where it arrives at a ``known`` fit of the same candidates, or where
+    it will leave more than a ``hopeless`` chi-square.
     """
     objective = data.objective(candidates)
     most = data.rules.fit_evaluations if steps is None else steps
@@ -181,17 +182,18 @@ class Vote:
         """Tell whether the change is large enough in these records to be seen."""
         return self.change >= rules.vote_change
 
-    def denies(self, rules: Rules) -> bool:
-        """Tell whether the records lose less by the change than any that is true would remove.
+    def denies(self, rules: Rules, misfit: float) -> bool:
+        """Tell whether the change removes nothing of their error, or less than a true one would.
 
-        By chance a true one removes two standard deviations less, and in another form of its law
-        not all of it: what stands for something else may remove next to nothing. A prediction that
-        diverges, so that its change has no size, is denied where it diverges with the change.
+        By chance a true one removes two standard deviations less, in units of what a fit's
+        residuals are beside their noise (``misfit``), and in another form of its law not all of it:
+        what stands for something else may remove next to nothing. A prediction that diverges, so
+        that its change has no size, is denied where it diverges with the change.
         """
         least = 0.0
         if np.isfinite(self.change):
-            by_chance = self.change - (rules.vote_change * self.change) ** 0.5
-            least = min(by_chance, rules.vote_share * self.change)
+            by_chance = self.change - (rules.vote_change * self.change * misfit) ** 0.5
+            least = max(min(by_chance, rules.vote_share * self.change), 0.0)
         return self.before - self.after <= least
 
 

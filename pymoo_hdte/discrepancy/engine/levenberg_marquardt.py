@@ -91,8 +91,8 @@ def minimum(
     ----------
     problem : Differentiable
     start : ndarray, shape (n_unknowns,), or Minimum
-        Moved to the nearest bound where it is outside; or where another search of the same problem
-        ended, within the bounds, whose derivatives serve for the first step.
+        Moved to the nearest bound where it is outside. With a minimum its derivatives serve for the
+        first step: another search of the same problem found them, there or elsewhere.
     steps : int
         Most steps with derivatives of their own; several times as many if derivatives are updated.
     settled : float

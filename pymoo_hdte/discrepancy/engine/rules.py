@@ -237,9 +237,10 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         16.0,
         "chi-square",
         "Least change of the prediction for the records kept out of the fit with which they have a "
-        "vote against a name: an error that does not shrink.",
+        "vote against a name: an error that does not shrink as it should.",
         "Test level: a true change of this size fails to shrink the error with a chance of 2.3 %, "
-        "that of a normal value below minus half its root.",
+        "that of a normal value below minus half its root; so does a larger one to remove more "
+        "than itself less the root of this times itself.",
     )
     vote_share: float = rule(
         0.5,
@@ -248,7 +249,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         "below which they deny a name, where chance does not explain it.",
         "Set by hand on 2026-11-28, after 25 seen campaigns with one effect or two: right names "
         "removed between 0.91 and 1.14 of it, whatever their form. A play that stood for an error "
-        "that grows with load removed 0.0003 of it, 3.7 standard deviations less than all.",
+        "that grows with load removed 0.0003 of it, 3.7 standard deviations less than all. No "
+        "verdict on the measured joints and mechanisms of the tests changes.",
         at_least=0.0,
         at_most=1.0,
     )

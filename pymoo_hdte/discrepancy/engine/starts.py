@@ -43,7 +43,7 @@ def best_fit(
                 fits.append(found)
         return _least(fits)
 
-    best = fit_from((_from_believed(data.base, one), *starts))
+    best = fit_from((_from_believed(data.base, fits[0]), *starts))
     return fit_from(_other_shapes(best, one, found, data.rules))
 
 
@@ -52,24 +52,27 @@ def _least(fits: Sequence[Fit]) -> Fit:
 
 
 def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
-    """Return a fit from a start; None where it would end no lower than the best one so far.
+    """Return a fit from a start; None where it is not expected to end lower than the best one.
 
-    Where the derivatives of the best one foretell most of the residuals at the start, they serve
-    for the first steps: a start that leads back costs a few evaluations, and one beyond a kink of a
-    law, as of a friction whose load changes sign, ends lower. At a new shape of a law that has
-    vanished they foretell nothing: a fit takes its own derivatives, unless what is not foretold
-    there removes, with any strength, less than `SAME` of what the best one leaves.
+    The derivatives of the best one serve for the first steps where they foretell the residuals at
+    the start: where what else changes there is no larger. So a start that leads back costs a few
+    evaluations, and one beyond a kink of a law, as of a friction whose load changes sign, ends
+    lower. Where effects have other values, what their own unknowns do counts: a law that has
+    vanished foretells nothing of a new shape. From there a fit takes its own derivatives, unless
+    what is not foretold removes, with any strength, less than `SAME` of what the best one leaves.
     """
     best = _least(fits)
     problem = data.objective(best.candidates)
-    moved = np.clip(start, problem.lower, problem.upper) - best.values
-    foretold = best.jacobian @ (moved / problem.scale)
-    beyond = problem.residuals(best.values + moved) - best.residuals - foretold
-    if beyond @ beyond <= foretold @ foretold:
-        if foretold @ foretold <= SAME * best.misfit:
-            return None
-        begin = replace(best, values=best.values + moved)
-        return fit(data, best.candidates, begin, known=fits)
+    way = (np.clip(start, problem.lower, problem.upper) - best.values) / problem.scale
+    begin = replace(best, values=best.values + way * problem.scale)
+    changes = best.jacobian * way
+    foretold = changes.sum(axis=1)
+    beyond = problem.residuals(begin.values) - best.residuals - foretold
+    reshaped = way[best.n_base :].any()
+    by_derivatives = changes[:, best.n_base :].sum(axis=1) if reshaped else foretold
+    if beyond @ beyond <= by_derivatives @ by_derivatives:
+        same = foretold @ foretold <= SAME * best.misfit
+        return None if same else fit(data, best.candidates, begin, known=fits)
     if np.isfinite(beyond).all():
         by_unknowns = basis_of(best.jacobian[:, best.bound_sides == 0.0])
         beyond -= by_unknowns @ (by_unknowns.T @ beyond)
@@ -91,10 +94,10 @@ def other_starts(one: Hypothesis, base: Vector) -> list[Vector]:
     return [np.append(base, start) for start in last.starts]
 
 
-def _from_believed(base: Sequence[Parameter], one: Hypothesis) -> Vector:
+def _from_believed(base: Sequence[Parameter], fitted: Fit) -> Vector:
     """Return the believed values of the base with the fitted ones of a set's effects."""
     believed = np.array([parameter.start for parameter in base])
-    return np.append(believed, one.fit.values[len(believed) :])
+    return np.append(believed, fitted.values[len(believed) :])
 
 
 def _other_shapes(

@@ -111,7 +111,7 @@ class Verdict:
         """Return it with the vote of held-out records: ``unlisted`` where they contradict it."""
         if not vote.counts(self.rules):
             return replace(self, shown_in_held_out=False)
-        if not vote.denies(self.rules):
+        if not vote.denies(self.rules, self.accepted.misfit):
             return self
         doubts = (*self.doubts, NOT_PROVEN)
         return replace(self, status="unlisted", equivalent=(), doubts=doubts, probability=None)

@@ -213,8 +213,8 @@ def _state(motion: SmoothedMotion, row: int) -> tuple[float, float]:
 def voted(verdict: Verdict, simulated: Sequence[SimulatedRecord]) -> Verdict:
     """Return the verdict, ``unlisted`` where held-out records contradict what it names.
 
-    Simulated, their positions do not come nearer to the measured ones, though the change is large
-    enough to be seen in them.
+    Simulated, their positions do not come nearer to the measured ones as they should, though the
+    change is large enough to be seen in them.
     """
     if verdict.accepted is verdict.base or not simulated:
         return verdict
