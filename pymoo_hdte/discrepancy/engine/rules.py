@@ -239,8 +239,8 @@ class Rules(MechanismRules, ReportRules, RecordRules, RowRules, SearchRules):
         "Least change of the prediction for the records kept out of the fit with which they have a "
         "vote against a name: an error that does not shrink as it should.",
         "Test level: a true change of this size fails to shrink the error with a chance of 2.3 %, "
-        "that of a normal value below minus half its root; so does a larger one to remove more "
-        "than itself less the root of this times itself.",
+        "that of a normal value below minus half its root. With the same chance a larger one "
+        "removes less than itself minus the square root of itself times this value.",
     )
     vote_share: float = rule(
         0.5,

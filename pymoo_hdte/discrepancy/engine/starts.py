@@ -37,14 +37,14 @@ def best_fit(
     """
     fits = [fit(data, one.candidates, one.fit)]
 
-    def fit_from(further: Iterable[Vector]) -> Fit:
+    def follow(further: Iterable[Vector]) -> Fit:
         for start in further:
-            if found := _fit_from(data, fits, start):
-                fits.append(found)
+            if again := _fit_from(data, fits, start):
+                fits.append(again)
         return _least(fits)
 
-    best = fit_from((_from_believed(data.base, fits[0]), *starts))
-    return fit_from(_other_shapes(best, one, found, data.rules))
+    best = follow((_from_believed(data.base, fits[0]), *starts))
+    return follow(_other_shapes(best, one, found, data.rules))
 
 
 def _least(fits: Sequence[Fit]) -> Fit:
@@ -59,7 +59,7 @@ def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
     evaluations, and one beyond a kink of a law, as of a friction whose load changes sign, ends
     lower. Where effects have other values, what their own unknowns do counts: a law that has
     vanished foretells nothing of a new shape. From there a fit takes its own derivatives, unless
-    what is not foretold removes, with any strength, less than `SAME` of what the best one leaves.
+    what is not foretold could remove nothing of what the best one leaves.
     """
     best = _least(fits)
     problem = data.objective(best.candidates)
@@ -73,13 +73,19 @@ def _fit_from(data: Evidence, fits: Sequence[Fit], start: Vector) -> Fit | None:
     if beyond @ beyond <= by_derivatives @ by_derivatives:
         same = foretold @ foretold <= SAME * best.misfit
         return None if same else fit(data, best.candidates, begin, known=fits)
-    if np.isfinite(beyond).all():
-        by_unknowns = basis_of(best.jacobian[:, best.bound_sides == 0.0])
-        beyond -= by_unknowns @ (by_unknowns.T @ beyond)
-        removed, size = (beyond @ best.residuals) ** 2, beyond @ beyond
-        if removed <= SAME * best.misfit * size:
-            return None
-    return fit(data, best.candidates, start, known=fits)
+    return fit(data, best.candidates, start, known=fits) if _could_remove(best, beyond) else None
+
+
+def _could_remove(best: Fit, change: Vector) -> bool:
+    """Tell whether a change of residuals, in any strength, could leave less than a fit does.
+
+    By more than `SAME`, beside the unknowns that are at no bound. What is not finite may.
+    """
+    if not np.isfinite(change).all():
+        return True
+    by_unknowns = basis_of(best.jacobian[:, best.bound_sides == 0.0])
+    beside = change - by_unknowns @ (by_unknowns.T @ change)
+    return bool((beside @ best.residuals) ** 2 > SAME * best.misfit * (beside @ beside))
 
 
 def other_starts(one: Hypothesis, base: Vector) -> list[Vector]:

@@ -472,7 +472,7 @@ def denials(change, share, misfit=1.0):
     predicted = np.zeros(40)
     predicted[0] = np.sqrt(change)
     measured = share * predicted + misfit**0.5 * rng.normal(size=(4000, 40))
-    before, after = (np.sum((measured - one) ** 2, axis=1) for one in (0.0 * predicted, predicted))
+    before, after = (np.sum((measured - one) ** 2, axis=1) for one in (0.0, predicted))
     votes = [Vote(*pair, change) for pair in zip(before, after, strict=True)]
     return np.mean([one.denies(RULES, misfit) for one in votes])
 

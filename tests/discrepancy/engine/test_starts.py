@@ -22,7 +22,7 @@ class Wave:
         Parameter("strength", 1.0, 0.0, 10.0, 1.0),
         Parameter("frequency", 6.0, 0.5, 12.0, 1.0),
     )
-    candidates = (SimpleNamespace(parameters=parameters[1:], starts=()),)
+    candidates = (SimpleNamespace(parameters=parameters[1:]),)
     scale = np.ones(3)
     start, lower, upper = np.array([[one.start, one.lower, one.upper] for one in parameters]).T
 
