@@ -16,8 +16,11 @@ from pymoo_hdte.drive.solve.coefficients import Coefficients
 from pymoo_hdte.effects.law import Law, PortState, Response, Values, periodic_phase
 
 _STEPS = 100
-_TOLERANCE = 1e-12
-"""Largest change of the torsion, relative to the length of the leg, that ends the root search."""
+_TOLERANCE = 1e-10
+"""Largest change of the torsion, relative to the length of the leg, that ends the root search.
+
+Beyond a kink Newton's next step would remove its square.
+"""
 _DOUBLINGS = 20
 _LEAST_WAY = 1e-7
 """rad. The search starts no smaller: within a clearance hardly any torque is a long way."""
@@ -142,16 +145,16 @@ class _Mesh:
             return direction * (response.torque - held), np.asarray(response.slope)
 
         low = np.zeros((len(before), len(held)))
-        way = np.abs(beyond(low)[0]) / self.stiffness
-        high = np.maximum(way, _LEAST_WAY)
+        way = high = np.maximum(np.abs(beyond(low)[0]) / self.stiffness, _LEAST_WAY)
+        excess, slope = beyond(high)
         for _ in range(_DOUBLINGS):
-            short = beyond(high)[0] < 0.0
+            short = excess < 0.0
             if not short.any():
                 break
-            high = np.where(short, 2.0 * high, high)
+            way = high = np.where(short, 2.0 * high, high)
+            excess, slope = beyond(high)
         tolerance = _TOLERANCE * high
         for _ in range(_STEPS):
-            excess, slope = beyond(way)
             low, high = np.where(excess < 0.0, way, low), np.where(excess < 0.0, high, way)
             step = np.divide(excess, slope, out=np.full_like(way, np.inf), where=slope > 0.0)
             inside = (way - step >= low) & (way - step <= high)
@@ -160,6 +163,7 @@ class _Mesh:
             way = moved
             if not unsettled:
                 break
+            excess, slope = beyond(way)
         return np.where(short, np.nan, before + direction * way)
 
 
