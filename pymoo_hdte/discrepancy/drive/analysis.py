@@ -25,7 +25,7 @@ from pymoo_hdte.discrepancy.drive.features import (
 )
 from pymoo_hdte.discrepancy.drive.prediction import coefficients_of
 from pymoo_hdte.discrepancy.drive.sizes import port_sizes, scales_of
-from pymoo_hdte.discrepancy.drive.steady_states import TOLERANCE
+from pymoo_hdte.discrepancy.drive.steady_states import PREDICTION
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Fit, fit
 from pymoo_hdte.discrepancy.engine.rules import RULES, Rules
@@ -146,7 +146,7 @@ def _check_steady(data: Data) -> None:
         load_torque=conditions.output_torque,
         motor=SpeedLoop(campaign.rig.proportional, campaign.rig.integral),
         torus=torus_of(coefficients),
-        tolerance=TOLERANCE,
+        tolerance=PREDICTION.tolerance,
     ).converged
     if not steady.all():
         lost = data.features.records[int(np.argmin(steady))].name

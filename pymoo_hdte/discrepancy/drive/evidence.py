@@ -21,6 +21,7 @@ from pymoo_hdte.discrepancy.drive.observations import (
     cell_degrees_of_freedom,
 )
 from pymoo_hdte.discrepancy.drive.parameters import base_parameters
+from pymoo_hdte.discrepancy.drive.steady_states import SCREENING
 from pymoo_hdte.discrepancy.drive.torsion_curve import torsion_points
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.excess import Excess
@@ -33,14 +34,6 @@ Vector = NDArray[np.float64]
 
 PARTS = (*CHANNELS, "torsion_sweep")
 """Parts of the data, as in `Excess`: channels of the running records, and the sweeps."""
-
-
-_STEPS = 25
-"""Most steps to a steady state with an effect that is only screened.
-
-Of 143,588 cases that arrived in four campaigns of a test bench none took more than 23; those that
-would take longer are no evidence for the effect there.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +70,7 @@ class Data(Observations):
 
         def change(added: Sequence[DriveEffect]) -> Vector:
             effects = (*fitted.effects, *added)
-            there = self.prediction(base, effects, stands.balance, _STEPS)
+            there = self.prediction(base, effects, stands.balance, SCREENING)
             # A record without a steady state says nothing of the effect.
             steady = (there.balance.converged & stands.balance.converged)[:, None]
             changed = self.features.of_prediction(there) - before

@@ -10,6 +10,13 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.known_values import known_values
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.observations import Observations
+from pymoo_hdte.discrepancy.drive.steady_states import (
+    DEPARTURE,
+    PREDICTION,
+    SLOPES,
+    Continuation,
+    Effort,
+)
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Unknowns, Vector, built
 from pymoo_hdte.drive import DriveEffect, SteadyMotion
@@ -43,7 +50,7 @@ class Objective(Unknowns):
         super().__init__(data.base, candidates)
         self.data = data
         self.slopes = slopes
-        self.nearby: SteadyMotion | None = None
+        self._states = Continuation()
 
     def residuals(self, values: Vector) -> Vector:
         """Return residuals at values (n,), those of sweeps and priors last."""
@@ -52,9 +59,8 @@ class Objective(Unknowns):
 
     def differences(self, values: Vector) -> tuple[NDArray[np.float64], Vector]:
         """Return predicted minus measured features (r, f), and residuals of sweeps and priors."""
-        base, effects = self._parts(values)
-        difference = self._features(base, effects)[0] - self.data.features.values
-        torsion = self._torsion(base, effects)[0]
+        difference = self._features(values) - self.data.features.values
+        torsion = self._torsion(*self._parts(values))[0]
         return difference, np.concatenate([torsion, self.priors(values)])
 
     def jacobian(self, values: Vector) -> NDArray[np.float64]:
@@ -70,8 +76,7 @@ class Objective(Unknowns):
         n_base, steps = len(self.data.base), self.steps(values)
         moved = values + np.diag(steps * self.scale)
         base, effects = self._parts(values)
-        # The steady states here are kept, as slopes leave out the records that have none here.
-        here = self._features(base, effects)[0]
+        here = self._departed(values)
         slopes = self._slopes(values) if self.slopes is None else self.slopes
         in_sweeps = (*_IN_SWEEPS, *known_values(self.data.campaign.believed.effects))
         swept = [k for k, one in enumerate(self.data.base) if one.name in in_sweeps]
@@ -81,8 +86,9 @@ class Objective(Unknowns):
         features, sweeps = list(slopes), list(by_base)
         for place in range(n_base, len(values)):
             base, effects = self._parts(moved[place])
-            there = self._features(base, effects, for_slopes=True)[0]
-            features.append((there - here) / steps[place])
+            there, (states,) = self._moved(base, effects)
+            features.append((there[0] - here) / steps[place])
+            self._states.follow(place, steps[place] * self.scale[place], states)
             sweeps.append((self._torsion(base, effects)[0] - torsion[0]) / steps[place])
         priors = np.diag(self.scale / self.prior)[:, self.bounded]
         return np.array(features), np.concatenate([np.array(sweeps), priors], axis=1)
@@ -94,21 +100,23 @@ class Objective(Unknowns):
 
     def slopes_at(self, values: Vector) -> NDArray[np.float64]:
         """Return derivatives of the features by base parameters in units of their scale."""
-        self._features(*self._parts(values))
+        self._departed(values)
         return self._slopes(values)
 
     def _slopes(self, values: Vector) -> NDArray[np.float64]:
-        """Return the same at values of which the steady states are known."""
+        """Return the same at values of which the steady states are known, and follow these."""
         base, effects = self._parts(values)
         n_base = base.shape[1]
         steps = self.steps(values)[:n_base]
         moving = [k for k, one in enumerate(self.data.base) if one.name not in _READ_ONLY]
         moved = base + np.diag(steps * self.scale[:n_base])
         # Solved together, so that what Newton's method leaves cancels in the quotients.
-        both = self._features(np.vstack([base, moved[moving]]), effects, for_slopes=True)
+        both, (_, *there) = self._moved(np.vstack([base, moved[moving]]), effects)
         here = both[0]
         found = np.empty((n_base, *here.shape))
         found[moving] = (both[1:] - here) / steps[moving, None, None]
+        for place, states in zip(moving, there, strict=True):
+            self._states.follow(place, steps[place] * self.scale[place], states)
         for place, one in enumerate(self.data.base):
             if one.name in _READ_ONLY:
                 found[place] = self.scale[place] * self._reading(one.name, base[0], here)
@@ -138,17 +146,27 @@ class Objective(Unknowns):
         parts = built(self.candidates, values[n_base:])
         return values[None, :n_base], tuple(effect for part in parts for effect in part)
 
-    def _features(
-        self,
-        vectors: NDArray[np.float64],
-        effects: tuple[DriveEffect, ...],
-        for_slopes: bool = False,
-    ) -> NDArray[np.float64]:
-        """Return predicted features; the first vector's steady states are kept as a start.
+    def _features(self, values: Vector, effort: Effort = PREDICTION) -> NDArray[np.float64]:
+        """Return predicted features (r, f) at values; their steady states are kept as a start."""
+        prediction = self.data.prediction(*self._parts(values), self._states.at(values), effort)
+        self._states.arrived(values, prediction.balance)
+        return self.data.features.of_prediction(prediction)[0]
 
-        Unless they are ``for_slopes``, the quotients of which belong to the last ones kept.
+    def _departed(self, values: Vector) -> NDArray[np.float64]:
+        """Return the same where slopes are to follow."""
+        features = self._features(values, DEPARTURE)
+        self._states.depart(len(values))
+        return features
+
+    def _moved(
+        self, vectors: NDArray[np.float64], effects: tuple[DriveEffect, ...]
+    ) -> tuple[NDArray[np.float64], list[SteadyMotion]]:
+        """Return features (v, r, f) so near the values tried last that slopes follow; the states.
+
+        Records without a steady state there have none here.
         """
-        prediction = self.data.prediction(vectors, effects, self.nearby, for_slopes=for_slopes)
-        if not for_slopes:
-            self.nearby = prediction.balance.rows(slice(len(self.data.features.records)))
-        return self.data.features.of_prediction(prediction)
+        prediction = self.data.prediction(vectors, effects, self._states.motion, SLOPES)
+        records = len(self.data.features.records)
+        places = [slice(k * records, (k + 1) * records) for k in range(len(vectors))]
+        states = [prediction.balance.rows(place) for place in places]
+        return self.data.features.of_prediction(prediction), states

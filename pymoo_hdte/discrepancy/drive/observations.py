@@ -23,10 +23,10 @@ from pymoo_hdte.discrepancy.drive.features import (
     Features,
 )
 from pymoo_hdte.discrepancy.drive.prediction import Prediction, coefficients_of, predict
+from pymoo_hdte.discrepancy.drive.steady_states import PREDICTION, Effort
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.drive import DriveEffect, SteadyMotion, mean_torsion
-from pymoo_hdte.drive.solve.free_angle import STEPS
 from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
@@ -99,16 +99,15 @@ class Observations:
         vectors: Vector,
         effects: Sequence[DriveEffect],
         start: SteadyMotion | None = None,
-        steps: int = STEPS,
-        for_slopes: bool = False,
+        effort: Effort = PREDICTION,
     ) -> Prediction:
         """Return the prediction behind `predict`, steady states included."""
         values = self._named(vectors)
         believed, rig = self.campaign.believed, self.campaign.rig
         features = self.features
         orders = features.orders.tolist()
-        how = (start, steps, for_slopes)
-        return predict(believed, rig, features.conditions, orders, values, effects, *how)
+        conditions = features.conditions
+        return predict(believed, rig, conditions, orders, values, effects, start, effort)
 
     def _named(self, vectors: Vector) -> dict[str, Vector]:
         return {p.name: column for p, column in zip(self.base, vectors.T, strict=True)}

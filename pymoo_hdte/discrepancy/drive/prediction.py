@@ -17,14 +17,13 @@ from pymoo_hdte.discrepancy.campaign.believed import BelievedDrive, Rig
 from pymoo_hdte.discrepancy.campaign.known_values import of_equal_numbers
 from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.parameters import MECHANICAL
-from pymoo_hdte.discrepancy.drive.steady_states import merged, steady_motions
+from pymoo_hdte.discrepancy.drive.steady_states import PREDICTION, Effort, merged, steady_motions
 from pymoo_hdte.drive import (
     Coefficients,
     DriveEffect,
     SteadyMotion,
 )
 from pymoo_hdte.drive.effects import Session
-from pymoo_hdte.drive.solve.free_angle import STEPS
 from pymoo_hdte.drive.solve.order_spectrum import sine_phasor
 
 _SAME = 1e-8
@@ -98,8 +97,7 @@ def predict(
     values: dict[str, NDArray[np.float64]],
     effects: Sequence[DriveEffect] = (),
     start: SteadyMotion | None = None,
-    steps: int = STEPS,
-    for_slopes: bool = False,
+    effort: Effort = PREDICTION,
 ) -> Prediction:
     """Return the predicted readings of the sensors.
 
@@ -117,18 +115,16 @@ def predict(
         In addition to the believed ones; shared by all vectors.
     start : SteadyMotion, optional
         Steady states of the records for nearby values, to begin from.
-    steps : int
-        Most steps of Newton's method for a steady state.
-    for_slopes : bool
-        Whether records without a steady state in ``start`` are to be predicted as such.
+    effort : Effort
+        How far the steady states are searched for.
     """
     parts = []
     groups = of_equal_numbers(believed.effects, values)
     for rows, known in groups:
         some = {name: column[rows] for name, column in values.items()}
         present = (*known, *effects)
-        how = (start, steps, for_slopes)
-        parts.append(_predict_group(believed, rig, conditions, orders, some, present, *how))
+        args = (believed, rig, conditions, orders, some, present, start, effort)
+        parts.append(_predict_group(*args))
     if len(parts) == 1:
         return parts[0]
     return _joined(parts, [rows for rows, _ in groups], len(conditions))
@@ -142,8 +138,7 @@ def _predict_group(
     values: dict[str, NDArray[np.float64]],
     present: Sequence[DriveEffect],
     start: SteadyMotion | None,
-    steps: int,
-    for_slopes: bool,
+    effort: Effort,
 ) -> Prediction:
     """Return the prediction of vectors that share all effects ``present``."""
     count, records = len(values["offset"]), len(conditions)
@@ -154,7 +149,7 @@ def _predict_group(
         coefficients = replace(coefficients, temperature=np.tile(conditions.temperature, count))
     near = None if start is None else start.rows(np.tile(np.arange(records), count))
     speed = np.tile(conditions.input_speed, count)
-    balance = steady_motions(coefficients, speed, load.ravel(), rig, near, steps, for_slopes)
+    balance = steady_motions(coefficients, speed, load.ravel(), rig, near, effort)
     channels = [
         balance.transmission_error,
         balance.motor_torque + _driving(balance, coefficients),

@@ -29,15 +29,19 @@ _STATIC_STEPS = 8
 
 Values = NDArray[np.float64]
 
+_NO_LAW = Response(np.zeros((1, 1)))
+
 
 @dataclass(frozen=True)
 class TorsionMotion:
     """A torsion and a speed on the grid of the torus, with the resulting torques; arrays (n, G).
 
-    ``mesh_slope`` and ``mesh_damping`` are the derivatives of ``mesh_torque`` by torsion and by its
-    rate, ``output_loss`` that of ``output_friction`` by speed.
+    ``energy`` are the harmonics of E, (n, n_harmonics). ``mesh_slope`` and ``mesh_damping`` are the
+    derivatives of ``mesh_torque`` by torsion and by its rate, ``output_loss`` that of
+    ``output_friction`` by speed; what is the same on the whole grid may have one column.
     """
 
+    energy: Phasors
     angular_speed: Values
     energy_slope: Values
     output_speed: Values
@@ -72,7 +76,8 @@ class AngleEquations:
             self.static[:, place] += phasor.conj() if conjugate else phasor
         self._static_slope = torus.signal(torus.derivative(self.static))
         angle = 2.0 * torus.phase(1.0) + coefficients.stiffness_phase
-        self._varying = 1.0 + coefficients.stiffness_depth * np.cos(angle)
+        varying = 1.0 + coefficients.stiffness_depth * np.cos(angle)
+        self._stiffness = coefficients.stiffness[:, None] * varying
         self._backward = speed < 0.0
 
     def rows(self, rows: NDArray[np.int_]) -> AngleEquations:
@@ -94,17 +99,11 @@ class AngleEquations:
             found = found + (torque - stiffness * found - added) / stiffness
         return found
 
-    def at_wanted_speed(self, energy: Phasors) -> Phasors:
-        """Return E scaled such that the mean of 1/w is that of the wanted speed."""
-        angular_speed = self._angular_speed(self.torus.signal(energy))
-        return energy * (self.speed * mean(1.0 / angular_speed)) ** 2
-
-    def _angular_speed(self, energy: Values) -> Values:
-        size = np.sqrt(2.0 * np.maximum(energy, 1e-12))
-        return np.copysign(size, self.speed)
-
     def motion(self, torsion: Phasors, energy: Phasors) -> TorsionMotion:
-        """Evaluate torsion and E on the grid, with the resulting torques."""
+        """Evaluate torsion and E on the grid, with the resulting torques.
+
+        E is scaled such that the mean of 1/w is that of the wanted speed.
+        """
         torus, coefficients = self.torus, self.coefficients
         slope, error = torus.derivative(torsion), self.static + torsion
         curvature = torus.derivative(torus.derivative(error))
@@ -112,7 +111,10 @@ class AngleEquations:
         # In one call: most of the time of a small one goes by before it begins.
         signals = torus.signal(np.concatenate(each)).reshape(len(each), -1, torus.size)
         energy_there, energy_slope, position, slope_there, error_curvature = signals
-        angular_speed = self._angular_speed(energy_there)
+        angular_speed = np.copysign(np.sqrt(2.0 * np.maximum(energy_there, 1e-12)), self.speed)
+        faster = self.speed * mean(1.0 / angular_speed)
+        angular_speed *= faster
+        energy_slope *= faster**2
         error_slope = self._static_slope + slope_there
         output_acceleration = (
             energy_slope / coefficients.ratio
@@ -121,11 +123,11 @@ class AngleEquations:
         )
         output_speed = angular_speed * (1.0 / coefficients.ratio - error_slope)
         rate = angular_speed * slope_there
-        stiffness = coefficients.stiffness[:, None] * self._varying
-        damping = coefficients.damping[:, None]
+        stiffness, damping = self._stiffness, coefficients.damping[:, None]
         mesh = self._laws("mesh", position, rate)
         output = self._laws("output", np.zeros_like(output_speed), output_speed)
         return TorsionMotion(
+            energy=energy * faster**2,
             angular_speed=angular_speed,
             energy_slope=energy_slope,
             output_speed=output_speed,
@@ -142,9 +144,8 @@ class AngleEquations:
     ) -> Response:
         """Return the sum of the laws at a port, which passes on ``load`` besides them."""
         laws = [law for place, law in self.coefficients.laws if place == port]
-        total = Response(np.zeros_like(speed))
         if not laws:
-            return total
+            return _NO_LAW
         # The angle of periodic laws at the output omits the small fluctuation of the output.
         slower = self.coefficients.ratio if port == "output" else 1.0
 
@@ -154,8 +155,8 @@ class AngleEquations:
         stiffness = self.coefficients.stiffness[:, None]
         warmth = np.reshape(self.coefficients.temperature, (-1, 1))
         state = PortState(position, speed, phase, stiffness, self._path, self._back, load, warmth)
-        for law in laws:
-            one = law.respond(state)
+        total, *others = (law.respond(state) for law in laws)
+        for one in others:
             total = Response(
                 total.torque + one.torque,
                 total.slope + one.slope,
@@ -197,14 +198,24 @@ class AngleEquations:
             total -= self.torus.recall_matrix(on_grid, elsewhere)
         return total
 
-    def output_residual(self, motion: TorsionMotion) -> Phasors:
-        """Return the residual of the second equation, N.m."""
-        return self.torus.phasors(
+    def residuals(self, motion: TorsionMotion) -> tuple[Phasors, Phasors, Phasors]:
+        """Return the residuals of both equations, N.m, and the lead of the input, rad.
+
+        The lead is alpha - Omega t, minus the integral of the speed that is missing. The mean of
+        the first equation is the motor's constant.
+        """
+        delivered = self.delivered(motion)
+        of_load = (
             self.output_inertia * motion.output_acceleration
             + self.of_loose_loads(motion)
-            + self.delivered(motion)
+            + delivered
             - motion.mesh_torque
         )
+        each = (self._of_input(motion, delivered), of_load, self.speed / motion.angular_speed)
+        # In one call, as in `motion`.
+        of_input, of_output, slower = np.split(self.torus.phasors(np.concatenate(each)), len(each))
+        lead = -self.torus.integral(slower)
+        return of_input + self.motor.integral * lead, of_output, lead
 
     def of_loose_loads(self, motion: TorsionMotion) -> Values | float:
         """Return the torque of loads that are not rigidly coupled, beyond that of the inertia.
@@ -225,33 +236,30 @@ class AngleEquations:
         """Return the torque, N.m, that the output passes on to load, bearings and laws there."""
         return self.output_damping * motion.output_speed + motion.output_friction + self.load
 
-    def input_residual(self, motion: TorsionMotion, lead: Phasors | float) -> Phasors:
-        """Return the residual of the first equation, N.m; its mean is the motor's constant.
-
-        ``lead`` is that of the motion.
-        """
+    def _of_input(self, motion: TorsionMotion, delivered: Values) -> Values:
+        """Return the residual of the first equation on the grid, without the lead's share."""
         coefficients = self.coefficients
-        reaction = coefficients.reaction * self._static_slope
         still = np.zeros_like(motion.angular_speed)
-        delivered = self.delivered(motion) / coefficients.ratio
-        friction = self._laws("input", still, motion.angular_speed, delivered)
-        resisting = (
+        passed_on = delivered / coefficients.ratio
+        friction = self._laws("input", still, motion.angular_speed, passed_on)
+        return np.asarray(
             coefficients.input_inertia[:, None] * motion.energy_slope
             + coefficients.input_damping[:, None] * motion.angular_speed
             + friction.torque
-            + motion.mesh_torque * (1.0 / coefficients.ratio - reaction)
+            + motion.mesh_torque * self._share_of_mesh
+            - self.motor.proportional * (self.speed - motion.angular_speed)
         )
-        driving = self.motor.proportional * (self.speed - motion.angular_speed)
-        return self.torus.phasors(resisting - driving) + self.motor.integral * lead
-
-    def lead(self, motion: TorsionMotion) -> Phasors:
-        """Return alpha - Omega t, minus the integral of the speed that is missing."""
-        return -self.torus.integral(self.torus.phasors(self.speed / motion.angular_speed))
 
     def loop_torque(self, motion: TorsionMotion, lead: Phasors) -> Phasors:
         """Return the motor's torque without its constant; ``lead`` is that of the motion."""
         slower = self.torus.phasors(self.speed - motion.angular_speed)
         return self.motor.proportional * slower - self.motor.integral * lead
+
+    @cached_property
+    def _share_of_mesh(self) -> Values:
+        """Torque at the input for each N.m of the mesh, on the grid."""
+        coefficients = self.coefficients
+        return np.asarray(1.0 / coefficients.ratio - coefficients.reaction * self._static_slope)
 
     @cached_property
     def rate(self) -> Phasors:
@@ -297,5 +305,7 @@ class AngleEquations:
 
 
 def mean(values: Values | float) -> Values:
-    """Return the mean over the grid, shape (n, 1)."""
-    return np.asarray(np.atleast_2d(values).mean(axis=1, keepdims=True))
+    """Return the mean over the grid, shape (n, 1), of values that may be the same on all of it."""
+    there = np.atleast_2d(values)
+    points = there.shape[1]
+    return there if points == 1 else np.asarray(there.sum(axis=1, keepdims=True) / points)

@@ -192,7 +192,7 @@ class _Solver:
         self.equations = equations
         self.converged = np.zeros(len(equations.speed), dtype=bool)
         if near is not None and np.all(near.converged):
-            self.torsion, self.energy = near.torsion.copy(), near.energy
+            self.torsion, self.energy = near.torsion.copy(), near.energy.copy()
         else:
             self.torsion = np.zeros_like(equations.static)
             self.torsion[:, 0] = equations.static_torsion()
@@ -202,8 +202,6 @@ class _Solver:
                 kept = near.converged[:, None]
                 self.torsion = np.where(kept, near.torsion, self.torsion)
                 self.energy = np.where(kept, near.energy, self.energy)
-        if near is not None:
-            self.energy = equations.at_wanted_speed(self.energy)
 
     def solve(self, tolerance: float, steps: int, factors: list[Factors | None]) -> None:
         """Iterate until the torsion converges; rows that do not are marked.
@@ -228,7 +226,7 @@ class _Solver:
             self.converged[left] = settled
             if np.all(settled):
                 self.torsion[left] = at.torsion + change
-                self.energy[left] = equations.at_wanted_speed(at.energy + energy_change)
+                self.energy[left] = at.energy + energy_change
                 break
             at = nearer(at, change, energy_change, settled)
             self.torsion[left], self.energy[left] = at.torsion, at.energy
@@ -263,9 +261,9 @@ class _Solver:
         motion = equations.motion(self.torsion, self.energy)
         torus, coefficients = equations.torus, equations.coefficients
         inertia = np.reshape(coefficients.load_inertia, (-1, 1))
-        lead = equations.lead(motion)
+        missing, _, lead = equations.residuals(motion)
         motor_torque = equations.loop_torque(motion, lead)
-        motor_torque[:, :1] += equations.input_residual(motion, lead)[:, :1].real
+        motor_torque[:, :1] += missing[:, :1].real
         return SteadyMotion(
             torus=torus,
             transmission_error=equations.static + self.torsion,
@@ -277,7 +275,7 @@ class _Solver:
                 + equations.of_loose_loads(motion)
             ),
             lead=lead,
-            energy=self.energy,
+            energy=motion.energy,
             converged=self.converged,
         )
 

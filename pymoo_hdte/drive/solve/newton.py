@@ -44,19 +44,17 @@ class Place:
     """
 
     def __init__(self, equations: AngleEquations, torsion: Phasors, energy: Phasors) -> None:
-        self.equations, self.torsion, self.energy = equations, torsion, energy
         motion = equations.motion(torsion, energy)
+        self.equations, self.torsion, self.energy = equations, torsion, motion.energy
         self._mesh_slope = motion.mesh_slope
         ratio = equations.coefficients.ratio
         operator = equations.input_operator
         loss = mean(motion.output_loss)
         self._impedance, coupling, share = equations.impedance(loss)
-        # A motor of constant torque does not ask how far the input lags.
-        lead = equations.lead(motion) if equations.motor.integral else 0.0
-        missing = equations.input_residual(motion, lead)
+        missing, of_output, _ = equations.residuals(motion)
         self._energy_change = -ratio * missing / operator
         self._energy_change[:, 0] = 0.0
-        self._left = (equations.output_residual(motion) + coupling * self._energy_change) / share
+        self._left = (of_output + coupling * self._energy_change) / share
         self._viscous = equations.rate * mean(motion.mesh_damping) - self._impedance
         self._level = mean(motion.mesh_slope)
         of_each = self._left / (np.abs(self._level) + np.abs(self._viscous))
@@ -74,8 +72,7 @@ class Place:
 
     def moved(self, change: Phasors, energy_change: Phasors) -> Place:
         """Return the place after a change, at the wanted speed."""
-        energy = self.equations.at_wanted_speed(self.energy + energy_change)
-        return Place(self.equations, self.torsion + change, energy)
+        return Place(self.equations, self.torsion + change, self.energy + energy_change)
 
     def newton_step(
         self, size: Values, factors: Sequence[Factors | None]

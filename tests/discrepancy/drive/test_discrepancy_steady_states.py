@@ -11,7 +11,12 @@ from virtual_rig_cases import BELIEVED, RIG, effect, true_rig
 from pymoo_hdte.discrepancy.drive import rattling
 from pymoo_hdte.discrepancy.drive.evidence import flanks_held
 from pymoo_hdte.discrepancy.drive.features import measure, unexpected_lines
-from pymoo_hdte.discrepancy.drive.steady_states import merged
+from pymoo_hdte.discrepancy.drive.steady_states import (
+    DEPARTURE,
+    SLOPES,
+    Continuation,
+    merged,
+)
 from pymoo_hdte.discrepancy.engine.candidate import Layout
 from pymoo_hdte.discrepancy.engine.fitting import fit
 from pymoo_hdte.discrepancy.engine.rules import RULES
@@ -43,7 +48,7 @@ def test_a_record_without_a_steady_state_makes_no_slope_of_the_jump(data, soften
     here = data.prediction(values, softening)
     lost = np.arange(records) == 2
     start = replace(here.balance.rows(slice(records)), converged=~lost)
-    there = data.prediction(values, softening, start, for_slopes=True)
+    there = data.prediction(values, softening, start, SLOPES)
     assert np.array_equal(there.balance.converged, ~lost)
     plain = data.features.of_prediction(data.prediction(values, ()))[0]
     with_law = data.features.of_prediction(here)[0]
@@ -53,6 +58,41 @@ def test_a_record_without_a_steady_state_makes_no_slope_of_the_jump(data, soften
     assert not np.allclose(plain[lost], with_law[lost], rtol=1e-2, atol=1e-7)
     # What is not for slopes is tried anew.
     assert data.prediction(values, softening, start).balance.converged.all()
+
+
+def test_states_are_continued_to_first_order(data, softening):
+    """Half as far away, a quarter as wrong; states that move far begin where they were."""
+    records = len(data.features.records)
+    values = Layout(data.base).array("start")
+    scale = Layout(data.base).array("scale")
+
+    def states(at):
+        return data.prediction(at[None], softening, effort=DEPARTURE).balance
+
+    known, step = Continuation(), 1e-3 * scale[0]
+    assert known.at(values) is None
+    away = values.copy()
+    away[0] += step
+    known.arrived(values, states(values))
+    known.depart(len(values))
+    known.follow(0, step, states(away))
+    errors = []
+    for way in (0.2 * scale[0], 0.1 * scale[0]):
+        away[0] = values[0] + way
+        errors.append(np.abs(known.at(away).torsion - states(away).torsion).sum())
+    plain = np.abs(known.motion.torsion - states(away).torsion).sum()
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.3)
+    assert errors[1] < 0.1 * plain
+    away[0] = -values[0]
+    assert np.array_equal(known.at(away).torsion, known.motion.torsion)
+    # Where a record has no steady state on one side, the other is no slope.
+    lost = np.arange(records) == 1
+    away[0] = values[0] + step
+    known.depart(len(values))
+    known.follow(0, step, replace(states(away), converged=~lost))
+    away[0] = values[0] + 0.1 * scale[0]
+    still = known.at(away).torsion == known.motion.torsion
+    assert still[lost].all() and not still[~lost].all()
 
 
 def test_merged_rows_keep_their_own_tangents(data):

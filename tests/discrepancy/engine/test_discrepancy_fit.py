@@ -54,6 +54,22 @@ def test_jacobian_is_that_of_the_residuals(swept, names):
     assert kept.jacobian(values) == pytest.approx(found, abs=1e-2)
 
 
+def test_derivatives_do_not_depend_on_the_way_there():
+    """What Newton's method leaves of a steady state must be far below the step of a quotient.
+
+    With the tolerance of a prediction derivatives by a sensor's gain were wrong by half.
+    """
+    data = known_data(FEW, [1.0, 2.0, 2.02, 6.0])
+    data, _ = measured((), np.random.default_rng(1), data)
+    ripple = listed(data, "torque_ripple", [6.0])
+    objective, other = Objective(data, (ripple,)), Objective(data, (ripple,))
+    values = objective.start
+    from_rest = other.jacobian(values)
+    objective.residuals(values)
+    errors = np.abs(objective.jacobian(values) - from_rest).max(axis=0)
+    assert np.all(errors < 1e-2 * np.abs(from_rest).max(axis=0))
+
+
 def test_kept_slopes_stand_for_the_features_of_the_base_only(swept):
     line = listed(swept, "kinematic_error", [3.0])
     renewed = Objective(swept, (line,))
