@@ -40,8 +40,8 @@ Of 143,588 cases that arrived in four campaigns of a test bench none took more t
 that would take longer are no evidence for the effect there.
 """
 DEPARTURE = Effort(1e-10)
-"""Where slopes are to follow: with the tolerance of a prediction, those by a sensor's gain were off by
-half in a campaign of a test."""
+"""Where slopes are to follow: with the tolerance of a prediction, those by a sensor's gain were off
+by half in a campaign of a test."""
 SLOPES = Effort(3e-7, slopes=True)
 """From there: on a seen campaign it moves the worst slope, which forward quotients give to .3 %, by
 .2 %."""
