@@ -20,13 +20,18 @@ SMOOTHING_SPEED = 1e-4
 """rad/s. Dry friction follows tanh(speed / this): exact to rounding wherever a drive turns, and its
 sign is undecided only below 1 % of the slowest output speed of interest (10 r/min at the input)."""
 
+_WHOLE = 20.0
+"""Argument beyond which a hyperbolic tangent is 1 to the last digit; it takes long to compute."""
 _NEGLIGIBLE_SPEED = 1e-150
 """rad/s. Keeps a quotient finite at rest."""
 
 
 def smoothed_sign(speed: Values) -> tuple[Values, Values]:
     """Return the smoothed sign of a speed and its derivative."""
-    value = np.tanh(speed / SMOOTHING_SPEED)
+    share = np.asarray(speed / SMOOTHING_SPEED)
+    if np.abs(share).min(initial=np.inf) > _WHOLE:
+        return np.copysign(1.0, share), np.zeros_like(share)
+    value = np.tanh(share)
     return value, (1.0 - value**2) / SMOOTHING_SPEED
 
 
