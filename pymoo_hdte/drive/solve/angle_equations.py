@@ -38,7 +38,8 @@ class TorsionMotion:
 
     ``energy`` are the harmonics of E, (n, n_harmonics). ``mesh_slope`` and ``mesh_damping`` are the
     derivatives of ``mesh_torque`` by torsion and by its rate, ``output_loss`` that of
-    ``output_friction`` by speed; what is the same on the whole grid may have one column.
+    ``output_friction`` by speed. What is the same on the whole grid, or of no law, may have one
+    column or row, or be a number.
     """
 
     energy: Phasors

@@ -94,15 +94,16 @@ def harmonic_balance(
     torus : Torus, optional
         Harmonics that are kept; by default all excited orders and their combinations.
     tolerance : float
-        Largest change of the torsion, relative to its size, at which the iteration ends.
+        Largest change of the torsion, and of the energy, relative to their sizes, at which the
+        iteration ends.
     start : SteadyMotion, optional
         Nearby cases, a row each, to begin from; ignored if their torus is another.
     steps : int
         Most steps of Newton's method; a row that would need more, or that does not halve what is
         left in fifteen of them, has not converged.
     tangents : bool
-        Whether the result is to serve as ``start`` of cases so near that its matrices are good
-        enough for them, as for difference quotients; it then holds all that it was found from.
+        Whether the result is to serve as ``start`` of cases that take steps with its matrices as
+        long as these shrink fast; it then holds all that it was found from.
 
     Returns
     -------
@@ -223,6 +224,9 @@ class _Solver:
             shrinks = longest <= _SHRINKS * before
             # With the matrix of another place a short step alone does not tell that it has arrived.
             settled = (longest <= tolerance * size[left, 0]) & (shrinks | own)
+            # The speed may answer more than the torsion, as to a strong ripple at a low speed.
+            slower = np.abs(energy_change).max(axis=1)
+            settled &= slower <= tolerance * np.abs(at.energy[:, 0])
             self.converged[left] = settled
             if np.all(settled):
                 self.torsion[left] = at.torsion + change

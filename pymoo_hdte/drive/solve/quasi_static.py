@@ -19,7 +19,8 @@ _STEPS = 100
 _TOLERANCE = 1e-10
 """Largest change of the torsion, relative to the length of the leg, that ends the root search.
 
-Beyond a kink Newton's next step would remove its square.
+Away from a kink the next step would be about its square; at one, where the bracket is halved, the
+error may be as large as this.
 """
 _DOUBLINGS = 20
 _LEAST_WAY = 1e-7
@@ -145,15 +146,18 @@ class _Mesh:
             return direction * (response.torque - held), np.asarray(response.slope)
 
         low = np.zeros((len(before), len(held)))
-        way = high = np.maximum(np.abs(beyond(low)[0]) / self.stiffness, _LEAST_WAY)
+        first = beyond(low)[0]
+        high = np.maximum(np.abs(first) / self.stiffness, _LEAST_WAY)
         excess, slope = beyond(high)
         for _ in range(_DOUBLINGS):
             short = excess < 0.0
             if not short.any():
                 break
-            way = high = np.where(short, 2.0 * high, high)
+            high = np.where(short, 2.0 * high, high)
             excess, slope = beyond(high)
         tolerance = _TOLERANCE * high
+        # Within a clearance a torque of zero is carried from the start.
+        way, excess = (np.where(first == 0.0, 0.0, one) for one in (high, excess))
         for _ in range(_STEPS):
             low, high = np.where(excess < 0.0, way, low), np.where(excess < 0.0, high, way)
             step = np.divide(excess, slope, out=np.full_like(way, np.inf), where=slope > 0.0)

@@ -248,6 +248,27 @@ def test_orders_out_of_reach_are_refused(orders, rng):
         order_lines(noisy(rng), RIG, RATIO, orders)
 
 
+def test_what_no_row_shows_is_refused():
+    """A decay that has ended before the second row has a derivative of zero in all of them."""
+    unsettled = replace(noisy(np.random.default_rng(3)), settling=1e-5)
+    with pytest.raises(InvalidInput, match="orders"):
+        order_lines(unsettled, RIG, RATIO, ORDERS)
+
+
+def test_an_ill_conditioned_fit_keeps_its_digits():
+    """A decay nearly as long as the record is a line with little curvature; angles are large."""
+    far = record(*np.sin(np.outer([3.0, 4.0, 5.0], TIME)), angle=1e5 + ANGLE)
+    far = replace(far, settling=0.8 * TIME[-1])
+    fit = line_basis.LineFit.of(far, RATIO, ORDERS)
+    unit = fit.triangle / np.linalg.norm(fit.triangle, axis=0)
+    assert 500.0 < np.linalg.cond(unit) < line_basis.LARGEST_CONDITION
+    # A straight line without any wave: what is beside it is an error of the fit.
+    slope, waves_and_decay = fit.coefficients[1, 3], fit.coefficients[2:, 3]
+    assert slope == pytest.approx(SPEED, rel=1e-9)
+    assert np.abs(waves_and_decay).max() < 1e-7
+    assert np.abs(fit.whole_residual[:, 3]).max() < 1e-9
+
+
 def test_blocks_of_rows_give_the_lines_and_spectrum_of_all_rows(monkeypatch):
     rng = np.random.default_rng(8)
     whole = noisy(rng, 4)

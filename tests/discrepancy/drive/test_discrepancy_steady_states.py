@@ -13,8 +13,10 @@ from pymoo_hdte.discrepancy.drive.evidence import flanks_held
 from pymoo_hdte.discrepancy.drive.features import measure, unexpected_lines
 from pymoo_hdte.discrepancy.drive.steady_states import (
     DEPARTURE,
+    PREDICTION,
     SLOPES,
     Continuation,
+    Effort,
     merged,
 )
 from pymoo_hdte.discrepancy.engine.candidate import Layout
@@ -94,6 +96,21 @@ def test_states_are_continued_to_first_order(data, softening):
     still = known.at(away).torsion == known.motion.torsion
     assert still[lost].all()
     assert not still[~lost].all()
+
+
+def test_a_speed_that_varies_strongly_is_found_as_well_as_the_torsion():
+    """A ripple makes the input turn a quarter slower and faster at 10 r/min, and twists little.
+
+    The angle of the input was off by more than half its noise.
+    """
+    data = known_data(LOADED_OR_NOT, [1.0, 2.0, 2.02, 3.0, 6.0])
+    ripple = listed(data, "torque_ripple", [6.0]).build((0.01, 0.0))
+    values = Layout(data.base).array("start")[None]
+    found, sharp = (
+        data.features.of_prediction(data.prediction(values, ripple, effort=effort))[0]
+        for effort in (PREDICTION, Effort(1e-12))
+    )
+    assert np.abs(data.whiten(found - sharp)).max() < 1e-2
 
 
 def test_merged_rows_keep_their_own_tangents(data):

@@ -70,6 +70,26 @@ def test_derivatives_do_not_depend_on_the_way_there():
     assert np.all(errors < 1e-2 * np.abs(from_rest).max(axis=0))
 
 
+@pytest.mark.parametrize("place", [0, -1])
+def test_a_fit_begins_where_its_derivatives_foretell(swept, place):
+    """Of the stiffness, and of a strength at its upper bound, from where the step goes down."""
+    soft = listed(swept, "soft_windup")
+    objective = Objective(swept, (soft,))
+    values = objective.start.copy()
+    values[-3] = objective.upper[-3]
+    values[-1] = objective.upper[-1]
+    objective.residuals(values)
+    objective.jacobian(values)
+    there = values.copy()
+    there[place] -= 0.05 * objective.scale[place]
+    begins, was = objective._states.at(there), objective._states.motion
+    assert begins.tangents is not None
+    objective.residuals(there)
+    arrived = objective._states.motion
+    left = np.abs(begins.torsion - arrived.torsion).sum()
+    assert left < 0.2 * np.abs(was.torsion - arrived.torsion).sum()
+
+
 def test_kept_slopes_stand_for_the_features_of_the_base_only(swept):
     line = listed(swept, "kinematic_error", [3.0])
     renewed = Objective(swept, (line,))
