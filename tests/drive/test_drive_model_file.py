@@ -36,7 +36,16 @@ at_least_0 = st.floats(min_value=0.0, allow_infinity=False)
 above_0 = st.floats(min_value=0.0, exclude_min=True, allow_infinity=False)
 # Between the bounds of every law's every field.
 share = st.floats(min_value=0.0, max_value=1.0, exclude_max=True)
-AT_LEAST_1 = ("sharpness", "order", "torsion", "spread", "fading", "exponent", "reference")
+AT_LEAST_1 = (
+    "sharpness",
+    "thinning",
+    "order",
+    "torsion",
+    "spread",
+    "fading",
+    "exponent",
+    "reference",
+)
 texts = st.text(min_size=1).filter(str.strip)
 
 
