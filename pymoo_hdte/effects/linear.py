@@ -9,7 +9,7 @@ import numpy as np
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.effects.effect import Effect, register
-from pymoo_hdte.effects.friction import SMOOTHING_SPEED
+from pymoo_hdte.effects.friction import smoothed_sign
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, Law, PortState, Response
 from pymoo_hdte.effects.unknowns import starts_along_each, unknown
@@ -67,9 +67,8 @@ class DirectionalFriction(Aperiodic):
 
     def respond(self, state: PortState) -> Response:
         """Return force and tangents."""
-        size, sign = np.abs(state.speed), np.tanh(state.speed / SMOOTHING_SPEED)
-        moving = sign**2
-        slope = 2.0 * sign * (1.0 - moving) / SMOOTHING_SPEED
+        size, (sign, steep) = np.abs(state.speed), smoothed_sign(state.speed)
+        moving, slope = sign**2, 2.0 * sign * steep
         force = self.level + self.viscous * size
         return Response(force * moving, damping=force * slope + self.viscous * sign * moving)
 

@@ -10,13 +10,7 @@ from numpy.typing import NDArray
 from pymoo_hdte.discrepancy.campaign.known_values import known_values
 from pymoo_hdte.discrepancy.drive.features import MEANS
 from pymoo_hdte.discrepancy.drive.observations import Observations
-from pymoo_hdte.discrepancy.drive.steady_states import (
-    DEPARTURE,
-    PREDICTION,
-    SLOPES,
-    Continuation,
-    Effort,
-)
+from pymoo_hdte.discrepancy.drive.steady_states import SLOPES, Continuation
 from pymoo_hdte.discrepancy.engine.candidate import Candidate
 from pymoo_hdte.discrepancy.engine.fitting import Unknowns, Vector, built
 from pymoo_hdte.drive import DriveEffect, SteadyMotion
@@ -146,15 +140,15 @@ class Objective(Unknowns):
         parts = built(self.candidates, values[n_base:])
         return values[None, :n_base], tuple(effect for part in parts for effect in part)
 
-    def _features(self, values: Vector, effort: Effort = PREDICTION) -> NDArray[np.float64]:
+    def _features(self, values: Vector) -> NDArray[np.float64]:
         """Return predicted features (r, f) at values; their steady states are kept as a start."""
-        prediction = self.data.prediction(*self._parts(values), self._states.at(values), effort)
+        prediction = self.data.prediction(*self._parts(values), self._states.at(values))
         self._states.arrived(values, prediction.balance)
         return self.data.features.of_prediction(prediction)[0]
 
     def _departed(self, values: Vector) -> NDArray[np.float64]:
         """Return the same where slopes are to follow."""
-        features = self._features(values, DEPARTURE)
+        features = self._features(values)
         self._states.depart(len(values))
         return features
 

@@ -123,8 +123,9 @@ def predict(
     for rows, known in groups:
         some = {name: column[rows] for name, column in values.items()}
         present = (*known, *effects)
-        args = (believed, rig, conditions, orders, some, present, start, effort)
-        parts.append(_predict_group(*args))
+        parts.append(
+            _predict_group(believed, rig, conditions, orders, some, present, start, effort)
+        )
     if len(parts) == 1:
         return parts[0]
     return _joined(parts, [rows for rows, _ in groups], len(conditions))

@@ -39,11 +39,8 @@ SCREENING = Effort(1e-7, 25)
 Of 143,588 cases that arrived in four campaigns of a test bench none took more than 23 steps; those
 that would take longer are no evidence for the effect there.
 """
-DEPARTURE = Effort(1e-10)
-"""Where slopes are to follow: with the tolerance of a prediction, those by a sensor's gain were off
-by half (`test_derivatives_do_not_depend_on_the_way_there`)."""
 SLOPES = Effort(3e-7, slopes=True)
-"""For quotients from there. Forward quotients give the worst slope of a seen campaign to .3 %; this
+"""For difference quotients. Forward quotients give the worst slope of a seen campaign to .3 %; this
 moves it by .2 %, and beside a strong ripple of the motor that by the input's inertia by 2 %."""
 
 _LONGEST = 0.5

@@ -12,7 +12,6 @@ from pymoo_hdte.discrepancy.drive import rattling
 from pymoo_hdte.discrepancy.drive.evidence import flanks_held
 from pymoo_hdte.discrepancy.drive.features import measure, unexpected_lines
 from pymoo_hdte.discrepancy.drive.steady_states import (
-    DEPARTURE,
     PREDICTION,
     SLOPES,
     Continuation,
@@ -69,7 +68,7 @@ def test_states_are_continued_to_first_order(data, softening):
     scale = Layout(data.base).array("scale")
 
     def states(at):
-        return data.prediction(at[None], softening, effort=DEPARTURE).balance
+        return data.prediction(at[None], softening, effort=Effort(1e-10)).balance
 
     known, step = Continuation(), 1e-3 * scale[0]
     assert known.at(values) is None

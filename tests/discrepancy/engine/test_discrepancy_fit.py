@@ -57,7 +57,8 @@ def test_jacobian_is_that_of_the_residuals(swept, names):
 def test_derivatives_do_not_depend_on_the_way_there():
     """What Newton's method leaves of a steady state must be far below the step of a quotient.
 
-    With the tolerance of a prediction derivatives by a sensor's gain were wrong by half.
+    Where states arrived by their torsion alone, whatever the speed did, derivatives by a sensor's
+    gain were wrong by more than their size.
     """
     data = known_data(FEW, [1.0, 2.0, 2.02, 6.0])
     data, _ = measured((), np.random.default_rng(1), data)
@@ -67,7 +68,7 @@ def test_derivatives_do_not_depend_on_the_way_there():
     from_rest = other.jacobian(values)
     objective.residuals(values)
     errors = np.abs(objective.jacobian(values) - from_rest).max(axis=0)
-    assert np.all(errors < 1e-2 * np.abs(from_rest).max(axis=0))
+    assert np.all(errors < 5e-3 * np.abs(from_rest).max(axis=0))
 
 
 @pytest.mark.parametrize("place", [0, -1])
