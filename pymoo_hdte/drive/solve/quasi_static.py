@@ -2,6 +2,7 @@
 
 Between two turning points of the mesh torque the torsion moves one way only. A law with memory then
 follows from the torsions at the turning points, which makes each leg one vectorised root search.
+Where no law asks for the way, the torsion follows the torque and the whole path is one leg.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ error may be as large as this.
 _DOUBLINGS = 20
 _LEAST_WAY = 1e-7
 """rad. The search starts no smaller: within a clearance hardly any torque is a long way."""
+_HARDLY = 1e-12
+"""Share of the largest torque that stands for none: a clearance ends where it is about to carry."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 """For the integral of torque over the torsion of one interval; its kinks need this many nodes."""
 
@@ -108,6 +111,10 @@ def _none(coefficients: Coefficients) -> Values:
     return np.empty((len(coefficients.stiffness), 0))
 
 
+class _AskedForTheWay(Exception):
+    """A law depends on where the torsion was before."""
+
+
 @dataclass(frozen=True)
 class _Mesh:
     """Mesh torque over torsion with the input locked."""
@@ -115,10 +122,15 @@ class _Mesh:
     stiffness: Values
     laws: tuple[Law, ...]
 
-    def respond(self, torsion: Values, turns: Values) -> Response:
-        """Return the torque at torsions (n, m) that each follow the turning points (n, k)."""
+    def respond(self, torsion: Values, turns: Values | None) -> Response:
+        """Return the torque at torsions (n, m) that each follow the turning points (n, k).
+
+        Without these a law that asks for the way raises `_AskedForTheWay`.
+        """
 
         def path(values: Values) -> Values:
+            if turns is None:
+                raise _AskedForTheWay
             return np.column_stack([np.repeat(turns, torsion.shape[1], axis=0), values.ravel()])
 
         def back(values: Values) -> Values:
@@ -132,9 +144,12 @@ class _Mesh:
             torque, slope = torque + one.torque, slope + one.slope
         return Response(torque, slope)
 
-    def torsion_at(self, held: Values, before: Values, turns: Values, direction: float) -> Values:
+    def torsion_at(
+        self, held: Values, before: Values, turns: Values | None, direction: Values | float
+    ) -> Values:
         """Return the first torsions beyond ``before`` (n, 1) that carry the torques (m,).
 
+        The torsion moves in a ``direction``, 1 or -1, which may differ from torque to torque (m,).
         Newton's method in a bracket; a step that would leave it, as at a kink, halves it instead.
         Without a law the torsion follows the torque.
         """
@@ -173,10 +188,11 @@ class _Mesh:
 
 @dataclass(frozen=True)
 class _Leg:
-    """Part of the path on which the mesh torque moves one way.
+    """Part of the path on which the mesh torque moves one way, or all of it where no way counts.
 
     ``steps`` of the load (m,), N.m; ``held`` (m,) is the mesh torque, N.m; ``torsion`` (n, m) and
-    that ``before`` the leg (n, 1), rad; ``turns`` (n, k) are the torsions at the turning points.
+    that ``before`` the leg (n, 1), rad; ``turns`` (n, k) are the torsions at the turning points,
+    None where they do not matter.
     """
 
     mesh: _Mesh
@@ -184,7 +200,7 @@ class _Leg:
     held: Values
     torsion: Values
     before: Values
-    turns: Values
+    turns: Values | None
 
 
 def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
@@ -198,16 +214,36 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
     held = _play(torque, sum(law.breakaway for law in at_output if law.before_slip is None))
     steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
+    before, turns = np.zeros((len(mesh.stiffness), 1)), _none(coefficients)
+    try:
+        loaded, sides = _away_from_rest(held)
+        torsion = mesh.torsion_at(loaded, before, None, sides)
+    except _AskedForTheWay:
+        pass
+    else:
+        yield _Leg(mesh, steps, held, torsion, before, None)
+        return
     moving = np.flatnonzero(moves)
     # Signs, since the product of two small moves may be zero.
     turning = moving[1:][np.diff(np.sign(moves[moving])) != 0.0]
-    before, turns = np.zeros((len(mesh.stiffness), 1)), _none(coefficients)
     for rows in np.split(np.arange(len(torque)), turning):
         direction = 1.0 if moves[rows].sum() >= 0.0 else -1.0
         torsion = mesh.torsion_at(held[rows], before, turns, direction)
         yield _Leg(mesh, steps[rows], held[rows], torsion, before, turns)
         before = torsion[:, -1:]
         turns = np.hstack([turns, before])
+
+
+def _away_from_rest(held: Values) -> tuple[Values, Values]:
+    """Return torques (m,) and the sides, 1 or -1, of the torsions that carry them on any way.
+
+    Where there is none, the flanks that carried the last torque are about to.
+    """
+    loaded = np.flatnonzero(held)
+    last = np.searchsorted(loaded, np.arange(len(held)), side="right") - 1
+    sides = np.append(np.sign(held[loaded]), 0.0)[last]
+    least = _HARDLY * np.abs(held).max(initial=0.0)
+    return np.where(held == 0.0, least * sides, held), np.where(sides < 0.0, -1.0, 1.0)
 
 
 def _play(torque: Values, breakaway: float) -> Values:
