@@ -215,14 +215,15 @@ class FittedSets:
     def resume(self, known: Sequence[Hypothesis], go_on: bool = False) -> None:
         """Fit sets from the values that another search has found on nearly the same data.
 
-        The chosen one first. Those that came nowhere near it or the best one are only evaluated.
+        The chosen one first. Those that came nowhere near it are only evaluated.
         Where the search is to ``go_on``, what it fits afterwards is fitted as in any search.
         """
         self._resumed = True
-        chosen, best = known[0], min(known, key=lambda one: one.bic)
+        chosen = known[0]
         rivals = [chosen, *(one for one in known[1:] if self.alike(one, chosen))]
         for one in known:
-            hopeful = one in rivals or self.may_come_as_near(one, best)
+            # Not the best one, of which a member may not be earned.
+            hopeful = one in rivals or self.may_come_as_near(one, chosen)
             self.fitted(one.candidates, one.fit.values, steps=None if hopeful else 0)
         for one in rivals:
             self.finished(self._by_label[label_of(one.candidates)])
