@@ -26,8 +26,6 @@ error may be as large as this.
 _DOUBLINGS = 20
 _LEAST_WAY = 1e-7
 """rad. The search starts no smaller: within a clearance hardly any torque is a long way."""
-_HARDLY = 1e-12
-"""Share of the largest torque that stands for none: a clearance ends where it is about to carry."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 """For the integral of torque over the torsion of one interval; its kinks need this many nodes."""
 
@@ -38,7 +36,7 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     Laws at the mesh act unchanged. Dry friction at the output, its level with all of the Stribeck
     excess, holds the mesh torque until the load differs from it by that much, in either direction;
     contacts that bend (`PreslidingFriction`) start unbent, and act as springs across the mesh.
-    Where a clearance leaves the torsion free, it moves no further than necessary.
+    Where a clearance leaves the torsion free, it moves no further from zero than necessary.
 
     The angle of the locked input is not known: a stiffness and clearances that vary with it are
     taken at their means, which is wrong by up to the depth of the variation and by up to half the
@@ -216,8 +214,7 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
     before, turns = np.zeros((len(mesh.stiffness), 1)), _none(coefficients)
     try:
-        loaded, sides = _away_from_rest(held)
-        torsion = mesh.torsion_at(loaded, before, None, sides)
+        torsion = mesh.torsion_at(held, before, None, np.where(held < 0.0, -1.0, 1.0))
     except _AskedForTheWay:
         pass
     else:
@@ -232,18 +229,6 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
         yield _Leg(mesh, steps[rows], held[rows], torsion, before, turns)
         before = torsion[:, -1:]
         turns = np.hstack([turns, before])
-
-
-def _away_from_rest(held: Values) -> tuple[Values, Values]:
-    """Return torques (m,) and the sides, 1 or -1, of the torsions that carry them on any way.
-
-    Where there is none, the flanks that carried the last torque are about to.
-    """
-    loaded = np.flatnonzero(held)
-    last = np.searchsorted(loaded, np.arange(len(held)), side="right") - 1
-    sides = np.append(np.sign(held[loaded]), 0.0)[last]
-    least = _HARDLY * np.abs(held).max(initial=0.0)
-    return np.where(held == 0.0, least * sides, held), np.where(sides < 0.0, -1.0, 1.0)
 
 
 def _play(torque: Values, breakaway: float) -> Values:
