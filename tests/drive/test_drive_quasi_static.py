@@ -8,6 +8,7 @@ import pytest
 from pymoo_hdte.drive import mean_torsion, preset, quasi_static_torsion
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import Aperiodic, Response
+from pymoo_hdte.effects.linear import ConstantForce
 from pymoo_hdte.effects.stiffness import DeadZone, HardeningStiffness, SoftWindup
 
 TORQUE = 40.0
@@ -56,17 +57,78 @@ def test_of_a_law_with_memory_the_way_counts():
     assert up > 1.02 * down
 
 
-def test_a_law_of_ones_own_that_asks_for_the_way_gets_it():
-    """Though it states no inner states: a solver in time would need these."""
+class Brush(Aperiodic):
+    """Dry friction of 2 N.m that states no inner states, though a solver in time needs these."""
 
-    class Brush(Aperiodic):
-        def respond(self, state):
-            steps = np.diff(state.path(state.position), prepend=0.0)
-            on_the_way = np.sign(np.where(steps == 0.0, 1.0, steps))
-            return Response(2.0 * state.back(on_the_way))
+    def respond(self, state):
+        steps = np.diff(state.path(state.position), prepend=0.0)
+        return Response(2.0 * state.back(np.sign(np.where(steps == 0.0, 1.0, steps))))
 
-    up, down = quasi_static_torsion(drive(Brush()), np.array([20.0, 40.0, 20.0]))[0, [0, 2]]
+
+class Idle(Aperiodic):
+    """No torque; asks for the way where some torsion is between two points only."""
+
+    def respond(self, state):
+        here = np.abs(state.position) / travel()
+        asks = np.any((here > 0.2) & (here < 0.3))
+        return Response(0.0 * (state.back(state.path(state.position)) if asks else here))
+
+
+@pytest.mark.parametrize("torsion", [quasi_static_torsion, mean_torsion])
+def test_a_law_of_ones_own_that_asks_for_the_way_gets_it(torsion):
+    ends = np.array([-30.0, 10.0, 20.0, 40.0, 20.0, 10.0])
+    found = torsion(drive(Brush()), ends)[0]
+    up, down = found[[-5, -1]] if torsion is quasi_static_torsion else found[[-4, -1]]
     assert down - up == pytest.approx(4.0 / stiffness())
+
+
+def test_a_law_may_ask_for_the_way_between_the_points_only():
+    ends = np.array([40.0, -40.0, 30.0])
+    assert mean_torsion(drive(Idle()), ends) == pytest.approx(mean_torsion(drive(), ends))
+
+
+def test_a_force_without_torsion_moves_the_drive_at_rest():
+    held = np.array([0.0, 10.0, 2.0, 1.0, -1.0, -40.0, 0.0, 2.0])
+    found = quasi_static_torsion(drive(ConstantForce(3.0)), held)[0]
+    assert found == pytest.approx((held - 3.0) / stiffness(), abs=1e-9 * travel())
+
+
+def test_rows_are_drives_of_their_own():
+    coefficients = drive(DeadZone(0.1 * travel()))
+    both = replace(
+        preset("calibrated").coefficients(np.tile(preset("calibrated").nominal, (2, 1))),
+        laws=coefficients.laws,
+        stiffness=np.array([1.0, 2.0]) * stiffness(),
+    )
+    softer, stiffer = mean_torsion(both, SWEEP)
+    assert softer == pytest.approx(mean_torsion(coefficients, SWEEP)[0], abs=1e-9 * travel())
+    assert np.ptp(stiffer) < 0.7 * np.ptp(softer)
+
+
+def test_a_torque_that_the_mesh_cannot_carry_is_no_number_and_the_others_are():
+    """A spring that softens by a cubic carries at most 2/3 K d, where its slope is zero."""
+
+    class Softening(Aperiodic):
+        def respond(self, state):
+            share = -stiffness() / travel() ** 2
+            return Response(share * state.position**3 / 3.0, share * state.position**2)
+
+    found = quasi_static_torsion(drive(Softening()), np.array([10.0, 40.0, -10.0]))[0]
+    assert np.isnan(found).tolist() == [False, True, False]
+    assert found[0] == -found[2]
+
+
+def test_the_whole_path_is_searched_at_once_where_no_law_asks_for_the_way(monkeypatch):
+    calls = []
+    respond = DeadZone.respond
+    monkeypatch.setattr(DeadZone, "respond", lambda *given: calls.append(1) or respond(*given))
+    coefficients = drive(DeadZone(0.1 * travel()))
+    counts = []
+    for repeats in (1, 5):
+        calls.clear()
+        mean_torsion(coefficients, np.tile(SWEEP, repeats))
+        counts.append(len(calls))
+    assert counts[0] == counts[1]
 
 
 def test_a_clearance_adds_its_half_width_and_leaves_the_unloaded_drive_where_it_is_free():

@@ -222,7 +222,7 @@ class FittedSets:
         chosen = known[0]
         rivals = [chosen, *(one for one in known[1:] if self.alike(one, chosen))]
         for one in known:
-            # Not the best one, of which a member may not be earned.
+            # Measured from the chosen one: of the best one a member may not be earned.
             hopeful = one in rivals or self.may_come_as_near(one, chosen)
             self.fitted(one.candidates, one.fit.values, steps=None if hopeful else 0)
         for one in rivals:

@@ -2,12 +2,12 @@
 
 Between two turning points of the mesh torque the torsion moves one way only. A law with memory then
 follows from the torsions at the turning points, which makes each leg one vectorised root search.
-Where no law asks for the way, the torsion follows the torque and the whole path is one leg.
+Where no law asks for the way, the torsion follows the torque, and the whole path is one leg.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +36,8 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     Laws at the mesh act unchanged. Dry friction at the output, its level with all of the Stribeck
     excess, holds the mesh torque until the load differs from it by that much, in either direction;
     contacts that bend (`PreslidingFriction`) start unbent, and act as springs across the mesh.
-    Where a clearance leaves the torsion free, it moves no further from zero than necessary.
+    Where a clearance leaves the torsion free, it is as near to zero as may be or, where a law has
+    memory, moves no further than necessary. So it is where the torque falls with the torsion.
 
     The angle of the locked input is not known: a stiffness and clearances that vary with it are
     taken at their means, which is wrong by up to the depth of the variation and by up to half the
@@ -68,7 +69,7 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     >>> print(np.round(np.degrees(loop) * 3600))
     [[   0.  319.    0. -319.    0.]]
     """
-    return np.hstack([_none(coefficients), *(leg.torsion for leg in _legs(coefficients, torque))])
+    return np.hstack(_by_legs(coefficients, torque, lambda leg: leg.torsion))
 
 
 def mean_torsion(coefficients: Coefficients, torque: Values) -> Values:
@@ -92,21 +93,19 @@ def mean_torsion(coefficients: Coefficients, torque: Values) -> Values:
     >>> print(np.round(np.degrees(twist) * 3600))
     [[160.]]
     """
-    parts = [_none(coefficients)]
-    for leg in _legs(coefficients, torque):
-        half = np.diff(leg.torsion, prepend=leg.before) / 2.0
-        low = leg.torsion - 2.0 * half
-        inside = (low + half)[..., None] + half[..., None] * _NODES
-        carried = leg.mesh.respond(inside.reshape(len(inside), -1), leg.turns).torque
-        missing = leg.held[:, None] - carried.reshape(inside.shape)
-        area = half * (missing @ _WEIGHTS)
-        steady = np.divide(area, leg.steps, out=np.zeros_like(area), where=leg.steps != 0.0)
-        parts.append(low + steady)
-    return np.hstack(parts)[:, 1:]
+    return np.hstack(_by_legs(coefficients, torque, _means))[:, 1:]
 
 
-def _none(coefficients: Coefficients) -> Values:
-    return np.empty((len(coefficients.stiffness), 0))
+def _means(leg: _Leg) -> Values:
+    """Return the mean torsion on the way to each point of a leg, shape (n, m)."""
+    half = np.diff(leg.torsion, prepend=leg.before) / 2.0
+    low = leg.torsion - 2.0 * half
+    inside = (low + half)[..., None] + half[..., None] * _NODES
+    carried = leg.mesh.respond(inside.reshape(len(inside), -1), leg.turns).torque
+    missing = leg.held[:, None] - carried.reshape(inside.shape)
+    area = half * (missing @ _WEIGHTS)
+    steady = np.divide(area, leg.steps, out=np.zeros_like(area), where=leg.steps != 0.0)
+    return np.asarray(low + steady)
 
 
 class _AskedForTheWay(Exception):
@@ -147,7 +146,7 @@ class _Mesh:
     ) -> Values:
         """Return the first torsions beyond ``before`` (n, 1) that carry the torques (m,).
 
-        The torsion moves in a ``direction``, 1 or -1, which may differ from torque to torque (m,).
+        The torsion moves in a ``direction``, 1 or -1, perhaps of each row and torque (n, m).
         Newton's method in a bracket; a step that would leave it, as at a kink, halves it instead.
         Without a law the torsion follows the torque.
         """
@@ -183,6 +182,31 @@ class _Mesh:
             excess, slope = beyond(way)
         return np.where(short, np.nan, before + direction * way)
 
+    def whole(self, steps: Values, held: Values) -> _Leg:
+        """Return the path as one leg: of each torque the torsion nearest to zero that carries it.
+
+        Raises `_AskedForTheWay` where a law depends on more.
+        """
+        before = np.zeros((len(self.stiffness), 1))
+        # A law may make a torque without any torsion.
+        at_rest = self.respond(before, None).torque if self.laws else before
+        torsion = self.torsion_at(held, before, None, np.where(held < at_rest, -1.0, 1.0))
+        return _Leg(self, steps, held, torsion, before, None)
+
+    def legs(self, steps: Values, held: Values) -> Iterator[_Leg]:
+        """Yield the legs of the path from rest, on each of which the mesh torque moves one way."""
+        moves = np.diff(held, prepend=0.0)
+        moving = np.flatnonzero(moves)
+        # Signs, since the product of two small moves may be zero.
+        turning = moving[1:][np.diff(np.sign(moves[moving])) != 0.0]
+        before, turns = np.zeros((len(self.stiffness), 1)), np.empty((len(self.stiffness), 0))
+        for rows in np.split(np.arange(len(held)), turning):
+            direction = 1.0 if moves[rows].sum() >= 0.0 else -1.0
+            torsion = self.torsion_at(held[rows], before, turns, direction)
+            yield _Leg(self, steps[rows], held[rows], torsion, before, turns)
+            before = torsion[:, -1:]
+            turns = np.hstack([turns, before])
+
 
 @dataclass(frozen=True)
 class _Leg:
@@ -201,8 +225,10 @@ class _Leg:
     turns: Values | None
 
 
-def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
-    """Yield the legs of the path from rest."""
+def _by_legs(
+    coefficients: Coefficients, torque: Values, of_leg: Callable[[_Leg], Values]
+) -> list[Values]:
+    """Return what each leg of the path gives, the first without a point."""
     torque = finite_array("torque", torque, (None,))
     locked = [law.with_input_locked() for port, law in coefficients.laws if port == "mesh"]
     at_output = [law for port, law in coefficients.laws if port == "output"]
@@ -211,24 +237,11 @@ def _legs(coefficients: Coefficients, torque: Values) -> Iterator[_Leg]:
     mesh_laws = tuple(law for law in locked if law is not None)
     mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
     held = _play(torque, sum(law.breakaway for law in at_output if law.before_slip is None))
-    steps, moves = np.diff(torque, prepend=0.0), np.diff(held, prepend=0.0)
-    before, turns = np.zeros((len(mesh.stiffness), 1)), _none(coefficients)
+    steps, none = np.diff(torque, prepend=0.0), np.empty((len(coefficients.stiffness), 0))
     try:
-        torsion = mesh.torsion_at(held, before, None, np.where(held < 0.0, -1.0, 1.0))
+        return [none, of_leg(mesh.whole(steps, held))]
     except _AskedForTheWay:
-        pass
-    else:
-        yield _Leg(mesh, steps, held, torsion, before, None)
-        return
-    moving = np.flatnonzero(moves)
-    # Signs, since the product of two small moves may be zero.
-    turning = moving[1:][np.diff(np.sign(moves[moving])) != 0.0]
-    for rows in np.split(np.arange(len(torque)), turning):
-        direction = 1.0 if moves[rows].sum() >= 0.0 else -1.0
-        torsion = mesh.torsion_at(held[rows], before, turns, direction)
-        yield _Leg(mesh, steps[rows], held[rows], torsion, before, turns)
-        before = torsion[:, -1:]
-        turns = np.hstack([turns, before])
+        return [none, *map(of_leg, mesh.legs(steps, held))]
 
 
 def _play(torque: Values, breakaway: float) -> Values:

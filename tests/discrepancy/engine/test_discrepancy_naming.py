@@ -213,7 +213,7 @@ def test_what_came_as_near_as_the_chosen_set_is_fitted_again_when_the_noise_is_r
     """Though another, no member of which is earned, came far nearer.
 
     The noise that a reaction brings with it moved all fits: a friction beside it was evaluated at
-    the values that it had before, and lost among thousands.
+    the values that it had before, where chi-square was twice that of the reaction alone.
     """
     data, verdict = ripple
     again, chosen = search.Search(data, verdict.base, ()), verdict.chosen
