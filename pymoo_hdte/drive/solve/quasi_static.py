@@ -69,7 +69,7 @@ def quasi_static_torsion(coefficients: Coefficients, torque: Values) -> Values:
     >>> print(np.round(np.degrees(loop) * 3600))
     [[   0.  319.    0. -319.    0.]]
     """
-    return np.hstack(_by_legs(coefficients, torque, lambda leg: leg.torsion))
+    return _by_legs(coefficients, torque, lambda leg: leg.torsion)
 
 
 def mean_torsion(coefficients: Coefficients, torque: Values) -> Values:
@@ -93,7 +93,7 @@ def mean_torsion(coefficients: Coefficients, torque: Values) -> Values:
     >>> print(np.round(np.degrees(twist) * 3600))
     [[160.]]
     """
-    return np.hstack(_by_legs(coefficients, torque, _means))[:, 1:]
+    return _by_legs(coefficients, torque, _means)[:, 1:]
 
 
 def _means(leg: _Leg) -> Values:
@@ -189,7 +189,7 @@ class _Mesh:
         """
         before = np.zeros((len(self.stiffness), 1))
         # A law may make a torque without any torsion.
-        at_rest = self.respond(before, None).torque if self.laws else before
+        at_rest = self.respond(before, None).torque
         torsion = self.torsion_at(held, before, None, np.where(held < at_rest, -1.0, 1.0))
         return _Leg(self, steps, held, torsion, before, None)
 
@@ -227,8 +227,8 @@ class _Leg:
 
 def _by_legs(
     coefficients: Coefficients, torque: Values, of_leg: Callable[[_Leg], Values]
-) -> list[Values]:
-    """Return what each leg of the path gives, the first without a point."""
+) -> Values:
+    """Return what the legs of the path give, side by side."""
     torque = finite_array("torque", torque, (None,))
     locked = [law.with_input_locked() for port, law in coefficients.laws if port == "mesh"]
     at_output = [law for port, law in coefficients.laws if port == "output"]
@@ -237,11 +237,11 @@ def _by_legs(
     mesh_laws = tuple(law for law in locked if law is not None)
     mesh = _Mesh(coefficients.stiffness[:, None], mesh_laws)
     held = _play(torque, sum(law.breakaway for law in at_output if law.before_slip is None))
-    steps, none = np.diff(torque, prepend=0.0), np.empty((len(coefficients.stiffness), 0))
+    steps = np.diff(torque, prepend=0.0)
     try:
-        return [none, of_leg(mesh.whole(steps, held))]
+        return of_leg(mesh.whole(steps, held))
     except _AskedForTheWay:
-        return [none, *map(of_leg, mesh.legs(steps, held))]
+        return np.hstack([*map(of_leg, mesh.legs(steps, held))])
 
 
 def _play(torque: Values, breakaway: float) -> Values:

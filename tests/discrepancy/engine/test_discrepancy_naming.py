@@ -210,7 +210,7 @@ def test_what_came_nowhere_near_is_only_evaluated_when_the_noise_is_renewed(ripp
 
 
 def test_what_came_as_near_as_the_chosen_set_is_fitted_again_when_the_noise_is_renewed(ripple):
-    """Though another, no member of which is earned, came far nearer.
+    """Though another, of which a member may not be earned, came far nearer.
 
     The noise that a reaction brings with it moved all fits: a friction beside it was evaluated at
     the values that it had before, where chi-square was twice that of the reaction alone.
