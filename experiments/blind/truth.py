@@ -17,6 +17,7 @@ FORM_OF = {
     "presliding_friction": "coulomb_friction",
     "coupled_inertia": "load_inertia",
     "shear_thinning_drag": "nonlinear_drag",
+    "bouc_wen_hysteresis": "hysteresis",
 }
 """Effects of the library that are a form of one that is hidden."""
 PARAMETER = "parameter"

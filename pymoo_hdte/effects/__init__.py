@@ -1,6 +1,7 @@
 """Effects: laws of force over motion at the ports of any machine, each with its sentence."""
 
 from pymoo_hdte.effects import (
+    bouc_wen,
     friction,
     gravity,
     hysteresis,
@@ -24,6 +25,7 @@ __all__ = [
     "PortState",
     "Response",
     "Sizes",
+    "bouc_wen",
     "effect_named",
     "friction",
     "gravity",

@@ -7,10 +7,10 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pymoo_hdte.checks import real_number
 from pymoo_hdte.compilation import compiled
+from pymoo_hdte.effects.bouc_wen import bouc_wen
 from pymoo_hdte.effects.effect import Effect, register
 from pymoo_hdte.effects.guess import Guess, Sizes
 from pymoo_hdte.effects.law import Aperiodic, PortState, Response, Values
@@ -61,17 +61,14 @@ class MaxwellSlip(Aperiodic):
         _pull(path, self._slips, self._stiffnesses, torque, slope)
         return Response(state.back(torque), state.back(slope))
 
-    def recall(self, path: Values) -> tuple[Values, NDArray[np.int_]]:
-        """Return how torques depend on where springs last slipped: weights and steps of ``path``.
+    def recall(self, path: Values) -> tuple[Values, Values]:
+        """Return how each spring's torque depends on the step before and on the way since then.
 
-        Both have shape (springs, n, steps). A sticking spring is stretched by the way since then,
-        so the torque changes by minus weight times the change of the position at that step.
+        A sticking spring keeps its torque and is stretched by the way, a slipping one has forgotten
+        both. Both have shape (springs, n, steps).
         """
         _, sticking = slip_along(path, self._slips)
-        slipped = np.where(sticking == 0.0, np.arange(path.shape[1]), -1)
-        last = np.maximum.accumulate(slipped, axis=2)
-        weights = self._stiffnesses[:, None, None] * sticking * (last >= 0)
-        return weights, np.maximum(last, 0)
+        return sticking, self._stiffnesses[:, None, None] * sticking
 
     def rates(self, speed: float, kept: Values) -> Values:
         """Return how fast the springs stretch, (4,), for an integrator that keeps their state."""
@@ -97,8 +94,11 @@ class MaxwellSlip(Aperiodic):
 
 
 def _slipping(sizes: Sizes) -> list[Guess]:
-    """Guess springs that slip; in a motion without reversal they would act as dry friction."""
-    return [Guess(*springs("force", sizes))] if sizes.both_ways else []
+    """Guess springs that slip, and a smooth loop in their place.
+
+    In a motion without reversal both would act as dry friction.
+    """
+    return [Guess(*springs("force", sizes)), bouc_wen(sizes)] if sizes.both_ways else []
 
 
 def springs(strength: str, sizes: Sizes) -> tuple[tuple[Parameter, ...], list[tuple[float, ...]]]:

@@ -50,6 +50,9 @@ class PortState:
         ``load`` says.
     temperature : ndarray or float
         Of the machine in kelvin; NaN where it is not known.
+    recurs : bool
+        Whether the second half of a ``path`` is the first again, and so on for ever: a law that
+        forgets gradually has then come to repeat itself, too.
     """
 
     position: Values
@@ -60,6 +63,7 @@ class PortState:
     back: Callable[[Values], Values] = _whole
     load: Values | None = None
     temperature: Values | float = np.nan
+    recurs: bool = False
 
 
 @dataclass(frozen=True)
@@ -129,6 +133,11 @@ class Law(Protocol):
         ...
 
     @property
+    def creep(self) -> float:
+        """See `Behaviour`."""
+        ...
+
+    @property
     def before_slip(self) -> Law | None:
         """See `Behaviour`."""
         ...
@@ -167,11 +176,11 @@ class Memory(Law, Protocol):
         """Return the slope of the force by the position, moving in a direction, 1 or -1."""
         ...
 
-    def recall(self, path: Values) -> tuple[Values, NDArray[np.int_]]:
-        """Return how forces along paths (n, steps) depend on earlier steps: weights and steps.
+    def recall(self, path: Values) -> tuple[Values, Values]:
+        """Return how forces along paths (n, steps) that recur depend on earlier steps.
 
-        Both of shape (k, n, steps): the force changes by minus weight times the change of the
-        position at that step, beside what ``respond`` gives as its slope.
+        The force is a sum of k parts. Two derivatives of each, both of shape (k, n, steps): by
+        itself at the step before, and by the way since then.
         """
         ...
 
@@ -207,6 +216,11 @@ class Behaviour:
     @property
     def driving(self) -> complex:
         """Phasor of a driving force, which a sensor of that force reads; 0 otherwise."""
+        return 0.0
+
+    @property
+    def creep(self) -> float:
+        """Force that fades away in many repetitions of a motion, after a load has wound it up."""
         return 0.0
 
     @property

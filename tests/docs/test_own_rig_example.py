@@ -206,7 +206,7 @@ def test_page_lists_the_library():
     listed = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
     # A clearance that varies belongs to the mesh of a drive, and is looked for there only; and what
     # is a form of another alone is tried in drives only.
-    of_drives = {"clearance_variation", "shear_thinning_drag"}
+    of_drives = {"clearance_variation", "shear_thinning_drag", "bouc_wen_hysteresis"}
     assert sorted(listed) == sorted({one.name for one in law_effects()} - of_drives)
 
 

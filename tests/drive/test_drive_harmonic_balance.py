@@ -36,6 +36,7 @@ from pymoo_hdte.drive.solve.torus import (
     fundamental_orders,
     multiples_of,
 )
+from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
     NonlinearDrag,
@@ -50,7 +51,7 @@ from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.units import ARCSEC
 
-MEMORYLESS = memoryless(EFFECTS)
+SMOOTH = [*memoryless(EFFECTS), LawAtPort("bouc_wen_hysteresis", "mesh", BoucWen(1.0, 1e-4, 2.0))]
 
 
 def with_effects(model, *effects):
@@ -69,7 +70,7 @@ def test_presets_agree_with_the_integrator_though_the_angle_is_free(name):
 
 
 @pytest.mark.parametrize(
-    "effect", others_at_night(MEMORYLESS, *MEMORYLESS[::3]), ids=lambda effect: effect.name
+    "effect", others_at_night(SMOOTH, *SMOOTH[::3], SMOOTH[-1]), ids=lambda effect: effect.name
 )
 def test_every_law_agrees_with_the_integrator_along_the_whole_turn(effect):
     model = with_effects(preset("resonant"), effect)
@@ -477,20 +478,32 @@ def test_harmonics_on_a_grid_are_their_sum_there_and_come_back(highest, rng):
 
 
 @pytest.mark.parametrize("highest", [(3,), (4, 2), (3, 2, 1)])
-def test_a_recalled_signal_is_that_of_the_points_where_it_was(highest, rng):
+def test_what_is_recalled_is_a_recursion_once_it_repeats(highest, rng):
+    """Of parts that slip now and then, that fade, and that keep all, as from the first passage."""
     torus = Torus((1.0, 0.02, 0.37)[: len(highest)], highest)
-    terms, n = 3, 2
+    n, size = 2, torus.size
     phasors = rng.standard_normal((n, len(torus.orders), 2)) @ [1.0, 1j]
     phasors[:, 0] = phasors[:, 0].real
-    weights = rng.standard_normal((terms, n, torus.size))
-    # Where a spring slips it recalls nothing.
-    weights *= rng.random(weights.shape) < 0.5
-    places = rng.integers(0, torus.size, weights.shape)
-    values = torus.signal(phasors)
-    elsewhere = np.take_along_axis(np.broadcast_to(values, places.shape), places, axis=2)
-    recalled = torus.phasors((weights * elsewhere).sum(axis=0))
-    product = np.einsum("nij,nj->ni", torus.recall_matrix(weights, places), stacked(phasors))
-    assert np.abs(unstacked(product) - recalled).max() < 1e-12
+    slips, keeps = rng.random((2, n, size)) < 0.3, np.ones((n, size))
+    kept = np.array([1.0 - slips[0], rng.uniform(0.8, 1.0, (n, size)), keeps])
+    gained = rng.standard_normal(kept.shape) * (kept > 0.0)
+    # The last part slips in its first passage only, and is then stretched and released.
+    gained[2] = 1.5
+    first = np.array([kept[0], kept[1], 1.0 - slips[1]])
+    places = np.array([rng.permutation(size) for _ in range(n)])
+    values = np.take_along_axis(torus.signal(phasors), places, axis=1)
+    parts, before, recalled = np.zeros((3, n)), np.zeros(n), np.empty((n, size))
+    for passage in range(60):
+        for step in range(size):
+            keep = (kept if passage else first)[..., step]
+            parts = keep * parts + gained[..., step] * (values[:, step] - before)
+            before = values[:, step]
+            there = parts.sum(axis=0) - gained[..., step].sum(axis=0) * before
+            recalled[np.arange(n), places[:, step]] = there
+    both = np.concatenate([first, kept], axis=2), np.concatenate([gained, gained], axis=2)
+    matrix = torus.recall_matrix(*both, places)
+    product = unstacked(np.einsum("nij,nj->ni", matrix, stacked(phasors)))
+    assert product == pytest.approx(torus.phasors(recalled), abs=1e-9 * np.abs(product).max())
 
 
 def test_springs_together_pull_as_much_as_one_after_the_other(rng):

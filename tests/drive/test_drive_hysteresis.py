@@ -10,22 +10,38 @@ from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
 from pymoo_hdte.drive.solve.angle_equations import AngleEquations
 from pymoo_hdte.drive.solve.free_angle import torus_of
 from pymoo_hdte.drive.solve.newton import Place, stacked, unstacked
+from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.effect import effect_named
 from pymoo_hdte.effects.hysteresis import MaxwellSlip
 from pymoo_hdte.effects.law import PortState
 from pymoo_hdte.units import ARCSEC
 
+SPRINGS = LawAtPort("hysteresis", "mesh", MaxwellSlip(3.0, 1e-4))
+FADING = [
+    LawAtPort("bouc_wen_hysteresis", "mesh", BoucWen(3.0, torsion, exponent, share))
+    for torsion, exponent, share in [(3e-4, 1.0, 0.6), (5e-4, 2.5, 1.0), (2e-3, 1.5, 0.3)]
+]
+
 
 def drive(name, force, torsion, input_speed=200.0, load_torque=40.0):
+    return drive_with(
+        name,
+        LawAtPort("hysteresis", "mesh", MaxwellSlip(force, torsion)),
+        input_speed=input_speed,
+        load_torque=load_torque,
+    )
+
+
+def drive_with(name, *effects, input_speed=200.0, load_torque=40.0):
     model = preset(name)
-    effect = LawAtPort("hysteresis", "mesh", MaxwellSlip(force, torsion))
-    model = replace(model, effects=(*model.effects, effect)).at(input_speed, load_torque)
+    model = replace(model, effects=(*model.effects, *effects)).at(input_speed, load_torque)
     return model.coefficients(model.nominal[None])
 
 
+@pytest.mark.parametrize("effects", [(SPRINGS,), *((one,) for one in FADING), (SPRINGS, FADING[0])])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-def test_slope_and_memory_together_are_the_derivative_of_the_torque(direction, rng):
-    coefficients = drive("resonant", 3.0, 1e-4)
+def test_slope_and_memory_together_are_the_derivative_of_the_torque(direction, effects, rng):
+    coefficients = drive_with("resonant", *effects)
     torus = torus_of(coefficients)
     speed, load = direction * np.array([200.0]), np.array([40.0])
     equations = AngleEquations(coefficients, speed, load, SpeedLoop(), torus)

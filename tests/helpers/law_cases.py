@@ -7,6 +7,7 @@ from pymoo_hdte.drive.effects import (
     PreslidingFriction,
     drive_effects,
 )
+from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
     NonlinearDrag,
@@ -30,6 +31,7 @@ EFFECTS = [
     LawAtPort("backlash", "mesh", DeadZone(5 * ARCSEC)),
     LawAtPort("clearance_variation", "mesh", PeriodicClearance(2.0, 0.3, 3 * ARCSEC, 2 * ARCSEC)),
     LawAtPort("hysteresis", "mesh", MaxwellSlip(1.0, 2e-4)),
+    LawAtPort("bouc_wen_hysteresis", "mesh", BoucWen(1.0, 1e-4, 1.5, 0.7)),
     LawAtPort("coulomb_friction", "output", CoulombFriction(2.0)),
     LawAtPort("presliding_friction", "output", PreslidingFriction(2.0, 4e-5, 1.4)),
     LawAtPort("stribeck_friction", "input", StribeckFriction(0.05, 0.05, 50.0)),
@@ -47,5 +49,5 @@ EFFECTS = [
 
 
 def memoryless(effects):
-    """Return the effects without hysteresis, whose springs make an integrator chatter."""
-    return [effect for effect in effects if effect.name != "hysteresis"]
+    """Return the effects without those that remember: springs make an integrator chatter."""
+    return [one for one in effects if not getattr(getattr(one, "law", None), "states", 0)]

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import finite_array
 from pymoo_hdte.discrepancy.campaign.believed import Rig
-from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, mean_speed, nyquist_order
+from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, decays, mean_speed, nyquist_order
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 
 CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
@@ -147,6 +147,23 @@ def order_lines(
         row_covariance=noise,
         bends=np.column_stack([bends[0], lines]),
     )
+
+
+def lines_of_decays(
+    record: RunningRecord, ratio: float, orders: ArrayLike, constants: ArrayLike
+) -> NDArray[np.complex128]:
+    """Return mean and phasors, (k, 1 + m), that `order_lines` assigns to decays.
+
+    Each falls from one at the first row by its time constant, s; ``constants`` has shape (k,).
+    """
+    asked = finite_array("orders", orders, (None,))
+    fit = LineFit.of(record, ratio, [*asked, *_doubles(asked, record, ratio)])
+    times = np.asarray(constants)
+    projected = sum(fit.basis(part).T @ decays(record, part, times) for part in fit.parts)
+    lines = np.linalg.solve(fit.triangle, projected).T
+    m, every = len(asked), len(fit.orders)
+    phasors = lines[:, 2 : 2 + m] + 1j * lines[:, 2 + every : 2 + every + m]
+    return np.column_stack([lines[:, 0], phasors / averaging_gain(asked, record)])
 
 
 def _doubles(orders: NDArray[np.float64], record: RunningRecord, ratio: float) -> list[float]:

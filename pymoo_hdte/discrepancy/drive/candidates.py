@@ -22,8 +22,9 @@ _COVERED = {"load_inertia": "load_inertia", "damping": "damping_reference"}
 _ONCE = (
     {"coulomb_friction", "presliding_friction"},
     {"nonlinear_drag", "shear_thinning_drag"},
+    {"hysteresis", "bouc_wen_hysteresis"},
 )
-"""Names of one thing in several forms, which a port has once: dry friction, and drag."""
+"""Names of one thing in several forms, which a port has once: dry friction, drag, hysteresis."""
 
 
 def drive_candidates(
@@ -32,7 +33,7 @@ def drive_candidates(
     """Return all candidates for a drive, for the sizes of each of its ports.
 
     None of them is at the place of a believed effect; dry friction is there once, bending or not,
-    and drag once, of a fluid that thins or not.
+    drag once, of a fluid that thins or not, and hysteresis once, of springs or of Bouc and Wen.
     """
     known = {place_of(effect) for effect in believed}
     known |= {

@@ -17,7 +17,7 @@ from scipy.linalg import solve_triangular
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.known_values import of_equal_numbers
-from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, lines_of_decays
 from pymoo_hdte.discrepancy.drive.features import (
     MEANS,
     Features,
@@ -26,11 +26,15 @@ from pymoo_hdte.discrepancy.drive.prediction import Prediction, coefficients_of,
 from pymoo_hdte.discrepancy.drive.steady_states import PREDICTION, Effort
 from pymoo_hdte.discrepancy.drive.torsion_curve import TorsionPoints
 from pymoo_hdte.discrepancy.engine.candidate import Layout
-from pymoo_hdte.drive import DriveEffect, SteadyMotion, mean_torsion
+from pymoo_hdte.drive import DriveEffect, LawAtPort, SteadyMotion, mean_torsion
 from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 Values = NDArray[np.float64]
+
+_FADING = (0.02, 0.05, 0.1, 0.25, 0.6, 2.0)
+"""Time constants of what fades in a record, as shares of its duration: a loop of Bouc and Wen that
+a load has wound up slows down as it fades, and what is left of it takes these together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +69,35 @@ class Observations:
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
-        """Covariance of the features of each record, sensors and repeatability, shape (r, f, f)."""
+        """Covariance of the features of each record, shape (r, f, f).
+
+        Of sensors, of the repeatability, and of what still creeps in laws that forget gradually.
+        """
         layout = Layout(self.base)
         start = layout.array("start") if self.reference is None else self.reference
-        return self.features.covariance + self._repeatability(layout, start)
+        known = self.features.covariance + self._repeatability(layout, start)
+        return known + self._creep(float(start[layout.index("stiffness")]))
+
+    def _creep(self, stiffness: float) -> NDArray[np.float64] | float:
+        """Return the covariance by torsion that fades in a record, which loads had left before.
+
+        Nobody knows how long the drive had turned on when a record began, so that any of it may be
+        left, up to that of the whole force, and fade at any rate.
+        """
+        effects = (*self.campaign.believed.effects, *self.reference_effects)
+        laws = [effect.law for effect in effects if isinstance(effect, LawAtPort)]
+        if not (size := sum(law.creep for law in laws) / stiffness):
+            return 0.0
+        features, ratio = self.features, self.campaign.believed.ratio
+        ways = np.zeros((len(features.records), 1 + len(_FADING), features.values.shape[1]))
+        ways[:, 0, 0] = 1.0
+        real, imaginary = features.places(0).T
+        for record, way in zip(features.records, ways[:, 1:], strict=True):
+            constants = np.ptp(record.time) * np.array(_FADING)
+            mean, *lines = lines_of_decays(record, ratio, features.orders, constants).T
+            way[:, 0], lines = mean.real, np.array(lines).T
+            way[:, real], way[:, imaginary] = lines.real, lines.imag
+        return size**2 * np.einsum("rki,rkj->rij", ways, ways)
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
         """Return the covariance by small changes of the static error for each record."""

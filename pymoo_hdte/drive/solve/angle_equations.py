@@ -155,7 +155,8 @@ class AngleEquations:
 
         stiffness = self.coefficients.stiffness[:, None]
         warmth = np.reshape(self.coefficients.temperature, (-1, 1))
-        state = PortState(position, speed, phase, stiffness, self._path, self._back, load, warmth)
+        around = (self._path, self._back)
+        state = PortState(position, speed, phase, stiffness, *around, load, warmth, recurs=True)
         total, *others = (law.respond(state) for law in laws)
         for one in others:
             total = Response(
@@ -188,16 +189,10 @@ class AngleEquations:
         """
         memories = [cast(Memory, law) for _, law in self.coefficients.laws if law.states]
         along = self._path(self.torus.signal(torsion))
-        every = np.arange(self.torus.size, dtype=float)
-        passed = self._path(np.tile(every, (len(along), 1)))
-        total = np.zeros((len(along), *[2 * len(self.torus.orders)] * 2))
-        for law in memories:
-            weights, steps = law.recall(along)
-            places = np.take_along_axis(np.broadcast_to(passed, steps.shape), steps, axis=2)
-            on_grid = np.array([self._back(one) for one in weights])
-            elsewhere = np.array([self._back(one) for one in places]).astype(int)
-            total -= self.torus.recall_matrix(on_grid, elsewhere)
-        return total
+        every = np.tile(np.arange(self.torus.size, dtype=float), (len(along), 1))
+        places = self._path(every)[:, : self.torus.size].astype(int)
+        kept, gained = zip(*(law.recall(along) for law in memories), strict=True)
+        return self.torus.recall_matrix(np.concatenate(kept), np.concatenate(gained), places)
 
     def residuals(self, motion: TorsionMotion) -> tuple[Phasors, Phasors, Phasors]:
         """Return the residuals of both equations, N.m, and the lead of the input, rad.

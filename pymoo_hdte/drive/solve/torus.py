@@ -14,9 +14,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.sparse import csr_array
 
 from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive.solve.recursion import recall
 
 Matrices = NDArray[np.float64]
 
@@ -272,22 +272,21 @@ class Torus:
         matrix[:, 0] *= 0.5
         return matrix
 
-    def recall_matrix(self, weights: NDArray[np.float64], places: NDArray[np.int_]) -> Matrices:
-        """Return the real matrices of weights times the signal at other points of the grid.
+    def recall_matrix(
+        self, kept: Matrices, gained: Matrices, places: NDArray[np.int_]
+    ) -> NDArray[np.float64]:
+        """Return the real matrices by which a sum of recursions depends on the signal elsewhere.
 
-        ``weights`` and ``places`` have shape (terms, n, G); the terms are summed. Matrices act as
-        those of `product_matrix`.
+        Parts ``kept`` and ``gained`` (k, n, 2 G) along a `path` are those of `recall`; ``places``
+        (n, G) are the points of the grid that it passes. Matrices act as those of `product_matrix`.
         """
-        terms, n, size = weights.shape
+        n, size = places.shape
         half = len(self.orders)
         found = np.empty((n, 2 * half, 2 * half))
         for row in range(n):
-            weight, place = weights[:, row].T.ravel(), places[:, row].T.ravel()
-            ends = np.arange(0, terms * size + 1, terms)
-            recall = csr_array((weight, place, ends), shape=(size, size))
-            # A slipping spring has forgotten.
-            recall.eliminate_zeros()
-            found[row] = self._stacked_harmonics(recall @ self._synthesis)
+            elsewhere = np.zeros((size, 2 * half))
+            recall(kept[:, row], gained[:, row], places[row], self._synthesis, elsewhere)
+            found[row] = self._stacked_harmonics(elsewhere)
         return found
 
     def _stacked_harmonics(self, columns: Matrices) -> Matrices:

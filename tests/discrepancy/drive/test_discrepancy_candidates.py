@@ -88,6 +88,7 @@ IN_FILES = {
     "load_inertia/coupled": "coupled_inertia",
     # Another law, with other numbers.
     "nonlinear_drag/shear_thinning": "shear_thinning_drag",
+    "hysteresis/bouc_wen": "bouc_wen_hysteresis",
 }
 """Forms of effects that stand in a model under a name of their own."""
 

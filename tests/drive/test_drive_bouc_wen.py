@@ -1,0 +1,161 @@
+"""Hysteresis of Bouc and Wen: closed forms, memory that fades, drives that run on and on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from pymoo_hdte.checks import InvalidInput
+from pymoo_hdte.drive import LawAtPort, SpeedLoop, harmonic_balance, preset
+from pymoo_hdte.drive.solve.quasi_static import quasi_static_torsion
+from pymoo_hdte.effects.bouc_wen import BoucWen
+from pymoo_hdte.effects.law import PortState
+
+FORCE, YIELD = 2.0, 1e-4
+exponents, shares = st.floats(1.0, 4.0), st.floats(0.05, 1.0)
+
+
+def torque(law, path, recurs=False):
+    """The torque on one path, or on one that recurs after its first half."""
+    around = (lambda values: values, lambda values: values)
+    state = PortState(path[None], 0.0 * path[None], None, np.ones(1), *around, recurs=recurs)
+    return law.respond(state).torque[0]
+
+
+def back_and_forth(reach, points=200):
+    """Up from rest to a reach, down to its opposite and back to zero."""
+    return reach * np.interp(np.linspace(0.0, 4.0, 4 * points + 1), [0, 1, 3, 4], [0, 1, -1, 0])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8, 1.0])
+def test_with_exponent_one_it_rises_and_falls_as_exponentials(share):
+    way = np.linspace(0.0, 3.0, 301)
+    there = torque(BoucWen(FORCE, YIELD, 1.0, share), YIELD * np.append(way, 3.0 - way[1:]))
+    assert there[:301] == pytest.approx(FORCE * (1.0 - np.exp(-way)), abs=1e-5)
+    # Back to zero z' = -(1 - a z) with a = 1 - 2 share, and from there as from rest.
+    top, a = 1.0 - np.exp(-3.0), 1.0 - 2.0 * share
+    down = top - way if a == 0.0 else 1.0 / a - (1.0 / a - top) * np.exp(a * way)
+    to_zero = top if a == 0.0 else -np.log1p(-a * top) / a
+    beyond = way > to_zero
+    down[beyond] = np.exp(to_zero - way[beyond]) - 1.0
+    assert there[300:] == pytest.approx(FORCE * down, abs=2e-5)
+
+
+def test_with_exponent_two_it_rises_as_a_hyperbolic_tangent():
+    way = np.linspace(0.0, 4.0, 101)
+    assert torque(BoucWen(FORCE, YIELD, 2.0), YIELD * way) == pytest.approx(
+        FORCE * np.tanh(way), abs=1e-5
+    )
+
+
+@settings(max_examples=15)
+@given(exponents, shares, st.integers(0, 2**32 - 1))
+def test_an_integrator_in_time_finds_the_same_torque(exponent, share, seed):
+    law = BoucWen(FORCE, YIELD, exponent, share)
+    turns = YIELD * np.cumsum(np.random.default_rng(seed).uniform(-2.0, 2.0, 6))
+    points = np.concatenate([[0.0], turns])
+    path = np.interp(np.linspace(0.0, 6.0, 61), np.arange(7), points)
+    kept, found = np.zeros(1), [0.0]
+    for leg in range(6):
+        speed = points[leg + 1] - points[leg]
+        times = np.linspace(0.0, 1.0, 11)
+        there = solve_ivp(
+            lambda _, z, speed=speed: law.rates(speed, z),
+            (0.0, 1.0),
+            kept,
+            t_eval=times,
+            rtol=1e-9,
+            atol=1e-13,
+            max_step=0.01,
+        ).y
+        kept = there[:, -1]
+        found += [law.torque(one) for one in there.T[1:]]
+    assert torque(law, path) == pytest.approx(found, abs=1e-4 * FORCE)
+    # And in one step between reversals, as integrators of mechanisms take it.
+    state = np.zeros(1)
+    for way in np.diff(points):
+        state = law.moved(state, way)
+    assert law.torque(state) == pytest.approx(found[-1], abs=1e-4 * FORCE)
+
+
+@given(exponents, shares, st.floats(-0.95, 0.95), st.sampled_from([-1.0, 1.0]))
+def test_its_tangent_is_the_slope_of_its_torque(exponent, share, z, direction):
+    law, kept, step = BoucWen(FORCE, YIELD, exponent, share), np.array([z * YIELD]), 1e-6 * YIELD
+    numerical = (law.torque(law.moved(kept, direction * step)) - law.torque(kept)) / step
+    assert law.tangent(kept, direction) == pytest.approx(
+        direction * numerical, rel=1e-4, abs=1e-4 * FORCE / YIELD
+    )
+
+
+@settings(max_examples=25)
+@given(exponents, shares, st.floats(0.05, 4.0))
+def test_a_loop_takes_energy(exponent, share, reach):
+    path = np.tile(YIELD * back_and_forth(reach)[1:], 2)
+    there = torque(BoucWen(FORCE, YIELD, exponent, share), path, recurs=True)[-800:]
+    way = np.diff(path[-800:], prepend=path[-1])
+    lost = float(np.sum(there * way))
+    assert lost > 0.0
+    # Never more than dry friction of the same force would.
+    assert lost < 4.0 * FORCE * reach * YIELD
+
+
+@pytest.mark.parametrize(("exponent", "share"), [(1.0, 1.0), (1.5, 0.3), (3.0, 0.6)])
+@pytest.mark.parametrize("load", [0.0, 5.0])
+@pytest.mark.parametrize("reach", [0.3, 2.0])
+def test_a_motion_that_recurs_has_forgotten_how_it_began(exponent, share, load, reach):
+    law = BoucWen(FORCE, YIELD, exponent, share)
+    passage = YIELD * (load + back_and_forth(reach, 40)[1:])
+    found = torque(law, np.tile(passage, 2), recurs=True)[-len(passage) :]
+    often = torque(law, np.tile(passage, 4000))[-len(passage) :]
+    assert found == pytest.approx(often, abs=1e-6 * FORCE)
+
+
+def test_a_port_that_rests_bears_what_wound_it_up():
+    law = BoucWen(FORCE, YIELD)
+    assert torque(law, np.full(8, 2.0 * YIELD), recurs=True) == pytest.approx(
+        FORCE * (1.0 - np.exp(-2.0)), rel=1e-5
+    )
+
+
+def drive(law):
+    model = preset("calibrated")
+    model = replace(model, effects=(LawAtPort("bouc_wen_hysteresis", "mesh", law),))
+    return model.coefficients(model.nominal[None])
+
+
+@pytest.mark.parametrize("force", [2.0, 8.0])
+@pytest.mark.parametrize(("exponent", "share"), [(1.0, 0.6), (2.0, 1.0)])
+def test_it_converges_at_any_load_and_speed(force, exponent, share):
+    coefficients = drive(BoucWen(force, 8e-5, exponent, share))
+    speed, load = np.meshgrid([20.0, 100.0, 209.4], [0.0, 0.5, 2.0, 20.0])
+    balance = harmonic_balance(
+        coefficients.rows(np.zeros(speed.size, dtype=int)),
+        input_speed=speed.ravel(),
+        load_torque=load.ravel(),
+        motor=SpeedLoop(0.02, 0.5),
+        tolerance=1e-8,
+    )
+    assert np.all(balance.converged)
+
+
+def test_a_sweep_of_the_load_is_carried_by_spring_and_loop_together():
+    law = BoucWen(5.0, YIELD, 1.5, 0.7)
+    coefficients = drive(law)
+    load = 40.0 * back_and_forth(1.0, 30)
+    torsion = quasi_static_torsion(coefficients, load)[0]
+    carried = coefficients.stiffness[0] * torsion + torque(law, torsion)
+    assert carried == pytest.approx(load, abs=1e-3)
+    # It lags behind: at the same load it is twisted further on the way down.
+    assert torsion[45] > torsion[15] + 1e-6
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [(np.nan, 1e-4), (1.0, 0.0), (1.0, 1e-4, 0.9), (1.0, 1e-4, 1.0, 0.0), (1.0, 1e-4, 1.0, 1.1)],
+)
+def test_numbers_that_are_none_of_such_a_loop_are_refused(bad):
+    with pytest.raises(InvalidInput, match="bouc_wen_hysteresis"):
+        BoucWen(*bad)
