@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pymoo_hdte.discrepancy.engine.candidate import Candidate, Layout
 from pymoo_hdte.discrepancy.engine.fitting import Evidence, Fit, fit
 from pymoo_hdte.discrepancy.engine.hypothesis import Hypothesis, contains
 from pymoo_hdte.discrepancy.engine.levenberg_marquardt import SAME
@@ -19,7 +20,7 @@ Vector = NDArray[np.float64]
 
 
 def best_fit(
-    data: Evidence, one: Hypothesis, starts: Sequence[Vector], found: Iterable[Hypothesis]
+    data: Evidence, one: Hypothesis, starts: Sequence[Vector], found: Collection[Hypothesis]
 ) -> Fit:
     """Return the best fit of a set from its values, the believed base and other starts.
 
@@ -32,7 +33,7 @@ def best_fit(
         The set, fitted at least so far as to rank it.
     starts : sequence of ndarray, shape (n_parameters,)
         In addition to its own values and those with the believed base.
-    found : iterable of Hypothesis
+    found : collection of Hypothesis
         Sets that it may contain: where it does no better than one of them, other shapes are tried.
     """
     fits = [fit(data, one.candidates, one.fit)]
@@ -44,7 +45,8 @@ def best_fit(
         return _least(fits)
 
     best = follow((_from_believed(data.base, fits[0]), *starts))
-    return follow(_other_shapes(best, one, found, data.rules))
+    best = follow(_other_shapes(best, _no_better(best, one, found, data.rules)))
+    return follow(_other_ends(best, _no_better(best, one, found, data.rules)))
 
 
 def _least(fits: Sequence[Fit]) -> Fit:
@@ -106,12 +108,12 @@ def _from_believed(base: Sequence[Parameter], fitted: Fit) -> Vector:
     return np.append(believed, fitted.values[len(believed) :])
 
 
-def _other_shapes(
+def _no_better(
     best: Fit, one: Hypothesis, found: Iterable[Hypothesis], rules: Rules
-) -> list[Vector]:
-    """Return starts with other shapes for a set that does no better than a special case of it.
+) -> list[tuple[Candidate, slice]]:
+    """Return the laws by which a set does no better than a special case of it.
 
-    A part of a law that has vanished during a fit has no shape that could lead it back.
+    Those with starts of several shapes, and the places of all their values but the strength.
     """
     special = {
         name
@@ -121,11 +123,45 @@ def _other_shapes(
         and other.fit.chi_square - best.chi_square < rules.evidence_distance
         for name in other.names
     }
+    return [
+        (member, slice(place.start + 1, place.stop))
+        for member, place in (best.places if special else ())
+        if (member.name, member.port) not in special
+        and len(member.starts) > 1
+        and not member.linear
+    ]
+
+
+def _other_shapes(best: Fit, laws: Iterable[tuple[Candidate, slice]]) -> list[Vector]:
+    """Return starts with the shapes of all starts of laws that do no better than a special case.
+
+    A part of a law that has vanished during a fit has no shape that could lead it back.
+    """
     starts = []
-    for member, place in best.places if special else ():
-        vanished = (member.name, member.port) not in special and not member.linear
-        for shape in member.starts if len(member.starts) > 1 and vanished else ():
+    for member, place in laws:
+        for shape in member.starts:
             start = best.values.copy()
-            start[place.start + 1 : place.stop] = shape[1:]
+            start[place] = shape[1:]
+            starts.append(start)
+    return starts
+
+
+def _other_ends(best: Fit, laws: Iterable[tuple[Candidate, slice]]) -> list[Vector]:
+    """Return starts at the other bound of shapes of such laws that ended at one.
+
+    What a law adds to its special case at one bound of a shape differs from what it adds at the
+    other, and no slope leads across where it vanishes between them: an excess of friction that
+    fades at once, or nowhere. A shape is what the starts of a law differ in. What else ended at a
+    bound may have vanished, and begins as in the first of them.
+    """
+    starts = []
+    for member, place in laws:
+        layout, sides = Layout(member.parameters[1:]), best.bound_sides[place]
+        first, *others = np.array(member.starts)[:, 1:]
+        moved = sides * np.any(others != first, axis=0)
+        ends = [layout.array("upper"), layout.array("lower"), first]
+        start = best.values.copy()
+        start[place] = np.select([moved < 0.0, moved > 0.0, sides != 0.0], ends, start[place])
+        if moved.any():
             starts.append(start)
     return starts

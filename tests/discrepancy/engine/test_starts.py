@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pymoo_hdte.discrepancy.engine.fitting import fit
+from pymoo_hdte.discrepancy.engine.candidate import Candidate
+from pymoo_hdte.discrepancy.engine.fitting import Unknowns, fit
+from pymoo_hdte.discrepancy.engine.hypothesis import hypothesis_of
 from pymoo_hdte.discrepancy.engine.rules import RULES
 from pymoo_hdte.discrepancy.engine.starts import best_fit
-from pymoo_hdte.effects.unknowns import Parameter
+from pymoo_hdte.effects.unknowns import Parameter, unknown
 
 TIME = np.linspace(0.0, 10.0, 400)
 STRENGTH, FREQUENCY, LEVEL = 3.0, 2.0, 5.0
@@ -111,3 +113,62 @@ def test_a_start_beyond_a_kink_is_followed_by_the_derivatives_that_foretell_most
     assert best.values == pytest.approx([(-Fold.SIZE + 0.25 * Fold.BELIEVED) / 1.25], abs=0.01)
     assert best.chi_square < above.chi_square
     assert -2.0 not in problem.derived
+
+
+class Falling(Unknowns):
+    """Residuals of a dry friction, beside excesses that fade at speeds of their own."""
+
+    speeds = np.linspace(0.5, 100.0, 200)
+
+    def __init__(self, candidates, excesses):
+        super().__init__((), candidates)
+        self.measured = LEVEL + sum(size * self.left(fading) for fading, size in excesses.items())
+
+    def left(self, fading):
+        return np.exp(-((self.speeds / fading) ** 2))
+
+    def residuals(self, values):
+        level, *falling = values
+        excess, fading = falling or (0.0, 1.0)
+        return level + excess * self.left(fading) - self.measured
+
+    def jacobian(self, values):
+        steps = self.steps(values)
+        moved = values + np.diag(steps * self.scale)
+        changes = np.array([self.residuals(one) for one in moved]) - self.residuals(values)
+        return (changes / steps[:, None]).T
+
+
+UNKNOWNS = (
+    unknown("level", 0.0, 20.0, LEVEL),
+    unknown("excess", 0.0, 20.0, 1.5),
+    unknown("fading", 1.0, 100.0, 10.0),
+)
+
+
+def friction(name, *starts):
+    return Candidate(f"{name}_friction", "input", UNKNOWNS[: len(starts[0])], starts, tuple, "")
+
+
+@pytest.mark.parametrize(
+    ("excesses", "begin", "end"),
+    [
+        ({1.0: 1.5, 10.0: -0.6, 100.0: 0.8}, 1.0, 100.0),
+        # There the excess has vanished.
+        ({1.0: 2.5, 10.0: -0.8}, 100.0, 1.0),
+    ],
+)
+def test_a_law_no_better_than_its_special_case_is_tried_from_the_other_bound_of_its_shape(
+    excesses, begin, end
+):
+    """From the law's own starts, between the bounds, the excess vanishes."""
+    coulomb = friction("coulomb", (LEVEL,))
+    law = friction("stribeck", *((LEVEL, 1.5, fading) for fading in (5.0, 10.0, 20.0)))
+    data = SimpleNamespace(
+        objective=lambda candidates: Falling(candidates, excesses), rules=RULES, base=()
+    )
+    one = hypothesis_of(fit(data, (law,), np.array([LEVEL, 0.1, begin])), 0.0)
+    assert one.fit.values[2] == pytest.approx(begin)
+    best = best_fit(data, one, (), [hypothesis_of(fit(data, (coulomb,)), 0.0)])
+    assert best.values[2] == pytest.approx(end)
+    assert best.chi_square < one.fit.chi_square - 1.0
