@@ -86,7 +86,9 @@ def test_its_tangent_is_the_slope_of_its_torque(exponent, share, z, direction):
     law, kept, step = BoucWen(FORCE, YIELD, exponent, share), np.array([z * YIELD]), 1e-6 * YIELD
     numerical = (law.torque(law.moved(kept, direction * step)) - law.torque(kept)) / step
     assert law.tangent(kept, direction) == pytest.approx(
-        direction * numerical, rel=1e-4, abs=1e-4 * FORCE / YIELD
+        # Between the steps of the rise it follows cubics, whose slopes are as good as this.
+        direction * numerical,
+        abs=5e-4 * FORCE / YIELD,
     )
 
 
@@ -111,6 +113,13 @@ def test_a_motion_that_recurs_has_forgotten_how_it_began(exponent, share, load, 
     found = torque(law, np.tile(passage, 2), recurs=True)[-len(passage) :]
     often = torque(law, np.tile(passage, 4000))[-len(passage) :]
     assert found == pytest.approx(often, abs=1e-6 * FORCE)
+
+
+def test_a_position_that_is_no_number_leads_to_none():
+    path = YIELD * np.array([0.5, np.nan, 1.0, 0.2] * 2)
+    for recurs in (False, True):
+        last = torque(BoucWen(FORCE, YIELD), path, recurs)[-3:]
+        assert np.isnan(last).all()
 
 
 def test_a_port_that_rests_bears_what_wound_it_up():

@@ -94,9 +94,9 @@ class Observations:
         real, imaginary = features.places(0).T
         for record, way in zip(features.records, ways[:, 1:], strict=True):
             constants = np.ptp(record.time) * np.array(_FADING)
-            mean, *lines = lines_of_decays(record, ratio, features.orders, constants).T
-            way[:, 0], lines = mean.real, np.array(lines).T
-            way[:, real], way[:, imaginary] = lines.real, lines.imag
+            lines = lines_of_decays(record, ratio, features.orders, constants)
+            way[:, 0] = lines[:, 0].real
+            way[:, real], way[:, imaginary] = lines[:, 1:].real, lines[:, 1:].imag
         return size**2 * np.einsum("rki,rkj->rij", ways, ways)
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:

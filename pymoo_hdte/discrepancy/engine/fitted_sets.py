@@ -115,6 +115,14 @@ class FittedSets:
         most = 1.0 - self.data.rules.explained_part_share
         return rest is not None and rest.excess <= most * left
 
+    def leaves_form_of(self, one: Hypothesis, member: Candidate) -> bool:
+        """Tell whether another form may do better in the place of a member of a set.
+
+        Where forms are most of what it leaves. And where it leaves more than noise beside a law
+        with memory: a loop that forgets is no sum of springs that slip, not even to first order.
+        """
+        return self.leaves_forms(one) or (member.remembers and not self.enough(one))
+
     def alike(self, one: Hypothesis, chosen: Hypothesis) -> bool:
         """Tell whether the data do not tell a set from another: see `hypothesis.alike`."""
         same_values = label_of(one.freed) == label_of(chosen.freed)

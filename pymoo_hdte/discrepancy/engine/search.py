@@ -296,13 +296,6 @@ class Search(FittedSets):
             kept = one.effects if member.covered_by else others
             for other in (*self.candidates, *self.forms_only):
                 fits = other.stands_for(member, open_to_curves) and may_be_together((*kept, other))
-                if fits and (not other.only_as_form or self._leaves_form_of(one, member)):
+                # What only stands for listed forms is tried where these leave some.
+                if fits and (not other.only_as_form or self.leaves_form_of(one, member)):
                     self.fitted((*kept, other), np.append(one.values_of(kept), other.starts[0]))
-
-    def _leaves_form_of(self, one: Hypothesis, member: Candidate) -> bool:
-        """Tell whether what only stands for a listed form may do better than that one.
-
-        Where forms are what is left; and where more than noise is left of a law with memory, since
-        a sum of springs that slip is no loop that forgets gradually, not even to first order.
-        """
-        return self.leaves_forms(one) or (member.remembers and not self.enough(one))

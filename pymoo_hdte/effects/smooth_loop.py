@@ -1,0 +1,178 @@
+"""A smooth loop that forgets: the one curve of its rise, and how it follows a path.
+
+States z lie between -1 and 1, ways are in torsions of yield. Whatever the state, a motion one way
+goes on along the same rise from -1 to 1, so that a path needs a search where it turns back only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pymoo_hdte.compilation import compiled
+from pymoo_hdte.effects.law import Values
+
+Rise = tuple[Values, Values, int]
+"""States of a rise at steps of equal ways, their slopes, and the step of the state zero."""
+
+_STEP = 0.04
+"""Ways between the states that are integrated, in torsions of yield: errors of the state stay below
+1e-6."""
+_STEPS = 1000
+"""Of them: after forty torsions of yield nothing is left of where it began, to the last digit."""
+_FLAT = 1e-12
+"""Slope below which a state is that of the end of the rise."""
+_UNCHANGED = 1e-10
+"""Share of the force by which a passage may still change a state that repeats itself."""
+_PASSAGES = 50
+
+
+@compiled
+def slope_of(z: float, exponent: float, share: float) -> float:
+    """Return dz over the way of a motion towards positive z, in torsions of yield."""
+    return 1.0 - (1.0 if z > 0.0 else 1.0 - 2.0 * share) * abs(z) ** exponent
+
+
+@compiled
+def rise_of(exponent: float, share: float) -> Rise:
+    """Return z and its slope at steps of a motion towards positive z, and the step of zero.
+
+    By the classical method of Runge and Kutta, from zero to 1 and back to -1, so that its kink at
+    zero lies between steps.
+    """
+    z, slope = np.empty(2 * _STEPS + 1), np.empty(2 * _STEPS + 1)
+    z[_STEPS], slope[_STEPS] = 0.0, 1.0
+    first = _STEPS
+    for way in (_STEP, -_STEP):
+        now, going = 0.0, 1.0
+        for step in range(1, _STEPS + 1):
+            second = slope_of(now + 0.5 * way * going, exponent, share)
+            third = slope_of(now + 0.5 * way * second, exponent, share)
+            fourth = slope_of(min(now + way * third, 1.0), exponent, share)
+            now += way * (going + 2.0 * second + 2.0 * third + fourth) / 6.0
+            now = min(now, 1.0)
+            going = slope_of(now, exponent, share)
+            place = _STEPS + (step if way > 0.0 else -step)
+            z[place], slope[place] = now, going
+            if now <= -1.0:
+                break
+        first = min(first, place)
+    return z[first:], slope[first:], _STEPS - first
+
+
+@compiled
+def state_at(way: float, rise: Rise) -> tuple[float, float]:
+    """Return z and its slope after a way from zero along a rise: cubics between its steps."""
+    z, slope, zero = rise
+    steps = way / _STEP + zero
+    if steps >= len(z) - 1:
+        return 1.0, 0.0
+    if steps < 0.0:
+        return z[0], slope[0]
+    if np.isnan(steps):
+        return np.nan, np.nan
+    place = int(steps)
+    s = steps - place
+    start, end = _STEP * slope[place], _STEP * slope[place + 1]
+    rest = z[place + 1] - z[place]
+    bend, twist = 3.0 * rest - 2.0 * start - end, start + end - 2.0 * rest
+    value = z[place] + s * (start + s * (bend + s * twist))
+    return value, (start + s * (2.0 * bend + 3.0 * s * twist)) / _STEP
+
+
+@compiled
+def way_to(z: float, rise: Rise) -> float:
+    """Return the way from zero along a rise to a state."""
+    values, zero = rise[0], rise[2]
+    place = max(int(np.searchsorted(values, z)) - 1, 0)
+    if np.isnan(z):
+        return z
+    way = _STEP * (place - zero)
+    if place == len(values) - 1:
+        return way
+    rest = values[place + 1] - values[place]
+    way += _STEP * (z - values[place]) / rest if rest > 0.0 else 0.0
+    for _ in range(3):
+        there, slope = state_at(way, rise)
+        way += (z - there) / slope if slope > _FLAT else 0.0
+    return way
+
+
+@compiled
+def _passed(
+    path: Values,
+    z: float,
+    before: float,
+    rise: Rise,
+    along: Values,
+    slope: Values,
+    kept: Values,
+) -> float:
+    """Follow a path from a state and a position; return how the last state depends on the first."""
+    product, side, way = 1.0, 1.0, way_to(z, rise)
+    z, going = state_at(way, rise)
+    for step in range(len(path)):
+        change = path[step] - before
+        before = path[step]
+        if change * side < 0.0:
+            side = -side
+            way = way_to(side * z, rise)
+            going = state_at(way, rise)[1]
+        first = going
+        way += abs(change)
+        z, going = state_at(way, rise)
+        z *= side
+        along[step], slope[step] = z, going
+        # States that differ by little stay apart as long as it takes to pass their difference.
+        kept[step] = going / first if first > 0.0 else 0.0
+        product *= kept[step]
+    return product
+
+
+@compiled
+def follow(
+    path: Values,
+    recurs: bool,
+    rise: Rise,
+    along: Values,
+    slope: Values,
+    kept: Values,
+) -> None:
+    """Follow paths (n, steps) from rest; where their second half recurs, as it does for ever."""
+    rows, steps = path.shape
+    half = steps // 2 if recurs else 0
+    for row in range(rows):
+        of_row = along[row, half:], slope[row, half:], kept[row, half:]
+        if recurs and np.ptp(path[row]) > 0.0:
+            _settle(path[row, half:], rise, *of_row)
+        else:
+            _passed(path[row, half:], 0.0, 0.0, rise, *of_row)
+        for one in (along, slope, kept):
+            one[row, :half] = one[row, half : 2 * half]
+
+
+@compiled
+def _settle(
+    path: Values,
+    rise: Rise,
+    along: Values,
+    slope: Values,
+    kept: Values,
+) -> None:
+    """Follow a path from the state to which it returns.
+
+    A passage leads two states nearer to each other, and keeps their order: Newton's method stays
+    between states that a passage raises and lowers.
+    """
+    z, low, high = 0.0, -1.0, 1.0
+    for _ in range(_PASSAGES):
+        product = _passed(path, z, path[-1], rise, along, slope, kept)
+        change = along[-1] - z
+        if abs(change) <= _UNCHANGED:
+            break
+        if change > 0.0:
+            low = z
+        else:
+            high = z
+        z += change / (1.0 - product) if product < 1.0 else change
+        if not low < z < high:
+            z = 0.5 * (low + high)
