@@ -36,7 +36,6 @@ from pymoo_hdte.drive.solve.torus import (
     fundamental_orders,
     multiples_of,
 )
-from pymoo_hdte.effects.bouc_wen import BoucWen
 from pymoo_hdte.effects.friction import (
     CoulombFriction,
     NonlinearDrag,
@@ -51,7 +50,7 @@ from pymoo_hdte.io.fields import Fields
 from pymoo_hdte.problems import RobustDTE
 from pymoo_hdte.units import ARCSEC
 
-SMOOTH = [*memoryless(EFFECTS), LawAtPort("bouc_wen_hysteresis", "mesh", BoucWen(1.0, 1e-4, 2.0))]
+MEMORYLESS = memoryless(EFFECTS)
 
 
 def with_effects(model, *effects):
@@ -70,7 +69,7 @@ def test_presets_agree_with_the_integrator_though_the_angle_is_free(name):
 
 
 @pytest.mark.parametrize(
-    "effect", others_at_night(SMOOTH, *SMOOTH[::3], SMOOTH[-1]), ids=lambda effect: effect.name
+    "effect", others_at_night(MEMORYLESS, *MEMORYLESS[::3]), ids=lambda effect: effect.name
 )
 def test_every_law_agrees_with_the_integrator_along_the_whole_turn(effect):
     model = with_effects(preset("resonant"), effect)

@@ -17,6 +17,11 @@ from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 LARGEST_CONDITION = 1e3
 """Largest condition number of the fit; beyond it the noise of the lines grows a thousandfold."""
 
+FADING = (0.02, 0.05, 0.1, 0.25, 0.6, 2.0)
+"""Time constants of what fades in a record, as shares of its duration: from two input turns of a
+record of one output turn to what hardly fades. A loop that forgets slows down as it fades, so that
+what is left of it takes several."""
+
 ROWS_A_BLOCK = 1 << 15
 """Rows worked on at once, to bound the memory."""
 
@@ -86,13 +91,14 @@ class LineFit:
         return replace(self, whole=whole, triangle=triangle @ self.triangle)
 
     @cached_property
-    def projections(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Parts in the basis of the channels, shape (p, 4), and of the bends, (p, 3).
+    def projections(self) -> tuple[NDArray[np.float64], ...]:
+        """Parts in the basis of the channels, shape (p, 4), of bends, (p, 3), and of decays.
 
-        The bends are (t - t_mid)^k / k! for k = 2, 3, 4.
+        The bends are (t - t_mid)^k / k! for k = 2, 3, 4. Decays, (p, 6), fall from one at the first
+        row, with the time constants `FADING`.
         """
-        channels, bends = zip(*map(self._project, self.parts), strict=True)
-        return np.asarray(reduce(np.add, channels)), np.asarray(reduce(np.add, bends))
+        each = zip(*map(self._project, self.parts), strict=True)
+        return tuple(np.asarray(reduce(np.add, one)) for one in each)
 
     @property
     def coefficients(self) -> NDArray[np.float64]:
@@ -126,10 +132,11 @@ class LineFit:
         """What the lines leave of the channels in all rows, shape (n, 4)."""
         return np.vstack([self.residual(part, self.basis(part)) for part in self.parts])
 
-    def _project(self, part: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return what some rows add to the parts in the basis of the channels and of bends."""
-        basis = self.basis(part)
-        return basis.T @ self.values(part), basis.T @ _bent(self.record, part)
+    def _project(self, part: slice) -> tuple[NDArray[np.float64], ...]:
+        """Return what some rows add to the parts in the basis of channels, bends and decays."""
+        basis, constants = self.basis(part).T, np.ptp(self.record.time) * np.array(FADING)
+        fading = decays(self.record, part, constants)
+        return basis @ self.values(part), basis @ _bent(self.record, part), basis @ fading
 
 
 def _design(record: RunningRecord, orders: NDArray[np.float64], part: slice) -> NDArray[np.float64]:

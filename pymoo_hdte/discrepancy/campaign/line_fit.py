@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pymoo_hdte.checks import finite_array
 from pymoo_hdte.discrepancy.campaign.believed import Rig
-from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, decays, mean_speed, nyquist_order
+from pymoo_hdte.discrepancy.campaign.line_basis import LineFit, mean_speed, nyquist_order
 from pymoo_hdte.discrepancy.campaign.records import RunningRecord
 
 CHANNELS = ("transmission_error", "input_torque", "output_torque", "input_angle")
@@ -63,6 +63,9 @@ class OrderLines:
         Mean and phasors, in s^k, that a fit assigns to the signals (t - t_mid)^k / k!, k = 2, 3, 4:
         a drift is curved in a record of ten minutes, and an order with one cycle per record absorbs
         the curvature.
+    fading : ndarray of complex, shape (6, 1 + m)
+        Mean and phasors that a fit assigns to signals that fade from one at the first row, with
+        the time constants `line_basis.FADING`.
 
     Examples
     --------
@@ -79,6 +82,7 @@ class OrderLines:
     covariance: NDArray[np.float64]
     row_covariance: NDArray[np.float64]
     bends: NDArray[np.complex128]
+    fading: NDArray[np.complex128]
 
 
 def order_lines(
@@ -132,8 +136,13 @@ def order_lines(
     # The noise of the angle also enters the exponent, where a line is steep; it is nearly white.
     steepness = asked * phasors
     noise = noise + 0.5 * (steepness @ steepness.conj().T).real * noise[3, 3]
-    bends = inverse @ fit.projections[1]
-    lines = (bends[of_lines[0]] + 1j * bends[of_lines[1]]).T / gains
+    real_parts, imaginary_parts = of_lines
+
+    def assigned(projected: NDArray[np.float64]) -> NDArray[np.complex128]:
+        found = inverse @ projected
+        lines = (found[real_parts] + 1j * found[imaginary_parts]).T / gains
+        return np.column_stack([found[0], lines])
+
     covariance = np.diag(noise)[:, None, None] * unit
     for jump in record.jumps:
         channel, share = _READ[jump.channel]
@@ -145,25 +154,9 @@ def order_lines(
         phasors=phasors,
         covariance=covariance,
         row_covariance=noise,
-        bends=np.column_stack([bends[0], lines]),
+        bends=assigned(fit.projections[1]),
+        fading=assigned(fit.projections[2]),
     )
-
-
-def lines_of_decays(
-    record: RunningRecord, ratio: float, orders: ArrayLike, constants: ArrayLike
-) -> NDArray[np.complex128]:
-    """Return mean and phasors, (k, 1 + m), that `order_lines` assigns to decays.
-
-    Each falls from one at the first row by its time constant, s; ``constants`` has shape (k,).
-    """
-    asked = finite_array("orders", orders, (None,))
-    fit = LineFit.of(record, ratio, [*asked, *_doubles(asked, record, ratio)])
-    times = np.asarray(constants)
-    projected = sum(fit.basis(part).T @ decays(record, part, times) for part in fit.parts)
-    lines = np.linalg.solve(fit.triangle, projected).T
-    m, every = len(asked), len(fit.orders)
-    phasors = lines[:, 2 : 2 + m] + 1j * lines[:, 2 + every : 2 + every + m]
-    return np.column_stack([lines[:, 0], phasors / averaging_gain(asked, record)])
 
 
 def _doubles(orders: NDArray[np.float64], record: RunningRecord, ratio: float) -> list[float]:

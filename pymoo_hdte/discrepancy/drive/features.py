@@ -95,6 +95,7 @@ def measure(
         bends=np.array([line.bends for line in lines]),
         temperature=np.array([record.temperature for record in records], dtype=float),
         input_angle=np.array([line.mean[3] for line in lines]),
+        fading=np.array([line.fading for line in lines]),
         travel=np.array([abs(one.input_angle[-1] - one.input_angle[0]) for one in records]),
     )
     values = np.array([stack(line.mean, line.phasors) for line in lines])

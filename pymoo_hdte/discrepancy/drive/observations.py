@@ -17,7 +17,7 @@ from scipy.linalg import solve_triangular
 
 from pymoo_hdte.discrepancy.campaign.campaign import Campaign
 from pymoo_hdte.discrepancy.campaign.known_values import of_equal_numbers
-from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS, lines_of_decays
+from pymoo_hdte.discrepancy.campaign.line_fit import CHANNELS
 from pymoo_hdte.discrepancy.drive.features import (
     MEANS,
     Features,
@@ -31,10 +31,6 @@ from pymoo_hdte.effects.unknowns import Parameter
 
 Vector = NDArray[np.float64]
 Values = NDArray[np.float64]
-
-_FADING = (0.02, 0.05, 0.1, 0.25, 0.6, 2.0)
-"""Time constants of what fades in a record, as shares of its duration: a loop of Bouc and Wen that
-a load has wound up slows down as it fades, and what is left of it takes these together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,16 +84,18 @@ class Observations:
         laws = [effect.law for effect in effects if isinstance(effect, LawAtPort)]
         if not (size := sum(law.creep for law in laws) / stiffness):
             return 0.0
-        features, ratio = self.features, self.campaign.believed.ratio
-        ways = np.zeros((len(features.records), 1 + len(_FADING), features.values.shape[1]))
-        ways[:, 0, 0] = 1.0
-        real, imaginary = features.places(0).T
-        for record, way in zip(features.records, ways[:, 1:], strict=True):
-            constants = np.ptp(record.time) * np.array(_FADING)
-            lines = lines_of_decays(record, ratio, features.orders, constants)
-            way[:, 0] = lines[:, 0].real
-            way[:, real], way[:, imaginary] = lines[:, 1:].real, lines[:, 1:].imag
-        return size**2 * np.einsum("rki,rkj->rij", ways, ways)
+        features = self.features
+        fading = features.conditions.fading
+        # What hardly fades at all moves the mean.
+        ways = [np.eye(1, features.values.shape[1]) + np.zeros((len(features.records), 1, 1))]
+        if fading is not None:
+            real, imaginary = features.places(0).T
+            left = np.zeros((*fading.shape[:2], features.values.shape[1]))
+            left[..., 0] = fading[..., 0].real
+            left[..., real], left[..., imaginary] = fading[..., 1:].real, fading[..., 1:].imag
+            ways.append(left)
+        every = np.concatenate(ways, axis=1)
+        return size**2 * np.einsum("rki,rkj->rij", every, every)
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
         """Return the covariance by small changes of the static error for each record."""

@@ -82,6 +82,7 @@ class Grid:
                 load,
                 np.full(len(grid), conditions.elapsed.max()),
                 conditions.bends[nearest],
+                fading=None if conditions.fading is None else conditions.fading[nearest],
             ),
             orders=features.orders,
             values=np.zeros((len(grid), features.values.shape[1])),

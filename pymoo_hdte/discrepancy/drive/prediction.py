@@ -7,7 +7,7 @@ share their effects. Loads are the measured ones, not the planned ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 
 import numpy as np
@@ -51,6 +51,8 @@ class Conditions:
         In kelvin, NaN where it is not known; by default in no record.
     input_angle, travel : ndarray, optional
         Of the input in the middle of the record, and from its start to its end, rad; by default 0.
+    fading : complex ndarray, shape (r, k, 1 + m), optional
+        Contribution of what fades within a record: see `OrderLines`.
     """
 
     input_speed: NDArray[np.float64]
@@ -60,17 +62,13 @@ class Conditions:
     temperature: NDArray[np.float64] | None = None
     input_angle: NDArray[np.float64] | None = None
     travel: NDArray[np.float64] | None = None
+    fading: NDArray[np.complex128] | None = None
 
     def rows(self, rows: NDArray[np.int_]) -> Conditions:
         """Return the conditions of some of the records."""
-        optional = (self.temperature, self.input_angle, self.travel)
-        return Conditions(
-            self.input_speed[rows],
-            self.output_torque[rows],
-            self.elapsed[rows],
-            self.bends[rows],
-            *(None if one is None else one[rows] for one in optional),
-        )
+        known = {one.name: getattr(self, one.name) for one in fields(self)}
+        of_rows = {name: one[rows] for name, one in known.items() if one is not None}
+        return replace(self, **of_rows)
 
     def __len__(self) -> int:
         return len(self.input_speed)
