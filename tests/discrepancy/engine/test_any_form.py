@@ -103,7 +103,10 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
     assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
 
 
-@pytest.mark.parametrize(("go_on", "labels"), [(False, {SPRING}), (True, {SPRING, DRIFT})])
+@pytest.mark.parametrize(
+    ("go_on", "labels"),
+    [pytest.param(False, {SPRING}, marks=pytest.mark.nightly), (True, {SPRING, DRIFT})],
+)
 def test_a_search_goes_on_from_known_sets_only_where_that_is_asked_for(go_on, labels):
     """Resonances beside an inertia hid a friction: with their noise it alone was judged."""
     (drift,) = of_labels(DRIFT)
@@ -144,7 +147,7 @@ DRAG, DRY = "nonlinear_drag:input", "coulomb_friction:input"
     [
         (0.0, "named", [DRAG]),
         (0.04, "class", [f"{DRAG}+{DRY}", DRAG]),
-        (0.08, "named", [f"{DRY}+{DRAG}"]),
+        pytest.param(0.08, "named", [f"{DRY}+{DRAG}"], marks=pytest.mark.nightly),
     ],
 )
 def test_a_drag_of_any_form_is_told_with_the_listed_one_and_a_dry_friction(dry, status, labels):
@@ -179,7 +182,10 @@ def test_what_no_form_of_a_law_follows_is_another_effect_at_its_port(plain, earn
     assert search.forms.earns(both, alone) == earned
 
 
-@pytest.mark.parametrize(("worse", "named"), [(0.0, True), (140.0, False)])
+# That both are named where nothing speaks against them, a test below shows of the same data.
+@pytest.mark.parametrize(
+    ("worse", "named"), [pytest.param(0.0, True, marks=pytest.mark.nightly), (140.0, False)]
+)
 def test_a_small_effect_that_held_out_records_deny_is_not_named(monkeypatch, worse, named):
     """As the encoder of sealed rig 7, whose shift took 33 of chi-square there and added 26 here."""
     (law,) = of_labels("coulomb_friction:output")
@@ -195,7 +201,7 @@ def test_a_small_effect_that_held_out_records_deny_is_not_named(monkeypatch, wor
     assert (DRIFT in {one.label for one in found.chosen.candidates}) == named
 
 
-@pytest.mark.parametrize("certain", [True, False])
+@pytest.mark.parametrize("certain", [pytest.param(True, marks=pytest.mark.nightly), False])
 def test_a_small_effect_whose_interval_contains_nothing_is_not_named(monkeypatch, certain):
     """As the friction beside a reaction with a lag, whose level the damping takes as well."""
     (law,) = of_labels("coulomb_friction:output")
@@ -237,7 +243,9 @@ def test_a_small_effect_shows_beside_a_law_that_leaves_no_more_than_noise(label,
     assert [one.label for one in found.chosen.candidates] == named_too
 
 
-@pytest.mark.parametrize(("further", "named"), [(3e-4, True), (2e-3, False)])
+@pytest.mark.parametrize(
+    ("further", "named"), [pytest.param(3e-4, True, marks=pytest.mark.nightly), (2e-3, False)]
+)
 def test_a_form_is_known_to_the_square_of_what_its_listed_one_leaves(further, named):
     """A small drift beside a stiffness whose crests are sharper than those of three lines."""
     waving = "mesh_stiffness_variation:mesh@2"
