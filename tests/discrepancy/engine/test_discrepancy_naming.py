@@ -431,7 +431,7 @@ def test_no_value_is_freed_for_what_another_form_of_the_law_explains(monkeypatch
 @pytest.mark.parametrize(
     ("label", "value", "beside"),
     [
-        (INERTIA, 0.02, {}),
+        pytest.param(INERTIA, 0.02, {}, marks=pytest.mark.nightly),
         pytest.param(INERTIA, 0.02, {RIPPLE: (0.003, 0.001)}, marks=pytest.mark.nightly),
         ("damping_reference:mesh", 3.0, {}),
         pytest.param(
