@@ -106,7 +106,7 @@ def test_a_planted_power_comes_back_with_its_exponent(exponent, torque, word):
 
 FORMS = [
     ("load_dependent_friction", "power", (0.12, 0.8)),
-    pytest.param("nonlinear_drag", "shear_thinning", (0.03, 8.0), marks=pytest.mark.nightly),
+    ("nonlinear_drag", "shear_thinning", (0.03, 8.0)),
 ]
 """Effects whose further forms are sought in the place of others only, with values of these."""
 

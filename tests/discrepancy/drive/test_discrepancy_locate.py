@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from night import others_at_night
 from planted_features import analysed, known_data, listed, measured, with_sweep
 from scipy.stats import chi2
 
@@ -122,12 +121,7 @@ UNLISTED = {
 """Channel, line (-1 for the mean), records and size of misfits that no effect explains."""
 
 
-@pytest.mark.parametrize(
-    "case",
-    others_at_night(
-        UNLISTED, "line of the error under load", "mean of the torque at one condition"
-    ),
-)
+@pytest.mark.parametrize("case", UNLISTED)
 def test_an_unlisted_effect_flags_the_cells_where_it_is_and_no_other(case):
     channel, line, where, size = UNLISTED[case]
     data, _ = measured(rng=np.random.default_rng(11), stiffness=1.03)

@@ -103,10 +103,7 @@ def test_a_small_effect_shows_beside_a_law_of_another_form():
     assert {one.label for one in found.chosen.candidates} == {SPRING, DRIFT}
 
 
-@pytest.mark.parametrize(
-    ("go_on", "labels"),
-    [pytest.param(False, {SPRING}, marks=pytest.mark.nightly), (True, {SPRING, DRIFT})],
-)
+@pytest.mark.parametrize(("go_on", "labels"), [(False, {SPRING}), (True, {SPRING, DRIFT})])
 def test_a_search_goes_on_from_known_sets_only_where_that_is_asked_for(go_on, labels):
     """Resonances beside an inertia hid a friction: with their noise it alone was judged."""
     (drift,) = of_labels(DRIFT)
@@ -147,7 +144,7 @@ DRAG, DRY = "nonlinear_drag:input", "coulomb_friction:input"
     [
         (0.0, "named", [DRAG]),
         (0.04, "class", [f"{DRAG}+{DRY}", DRAG]),
-        pytest.param(0.08, "named", [f"{DRY}+{DRAG}"], marks=pytest.mark.nightly),
+        (0.08, "named", [f"{DRY}+{DRAG}"]),
     ],
 )
 def test_a_drag_of_any_form_is_told_with_the_listed_one_and_a_dry_friction(dry, status, labels):
@@ -243,9 +240,7 @@ def test_a_small_effect_shows_beside_a_law_that_leaves_no_more_than_noise(label,
     assert [one.label for one in found.chosen.candidates] == named_too
 
 
-@pytest.mark.parametrize(
-    ("further", "named"), [pytest.param(3e-4, True, marks=pytest.mark.nightly), (2e-3, False)]
-)
+@pytest.mark.parametrize(("further", "named"), [(3e-4, True), (2e-3, False)])
 def test_a_form_is_known_to_the_square_of_what_its_listed_one_leaves(further, named):
     """A small drift beside a stiffness whose crests are sharper than those of three lines."""
     waving = "mesh_stiffness_variation:mesh@2"

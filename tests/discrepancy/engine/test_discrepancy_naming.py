@@ -245,7 +245,7 @@ def test_a_search_that_goes_on_fits_further_sets_from_all_starts(monkeypatch, ri
 @pytest.mark.parametrize(
     ("ratio", "noise", "sizes"),
     [(RULES.changed_noise_ratio, True, {1}), (RULES.changed_noise_ratio, False, {1, 2}),
-     pytest.param(1e9, True, {1, 2}, marks=pytest.mark.nightly)],
+     (1e9, True, {1, 2})],
 )  # fmt: skip
 def test_nothing_is_sought_beside_an_effect_that_leaves_its_noise(monkeypatch, ratio, noise, sizes):
     """A reaction, which carries more of each turn's own error to the torque, took a minute."""
@@ -431,7 +431,7 @@ def test_no_value_is_freed_for_what_another_form_of_the_law_explains(monkeypatch
 @pytest.mark.parametrize(
     ("label", "value", "beside"),
     [
-        pytest.param(INERTIA, 0.02, {}, marks=pytest.mark.nightly),
+        (INERTIA, 0.02, {}),
         pytest.param(INERTIA, 0.02, {RIPPLE: (0.003, 0.001)}, marks=pytest.mark.nightly),
         ("damping_reference:mesh", 3.0, {}),
         pytest.param(
@@ -514,7 +514,7 @@ def test_an_error_of_the_encoder_s_scale_is_described_though_it_is_in_no_list():
     assert "encoder errs 46 times in its turn" in sentence(verdict)
 
 
-@pytest.mark.parametrize("further", [0.0, pytest.param(600.0, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("further", [pytest.param(0.0, marks=pytest.mark.nightly), 600.0])
 def test_a_listed_effect_is_named_before_one_in_no_list_that_does_as_well(further):
     """A line at each second of a turn is one of the encoder or of the drive."""
     order = 2.0 / 101.0
