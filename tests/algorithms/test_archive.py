@@ -54,7 +54,7 @@ def objectives(draw):
     return draw(arrays(float, shape, elements=elements))
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(objectives(), st.integers(1, 8))
 def test_truncation_equals_its_naive_twin(F, size):
     np.testing.assert_array_equal(least_crowded(F, size), least_crowded_by_recount(F, size))
@@ -108,7 +108,7 @@ def beaten(F):
     return (no_worse & better).any(axis=0)
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(batches(), st.integers(2, 10))
 def test_archive_invariants(sequence, capacity):
     archive = LeaderArchive(capacity, *[sequence[0].F.shape[1]] * 2)
@@ -124,7 +124,7 @@ def test_archive_invariants(sequence, capacity):
         )
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(batches())
 def test_large_archive_holds_the_front_of_all_it_has_seen(sequence):
     archive = LeaderArchive(1000, *[sequence[0].F.shape[1]] * 2)
@@ -203,6 +203,7 @@ def test_ranks_of_a_swarm_without_a_feasible_particle():
     np.testing.assert_array_equal(constrained_ranks(swarm), [2, 1, 2])
 
 
+@settings(max_examples=50)
 @given(batches())
 def test_ranks_peel_off_fronts_by_dominance(sequence):
     batch = sequence[0]

@@ -174,7 +174,7 @@ def objectives(draw):
     return draw(arrays(float, shape, elements=elements))
 
 
-@settings(max_examples=150)
+@settings(max_examples=80)
 @given(objectives(), st.integers(1, 8))
 def test_truncation_equals_its_naive_twin(F, size):
     np.testing.assert_array_equal(most_spread(F, size), most_spread_by_recount(F, size))
@@ -220,7 +220,7 @@ def swarms(draw):
     return points(F, draw(arrays(float, n, elements=st.sampled_from([0.0, 0.0, 1.0, 2.0, np.inf]))))
 
 
-@settings(max_examples=200)
+@settings(max_examples=100)
 @given(swarms(), st.data())
 def test_who_survives_is_never_worse_than_who_does_not(swarm, data):
     size = data.draw(st.integers(1, len(swarm)))

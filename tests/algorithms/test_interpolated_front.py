@@ -50,7 +50,8 @@ def test_a_known_front_is_found_in_few_evaluations():
 
 
 def test_the_same_generator_gives_the_same_front():
-    assert np.array_equal(search(objectives).front, search(objectives).front)
+    one, again = (search(objectives, accuracy=0.05) for _ in range(2))
+    assert np.array_equal(one.front, again.front)
 
 
 def test_designs_without_objectives_are_left_out_and_told():

@@ -146,7 +146,12 @@ def test_a_population_evaluated_again_replaces_what_was_true_before(swarm):
 
 @pytest.mark.parametrize(
     ("make", "name"),
-    [(ElitistSwarm, "bnh"), (ElitistSwarm, "tnk"), (ElitistSwarm, "dascmop1"), (AMPMOPSO, "bnh")],
+    [
+        pytest.param(ElitistSwarm, "bnh", marks=pytest.mark.nightly),
+        pytest.param(ElitistSwarm, "tnk", marks=pytest.mark.nightly),
+        (ElitistSwarm, "dascmop1"),
+        (AMPMOPSO, "bnh"),
+    ],
 )
 def test_pymoo_s_adaptive_constraint_handling_takes_our_swarms(make, name):
     problem = get_problem(name, 5) if name == "dascmop1" else get_problem(name)

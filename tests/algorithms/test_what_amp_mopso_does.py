@@ -20,7 +20,11 @@ class Weights(Callback):
 
 @pytest.mark.parametrize(
     ("problem", "median"),
-    [(get_problem("zdt1"), 0.421), (get_problem("dtlz2"), 0.400), (RobustDTE(), 0.414)],
+    [
+        pytest.param(get_problem("zdt1"), 0.421, marks=pytest.mark.nightly),
+        (get_problem("dtlz2"), 0.400),
+        (RobustDTE(), 0.414),
+    ],
     ids=["ZDT1", "DTLZ2", "RobustDTE"],
 )
 def test_the_adaptive_weight_hardly_adapts(problem, median):

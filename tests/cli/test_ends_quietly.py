@@ -9,6 +9,7 @@ from pathlib import Path
 from threading import Thread
 
 import pytest
+from night import others_at_night
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.cli.command_line import COMMANDS, MISTAKE
@@ -58,7 +59,9 @@ def interrupted(program, arguments, module, folder):
     return python("-c", code, cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)})
 
 
-@pytest.mark.parametrize("name", [command.name for command in COMMANDS])
+@pytest.mark.parametrize(
+    "name", others_at_night([command.name for command in COMMANDS], "discrepancy", "simulate")
+)
 def test_ctrl_c_during_imports_of_a_command(name, tmp_path):
     arguments = [name, *ARGUMENTS[name], "--out", "new/out"]
     done = interrupted("pymoo_hdte.cli", arguments, "scipy", tmp_path)

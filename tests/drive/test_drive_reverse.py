@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from law_cases import EFFECTS as FORWARD
 from law_cases import LAWS, memoryless
+from night import others_at_night
 from scipy.integrate import solve_ivp
 
 from pymoo_hdte.checks import InvalidInput
@@ -39,7 +40,9 @@ def reverse(effect):
     return replace(coefficients, input_speed=-coefficients.input_speed)
 
 
-@pytest.mark.parametrize("effect", MEMORYLESS, ids=label)
+@pytest.mark.parametrize(
+    "effect", others_at_night(MEMORYLESS, *MEMORYLESS[::3], MEMORYLESS[-1]), ids=label
+)
 def test_every_law_agrees_with_the_integrator_in_reverse(effect):
     """A motion that starts on the steady state must stay on it."""
     coefficients = reverse(effect)

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import random_designs
+from night import others_at_night
 
 from pymoo_hdte.checks import InvalidInput
 from pymoo_hdte.drive import (
+    PRESETS,
     DampingReference,
     DriveModel,
     LoadInertia,
@@ -137,6 +139,8 @@ def test_damping_reference_and_load_inertia_do_what_their_names_say():
     assert after.damping == pytest.approx(2.0 * 101**2 * before.damping)
 
 
+# Other tests of the gate integrate ``published``, with the angle free and prescribed.
+@pytest.mark.parametrize("model", others_at_night(PRESETS, "calibrated", "resonant"), indirect=True)
 @pytest.mark.parametrize("angle", ["prescribed", "free"])
 def test_integration_from_rest_reaches_the_steady_state(model, angle, rng):
     """Hill's method leaves out how the angle itself fluctuates; the harmonic balance does not."""

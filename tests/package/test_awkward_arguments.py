@@ -126,7 +126,7 @@ def test_valid_arguments_make_an_object(name):
 
 @pytest.mark.parametrize("name", VALID)
 @given(data=st.data())
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_an_awkward_argument_is_refused_by_name_or_taken(name, data):
     field = data.draw(st.sampled_from(sorted(VALID[name][1])))
     assert_refused_or_taken(name, field, data.draw(values))

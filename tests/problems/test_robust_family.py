@@ -92,7 +92,7 @@ def test_fronts_have_as_many_pieces_as_the_family_says(member):
 
 @pytest.mark.parametrize(
     "member",
-    others_at_night(FAMILY, "calibrated", "resonant", "calibrated_tolerance"),
+    others_at_night(FAMILY, "resonant", "calibrated_tolerance"),
     indirect=True,
     scope="module",
 )

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from night import others_at_night
 from places import SHARED
 from quick_campaigns import quick_campaign
 
@@ -53,7 +54,8 @@ def test_a_sound_campaign_is_left_as_it_is(clean):
             assert one.found == pytest.approx(one.stated, rel=0.15)
 
 
-@pytest.mark.parametrize("factor", [1.0 / 3.0, 1.25])
+# A shared case, below, has all of them three times as stated.
+@pytest.mark.parametrize("factor", others_at_night([1.0 / 3.0, 1.25], 1.25))
 @pytest.mark.parametrize("name", NOISES)
 def test_a_misstated_noise_is_replaced_by_that_of_the_records(clean, name, factor):
     changed, found = examined(with_stated(clean, name, factor))
@@ -216,7 +218,12 @@ def test_a_new_zero_between_two_records_is_found_and_taken_out(clean, channel):
 
 @pytest.mark.parametrize(
     "course",
-    [lambda t: t, lambda t: -np.expm1(-t / 0.2), lambda t: -np.expm1(-t / 0.05), lambda t: t**2],
+    [
+        pytest.param(lambda t: t, marks=pytest.mark.nightly),
+        pytest.param(lambda t: -np.expm1(-t / 0.2), marks=pytest.mark.nightly),
+        lambda t: -np.expm1(-t / 0.05),
+        lambda t: t**2,
+    ],
 )
 def test_a_drift_over_the_session_is_no_new_zero(clean, course):
     _, found = examined(in_session(clean, lambda t: 40.0 * ARCSEC * course(t)))

@@ -93,7 +93,7 @@ IN_FILES = {
 """Forms of effects that stand in a model under a name of their own."""
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @pytest.mark.parametrize("candidate", LISTED, ids=label)
 @given(data=st.data())
 def test_a_model_takes_the_effects_and_its_file_gives_them_back(candidate, data):

@@ -82,6 +82,7 @@ def test_a_law_is_named_in_part_whose_listed_form_explains_little(label):
     assert RULES.partial_share < found.in_another_form <= 1.0
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("label", LABELS)
 def test_without_its_forms_nothing_tells_that_such_a_law_has_another(label, monkeypatch):
     monkeypatch.setattr(Data, "corrections", lambda self, candidate: [])

@@ -219,8 +219,9 @@ def test_the_interval_of_an_inertia_holds_it_wherever_the_believed_one_lies(shar
     empty = known_data(list(zip(speeds, loads, strict=True)), [1.0, 2.0, 2.02, 3.0])
     load = listed(empty, "load_inertia")
     data, _ = measured(load.build((0.05,)), np.random.default_rng(1), empty, load_inertia=share)
+    base = fit(data).values
     found = min(
-        (fit(data, (load,), np.append(fit(data).values, start)) for start in load.starts),
+        (fit(data, (load,), np.append(base, start)) for start in load.starts),
         key=lambda one: one.chi_square,
     )
     deviation = np.sqrt(found.covariance[-1, -1])

@@ -514,7 +514,7 @@ def test_an_error_of_the_encoder_s_scale_is_described_though_it_is_in_no_list():
     assert "encoder errs 46 times in its turn" in sentence(verdict)
 
 
-@pytest.mark.parametrize("further", [0.0, 600.0])
+@pytest.mark.parametrize("further", [pytest.param(0.0, marks=pytest.mark.nightly), 600.0])
 def test_a_listed_effect_is_named_before_one_in_no_list_that_does_as_well(further):
     """A line at each second of a turn is one of the encoder or of the drive."""
     order = 2.0 / 101.0

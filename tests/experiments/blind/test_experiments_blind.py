@@ -130,14 +130,15 @@ def rows(case, twin=False):
     return rows_of(hidden, hidden.twin if twin else hidden.session)[0]
 
 
-def test_a_case_gives_the_same_bytes_twice_and_another_root_others(short):
-    for case in (ECCENTRIC, case_of("stressed", stress="outliers")):
-        first, second = (rows_of(one, one.session)[0] for one in (hiding(case), hiding(case)))
-        one = hiding(replace(case, root=ROOT + 1))
-        third = rows_of(one, one.session)[0]
-        for a, b, c in zip(first, second, third, strict=True):
-            assert a.tobytes() == b.tobytes()
-            assert not np.array_equal(a, c)
+@pytest.mark.parametrize("stress", [pytest.param(None, marks=pytest.mark.nightly), "outliers"])
+def test_a_case_gives_the_same_bytes_twice_and_another_root_others(short, stress):
+    case = case_of("stressed", stress=stress) if stress else ECCENTRIC
+    first, second = (rows_of(one, one.session)[0] for one in (hiding(case), hiding(case)))
+    one = hiding(replace(case, root=ROOT + 1))
+    third = rows_of(one, one.session)[0]
+    for a, b, c in zip(first, second, third, strict=True):
+        assert a.tobytes() == b.tobytes()
+        assert not np.array_equal(a, c)
 
 
 def test_the_twin_differs_only_by_the_effect(short):

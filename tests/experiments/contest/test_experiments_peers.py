@@ -62,7 +62,7 @@ def test_the_first_page_tells_where_our_swarm_is_not_the_best():
 
 
 def test_indicators_of_a_plane_are_the_closed_forms():
-    line = np.linspace(0.0, 1.0, 101)
+    line = np.linspace(0.0, 1.0, 51)
     first, second = (grid.ravel() for grid in np.meshgrid(line, line))
     inside = first + second <= 1.0 + 1e-12
     plane = np.column_stack([first, second, 1.0 - first - second])[inside]

@@ -23,7 +23,7 @@ from experiments.runner.committed import committed_file, read_rows
 from experiments.runner.registry import Context
 from pymoo_hdte.mechanism import BelievedValue, Input, Mechanism, Port, Record
 
-CHEAP = ("lara8_joint_3", "ur10e_joint_4")
+CHEAP = ("lara8_joint_3",)
 JOINT = KnownRig(
     "joint",
     "nowhere",

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from night import others_at_night
 from numpy.polynomial.legendre import leggauss
 from scipy.signal import butter, sosfreqz
 
@@ -439,7 +440,7 @@ def test_needed_runs_are_the_least_that_reach_the_target():
     assert not table.findings[0].agrees
 
 
-@pytest.mark.parametrize("model", ["calibrated", "resonant"])
+@pytest.mark.parametrize("model", others_at_night(["calibrated", "resonant"], "resonant"))
 def test_chaospy_agrees_on_moments_and_indices(model):
     problem = RobustDTE(model, order=2)
     twin = chaos(2, problem.inputs[0].cut)

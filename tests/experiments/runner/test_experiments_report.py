@@ -172,8 +172,15 @@ def test_seeds_are_refused_where_they_would_change_nothing(experiment, tmp_path,
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("option", "seeds"), [([], 20), (["--seeds", "3"], 3)])
-@pytest.mark.parametrize("name", [["table7"], []])
+@pytest.mark.parametrize(
+    ("name", "option", "seeds"),
+    [
+        (["table7"], [], 20),
+        (["table7"], ["--seeds", "3"], 3),
+        pytest.param([], [], 20, marks=pytest.mark.nightly),
+        ([], ["--seeds", "3"], 3),
+    ],
+)
 def test_the_number_of_seeds_reaches_what_takes_it(name, option, seeds, tmp_path, monkeypatch):
     asked = []
 

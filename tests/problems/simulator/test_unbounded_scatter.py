@@ -46,8 +46,13 @@ NORMAL = scipy.stats.norm()
     [
         (amplitude, Design(100.0, 200.0), "speed", scipy.stats.norm(80.0, 4.0), {}),
         pytest.param(bell, Design(-1.0, 1.0), "a", NORMAL, {}, marks=pytest.mark.nightly),
-        (step, Design(-1.0, 1.0), "a", NORMAL, {"budget": 150}),
-        (bell, Design(0.0, 1.0), "a", scipy.stats.gumbel_r(), {"budget": 150}),
+        pytest.param(
+            *(step, Design(-1.0, 1.0), "a", NORMAL, {"budget": 150}), marks=pytest.mark.nightly
+        ),
+        pytest.param(
+            *(bell, Design(0.0, 1.0), "a", scipy.stats.gumbel_r(), {"budget": 150}),
+            marks=pytest.mark.nightly,
+        ),
     ],
     ids=["mount", "bell", "step", "gumbel"],
 )
@@ -105,7 +110,9 @@ def test_rare_values_that_carry_the_scatter_are_in_it_or_refused():
             marks=pytest.mark.nightly,
         ),
         (lambda x, a: x + np.exp(a) * np.sin(3.0 * a), scipy.stats.gumbel_r(scale=0.5)),
-        (lambda x, a: x * np.exp(0.4 * a), scipy.stats.expon()),
+        pytest.param(
+            *(lambda x, a: x * np.exp(0.4 * a), scipy.stats.expon()), marks=pytest.mark.nightly
+        ),
     ],
 )
 def test_a_response_that_lives_beyond_all_runs_is_refused(function, scatter):

@@ -67,7 +67,8 @@ SET = [(a, b, c, d, e) for a in range(3) for b in range(3) for c in range(2) for
        for e in range(2)]  # fmt: skip
 
 
-@settings(max_examples=15)
+# A wrong moment is wrong for any polynomial, up to chance.
+@settings(max_examples=6)
 @given(
     st.lists(st.floats(-2.0, 2.0), min_size=4, max_size=4),
     st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3),
