@@ -206,7 +206,8 @@ def alike(
     exact form only, or one is a special case of the other. Where even the chosen form leaves more
     than noise, differences of chi-square are compared with this residual. Two laws at one port
     ``overlap`` where other forms of both are known, beside the same values out of tolerance. Where
-    an effect of one stands for several base parameters of the other, the evidence alone tells.
+    an effect of one stands for several base parameters of the other, the evidence alone tells, and
+    so it does of a form that stands in for a listed one: that one is compared, too.
     """
     if one.names == chosen.names:
         return False
@@ -221,7 +222,8 @@ def alike(
         same = all(mine.beside(other) for mine, other in pairs)
         accuracy = rules.form_share if overlap and same else rules.form_accuracy
         exact = all(mine.exact and other.exact for mine, other in pairs)
-        near = not exact and further < accuracy**2 * (chosen.removed + residual)
+        stands_in = any(mine.only_as_form for mine, _ in pairs)
+        near = not (exact or stands_in) and further < accuracy**2 * (chosen.removed + residual)
     if near or misfit <= adequate(degrees_of_freedom, rules) or (one.exact and chosen.exact):
         return near
     return one.fit.chi_square - degrees_of_freedom < rules.form_ratio * residual
