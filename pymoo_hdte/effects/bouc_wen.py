@@ -37,13 +37,15 @@ class BoucWen(Aperiodic):
     torsion : float
         Torsion of yield, rad.
     exponent, share : float
-        Dimensionless; the share is beta / (beta + gamma) of the literature.
+        Dimensionless; the share is beta / (beta + gamma) of the literature, which has exponents of
+        1 and more and, where no loop may give more than it took, shares from 1/2 on (Erlicher and
+        Point, Mathematical Models and Methods in Applied Sciences 14, 2004).
 
     Raises
     ------
     InvalidInput
-        For a number that is not finite, a torsion that is not above 0, an exponent below 1, or a
-        share that is not above 0, with which nothing would be lost, or above 1.
+        For a number that is not finite, a torsion or exponent that is not above 0, or a share that
+        is not, with which nothing would be lost, or is above 2.
     """
 
     states: ClassVar[int] = 1
@@ -55,8 +57,8 @@ class BoucWen(Aperiodic):
     def __post_init__(self) -> None:
         real_number("bouc_wen_hysteresis.force", self.force)
         real_number("bouc_wen_hysteresis.torsion", self.torsion, above=0.0)
-        real_number("bouc_wen_hysteresis.exponent", self.exponent, at_least=1.0)
-        real_number("bouc_wen_hysteresis.share", self.share, above=0.0, at_most=1.0)
+        real_number("bouc_wen_hysteresis.exponent", self.exponent, above=0.0)
+        real_number("bouc_wen_hysteresis.share", self.share, above=0.0, at_most=2.0)
 
     def respond(self, state: PortState) -> Response:
         """Return torque and tangents along the whole path of the port, from rest."""
@@ -124,16 +126,26 @@ class BoucWen(Aperiodic):
 
 
 def bouc_wen(sizes: Sizes) -> Guess:
-    """Guess a smooth loop, in the place of springs that slip."""
+    """Guess a smooth loop, in the place of springs that slip.
+
+    Exponent and share may go beyond what the literature has, by what noise may make of 1 and 1/2.
+    """
     travel, force = sizes.travel, sizes.force
     unknowns = (
         unknown("force", 0.0, sizes.largest, force),
         unknown("torsion", 0.003 * travel, 2.0 * travel, 0.1 * travel),
-        unknown("exponent", 1.0, 4.0, 1.5),
-        unknown("share", 0.05, 1.0, 0.6),
+        unknown("exponent", 0.6, 4.0, 1.5),
+        unknown("share", 0.3, 1.5, 0.6),
     )
     starts = [(force, share * travel, 1.5, 0.6) for share in (0.1, 0.03, 0.4)]
-    return Guess(unknowns, starts, _built, form="bouc_wen", instead_of=("hysteresis",))
+    sentence = (
+        "The {force} at the {port} lags behind the motion in a smooth loop, of Bouc and Wen's form "
+        "or Dahl's, which forgets gradually: it creeps after each change of the load, and how much "
+        "of that is left when a record begins is not known."
+    )
+    return Guess(
+        unknowns, starts, _built, form="bouc_wen", sentence=sentence, instead_of=("hysteresis",)
+    )
 
 
 def _built(values: Sequence[float]) -> tuple[BoucWen]:

@@ -16,7 +16,7 @@ Rise = tuple[Values, Values, int]
 
 _STEP = 0.04
 """Ways between the states that are integrated, in torsions of yield: errors of the state stay below
-1e-6."""
+1e-6 for exponents from 1 on."""
 _STEPS = 1000
 """Of them: after forty torsions of yield nothing is left of where it began, to the last digit."""
 _FLAT = 1e-12
