@@ -78,6 +78,19 @@ def test_planted_lines_come_back(rng, direction):
     )
 
 
+@pytest.mark.parametrize("place", range(len(line_basis.FADING)))
+def test_what_fades_in_a_record_adds_to_its_mean_and_lines_as_stated(place):
+    constant = line_basis.FADING[place] * TIME[-1]
+    orders = [1.0 / RATIO, 2.0 / RATIO, *ORDERS]
+    fading = 2e-5 * np.exp(-TIME / constant)
+    lines = order_lines(record(fading, 0.2 + fading, 20.0 + fading), RIG, RATIO, orders)
+    expected = 2e-5 * lines.fading[place]
+    found = np.append(lines.mean[0], lines.phasors[0])
+    assert found == pytest.approx(expected, abs=1e-9 * 2e-5)
+    # Slow lines take up most of what the straight line leaves.
+    assert np.abs(found[1:3]).max() > 3.0 * np.abs(found[3:]).max()
+
+
 @pytest.mark.parametrize("wobble", [0.005, 0.02])
 def test_a_line_that_makes_the_speed_vary_is_not_mixed_with_its_double(wobble):
     """Rows even in time are dense where the input is slow, so that the two are not orthogonal.
