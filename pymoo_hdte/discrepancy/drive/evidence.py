@@ -142,12 +142,15 @@ class Data(Observations):
     def held_out(self) -> Data | None:
         """Features of the records kept out of the fit, or None without such records.
 
-        If records with rattling were left out of the fit, they are left out here, too.
+        If records with rattling were left out of the fit, they are left out here, too. What creeps
+        in a record is an error here, and no noise: that would cover most of what speaks for a loop
+        that forgets, and for others in its place.
         """
         records = self.campaign.held_out
         if not records:
             return None
         features = measure(self.campaign, records, self.features.orders.tolist())
+        features = replace(features, conditions=replace(features.conditions, fading=None))
         if len(self.features.records) < len(self.campaign.train):
             held = flanks_held(features, self.campaign.torque_scale, self.rules)
             features = features.rows(np.flatnonzero(held))

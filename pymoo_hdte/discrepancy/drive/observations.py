@@ -82,20 +82,18 @@ class Observations:
         """
         effects = (*self.campaign.believed.effects, *self.reference_effects)
         laws = [effect.law for effect in effects if isinstance(effect, LawAtPort)]
-        if not (size := sum(law.creep for law in laws) / stiffness):
-            return 0.0
-        features = self.features
+        size, features = sum(law.creep for law in laws) / stiffness, self.features
         fading = features.conditions.fading
+        if fading is None or not size:
+            return 0.0
+        real, imaginary = features.places(0).T
+        left = np.zeros((*fading.shape[:2], features.values.shape[1]))
+        left[..., 0] = fading[..., 0].real
+        left[..., real], left[..., imaginary] = fading[..., 1:].real, fading[..., 1:].imag
+        found = size**2 * np.einsum("rki,rkj->rij", left, left)
         # What hardly fades at all moves the mean.
-        ways = [np.eye(1, features.values.shape[1]) + np.zeros((len(features.records), 1, 1))]
-        if fading is not None:
-            real, imaginary = features.places(0).T
-            left = np.zeros((*fading.shape[:2], features.values.shape[1]))
-            left[..., 0] = fading[..., 0].real
-            left[..., real], left[..., imaginary] = fading[..., 1:].real, fading[..., 1:].imag
-            ways.append(left)
-        every = np.concatenate(ways, axis=1)
-        return size**2 * np.einsum("rki,rkj->rij", every, every)
+        found[:, 0, 0] += size**2
+        return np.asarray(found)
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
         """Return the covariance by small changes of the static error for each record."""

@@ -52,7 +52,7 @@ class Conditions:
     input_angle, travel : ndarray, optional
         Of the input in the middle of the record, and from its start to its end, rad; by default 0.
     fading : complex ndarray, shape (r, k, 1 + m), optional
-        Contribution of what fades within a record: see `OrderLines`.
+        Contribution of what fades within a record, see `OrderLines`; by default nothing fades.
     """
 
     input_speed: NDArray[np.float64]
