@@ -32,6 +32,10 @@ from pymoo_hdte.effects.unknowns import Parameter
 Vector = NDArray[np.float64]
 Values = NDArray[np.float64]
 
+_COURSE = 0.1
+"""Share by which what creeps may differ from a sum of decays, line by line: it slows down as it
+fades, and goes by fits and starts where lines of the error beat."""
+
 
 @dataclass(frozen=True, eq=False)
 class Observations:
@@ -74,15 +78,19 @@ class Observations:
         known = self.features.covariance + self._repeatability(layout, start)
         return known + self._creep(float(start[layout.index("stiffness")]))
 
+    @property
+    def creep(self) -> float:
+        """Torque, N.m, that fades in its believed and included effects: see `Behaviour.creep`."""
+        effects = (*self.campaign.believed.effects, *self.reference_effects)
+        return sum(effect.law.creep for effect in effects if isinstance(effect, LawAtPort))
+
     def _creep(self, stiffness: float) -> NDArray[np.float64] | float:
         """Return the covariance by torsion that fades in a record, which loads had left before.
 
         Nobody knows how long the drive had turned on when a record began, so that any of it may be
         left, up to that of the whole force, and fade at any rate.
         """
-        effects = (*self.campaign.believed.effects, *self.reference_effects)
-        laws = [effect.law for effect in effects if isinstance(effect, LawAtPort)]
-        size, features = sum(law.creep for law in laws) / stiffness, self.features
+        size, features = self.creep / stiffness, self.features
         fading = features.conditions.fading
         if fading is None or not size:
             return 0.0
@@ -90,10 +98,12 @@ class Observations:
         left = np.zeros((*fading.shape[:2], features.values.shape[1]))
         left[..., 0] = fading[..., 0].real
         left[..., real], left[..., imaginary] = fading[..., 1:].real, fading[..., 1:].imag
-        found = size**2 * np.einsum("rki,rkj->rij", left, left)
+        found = np.einsum("rki,rkj->rij", left, left)
         # What hardly fades at all moves the mean.
-        found[:, 0, 0] += size**2
-        return np.asarray(found)
+        found[:, 0, 0] += 1.0
+        each = np.arange(left.shape[2])
+        found[:, each, each] *= 1.0 + _COURSE**2
+        return np.asarray(size**2 * found)
 
     def _repeatability(self, layout: Layout, start: Vector) -> NDArray[np.float64]:
         """Return the covariance by small changes of the static error for each record."""
